@@ -4,9 +4,9 @@
         shown = told_to_people()                     # "[Ƥéƥƥéř đíđ ñóť áñšŵéř ~~~~]"
         assert untranslated(shown, "Pepper") == []   # data is named: it is never translated
 
-The fixture ``pseudo`` is in tests/conftest.py. A sentence that is not marked (by `_`, `lazy`, `ngettext`,
-`pgettext`, or as words of a block) stays English, even where it is given to `_`. For a widget and all that is
-in it: `untranslated_in`. Neither Babel nor the compiled words are needed.
+The fixture ``pseudo`` is in tests/conftest.py. A sentence that is not marked (by `_`, `lazy`, `plazy`,
+`ngettext`, `pgettext`, as words of a block or of an example) stays English, even where it is given to `_`.
+For a widget and all that is in it: `untranslated_in`. Neither Babel nor the compiled words are needed.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nep import i18n
-from tools.pseudo import MARKUP, pseudo, sentences_of_blocks
+from tools.pseudo import MARKUP, pseudo, sentences_of_blocks, sentences_of_examples
 
 if TYPE_CHECKING:
     from PySide6.QtGui import QAction
     from PySide6.QtWidgets import QWidget
 
 ROOT = Path(__file__).resolve().parents[1]
-MARKS = {"_": 1, "gettext": 1, "lazy": 1, "ngettext": 2, "pgettext": 2}
+MARKS = {"_": 1, "gettext": 1, "lazy": 1, "ngettext": 2, "pgettext": 2, "plazy": 2}
 """How many strings each takes."""
 UNITS = frozenset({
     "GB", "Hz", "KB", "MB", "TB", "cm", "deg", "fps", "kB", "kHz", "km", "mW", "min", "mm", "ms", "ns", "px",
@@ -73,7 +73,8 @@ def words() -> object:
 @lru_cache(maxsize=1)
 def marked() -> frozenset[tuple[str | None, str]]:
     """(context, sentence) of all that is marked; of `ngettext` (singular, plural)."""
-    found = {(context, english) for context, english, _place in sentences_of_blocks()}
+    told = (*sentences_of_blocks(), *sentences_of_examples())
+    found: set[tuple[str | None, str]] = {(context, english) for context, english, _place in told}
     for folder in ("nep", "app"):
         for path in (ROOT / folder).rglob("*.py"):
             found.update(_marked_in(path.read_text(encoding="utf-8")))

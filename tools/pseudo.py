@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[1]
 MARKUP = re.compile(r"\[(?:bold|dim|blue|red|green|yellow|cyan)[a-z ]*\]|\[/\]|</?[a-z]+>|`[^`]*`")
 _KEPT = re.compile(rf"\{{[^{{}}]*\}}|%[A-Za-z_]\w*|%(?:\(\w+\)[sdr]|\d)|{MARKUP.pattern}")
 _ACCENTS = str.maketrans(
@@ -51,5 +53,23 @@ def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
         found.setdefault(("category", title), "app/blocks/categories/robot.py")
     for example in EXAMPLES.values():
         found.setdefault((None, example), "app/blocks/toolbox/help.py")
+    for (context, english), place in found.items():
+        yield context, english, place
+
+
+def sentences_of_examples() -> Iterator[tuple[str, str, str]]:
+    """(context, English, its file) of what is translated when an example is opened."""
+    from app.core.documents.examples import translated  # noqa: PLC0415 - as above
+    from app.core.documents.file_format import read_file  # noqa: PLC0415
+
+    found: dict[tuple[str, str], str] = {}
+    for path in sorted((ROOT / "resources" / "examples").glob("*.nepb")):
+        place = path.relative_to(ROOT).as_posix()
+
+        def say(context: str, english: str, place: str = place) -> str:
+            found.setdefault((context, english), place)
+            return english
+
+        translated(read_file(path), say)
     for (context, english), place in found.items():
         yield context, english, place

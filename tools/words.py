@@ -32,7 +32,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from nep.i18n import DOMAIN, EDITOR_WORDS, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402 - started by its path
-from tools.pseudo import MARKUP, pseudo, sentences_of_blocks  # noqa: E402
+from tools.pseudo import MARKUP, pseudo, sentences_of_blocks, sentences_of_examples  # noqa: E402
 
 KEYWORDS = {
     "_": None,
@@ -50,8 +50,8 @@ SOURCES = (
 )
 FOREIGN = (
     "Aborted!", "Aborted.", "Arguments", "Commands", "Error", "Missing command.",
-    "No such command {name!r}.", "Options", "Show this message and exit.",
-    "Try [blue]'{command_path} {help_option}'[/] for help.", "[default: {}]", "[required]",
+    "Options", "Try [blue]'{command_path} {help_option}'[/] for help.",
+    "[default: {}]", "[env var: {}]", "[required]",
     "options", "positional arguments", "show program's version number and exit",
     "show this help message and exit",
 )  # fmt: skip
@@ -96,9 +96,7 @@ def template(root: Path = ROOT) -> Catalog:
         made.add(english, locations=[("nep/cli", 0)])
     for english, place in sentences_of_robots(root):
         made.add(english, locations=[(place, 0)], context="robot")
-    for english, place in sentences_of_examples(root):
-        made.add(english, locations=[(place, 0)], context="about an example")
-    for context, english, place in sentences_of_blocks():
+    for context, english, place in (*sentences_of_blocks(), *sentences_of_examples()):
         made.add(english, locations=[(place, 0)], context=context)
     return made
 
@@ -112,12 +110,6 @@ def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
         for english in _of_description(json.loads(path.read_text(encoding="utf-8")), is_inside=False):
             if has_words(english):
                 yield english, place
-
-
-def sentences_of_examples(root: Path) -> Iterator[tuple[str, str]]:
-    """(What it does, its file) of each example that we ship."""
-    for path in sorted((root / "resources" / "examples").glob("*.nepb")):
-        yield json.loads(path.read_text(encoding="utf-8"))["description"], path.relative_to(root).as_posix()
 
 
 def _of_description(value: object, *, is_inside: bool) -> Iterator[str]:

@@ -6,6 +6,7 @@ import itertools
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from app.core.documents.background_compile import (
     Key,
     compiled,
 )
+from app.core.documents.examples import translated
 from app.core.documents.file_format import (
     DIVIDE,
     TOO_DEEP,
@@ -116,8 +118,12 @@ class Document:
         self._stamp = stamp_of(path)
 
     def example(self, path: Path) -> None:
-        """Open an example as a new, unsaved behaviour. Raises DocumentError."""
-        self._replace(read_file(path), None)
+        """Open an example as a new, unsaved behaviour in the language of now. Raises DocumentError."""
+        self._replace(translated(read_file(path)), None)
+
+    def copy(self, path: Path, name: str) -> None:
+        """Open a file as a new, unsaved behaviour of another name. Raises DocumentError."""
+        self._replace(replace(read_file(path), name=name), None)
 
     def recover(self, unsaved: Unsaved) -> None:
         """Put back what a crash left behind.

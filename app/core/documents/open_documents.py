@@ -68,12 +68,7 @@ class Documents:
 
     def copy(self, path: Path, name: str) -> Document:
         """Open a file as a new behaviour of another name in a tab. Raises DocumentError."""
-
-        def fill(document: Document) -> None:
-            document.example(path)
-            document.name = name
-
-        return self._filled(fill)
+        return self._filled(lambda document: document.copy(path, name))
 
     def recover(self, unsaved: Unsaved) -> Document:
         """Put back unsaved work: into the tab that has its file, else into a tab of its own."""

@@ -130,12 +130,16 @@ def test_the_shipped_examples_are_read_with_their_blocks() -> None:
         assert example.rows[0].category == "events"
 
 
-def test_what_an_example_does_is_said_in_the_language_of_studio(monkeypatch, tmp_path: Path) -> None:
+def test_what_an_example_is_called_and_does_is_said_in_the_language_of_studio(
+    monkeypatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr("nep.i18n._now", None)
     extract(tmp_path)
     compile_all(tmp_path)
     install(PSEUDO, tmp_path)
-    assert all(each.text.startswith("[") for each in read_examples(resources.folder() / "examples"))
+    for each in read_examples(resources.folder() / "examples"):
+        assert each.name.startswith("[")
+        assert each.text.startswith("[")
 
 
 def test_a_damaged_example_is_left_out(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.core.documents.examples import ABOUT, NAME
 from app.core.storage.atomic_file import read_whole
 from app.core.storage.settings import RecentFile
 from app.ui.shell.start_page.art import EmptyPageArt, RobotArt
@@ -28,7 +29,7 @@ from app.ui.shell.start_page.preview import Row, rows
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
 from app.ui.widgets.buttons import LinkButton
-from nep.i18n import _, lazy, ngettext, pgettext
+from nep.i18n import _, lazy, ngettext, translate
 
 WIDTH = 1080
 BANNER_ROOM = 40
@@ -67,8 +68,9 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
         except (OSError, ValueError, KeyError, TypeError):
             continue
         if isinstance(workspace, dict):
-            text = pgettext("about an example", str(data.get("description", "")))
-            found.append(Example(path, str(data.get("name", path.stem)), text, rows(workspace)))
+            name = translate(NAME, str(data.get("name", path.stem)))
+            text = translate(ABOUT, str(data.get("description", "")))
+            found.append(Example(path, name, text, rows(workspace)))
     return tuple(found)
 
 

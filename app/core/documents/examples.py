@@ -1,0 +1,82 @@
+"""The words of an example, in the language of now: an example is read, and heard, by who begins.
+
+Its file stays as it is, in English; it is translated when it is opened, and belongs to a person from then on.
+What programs say to each other stays: topics, names of a message's fields, types, choices, robots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from app.core.documents.file_format import BehaviourFile
+from nep.i18n import translate
+
+NAME, ABOUT, TEXT, LABEL = (
+    "name of an example",
+    "about an example",
+    "text in an example",
+    "name in an example",
+)
+"""Contexts of the catalogue: the example's name, what it does, a block of text, a variable or function."""
+
+Say = Callable[[str, str], str]
+"""What a (context, English) is in another language."""
+
+
+def translated(example: BehaviourFile, say: Say = translate) -> BehaviourFile:
+    """An example that Studio ships as a person sees it; never for a person's own file.
+
+    The same English becomes the same words everywhere in it, so that what is compared stays equal.
+    """
+    names: dict[str, str] = {}
+
+    def label(english: str) -> str:
+        """A variable's or function's name; English where two would get the same."""
+        if english not in names:
+            told = say(LABEL, english)
+            is_taken = told.casefold() in map(str.casefold, names.values())
+            names[english] = english if is_taken else told
+        return names[english]
+
+    workspace = _translated(example.workspace, say, label)
+    others = dict(example.others)
+    if isinstance(about := others.get("description"), str):
+        others["description"] = say(ABOUT, about)
+    return replace(
+        example,
+        name=say(NAME, example.name),
+        workspace=workspace if isinstance(workspace, Mapping) else example.workspace,
+        others=others,
+    )
+
+
+def _translated(value: object, say: Say, label: Callable[[str], str]) -> object:
+    """A part of the blocks as Blockly saves them."""
+    if isinstance(value, list):
+        return [_translated(each, say, label) for each in value]
+    if not isinstance(value, Mapping):
+        return value
+    made = {key: _translated(each, say, label) for key, each in value.items()}
+    kind, fields = made.get("type"), made.get("fields")
+    if kind == "values_text" and isinstance(fields, dict) and _has_letters(fields.get("TEXT")):
+        fields["TEXT"] = say(TEXT, str(fields["TEXT"]))
+    if str(kind).startswith("functions_define") and isinstance(fields, dict):
+        fields["NAME"] = label(str(fields["NAME"]))
+    for variable in _dicts(made.get("variables")):
+        variable["name"] = label(str(variable["name"]))
+    state = made.get("extraState")
+    if isinstance(state, dict):
+        for named in (state, *_dicts(state.get("inputs"))):
+            if "name" in named:
+                named["name"] = label(str(named["name"]))
+    return made
+
+
+def _dicts(value: object) -> list[dict[str, object]]:
+    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
+
+
+def _has_letters(text: object) -> bool:
+    """Whether there is anything to translate in a text."""
+    return isinstance(text, str) and any(map(str.isalpha, text))

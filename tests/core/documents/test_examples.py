@@ -1,0 +1,175 @@
+"""Examples in the language of now: they compile, they speak it, and a person's own file stays as it is."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import pytest
+
+from app import resources
+from app.blocks import compile_behaviour
+from app.core.documents.document import Document
+from app.core.documents.examples import translated
+from app.core.documents.file_format import BehaviourFile, read_file
+from app.core.documents.journal import Journal
+from app.core.documents.open_documents import Documents
+from app.robots.description.description import parse
+from nep import i18n
+from tests.blocks.fakes import FakeLink, Play, until
+from tests.pseudo import untranslated
+
+EXAMPLES = sorted(resources.path("examples").glob("*.nepb"))
+FROM_OUTSIDE = ("robot_pepper_get_", "robot_pepper_do_", "messages_")
+
+
+@pytest.fixture(scope="module")
+def locale(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Every language, compiled from the translations of now."""
+    from tools import words
+
+    folder = tmp_path_factory.mktemp("locale")
+    shutil.copytree(words.LOCALE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.mo"))
+    words.compile_all(folder)
+    return folder
+
+
+@pytest.fixture
+def language(request: pytest.FixtureRequest, locale: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The language of the parameter; Spanish without one."""
+    chosen: str = getattr(request, "param", "es")
+    monkeypatch.setattr(i18n, "_now", None)
+    i18n.install(chosen, locale)
+    assert i18n.language() == chosen
+    return chosen
+
+
+def blocks(value: object, above: str = "") -> Iterator[tuple[Mapping[str, object], str]]:
+    """(block, the type of the block around it) of all that is in the blocks."""
+    if isinstance(value, list):
+        for each in value:
+            yield from blocks(each, above)
+    elif isinstance(value, Mapping):
+        kind = str(value.get("type", ""))
+        if kind:
+            yield value, above
+        for name, each in value.items():
+            yield from blocks(each, above if name == "next" else kind or above)
+
+
+def texts(example: BehaviourFile) -> list[str]:
+    found = [block for block, _above in blocks(example.workspace) if block["type"] == "values_text"]
+    return [str(block["fields"]["TEXT"]) for block in found]  # type: ignore[index]
+
+
+def names(example: BehaviourFile) -> list[str]:
+    """Of its variables and functions."""
+    variables = example.workspace.get("variables", [])
+    defined = [block["fields"] for block, _above in blocks(example.workspace)
+               if str(block["type"]).startswith("functions_define")]  # fmt: skip
+    return [*(each["name"] for each in variables), *(fields["NAME"] for fields in defined)]  # type: ignore[attr-defined,index]
+
+
+@pytest.mark.parametrize("language", ["es", i18n.PSEUDO], indirect=True)
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_compiles_in_another_language(path: Path, language: str) -> None:
+    english = read_file(path)
+    example = translated(english)
+    pepper = parse(example.robots["Pepper"])
+    program = compile_behaviour(example.workspace, [pepper], name=example.name)
+    assert program.problems == ()
+    assert program.starts == compile_behaviour(english.workspace, [pepper]).starts
+    assert len(set(texts(example))) == len(set(texts(english))), "what differs still differs"
+    assert len(set(names(example))) == len(names(english))
+    assert example.name != english.name
+    assert example.others["description"] != english.others["description"]
+    if language == i18n.PSEUDO:
+        said = [example.name, str(example.others["description"]), *texts(example), *names(example)]
+        assert [untranslated(each) for each in said if untranslated(each)] == []
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_no_text_of_an_example_is_what_programs_or_robots_say(path: Path) -> None:
+    """It would be translated, and they would not."""
+    for block, above in blocks(read_file(path).workspace):
+        if block["type"] == "values_text":
+            assert not above.startswith("messages_publish"), block
+        if block["type"] == "values_compare":
+            inside = [each for each, _above in blocks(block.get("inputs"))]
+            kinds = [str(each["type"]) for each in inside]
+            assert not ("values_text" in kinds and any(each.startswith(FROM_OUTSIDE) for each in kinds)), (
+                block
+            )
+
+
+def run(name: str, link: FakeLink) -> Play:
+    (path,) = [path for path in EXAMPLES if path.stem == name]
+    document = Document(Journal)
+    document.example(path)
+    pepper = parse(document.robots["Pepper"])
+    document.set_connected([pepper])
+    return Play(document.program(), (pepper,), link).start()
+
+
+def said(link: FakeLink) -> list[object]:
+    return [given["text"] for _, action, given in link.invoked if action == "say"]
+
+
+@pytest.fixture(autouse=True)
+def _home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+
+
+def test_the_robot_speaks_spanish(language: str) -> None:
+    link = FakeLink()
+    link.sensors = {("Pepper", "sees_face"): True, ("Pepper", "distance"): 2.0}
+    play = run("1-greeting", link)
+    play.end()
+    assert play.runtime.error is None
+    assert said(link) == ["¡Hola! Soy Pepper.", "Qué gusto verte."]
+
+
+@pytest.mark.parametrize(("language", "last"), [("es", "Respuestas correctas: 2 de 3"), ("qps", "2")],
+                         indirect=["language"])  # fmt: skip
+def test_what_a_quiz_compares_is_equal_in_every_language(language: str, last: str) -> None:
+    link = FakeLink()
+    link.sensors[("Pepper", "head_touched")] = True  # always yes
+    play = run("4-a-quiz", link)
+    play.end()
+    assert play.runtime.error is None
+    assert last in str(said(link)[-1])
+    if language == "es":
+        assert said(link)[1:4] == [
+            "¿El cielo es azul?",
+            "¿Los peces andan en bicicleta?",
+            "¿El hielo es frío?",
+        ]
+
+
+def test_topics_and_fields_of_messages_stay(language: str) -> None:
+    link = FakeLink()
+    play = run("8-weather-station", link)
+    until(lambda: bool(link.published))
+    topic, message = link.published[0]
+    assert (topic, list(message)) == ("/weather", ["temperature"])  # type: ignore[call-overload]
+    link.happen("/weather", {"temperature": 25})
+    until(lambda: "Hace calor, 25 grados." in said(link))
+    play.stop()
+    play.end()
+
+
+def test_a_persons_own_file_is_never_translated(language: str, tmp_path: Path) -> None:
+    own = Path(shutil.copy(EXAMPLES[0], tmp_path / "Greeting.nepb"))
+    documents = Documents(lambda: Document(lambda: Journal(tmp_path / "journal")))
+    for opened in (documents.open(own), documents.copy(own, "Greeting, before")):
+        assert opened.name.startswith("Greeting")
+        assert opened.workspace == read_file(own).workspace
+    assert documents.example(EXAMPLES[0]).name == "Saludo"
+    documents.end()
+
+
+def test_two_names_never_become_one() -> None:
+    variables = [{"id": "a", "name": "steps"}, {"id": "b", "name": "moves"}, {"id": "c", "name": "steps"}]
+    told = translated(BehaviourFile("x", {"variables": variables}, {}), lambda _context, _english: "pasos")
+    assert [each["name"] for each in told.workspace["variables"]] == ["pasos", "moves", "pasos"]  # type: ignore[attr-defined]
