@@ -1,0 +1,122 @@
+"""What typer itself says, in the language of now: the usage line, its own options, mistakes of who types.
+
+Half of its sentences go through gettext, to which `nep.i18n.begin` gives our catalogue. These here do not:
+they are looked up by their English. What a later typer says in other words stays English.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from nep.i18n import _, lazy
+
+__all__ = ["Command", "Group", "translated"]
+
+_HELPS = frozenset({
+    lazy("Show this message and exit."),
+    lazy("Install completion for the current shell."),
+    lazy("Show completion for the current shell, to copy it or customize the installation."),
+})  # fmt: skip
+_PIECES = frozenset({lazy("[OPTIONS]"), lazy("COMMAND [ARGS]...")})
+_MISTAKES = (
+    lazy("Missing argument {name}."),
+    lazy("Missing option {name}."),
+    lazy("No such option: {option} (Possible options: {options})"),
+    lazy("No such option: {option}"),
+    lazy("No such command {name}. Did you mean {others}?"),
+    lazy("No such command {name}."),
+    lazy("Option {option} requires an argument."),
+    lazy("Option {option} does not take a value."),
+    lazy("Got unexpected extra argument(s) ({arguments})"),
+    lazy("Invalid value for {name}: {reason}"),
+    lazy("Invalid value: {reason}"),
+    lazy("Input should be a valid integer, unable to parse string as an integer"),
+    lazy("Input should be a valid number, unable to parse string as a number"),
+    lazy("Input should be greater than or equal to {limit}"),
+    lazy("Input should be less than or equal to {limit}"),
+)
+"""The first that fits counts."""
+_UsageError: Any = typer.BadParameter.__mro__[1]
+"""What typer raises for every mistake in a command line; it has no public name."""
+
+
+def translated(english: str) -> str:
+    """A sentence of typer's about a mistake; as it was when it is none that is known here."""
+    for words, pattern in _patterns():
+        found = pattern.fullmatch(english)
+        if found is not None:
+            return _(words).format(**{name: translated(value) for name, value in found.groupdict().items()})
+    return english
+
+
+@cache
+def _patterns() -> Sequence[tuple[str, re.Pattern[str]]]:
+    return [
+        (words, re.compile(re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>.+)", re.escape(words)), re.DOTALL))
+        for words in _MISTAKES
+    ]
+
+
+@contextmanager
+def _mistakes_translated() -> Iterator[None]:
+    try:
+        yield
+    except _UsageError as error:
+        english = error.format_message()
+        words = translated(english)
+        if words == english:
+            raise
+        raise _UsageError(words, ctx=error.ctx) from error
+
+
+def _helps_translated(parameters: Sequence[Any]) -> Sequence[Any]:
+    for each in parameters:
+        if getattr(each, "help", None) in _HELPS:
+            each.help = _(each.help)
+    return parameters
+
+
+def _write_usage(command: Any, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - typer's types are not public
+    pieces = [_(piece) if piece in _PIECES else piece for piece in command.collect_usage_pieces(ctx)]
+    formatter.write_usage(ctx.command_path, " ".join(pieces), prefix=_("Usage:") + " ")
+
+
+class Command(TyperCommand):
+    """A command whose help is all in one language."""
+
+    def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
+        """See `click.Command`."""
+        return _helps_translated(super().get_params(ctx))
+
+    def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
+        """See `click.Command`."""
+        _write_usage(self, ctx, formatter)
+
+
+class Group(TyperGroup):
+    """A group of them, which also says in that language what is wrong with a command line."""
+
+    def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
+        """See `click.Command`."""
+        return _helps_translated(super().get_params(ctx))
+
+    def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
+        """See `click.Command`."""
+        _write_usage(self, ctx, formatter)
+
+    def make_context(self, *given: Any, **named: Any) -> Any:  # noqa: ANN401
+        """See `click.Command`."""
+        with _mistakes_translated():
+            return super().make_context(*given, **named)
+
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401
+        """See `click.Command`."""
+        with _mistakes_translated():
+            return super().invoke(ctx)

@@ -1,0 +1,58 @@
+"""What typer says itself is in the language of now, too: its help, and what is wrong with a command line."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+from nep.cli.app import app
+from nep.cli.typer_words import translated
+from tests.pseudo import untranslated
+
+OURS = ("nep", "topic", "echo", "pub", "hz", "list", "root", "payload", "count", "json", "timeout", "mastr")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "topic ecko", "topic xyz", "topic hz", "topic echo x --count abc", "topic echo x --count -3",
+        "topic echo x --timeout", "topic echo x --timeout abc", "topic echo x --timeout=-1",
+        "topic list extra", "topic echo x --json=3", "topic --mastr", "--mastr x",
+    ],
+)  # fmt: skip
+@pytest.mark.usefixtures("pseudo")
+def test_what_is_wrong_with_a_command_line_is_translated(line: str) -> None:
+    done = CliRunner().invoke(app, line.split(), env={"COLUMNS": "400"})
+    assert done.exit_code == 2
+    (said,) = [row for row in done.output.splitlines() if row.startswith("│")]
+    assert untranslated(said, *OURS, "ecko", "xyz", "abc", "extra", "x", "n", "master", "TOPIC") == []
+
+
+def test_what_typer_never_said_stays() -> None:
+    assert translated("Something else entirely.") == "Something else entirely."
+    assert translated("Missing argument '{x}'.") == "Missing argument '{x}'."
+
+
+@pytest.mark.parametrize("line", ["--help", "topic --help", "topic echo --help"])
+def test_the_whole_help_is_spanish(line: str) -> None:
+    """As a program: typer makes some of its words when it is imported."""
+    environ = {**os.environ, "NEP_LANG": "es", "COLUMNS": "200", "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run(
+        [sys.executable, "-m", "nep", *line.split()],
+        env=environ, capture_output=True, encoding="utf-8", check=True,
+    )  # fmt: skip
+    assert "Uso: " in done.stdout
+    assert "Muestra este mensaje y termina." in done.stdout
+    for english in ("Usage", "OPTIONS", "COMMAND", "Options", "Commands", "Arguments", "Show this", "env var",
+                    "Install", "completion for", "default:", "required"):  # fmt: skip
+        assert english not in done.stdout
+
+
+def test_in_english_it_is_as_typer_says_it() -> None:
+    done = CliRunner().invoke(app, ["topic", "--help"])
+    assert "Usage: nep topic [OPTIONS] COMMAND [ARGS]..." in done.output
+    assert "Show this message and exit." in done.output
