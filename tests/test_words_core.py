@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import logging
 import re
 import time
 from dataclasses import replace
@@ -10,6 +12,7 @@ from types import SimpleNamespace
 from typing import cast
 
 import pytest
+from msgpack import packb  # type: ignore[import-untyped]
 
 from app import errors as app_errors
 from app.core.alerts import Alerts
@@ -37,7 +40,10 @@ from nep import errors as nep_errors
 from nep.doctor import Facts, findings
 from nep.doctor.facts import ClockFact, FileFact, FolderFact, PackageFact, PortFact, ProcessFact, ProgramFact
 from nep.i18n import _
+from nep.nodes.log_handler import LogHandler
+from nep.protocol.encoding import decode_answer, decode_request
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from nep.system.terminal import Terminal
 from tests.pseudo import untranslated
 
 PEPPER = parse(td_for(simulated.ROBOT.thing_model, "Pepper"))
@@ -283,3 +289,29 @@ def test_who_may_connect() -> None:
     reach.changed(ReachChanged(("127.0.0.1",), "Xx"))
     for alert in alerts.active:
         said(alert.title, alert.detail, alert.button or "")
+
+
+def test_what_is_no_request_or_answer() -> None:
+    for body in (
+        packb(3), packb({"do": "xx"}), packb({"do": "leave", "what": []}), packb({"do": "leave"}),
+        packb({"do": "leave", "what": {"node_id": 3}}),
+    ):  # fmt: skip
+        request = decode_request(body).request
+        assert isinstance(request, str)
+        said(request, data=("xx", "Leave", "node_id", "str", "int", "list"))
+    assert str(decode_request(b"").request).startswith("[")  # what follows is said by msgpack
+    with pytest.raises(nep_errors.WireError) as caught:
+        decode_answer(packb({"is": "xx"}))
+    said(caught.value.reason, data=("xx",))
+
+
+def test_what_was_left_out_of_a_log_or_a_terminal() -> None:
+    handler = LogHandler("zz", lambda: pytest.fail("nothing is published"), burst=0)
+    handler.emit(logging.LogRecord("x", logging.INFO, "x.py", 1, "x" * 9000, (), None))
+    said(handler._left_out_record()["text"])
+    text = handler._plain(logging.LogRecord("x", logging.INFO, "x.py", 1, "x" * 9000, (), None))["text"]
+    said(str(text).replace("x", ""))
+    handler.close()
+    terminal = Terminal(io.StringIO())
+    terminal._lines_dropped, terminal._is_closing = 2, True
+    said(terminal._next())

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Protocol
 
 from nep.errors import ClosedError, NepError
+from nep.i18n import _, ngettext, number
 from nep.system.forks import watch
 from nep.text import shortened
 
@@ -270,7 +271,7 @@ class LogHandler(logging.Handler):
         if record.exc_info and record.exc_info[0] is not None:
             text += "\n" + "".join(traceback.format_exception(*record.exc_info)).rstrip()
         if len(text) > TEXT_LIMIT:
-            text = f"{text[:TEXT_LIMIT]}… ({len(text)} characters)"
+            text = _("{text}… ({count} characters)").format(text=text[:TEXT_LIMIT], count=len(text))
         return LogRecord(
             _named(record.levelno),
             text,
@@ -346,8 +347,11 @@ class LogHandler(logging.Handler):
     def _left_out_record(self) -> dict[str, object]:
         count, self._left_out = self._left_out, 0
         self._told_at = self._clock()
-        records = "1 log record was" if count == 1 else f"{count} log records were"
-        text = f"{records} left out: more than {self._rate_hz:g} a second"
+        text = ngettext(
+            "{count} log record was left out: more than {rate_hz} a second",
+            "{count} log records were left out: more than {rate_hz} a second",
+            count,
+        ).format(count=count, rate_hz=number(self._rate_hz))
         return LogRecord("warning", text, "nep.log", self._node, time.time_ns(), pid=os.getpid()).to_plain()
 
 

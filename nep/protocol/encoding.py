@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, TypeVar, Union, cast, get_args, get_origin, 
 import msgpack  # type: ignore[import-untyped]
 
 from nep.errors import WireError
+from nep.i18n import _, lazy
 from nep.messages.packing import pack_surely, saturated, unpack, unpack_bounded, unpack_first
 from nep.protocol.graph_view import NodeInfo, TopicInfo
 from nep.protocol.requests import (
@@ -90,6 +91,10 @@ _ANSWERS: Mapping[str, type[Reply | Push]] = {
 }
 _REQUEST_NAMES = {kind: name for name, kind in _REQUESTS.items()}
 _ANSWER_NAMES = {kind: name for name, kind in _ANSWERS.items()}
+_MISSING = lazy("'{field}' is missing")
+_NOT_THAT = lazy("'{field}' is a '{given}', not '{wanted}'")
+_NO_LIST = lazy("'{field}' is a '{given}', not a list")
+_NO_MAP = lazy("'{field}' is a '{given}', not a map")
 _LARGE_BYTES = 50_000
 _SMALL_BYTES = 4096
 _LISTS_MAX, _LONGEST = 50_000, 20_000
@@ -124,7 +129,7 @@ def decode_request(body: bytes) -> Asked:
         name = envelope.get("do")
         kind = _REQUESTS.get(name) if isinstance(name, str) else None
         if kind is None:
-            raise WireError(f"'{name}' is no request of this version")
+            raise WireError(_("'{name}' is no request of this version").format(name=name))
         return Asked(call, read(kind, envelope.get("what", {})))
     except WireError as error:
         return Asked(call, error.reason)
@@ -224,7 +229,7 @@ def _decode_answer(body: bytes) -> tuple[int, Reply | Push]:
     name, call = envelope.get("is"), envelope.get("re", 0)
     kind = _ANSWERS.get(name) if isinstance(name, str) else None
     if kind is None or not isinstance(call, int):
-        raise WireError(f"'{name}' is no answer of this version")
+        raise WireError(_("'{name}' is no answer of this version").format(name=name))
     return call, read(kind, envelope.get("what", {}))
 
 
@@ -232,9 +237,9 @@ def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str,
     try:
         value = unpack_it(body)
     except ValueError as error:
-        raise WireError(f"the body is no msgpack: {error}", len(body)) from error
+        raise WireError(_("the body is no msgpack: {error}").format(error=error), len(body)) from error
     if not isinstance(value, dict):
-        raise WireError("the body is no map", len(body))
+        raise WireError(_("the body is no map"), len(body))
     return value
 
 
@@ -286,15 +291,18 @@ def read(kind: type[T], value: object) -> T:
         return cast("T", _reader(hint)(value))
     except _MisfitError as misfit:
         where = ".".join((kind.__name__, *reversed(misfit.path)))
-        raise WireError(f"'{where}' {misfit.reason}") from None
+        raise WireError(_(misfit.words).format(field=where, **misfit.values)) from None
 
 
 class _MisfitError(Exception):
-    """A value that is none of its type. The way to it is noted on the way out: there is one rarely."""
+    """A value that is none of its type. The way to it is noted on the way out: there is one rarely.
 
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
+    ``words`` is the sentence for it, with the holes ``field`` and ``values``; who tells it fills them.
+    """
+
+    def __init__(self, words: str, **values: str) -> None:
+        super().__init__(words)
+        self.words, self.values = words, values
         self.path: list[str] = []
 
 
@@ -331,7 +339,7 @@ def _of_plain(hint: type) -> Reader:
         if hint is float and isinstance(value, int) and not isinstance(value, bool):
             return float(value)
         if not isinstance(value, hint) or (hint is int and isinstance(value, bool)):
-            raise _MisfitError(f"is a '{type(value).__name__}', not '{hint.__name__}'")
+            raise _MisfitError(_NOT_THAT, given=type(value).__name__, wanted=hint.__name__)
         return value
 
     return parse
@@ -340,7 +348,7 @@ def _of_plain(hint: type) -> Reader:
 def _of_tuple(item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, list | tuple):
-            raise _MisfitError(f"is a '{type(value).__name__}', not a list")
+            raise _MisfitError(_NO_LIST, given=type(value).__name__)
         return tuple([item(each) for each in value])
 
     return parse
@@ -349,7 +357,7 @@ def _of_tuple(item: Reader) -> Reader:
 def _of_mapping(key: Reader, item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, Mapping):
-            raise _MisfitError(f"is a '{type(value).__name__}', not a map")
+            raise _MisfitError(_NO_MAP, given=type(value).__name__)
         return {key(name): item(each) for name, each in value.items()}
 
     return parse
@@ -369,7 +377,7 @@ def _of_dataclass(kind: type) -> Reader:
         if made_quickly is not None:
             return made_quickly
         if not isinstance(value, Mapping):
-            raise _MisfitError(f"is a '{type(value).__name__}', not a map")
+            raise _MisfitError(_NO_MAP, given=type(value).__name__)
         found: dict[str, object] = {}
         for name, usual, reader, field in readers:
             item = value.get(name, MISSING)
@@ -434,6 +442,6 @@ def _default(field: Field[Any]) -> object:
         return field.default
     if field.default_factory is not MISSING:
         return field.default_factory()
-    misfit = _MisfitError("is missing")
+    misfit = _MisfitError(_MISSING)
     misfit.path.append(field.name)
     raise misfit

@@ -14,6 +14,7 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING, TextIO
 
+from nep.i18n import ngettext
 from nep.system.forks import watch
 from nep.text import escaped
 
@@ -143,7 +144,12 @@ class Terminal(io.TextIOBase):
             self._is_writing = True
             dropped, self._lines_dropped = self._lines_dropped, 0
         if dropped:
-            text += f"… {dropped} line{'s' if dropped > 1 else ''} left out: nobody read this for a while\n"
+            text += ngettext(
+                "… {count} line left out: nobody read this for a while",
+                "… {count} lines left out: nobody read this for a while",
+                dropped,
+            ).format(count=dropped)
+            text += "\n"
         return text
 
     def _put(self, text: str) -> None:
