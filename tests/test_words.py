@@ -17,8 +17,9 @@ from app.blocks.toolbox.definitions import editor_definitions
 from app.blocks.toolbox.help import help_of
 from nep import i18n
 from nep.cli.app import app as nep_command
-from nep.i18n import _, install, lazy, listed, ngettext, number, pgettext
+from nep.i18n import _, install, lazy, listed, ngettext, number, pgettext, plazy
 from tests.blocks.samples import robot
+from tests.pseudo import marked
 
 PO = r"""
 msgid ""
@@ -149,6 +150,14 @@ def test_a_constant_follows_the_language_that_is_chosen_later(words, tmp_path, s
     assert _(constant) == "esperar a {robot}"
     install("en", tmp_path)
     assert _(constant) == "wait for {robot}"
+
+
+def test_a_constant_of_several_meanings_keeps_its_context(words, tmp_path, spanish) -> None:
+    verb, noun = plazy("verb", "record"), plazy("noun", "record")
+    assert (_(verb), _(noun)) == ("grabar", "récord")
+    install("en", tmp_path)
+    assert (_(verb), _(noun)) == ("record", "record")
+    assert f"{verb}" == "record"
 
 
 def test_lists_numbers_and_days(spanish) -> None:
@@ -292,3 +301,10 @@ def test_the_library_does_not_ask_for_words_it_does_not_need() -> None:
     code = "import sys, nep, nep.errors; from nep.i18n import _; _('x'); print('gettext' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_what_is_marked_in_the_sources_is_found_by_the_tool(words) -> None:
+    """Babel reads no call inside an f-string, which Python's own parser does."""
+    ids = [(entry.context or None, words._ids(entry.id)) for entry in words.template()]
+    found = {each if len(each) == 2 else (context, *each) for context, each in ids}
+    assert [each for each in marked() if each not in found] == []

@@ -14,6 +14,7 @@ _KINDS = {
     "dict": lazy("a message"),
     "NoneType": lazy("nothing"),
 }
+_ANOTHER = lazy("something else")
 
 
 class BehaviourError(AppError):
@@ -56,7 +57,7 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
 
 def kind(value: object) -> str:
     """What a value is, in words: "a text"."""
-    return _(_KINDS.get(type(value).__name__, lazy("something else")))
+    return _(_KINDS.get(type(value).__name__, _ANOTHER))
 
 
 def _kinds(sentence: str) -> str:

@@ -54,6 +54,7 @@ class SystemDialogs:
         show_free(dialog)
 
     def _dialog(self, title: str, folder: str, take: Callable[[Path], None]) -> QFileDialog:
-        dialog = QFileDialog(self._window, title, folder, f"{_('Behaviours')} (*{SUFFIX})")
+        kind = _("Behaviours")
+        dialog = QFileDialog(self._window, title, folder, f"{kind} (*{SUFFIX})")
         dialog.fileSelected.connect(lambda chosen: take(Path(chosen)))
         return dialog
