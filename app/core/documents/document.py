@@ -6,20 +6,14 @@ import itertools
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
 from app.blocks.fixes.fixes import mend
 from app.blocks.fixes.replace_robot import blocks_of, use_robot
-from app.core.documents.background_compile import (
-    QUICK_S,
-    BackgroundWorker,
-    Compiled,
-    Key,
-    compiled,
-)
+from app.core.documents.background_worker import BackgroundWorker
 from app.core.documents.examples import translated
 from app.core.documents.file_format import (
     DIVIDE,
@@ -40,7 +34,20 @@ from nep.i18n import _, lazy
 
 UNNAMED = lazy("New behaviour")
 
+QUICK_S = 0.02
+"""A behaviour that compiles faster than this is compiled at once, in the window's thread."""
+Key = tuple[int, int, int]
+
 _keys = itertools.count(1)
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A program, what it was made of, and how long that took."""
+
+    key: Key
+    program: Program
+    seconds: float
 
 
 class Document:
@@ -76,9 +83,10 @@ class Document:
         self._compiled: tuple[Key, Program] | None = None
         self._compile_s: float | None = None
         self._asked: Key | None = None
-        self.beside: BackgroundWorker[Compiled] | None = None
+        self.compiler: BackgroundWorker[Compiled] | None = None
+        self.journal_writer: BackgroundWorker[bool] | None = None
         self._definitions: tuple[int, Mapping[str, object]] | None = None
-        self.journal_error: str | None = None
+        self._journal_error: str | None = None
 
     # -- editing and files -----------------------------------------------------------------------------------
 
@@ -97,7 +105,7 @@ class Document:
         return self._json.has_blocks
 
     def edited(self, workspace: Workspace | WorkspaceJson) -> None:
-        """The editor changed the blocks. They are in the journal when this returns, as they came."""
+        """The editor changed the blocks. They are journalled as they came; nobody waits for the disk."""
         told = workspace if isinstance(workspace, WorkspaceJson) else WorkspaceJson.of(workspace)
         if told.same_as(self._json):
             return
@@ -137,7 +145,8 @@ class Document:
             self._stamp = now  # nobody wrote the file after that work was done
         self.dirty = True
         self._write_journal()
-        unsaved.journal.unlink(missing_ok=True)
+        if self.is_kept:
+            unsaved.journal.unlink(missing_ok=True)
 
     def save(self, path: Path | None = None) -> None:
         """Write the file, atomically; with ``path`` it becomes the behaviour's file. Raises DocumentError."""
@@ -150,8 +159,7 @@ class Document:
         self.dirty = False
         self.saved_at = self._clock()
         self._stamp = stamp_of(target)
-        self._journal.discard()
-        self.journal_error = None
+        self._discard_journal()
 
     def mend(self, action: str) -> bool:
         """Do what a problem's button says to the blocks; False when the action is no matter of blocks."""
@@ -198,16 +206,31 @@ class Document:
         """The name of the file that keeps its unsaved work."""
         return self._journal.name
 
+    @property
+    def journal_error(self) -> str | None:
+        """Why unsaved work is not kept, in a sentence; None while it is, or is just being written."""
+        if self.journal_writer is not None:
+            self._written(partial(self.journal_writer.take, self._journal.name))
+        return self._journal_error
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether its newest state is on the disk; waits for what is being written, 2 s at most."""
+        finished = self.journal_writer is None or self.journal_writer.finish(self._journal.name)
+        return finished and self.journal_error is None
+
     def keep_again(self) -> bool:
         """Try once more to journal unsaved work that the disk did not take; whether all of it is kept."""
-        if self.dirty and self.journal_error is not None:
+        if self.dirty and not self.is_kept:
             self._write_journal()
-        return not self.dirty or self.journal_error is None
+        return not self.dirty or self.is_kept
 
     def close(self) -> None:
         """The window closes: unsaved work stays in the journal and is offered at the next start."""
         if not self.dirty:
-            self._journal.discard()
+            self._discard_journal()
+        elif self.journal_writer is not None:
+            self.journal_writer.finish(self._journal.name)
 
     # -- robots and the compiler -----------------------------------------------------------------------------
 
@@ -247,16 +270,16 @@ class Document:
         key = self._key()
         if self._compiled is not None and self._compiled[0] == key:
             return self._compiled[1]
-        if self.beside is None:
+        if self.compiler is None:
             return self.program()
-        done = self.beside.take(self.key)
+        done = self.compiler.take(self.key)
         if done is not None:
             self._compiled, self._compile_s = (done.key, done.program), done.seconds
         if self._asked != key:
             if self._is_quick():
                 return self.program()
             self._asked = key
-            self.beside.ask(self.key, partial(compiled, key, self._compiling(), self._timer))
+            self.compiler.ask(self.key, partial(_compiled, key, self._compiling(), self._timer))
         return self._compiled[1] if self._compiled is not None else None
 
     def _is_quick(self) -> bool:
@@ -286,9 +309,8 @@ class Document:
     # -- inside ----------------------------------------------------------------------------------------------
 
     def _replace(self, found: BehaviourFile, path: Path | None) -> None:
-        self._journal.discard()
+        self._discard_journal()
         self._journal = self._make_journal()
-        self.journal_error = None
         self.name, self.path, self.workspace = found.name, path, found.workspace
         self.robots, self.others = dict(found.robots), found.others
         self._compile_s = self._asked = None
@@ -298,18 +320,35 @@ class Document:
         self.definitions_revision += 1
 
     def _write_journal(self) -> None:
+        name, path, robots = self.name, self.path, dict(self.robots)
+        work = partial(_keep, self._journal, name, path, self._json, robots, self.others)
+        if self.journal_writer is not None:
+            self.journal_writer.ask(self._journal.name, work)
+        else:
+            self._written(work)
+
+    def _written(self, written: Callable[[], bool | None]) -> None:
+        """Take over how writing the journal ended; nothing has when that is None."""
         try:
-            self._journal.write(self.name, self.path, self._json.text, self.robots, self.others)
+            ended = written()
         except OSError as error:
-            self.journal_error = _("unsaved work can't be kept ({reason}); save the file now").format(
+            self._journal_error = _("unsaved work can't be kept ({reason}); save the file now").format(
                 reason=error.strerror or error
             )
         except RecursionError:
-            self.journal_error = _("unsaved work can't be kept: {reason}; {advice}").format(
+            self._journal_error = _("unsaved work can't be kept: {reason}; {advice}").format(
                 reason=_(TOO_DEEP), advice=_(DIVIDE)
             )
         else:
-            self.journal_error = None
+            self._journal_error = None if ended else self._journal_error
+
+    def _discard_journal(self) -> None:
+        if self.journal_writer is not None:
+            self.journal_writer.forget(self._journal.name)
+            self.journal_writer.finish(self._journal.name)  # or it would write what was discarded
+            self.journal_writer.forget(self._journal.name)
+        self._journal.discard()
+        self._journal_error = None
 
     def _keep_used_robots(self) -> None:
         """Keep the descriptions of the robots that the blocks name: they are known without them later."""
@@ -324,6 +363,23 @@ class Document:
     def _known(self) -> list[Robot]:
         found = (_parsed(description) for description in self.robots.values())
         return [robot for robot in found if robot is not None]
+
+
+def _keep(
+    journal: Journal,
+    name: str,
+    path: Path | None,
+    told: WorkspaceJson,
+    robots: Descriptions,
+    others: Mapping[str, object],
+) -> bool:
+    journal.write(name, path, told.text, robots, others)
+    return True
+
+
+def _compiled(key: Key, compiling: Callable[[], Program], timer: Callable[[], float]) -> Compiled:
+    began = timer()
+    return Compiled(key, compiling(), timer() - began)
 
 
 def _compile(told: WorkspaceJson, robots: Sequence[Robot], absent: Sequence[Robot], name: str) -> Program:

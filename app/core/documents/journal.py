@@ -1,4 +1,4 @@
-"""Unsaved work survives a crash: every edit is written to a journal before anything else happens.
+"""Unsaved work survives a crash: every edit is written to a journal at once, beside the window.
 
 One journal per open behaviour, in ``journal/`` of Studio's folder. It names the process that writes it, so
 that a second Studio does not offer what the first one still holds.

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from app.blocks import editor_definitions
-from app.core.documents.background_compile import BackgroundWorker, Compiled
-from app.core.documents.document import UNNAMED, Document
+from app.core.documents.background_worker import BackgroundWorker
+from app.core.documents.document import UNNAMED, Compiled, Document
 from app.core.documents.journal import Unsaved
 from app.errors import DocumentError
 from app.robots.description.description import Robot
@@ -28,7 +28,9 @@ class Documents:
         self._robots: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
         self._closed: list[Path] = []
-        self._beside: BackgroundWorker[Compiled] = BackgroundWorker("studio-compiler")
+        self._compiler: BackgroundWorker[Compiled] = BackgroundWorker("studio-compiler")
+        # of its own: unsaved work never waits for a long compilation
+        self._journal_writer: BackgroundWorker[bool] = BackgroundWorker("studio-journal")
         self.revision = 0
         self.current = self._made()
         self._open = [self.current]
@@ -114,7 +116,7 @@ class Documents:
             self._closed = [*(each for each in self._closed if each != document.path), document.path]
             del self._closed[:-CLOSED_KEPT]
         document.close()
-        self._beside.forget(document.key)
+        self._compiler.forget(document.key)
         self._open.remove(document)
         if not self._open:
             self._open.append(self._made())
@@ -177,7 +179,8 @@ class Documents:
         """The window closes; unsaved work stays in the journals."""
         for document in self._open:
             document.close()
-        self._beside.close()
+        self._compiler.close()
+        self._journal_writer.close()
 
     # -- from one start to the next ----------------------------------------------------------------------
 
@@ -227,7 +230,7 @@ class Documents:
 
     def _made(self) -> Document:
         made = self._make()
-        made.beside = self._beside
+        made.compiler, made.journal_writer = self._compiler, self._journal_writer
         made.set_connected(self._robots)
         made.set_topics(self._topics)
         return made

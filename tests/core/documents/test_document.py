@@ -5,13 +5,15 @@ from __future__ import annotations
 import errno
 import json
 import os
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from app.core.documents import file_format
-from app.core.documents.background_compile import BackgroundWorker, Compiled
-from app.core.documents.document import Document, read
+from app.core.documents.background_worker import BackgroundWorker
+from app.core.documents.document import Compiled, Document, read
 from app.core.documents.journal import Journal, left_behind
 from app.core.storage.atomic_file import LARGEST_BYTES
 from app.errors import DocumentError
@@ -30,12 +32,118 @@ def journals(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def document(journals: Path) -> Document:
-    return Document(lambda: Journal(journals), clock=lambda: 5.0)
+def journal_writer() -> Iterator[BackgroundWorker[bool]]:
+    made: BackgroundWorker[bool] = BackgroundWorker("test journal")
+    yield made
+    made.close()
 
 
-def test_an_edit_is_in_the_journal_before_anything_else(document: Document, journals: Path) -> None:
+@pytest.fixture(params=["written at once", "written beside the window"])
+def document(request, journals: Path, journal_writer: BackgroundWorker[bool]) -> Document:
+    made = Document(lambda: Journal(journals), clock=lambda: 5.0)
+    if request.param == "written beside the window":
+        made.journal_writer = journal_writer
+    return made
+
+
+class SlowJournal(Journal):
+    """On a disk that takes nothing until it is let."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self.began, self.goes, self.wrote = threading.Event(), threading.Event(), 0
+
+    def write(self, *arguments, **named) -> None:
+        self.began.set()
+        assert self.goes.wait(60)
+        super().write(*arguments, **named)
+        self.wrote += 1
+
+
+@pytest.fixture
+def slow(journals: Path) -> SlowJournal:
+    return SlowJournal(journals)
+
+
+@pytest.fixture
+def on_a_slow_disk(slow: SlowJournal, journal_writer: BackgroundWorker[bool]) -> Iterator[Document]:
+    document = Document(lambda: slow)
+    document.journal_writer = journal_writer
+    yield document
+    slow.goes.set()
+
+
+def test_nobody_waits_for_a_slow_disk_and_the_newest_edit_is_kept(
+    on_a_slow_disk: Document, slow: SlowJournal, journals: Path
+) -> None:
+    document = on_a_slow_disk
     document.edited(STARTED)
+    assert slow.began.wait(60)
+    for number in range(5):
+        document.edited(_many(number + 1))
+    assert document.edits == 6
+    assert not list(journals.glob("*.json")), "and yet nothing is there"
+    slow.goes.set()
+    assert document.is_kept
+    (file,) = journals.glob("*.json")
+    assert json.loads(file.read_bytes())["workspace"] == _many(5)
+    assert slow.wrote == 2, "what is outdated is not written"
+
+
+@pytest.mark.parametrize("end", [Document.new, Document.close, lambda document: document.save()])
+def test_what_is_discarded_while_it_is_written_does_not_come_back(
+    on_a_slow_disk: Document,
+    slow: SlowJournal,
+    tmp_path: Path,
+    journals: Path,
+    end: Callable[[Document], object],
+) -> None:
+    document = on_a_slow_disk
+    document.path = tmp_path / "mine.nepb"
+    document.edited(STARTED)
+    assert slow.began.wait(60)
+    document.dirty = False
+    threading.Timer(0.05, slow.goes.set).start()
+    end(document)
+    assert list(journals.glob("*")) == []
+
+
+def test_a_disk_that_hangs_is_told_when_the_window_closes(
+    on_a_slow_disk: Document, slow: SlowJournal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.core.documents.background_worker.END_S", 0.01)
+    on_a_slow_disk.edited(STARTED)
+    assert slow.began.wait(60)
+    assert not on_a_slow_disk.keep_again()
+    slow.goes.set()
+    assert on_a_slow_disk.keep_again()
+
+
+def test_the_old_journal_stays_while_the_new_one_can_not_be_written(
+    document: Document, journals: Path
+) -> None:
+    document.edited(STARTED)
+    assert document.is_kept
+    _as_if_dead(journals)
+    (unsaved,) = left_behind(journals)
+    full = journals.parent / "full"
+    full.write_text("no folder")
+    after = Document(lambda: Journal(full))
+    after.recover(unsaved)
+    assert after.dirty
+    assert unsaved.journal.is_file()
+
+
+def _as_if_dead(journals: Path) -> None:
+    (file,) = journals.glob("*.json")
+    entry = json.loads(file.read_bytes())
+    entry["pid"], entry["born_s"] = 2**22 + 5, 0.0
+    file.write_text(json.dumps(entry))
+
+
+def test_an_edit_is_in_the_journal(document: Document, journals: Path) -> None:
+    document.edited(STARTED)
+    assert document.is_kept
     (file,) = journals.glob("*.json")
     assert json.loads(file.read_bytes())["workspace"] == STARTED
     assert document.dirty
@@ -135,11 +243,13 @@ def test_a_stack_too_long_for_json_is_a_sentence_and_stays_open(document: Docume
     stack = {"blocks": {"languageVersion": 0, "blocks": [block]}}
     document.edited(stack)
     assert document.workspace is stack
+    assert not document.is_kept
     assert document.journal_error is not None
     assert "divide it into several scripts" in document.journal_error
     with pytest.raises(DocumentError, match="divide it into several scripts"):
         document.save(tmp_path / "long.nepb")
     document.edited(STARTED)
+    assert document.is_kept
     assert document.journal_error is None
 
 
@@ -162,10 +272,8 @@ def test_an_example_is_opened_without_its_file(document: Document, tmp_path: Pat
 def test_work_left_behind_is_put_back_and_stays_journalled(document: Document, journals: Path) -> None:
     document.others = {"description": "what it does"}
     document.edited(STARTED)
-    (file,) = journals.glob("*.json")
-    entry = json.loads(file.read_bytes())
-    entry["pid"], entry["born_s"] = 2**22 + 5, 0.0
-    file.write_text(json.dumps(entry))
+    assert document.is_kept
+    _as_if_dead(journals)
     (unsaved,) = left_behind(journals)
     after = Document(lambda: Journal(journals))
     after.recover(unsaved)
@@ -280,8 +388,8 @@ def _many(count: int) -> dict[str, object]:
 
 
 def test_a_long_behaviour_is_compiled_beside_the_window(document: Document) -> None:
-    beside: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
-    document.beside = beside
+    compiler: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
+    document.compiler = compiler
     document.edited(_many(800))
     assert document.newest() is None, "nothing waits for it"
     until(lambda: document.newest() is not None)
@@ -291,15 +399,15 @@ def test_a_long_behaviour_is_compiled_beside_the_window(document: Document) -> N
     assert document.newest() is first, "the one before, meanwhile"
     until(lambda: document.newest() is not first)
     assert document.newest() is document.program()
-    beside.close()
+    compiler.close()
 
 
 def test_a_short_behaviour_is_compiled_at_once(document: Document) -> None:
-    beside: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
-    document.beside = beside
+    compiler: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
+    document.compiler = compiler
     document.edited(STARTED)
     assert document.newest() is document.program()
-    assert beside._thread is None
+    assert compiler._thread is None
 
 
 def test_a_long_file_opened_in_an_untouched_tab_does_not_hold_the_window_up(
@@ -308,11 +416,11 @@ def test_a_long_file_opened_in_an_untouched_tab_does_not_hold_the_window_up(
     other = Document(lambda: Journal(tmp_path / "other"))
     other.edited(_many(800))
     other.save(tmp_path / "long.nepb")
-    beside: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
-    document.beside = beside
+    compiler: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
+    document.compiler = compiler
     assert document.newest() is not None, "an empty one is compiled at once"
     document.open(tmp_path / "long.nepb")
     before = document.newest()
     until(lambda: document.newest() is not before)
     assert document.newest() is document.program()
-    beside.close()
+    compiler.close()

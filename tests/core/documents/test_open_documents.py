@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -27,13 +28,34 @@ def journals(tmp_path: Path) -> Path:
     return tmp_path / "journal"
 
 
-def opened(journals: Path) -> Documents:
-    return Documents(lambda: Document(lambda: Journal(journals)))
+class Opens:
+    """Opens behaviours as Studio does, and ends their threads after the test."""
+
+    def __init__(self, journals: Path) -> None:
+        self.journals, self.all = journals, list[Documents]()
+
+    def __call__(self) -> Documents:
+        made = Documents(lambda: Document(lambda: Journal(self.journals)))
+        self.all.append(made)
+        return made
 
 
 @pytest.fixture
-def documents(journals: Path) -> Documents:
-    return opened(journals)
+def opened(journals: Path) -> Iterator[Opens]:
+    made = Opens(journals)
+    yield made
+    for each in made.all:
+        each.end()
+
+
+@pytest.fixture
+def documents(opened: Opens) -> Documents:
+    return opened()
+
+
+def all_kept(documents: Documents) -> bool:
+    """Waits for the journals."""
+    return all(document.is_kept for document in documents)
 
 
 def file(folder: Path, name: str, blocks: dict[str, object] = STARTED) -> Path:
@@ -100,6 +122,7 @@ def test_each_tab_has_its_own_blocks_journal_and_mark(documents, journals, tmp_p
     first.edited(OTHER)
     assert (first.dirty, second.dirty) == (True, False)
     assert (first.workspace, second.workspace) == (OTHER, STARTED)
+    assert all_kept(documents)
     assert [journal.name for journal in journals.glob("*.json")] == [first.journal]
 
 
@@ -143,6 +166,7 @@ def test_saving_over_the_file_of_another_tab_keeps_its_blocks(documents, journal
     documents.current.save(path)
     documents.saved(documents.current)
     assert (first.path, first.dirty, first.workspace) == (None, True, STARTED)
+    assert all_kept(documents)
     assert (journals / first.journal).is_file()
 
 
@@ -157,7 +181,7 @@ def test_every_tab_knows_the_robots_also_one_that_opens_later(documents, tmp_pat
         assert "/faces" in text
 
 
-def test_tabs_come_back_with_what_was_not_saved(documents, journals, tmp_path) -> None:
+def test_tabs_come_back_with_what_was_not_saved(opened, documents, journals, tmp_path) -> None:
     for name in "AB":
         documents.open(file(tmp_path, name))
     documents.show(next(iter(documents)))
@@ -167,24 +191,26 @@ def test_tabs_come_back_with_what_was_not_saved(documents, journals, tmp_path) -
     kept = json.loads(json.dumps(documents.kept()))
     documents.end()
     as_if_dead(journals)
-    after = opened(journals)
+    after = opened()
     taken = after.put_back(kept, left_behind(journals), ended_well=True)
     assert names(after) == ["A", "New behaviour", "B"]
     assert [document.dirty for document in after] == [True, True, False]
     assert next(iter(after)).workspace == OTHER
     assert after.current.name == "New behaviour"
     assert len(taken) == 2
+    assert all_kept(after)
     assert len(list(journals.glob("*.json"))) == 2, "journalled anew"
 
 
 def test_after_a_crash_files_come_back_as_saved_and_unsaved_work_waits_for_an_answer(
-    documents, journals, tmp_path
+    opened, documents, journals, tmp_path
 ) -> None:
     documents.open(file(tmp_path, "A"))
     documents.current.edited(OTHER)
     kept = documents.kept()
+    assert all_kept(documents)
     as_if_dead(journals)
-    after = opened(journals)
+    after = opened()
     left = left_behind(journals)
     assert after.put_back(kept, left, ended_well=False) == set()
     assert (names(after), after.current.workspace, after.current.dirty) == (["A"], STARTED, False)
@@ -205,12 +231,12 @@ def test_settings_that_make_no_sense_open_nothing(documents, kept) -> None:
     assert names(documents) == ["New behaviour"]
 
 
-def test_a_file_that_was_damaged_meanwhile_does_not_come_back(documents, tmp_path) -> None:
+def test_a_file_that_was_damaged_meanwhile_does_not_come_back(opened, documents, tmp_path) -> None:
     path = file(tmp_path, "A")
     documents.open(path)
     kept = documents.kept()
     path.write_text("{")
-    after = opened(tmp_path / "other")
+    after = opened()
     after.put_back(kept, [], ended_well=True)
     assert after.current.blank
 
@@ -224,12 +250,13 @@ def test_closing_leaves_no_journal_of_what_is_saved(documents, journals, tmp_pat
     assert list(journals.glob("*")) == []
 
 
-def test_unsaved_work_put_back_beside_newer_work_replaces_none(documents, journals, tmp_path) -> None:
+def test_unsaved_work_put_back_beside_newer_work_replaces_none(opened, documents, journals, tmp_path) -> None:
     path = file(tmp_path, "A")
     documents.open(path)
     documents.current.edited(OTHER)
+    assert all_kept(documents)
     as_if_dead(journals)
-    after = opened(journals)
+    after = opened()
     left = left_behind(journals)
     after.open(path)
     newer = {"blocks": {"blocks": [{"type": "events_started", "id": "newer"}]}}

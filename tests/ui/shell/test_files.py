@@ -245,6 +245,7 @@ def test_nothing_is_written_over_that_can_not_be_kept(
     answers.path = saved(tmp_path / "Theirs.nepb")
     before = answers.path.read_bytes()
     window.session.document.edited(changed("z"))
+    assert window.session.document.is_kept, "it makes the folder"
     (home / "earlier").write_text("in the way", "utf-8")
     commands.run("file.save_as")
     assert answers.path.read_bytes() == before

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.core.documents.background_compile import BackgroundWorker
+from app.core.documents.background_worker import BackgroundWorker
 from tests.blocks.fakes import until
 
 
@@ -69,3 +69,29 @@ def test_nothing_asked_makes_no_thread() -> None:
     beside.forget("a")
     beside.close()
     assert beside._thread is None
+
+
+def test_finishing_waits_for_what_is_asked_and_what_is_done_just_now(beside, monkeypatch) -> None:
+    go, did = threading.Event(), []
+    beside.ask("a", lambda: (go.wait(60) and did.append("first")) or "first")
+    until(lambda: beside._doing == "a")
+    beside.ask("a", lambda: did.append("second") or "second")
+    assert beside.finish("b"), "nothing of another is waited for"
+    monkeypatch.setattr("app.core.documents.background_worker.END_S", 0.01)
+    assert not beside.finish("a"), "and not for ever"
+    monkeypatch.setattr("app.core.documents.background_worker.END_S", 60.0)
+    go.set()
+    assert beside.finish("a")
+    assert did == ["first", "second"]
+    assert beside.take("a") == "second"
+
+
+def test_a_failure_is_outdated_by_the_next_success(beside) -> None:
+    def fail() -> str:
+        raise ValueError("no such luck")
+
+    beside.ask("a", fail)
+    assert beside.finish("a")
+    beside.ask("a", lambda: "well")
+    assert beside.finish("a")
+    assert beside.take("a") == "well"

@@ -1,31 +1,27 @@
-"""Compiling beside the window: a thread in which, for each owner, only the newest work counts."""
+"""Work beside the window: a thread in which, for each owner, only the newest work counts."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from app.blocks import Program
 from app.core.storage.deep_json import start_deep
 
 T = TypeVar("T")
 END_S = 2.0
-
-QUICK_S = 0.02
-"""A behaviour that compiles faster than this is compiled at once, in the window's thread."""
-Key = tuple[int, int, int]
+"""How long at most a window waits for work that does not end, say on a disk that hangs."""
 
 
 class BackgroundWorker(Generic[T]):
-    """One thread, made when there is something to do; `close` ends it. The other methods never wait."""
+    """One thread, made when there is something to do; `close` ends it. Only `finish` and `close` wait."""
 
     def __init__(self, name: str) -> None:
         """``name`` is the thread's."""
         self._name = name
         self._changed = threading.Condition()
         self._asked: dict[str, Callable[[], T]] = {}
+        self._doing: str | None = None
         self._done: dict[str, T] = {}
         self._failed: dict[str, Exception] = {}
         self._thread: threading.Thread | None = None
@@ -51,8 +47,15 @@ class BackgroundWorker(Generic[T]):
                 raise failed
             return self._done.pop(owner, None)
 
+    def finish(self, owner: str) -> bool:
+        """Wait until nothing is asked for the owner any more, 2 s at most; whether that is so."""
+        with self._changed:
+            return self._changed.wait_for(
+                lambda: self._closed or (owner not in self._asked and self._doing != owner), END_S
+            )
+
     def forget(self, owner: str) -> None:
-        """The owner is gone."""
+        """The owner is gone, or wants nothing any more of what waits."""
         with self._changed:
             self._asked.pop(owner, None)
             self._done.pop(owner, None)
@@ -70,31 +73,20 @@ class BackgroundWorker(Generic[T]):
     def _work(self) -> None:
         while True:
             with self._changed:
+                self._doing = None
+                self._changed.notify_all()
                 self._changed.wait_for(lambda: self._closed or bool(self._asked))
                 if self._closed:
                     return
-                owner = next(iter(self._asked))
+                owner = self._doing = next(iter(self._asked))
                 work = self._asked.pop(owner)
             try:
                 made = work()
             except Exception as error:  # noqa: BLE001  it belongs to who asked, and is raised there
                 with self._changed:
+                    self._done.pop(owner, None)
                     self._failed[owner] = error
                 continue
             with self._changed:
+                self._failed.pop(owner, None)
                 self._done[owner] = made
-
-
-@dataclass(frozen=True)
-class Compiled:
-    """A program, what it was made of, and how long that took."""
-
-    key: Key
-    program: Program
-    seconds: float
-
-
-def compiled(key: Key, compiling: Callable[[], Program], timer: Callable[[], float]) -> Compiled:
-    """Compile, and take the time."""
-    began = timer()
-    return Compiled(key, compiling(), timer() - began)
