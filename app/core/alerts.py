@@ -10,7 +10,7 @@ SEVERITIES = ("error", "warn", "info")
 
 
 @dataclass(frozen=True, slots=True)
-class Alert:
+class ActiveAlert:
     """One present problem.
 
     ``title`` says what is wrong, ``detail`` what it means, ``button`` and ``action`` the next step (words,
@@ -34,13 +34,13 @@ class Alerts:
     def __init__(self, clock: Callable[[], float] = time.time) -> None:
         """Start with no problem; ``clock`` gives epoch seconds."""
         self._clock = clock
-        self._alerts: dict[str, Alert] = {}
+        self._alerts: dict[str, ActiveAlert] = {}
         self._dismissed: set[str] = set()
-        self._sorted: tuple[Alert, ...] | None = ()
+        self._sorted: tuple[ActiveAlert, ...] | None = ()
         self.revision = 0
 
     @property
-    def active(self) -> Sequence[Alert]:
+    def active(self) -> Sequence[ActiveAlert]:
         """All present problems: errors, then warnings, then infos; the oldest first among equals."""
         if self._sorted is None:
             order = {severity: place for place, severity in enumerate(SEVERITIES)}
@@ -65,7 +65,7 @@ class Alerts:
             raise ValueError(f"no severity '{severity}'; use one of {', '.join(SEVERITIES)}")
         old = self._alerts.get(id)
         if old is None:
-            new = Alert(id, severity, title, detail, button, action, self._clock(), count)
+            new = ActiveAlert(id, severity, title, detail, button, action, self._clock(), count)
         else:
             new = replace(
                 old,

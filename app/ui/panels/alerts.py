@@ -13,7 +13,7 @@ from app.ui.widgets.lists.scroll_areas import PanelRows
 from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
-    from app.core.alerts import Alert
+    from app.core.alerts import ActiveAlert
 
 
 class AlertsPanel(PanelWidget):
@@ -23,7 +23,7 @@ class AlertsPanel(PanelWidget):
         super().__init__(context, _("Alerts"))
         self._seen = -1
         self.rows: list[AlertRow] = []
-        self.shown: list[Alert] = []  # each in the row of its place
+        self.shown: list[ActiveAlert] = []  # each in the row of its place
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.empty = EmptyState(
@@ -44,7 +44,7 @@ class AlertsPanel(PanelWidget):
         if active != self.shown:
             self._show(active)
 
-    def _show(self, active: list[Alert]) -> None:
+    def _show(self, active: list[ActiveAlert]) -> None:
         """Rows that are there stay: an alert that counts on is the same one."""
         known = {alert.id: row for alert, row in zip(self.shown, self.rows, strict=True)}
         self.shown = active
@@ -68,7 +68,7 @@ class AlertsPanel(PanelWidget):
             self.context.run(action)
 
 
-def _since(alert: Alert) -> str:
+def _since(alert: ActiveAlert) -> str:
     """Since when it is so, and how often it was."""
     clock = time.localtime(alert.since_s)
     since = f"{clock.tm_hour}:{clock.tm_min:02d}"

@@ -7,15 +7,14 @@ from typing import cast
 
 import pytest
 
-from app.core.alerts import Alert, Alerts
+from app.core.alerts import ActiveAlert, Alerts
 from app.core.network.decode_checks import Checked
 from app.core.network.mailbox import Batch
 from app.core.network.topics import Topics
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import AWAY_S, CURE_S, Health
 from nep.messages.message import Message
-from nep.protocol.graph_view import Alert as MasterAlert
-from nep.protocol.graph_view import GraphView, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.protocol.graph_view import Alert, GraphView, PublisherInfo, SubscriberInfo, TopicInfo
 
 
 class Case:
@@ -33,7 +32,7 @@ class Case:
         checked = Checked(bad + good, bad, unchecked, "no json" if bad else "", last_good)
         self.health.look({"/a": checked})
 
-    def alert(self) -> Alert | None:
+    def alert(self) -> ActiveAlert | None:
         return next(iter(self.alerts.active), None)
 
 
@@ -101,7 +100,7 @@ def test_good_messages_are_nothing_to_tell(case: Case) -> None:
 
 
 def test_a_taken_port_leads_to_the_doctor_and_other_notes_of_the_master_do_not(case: Case) -> None:
-    noticed = (MasterAlert("port:7000", "Port 7000 is taken", "Close it."), MasterAlert("name:x", "2 x", ""))
+    noticed = (Alert("port:7000", "Port 7000 is taken", "Close it."), Alert("name:x", "2 x", ""))
     case.health.graph_alerts(GraphView(1, 1, alerts=noticed))
     steps = {alert.id: (alert.button, alert.action) for alert in case.alerts.active}
     assert steps == {"port:7000": ("Open the connection doctor", "help.doctor"), "name:x": (None, None)}

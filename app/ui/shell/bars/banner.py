@@ -32,7 +32,7 @@ FRESH_S = 0.5
 
 
 class AlertLike(Protocol):
-    """What the banner needs of an alert (`app.core.alerts.Alert`)."""
+    """What the banner needs of an alert (`app.core.alerts.ActiveAlert`)."""
 
     @property
     def id(self) -> str:
