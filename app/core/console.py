@@ -24,7 +24,7 @@ _LEVELS = {"warning": "warn"}
 
 
 @dataclass(frozen=True, slots=True)
-class LogRecord:
+class ConsoleRecord:
     """One line: epoch seconds, level (debug, info, warn, error, critical), who says it, and the text.
 
     ``number`` counts all lines from 1. ``logger`` is the part of the program that says it and ``place`` the
@@ -46,7 +46,7 @@ class Console:
     def __init__(self, clock: Callable[[], float] = time.time, capacity: int = CAPACITY) -> None:
         """Keep at most ``capacity`` records; ``clock`` gives epoch seconds."""
         self._clock = clock
-        self._lines: deque[LogRecord | Message] = deque(maxlen=capacity)
+        self._lines: deque[ConsoleRecord | Message] = deque(maxlen=capacity)
         self._unread = 0
         self._own: deque[int] = deque(maxlen=OWN_KEPT)
         self._errors = log_handler.ShownErrors()
@@ -56,14 +56,14 @@ class Console:
         self.revision = 0
 
     @property
-    def records(self) -> Sequence[LogRecord]:
+    def records(self) -> Sequence[ConsoleRecord]:
         """The records, oldest first; those of the bus that nobody has read yet are decoded now."""
         self._read()
         return self._lines  # type: ignore[return-value]  # all are records now
 
     def add(self, level: str, origin: str, text: str) -> None:
         """Add one line; a very long text is cut and says so."""
-        self._put([LogRecord(self._clock(), level, origin, _cut(text))])
+        self._put([ConsoleRecord(self._clock(), level, origin, _cut(text))])
 
     def take(self, messages: Sequence[Message], dropped: int = 0) -> None:
         """Add records of the bus; ``dropped`` are those that were lost before these."""
@@ -89,7 +89,7 @@ class Console:
         self._unread = 0
         self.revision += 1
 
-    def _put(self, lines: Sequence[LogRecord | Message]) -> None:
+    def _put(self, lines: Sequence[ConsoleRecord | Message]) -> None:
         self._lines.extend(lines)
         self._unread = min(self._unread + len(lines), len(self._lines))
         self.revision += 1
@@ -103,7 +103,7 @@ class Console:
                 self._count += 1
                 self._lines.append(replace(record, number=self._count))
 
-    def _of_bus(self, message: Message) -> Sequence[LogRecord]:
+    def _of_bus(self, message: Message) -> Sequence[ConsoleRecord]:
         """The records in a message; a list of a node's last errors has those that did not come before."""
         try:
             if message.topic == log_handler.LAST_ERRORS_TOPIC:
@@ -115,9 +115,9 @@ class Console:
             return ()  # an alert says so, as for every topic
         return [self._record(each) for each in given if each.pid is None or each.pid not in self._own]
 
-    def _record(self, given: log_handler.LogRecord) -> LogRecord:
+    def _record(self, given: log_handler.LogRecord) -> ConsoleRecord:
         place = f"{given.file}:{given.line}" if given.file and given.line else given.file or ""
-        return LogRecord(
+        return ConsoleRecord(
             given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),
             _LEVELS.get(given.level, given.level),
             given.node or given.name or _("somebody"),

@@ -28,7 +28,7 @@ from app.ui.widgets.keyboard import is_plain
 from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
-    from app.core.console import LogRecord
+    from app.core.console import ConsoleRecord
 
 Index = QModelIndex | QPersistentModelIndex
 RECORD_ROLE = int(Qt.ItemDataRole.UserRole)
@@ -53,7 +53,7 @@ MESSAGE = 24  # letters of the text that should be seen
 _ROOT = QModelIndex()
 
 
-def line_of(record: LogRecord, level: str = "") -> str:
+def line_of(record: ConsoleRecord, level: str = "") -> str:
     """A record as text, for the clipboard: as logs are written, unless its ``level`` is said otherwise."""
     moment = time.localtime(record.stamp_s)
     clock = f"{time.strftime('%H:%M:%S', moment)}.{int(record.stamp_s % 1 * 1000):03d}"
@@ -61,7 +61,7 @@ def line_of(record: LogRecord, level: str = "") -> str:
     return f"{clock} {level or record.level} {record.origin}{logger} {record.text}"
 
 
-def tip_of(record: LogRecord) -> str:
+def tip_of(record: ConsoleRecord) -> str:
     """What is known of a record beside its text: where in the program it was logged."""
     where = "  ".join(part for part in (record.logger, record.place) if part)
     clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
@@ -79,7 +79,7 @@ def first_line(text: str) -> str:
     return said.format(text=first, count=more)
 
 
-def _level_words(record: LogRecord) -> str:
+def _level_words(record: ConsoleRecord) -> str:
     return _("critical") if record.level == "critical" else _(WORDS.get(record.level, record.level))
 
 
@@ -89,7 +89,7 @@ class Wanted:
     def __init__(self, levels: frozenset[str], node: str, words: str) -> None:
         self._levels, self._node, self._words = levels, node, words.casefold().split()
 
-    def __call__(self, record: LogRecord) -> bool:
+    def __call__(self, record: ConsoleRecord) -> bool:
         """Decide."""
         if record.level not in self._levels or (self._node and record.origin != self._node):
             return False
@@ -104,7 +104,7 @@ class ConsoleModel(QAbstractListModel):
 
     def __init__(self) -> None:
         super().__init__()
-        self._records: deque[LogRecord] = deque()  # oldest first
+        self._records: deque[ConsoleRecord] = deque()  # oldest first
         self._newest = 0
 
     def rowCount(self, parent: Index = _ROOT) -> int:
@@ -120,20 +120,20 @@ class ConsoleModel(QAbstractListModel):
             return line_of(record, _level_words(record))
         return plain.tip(tip_of(record)) if role == Qt.ItemDataRole.ToolTipRole else None
 
-    def show_all(self, records: Sequence[LogRecord], wanted: Callable[[LogRecord], bool]) -> None:
+    def show_all(self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]) -> None:
         """Begin anew with those of the records (oldest first) that are wanted."""
         self.beginResetModel()
         self._records = deque(record for record in records if wanted(record))
         self._newest = records[-1].number if records else 0
         self.endResetModel()
 
-    def follow(self, records: Sequence[LogRecord], wanted: Callable[[LogRecord], bool]) -> int:
+    def follow(self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]) -> int:
         """Take over what came since the last time, and let go what is kept no more; how many rows came."""
         if not records or records[-1].number < self._newest or records[0].number > self._newest + 1:
             self.show_all(records, wanted)
             return len(self._records)
         self._leave(records[0].number)
-        came: list[LogRecord] = []
+        came: list[ConsoleRecord] = []
         for record in reversed(records):
             if record.number <= self._newest:
                 break
@@ -178,7 +178,7 @@ class LineDelegate(QStyledItemDelegate):
         return round(self._theme.scaled(ROW[self._density()]))
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        record: LogRecord | None = index.data(RECORD_ROLE)
+        record: ConsoleRecord | None = index.data(RECORD_ROLE)
         if record is None:
             return
         theme, font = self._theme, self._font()
@@ -206,7 +206,7 @@ class LineDelegate(QStyledItemDelegate):
             paint.words(painter, part, words, font, theme.colour(colour))
             rect.setLeft(part.right() + 7)
 
-    def columns(self, record: LogRecord, width: float) -> dict[str, float]:
+    def columns(self, record: ConsoleRecord, width: float) -> dict[str, float]:
         """What stands before the text, with its width, in a row of that width.
 
         Where little is left for the text, first the logger goes, then the level's word (its icon says it
@@ -228,7 +228,7 @@ class LineDelegate(QStyledItemDelegate):
         return shown
 
     @staticmethod
-    def _parts(record: LogRecord, *, logger: bool) -> list[tuple[str, str, float]]:
+    def _parts(record: ConsoleRecord, *, logger: bool) -> list[tuple[str, str, float]]:
         """What stands in the rest of a row: words, their colour, how much of what is left they may take."""
         parts = [(record.origin, "textTertiary", 0.4), (first_line(record.text), "text", 1.0)]
         name = record.logger.rpartition(".")[2] if logger else ""

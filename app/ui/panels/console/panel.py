@@ -28,7 +28,7 @@ from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
-    from app.core.console import LogRecord
+    from app.core.console import ConsoleRecord
 
 FROM = {
     "debug": lazy("Everything, also details"),
@@ -120,7 +120,7 @@ class ConsolePanel(PanelWidget):
         self.pages.setCurrentIndex(1 if self.model.rowCount() else 0)
         self._say_nothing()
 
-    def _follow(self, records: Sequence[LogRecord]) -> None:
+    def _follow(self, records: Sequence[ConsoleRecord]) -> None:
         """New lines come above; who reads further down keeps the lines that he reads."""
         bar = self.list.verticalScrollBar()
         before = bar.value()
