@@ -15,6 +15,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter, QPixmap
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QVBoxLayout, QWidget
 
+from app.ui.panels.robots.controls.colour import ColourSwatches
 from app.ui.shell.bars.banner import Banner
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme
@@ -22,8 +23,7 @@ from app.ui.widgets import (
     Button,
     Card,
     Chip,
-    Choice,
-    ColourSwatches,
+    ComboBox,
     EmptyAction,
     EmptyState,
     IconButton,
@@ -99,7 +99,7 @@ def _fields(theme: Theme) -> list[QWidget]:
         row(Segments(theme, layouts), Segments(theme, languages, check=True, size="form")),
         row(
             SearchField(theme, "Filter", "/"),
-            Choice(theme, [("a", "Live network")]),
+            ComboBox(theme, [("a", "Live network")]),
             Switch(theme, "loud", True),
         ),
         SliderWithUnit(theme, 0, 100, value=60, unit="%", name="Volume"),

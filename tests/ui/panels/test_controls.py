@@ -19,7 +19,7 @@ from app.robots.description.inputs import Choice as Option
 from app.robots.description.inputs import Parameter, parameter_of
 from app.robots.description.model import Action
 from app.ui.panels.robots.controls.angle import AngleDial
-from app.ui.panels.robots.controls.colour import ColourChoice, HueStrip
+from app.ui.panels.robots.controls.colour import ColourChoice, ColourSwatches, HueStrip
 from app.ui.panels.robots.controls.picture import PictureChoice
 from app.ui.panels.robots.controls.picture_file import MOST_FILE_BYTES, encoded, file_filter, read_picture
 from app.ui.panels.robots.form import ActionForm
@@ -225,6 +225,21 @@ def test_an_angle_of_nodding_is_seen_from_the_side(qtbot, theme) -> None:
 
 
 # ---- colours ---------------------------------------------------------------------------------------
+
+
+def test_swatches_tell_the_colour_that_was_pressed(qtbot, theme) -> None:
+    swatches = ColourSwatches(theme, "#3AB7FF")
+    qtbot.addWidget(swatches)
+    told: list[str] = []
+    swatches.changed.connect(told.append)
+    assert (swatches.value, swatches._name.text()) == ("#3ab7ff", "sky blue")
+    swatches._swatches["#ff6b5e"].click()
+    swatches._swatches["#ff6b5e"].click()
+    assert (swatches.value, swatches._name.text(), told) == ("#ff6b5e", "coral", ["#ff6b5e"])
+    swatches.set_value("#102030")
+    assert (swatches.value, swatches._name.text()) == ("#102030", "#102030")
+    swatches.set_value("no colour")
+    assert (swatches.value, told) == ("#102030", ["#ff6b5e"])
 
 
 def test_another_colour_comes_from_the_strip_or_by_its_number(qtbot, theme) -> None:

@@ -9,10 +9,11 @@ from app.robots.description.inputs import Choice as Option
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Action
 from app.ui.panels.robots.controls.chooser import control_for
+from app.ui.panels.robots.controls.colour import ColourSwatches
 from app.ui.panels.robots.form import ActionForm
 from app.ui.panels.robots.input_text import input_words
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Choice, ColourSwatches, Segments, SliderWithUnit, Switch
+from app.ui.widgets import ComboBox, Segments, SliderWithUnit, Switch
 from nep.i18n import _, translate
 from tests.ui.fakes import ACTIONS
 
@@ -37,7 +38,7 @@ def theme(qapp) -> Theme:
         (Parameter("p", "p", "integer", 0, 100, 5, "%", 60), SliderWithUnit, 60, 20),
         (Parameter("p", "p", "angle", -180, 180, 5, "°", 30), SliderWithUnit, 30.0, -45.0),
         (Parameter("p", "p", "choice", choices=FEW, default="fr"), Segments, "fr", "en"),
-        (Parameter("p", "p", "choice", choices=MANY, default=3), Choice, 3, 5),
+        (Parameter("p", "p", "choice", choices=MANY, default=3), ComboBox, 3, 5),
         (Parameter("p", "p", "colour", default="#35c26b"), ColourSwatches, "#35c26b", "#b06bff"),
         (Parameter("p", "p", "boolean", default=True), Switch, True, False),
         (Parameter("p", "p", "list", default=["yes", "no"]), QLineEdit, ["yes", "no"], ["one"]),
@@ -98,7 +99,7 @@ def test_what_a_robot_offers_now_fills_a_list(qtbot, theme) -> None:
     form = ActionForm(theme, action(parameter), options)
     qtbot.addWidget(form)
     assert asked == ["animations"]
-    assert isinstance(form.controls["name"].widget, Choice)
+    assert isinstance(form.controls["name"].widget, ComboBox)
     assert form.input() == {"name": "hey"}
     assert isinstance(control_for(theme, parameter, []).widget, QLineEdit)
 

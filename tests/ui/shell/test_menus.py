@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Choice
+from app.ui.widgets import ComboBox
 from app.ui.widgets.menus import EditMenu, Menu, round_region
 
 # without a screen nothing can grab the keyboard, which every popup asks for
@@ -79,7 +79,7 @@ def test_a_field_offers_its_editing_in_our_menu(qtbot, theme: Theme) -> None:
 
 def test_the_list_of_a_choice_has_no_frame_of_the_system(qtbot, theme: Theme) -> None:
     theme.apply()
-    choice = Choice(theme, [(name, name) for name in ("one", "two", "three", "four", "five")])
+    choice = ComboBox(theme, [(name, name) for name in ("one", "two", "three", "four", "five")])
     qtbot.addWidget(choice)
     choice.show()
     choice.showPopup()

@@ -16,7 +16,7 @@ from app.ui.shell.dialogs.shortcuts import ShortcutSheet
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Choice
+from app.ui.widgets import ComboBox
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -159,7 +159,7 @@ def test_many_languages_are_a_list_to_open(
     sheet = window.findChild(SettingsSheet)
     assert sheet is not None
     language = sheet.language
-    assert isinstance(language, Choice)
+    assert isinstance(language, ComboBox)
     assert [language.itemText(at) for at in range(language.count())] == [name for _code, name in names]
     assert language.value == "en"
     assert sheet.first() is language

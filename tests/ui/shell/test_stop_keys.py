@@ -18,7 +18,7 @@ from app.ui.panels.robots.controls.picture import NoPictures, PictureChoice
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
-from app.ui.widgets.inputs.choice import Choice
+from app.ui.widgets.inputs.combo_box import ComboBox
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
@@ -68,7 +68,7 @@ def a_context_menu_of_a_field(window: MainWindow) -> None:
 
 
 def a_list_of_choices(window: MainWindow) -> None:
-    choice = Choice(window.theme, [(name, name) for name in ("one", "two")])
+    choice = ComboBox(window.theme, [(name, name) for name in ("one", "two")])
     choice.setParent(window)
     choice.show()
     choice.showPopup()

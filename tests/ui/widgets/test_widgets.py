@@ -12,8 +12,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import (
     Button,
     Chip,
-    Choice,
-    ColourSwatches,
+    ComboBox,
     EmptyAction,
     EmptyState,
     IconButton,
@@ -198,23 +197,6 @@ def test_stop_keeps_its_size_and_its_red_in_every_state(qtbot, theme: Theme, pla
         assert stop.accessibleName() == word
 
 
-def test_swatches_name_the_colour_and_take_another(qtbot, theme: Theme) -> None:
-    made = ColourSwatches(theme, "#3AB7FF")
-    shown(qtbot, made)
-    told: list[str] = []
-    made.changed.connect(told.append)
-    assert made.value == "#3ab7ff"
-    made._ask()
-    made._field.setText("#nonsense")
-    made._typed()
-    assert made._field.property("wrong") == "true"
-    made._field.setText("#102030")
-    made._typed()
-    assert (made.value, told) == ("#102030", ["#102030"])
-    made.set_value("no colour")
-    assert made.value == "#102030"
-
-
 def test_a_bar_knows_what_it_does_not_know(theme: Theme) -> None:
     bar = ValueBar(theme)
     assert bar.fraction is None
@@ -277,8 +259,8 @@ def test_a_switch_is_turned_with_space(qtbot, theme: Theme) -> None:
     assert theme.colour("accent").name() in colours(switch)
 
 
-def test_a_choice_keeps_what_is_not_offered_out(theme: Theme) -> None:
-    choice = Choice(theme, [("en", "English"), ("fr", "French")], name="Language")
+def test_a_combo_box_keeps_what_is_not_offered_out(theme: Theme) -> None:
+    choice = ComboBox(theme, [("en", "English"), ("fr", "French")], name="Language")
     choice.set_value("fr")
     choice.set_value("xx")
     assert choice.value == "fr"

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from app.core.network.remote_access import Reach
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Choice, IconButton, label, paint
+from app.ui.widgets import Button, ComboBox, IconButton, label, paint
 from nep.i18n import _, lazy
 
 WIDE = 520
@@ -31,7 +31,7 @@ class NetworkAccessSheet(Overlay):
         self.warning = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.where = QHBoxLayout()
         self.where_word = label(_("At the address"), "bodyLarge", role="textSecondary")
-        self.choice: Choice | None = None
+        self.choice: ComboBox | None = None
         self.typed_word = label(_("Programs there need this setting:"), "body", role="textSecondary")
         self.typed = label("", "code")
         self.typed.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -95,7 +95,7 @@ class NetworkAccessSheet(Overlay):
             self.choice = None
         if can_open and not is_open:
             options = [(own.host, f"{own.host} ({own.interface})") for own in addresses]
-            self.choice = Choice(self.theme, options, name=_("Address"))
+            self.choice = ComboBox(self.theme, options, name=_("Address"))
             self.choice.currentIndexChanged.connect(lambda _index: self._say_chosen())
             self.where.insertWidget(1, self.choice)
         paint.show_when(self.where_word, self.choice is not None)

@@ -13,7 +13,7 @@ from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.system import WISHES
 from app.ui.theme.theme import MODES, Theme
-from app.ui.widgets import Button, Choice, Elided, IconButton, Segments, label
+from app.ui.widgets import Button, ComboBox, Elided, IconButton, Segments, label
 from app.ui.widgets.file_dialogs import show_free
 from nep import i18n
 from nep.i18n import _, lazy, pgettext
@@ -60,10 +60,10 @@ class SettingsSheet(Overlay):
         self._lay_out()
         theme.changed.connect(self._show)
 
-    def _language_input(self) -> Segments | Choice:
+    def _language_input(self) -> Segments | ComboBox:
         offered = i18n.offered()
         if len(offered) > SIDE_BY_SIDE:
-            choice = Choice(self.theme, offered, name=_("Language"))
+            choice = ComboBox(self.theme, offered, name=_("Language"))
             choice.activated.connect(lambda _index: self._language(choice.value))
             return choice
         segments = Segments(
@@ -123,7 +123,7 @@ class SettingsSheet(Overlay):
         column.addWidget(self._area, 1)
 
     def first(self) -> QWidget:
-        if isinstance(self.language, Choice):
+        if isinstance(self.language, ComboBox):
             return self.language
         return self.language.chosen_button() or self
 

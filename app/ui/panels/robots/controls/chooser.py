@@ -13,7 +13,7 @@ from app.ui.panels.robots.controls.text import text_control
 from app.ui.panels.robots.input_text import NUMBERS
 from app.ui.text.sensor_values import yes_words
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Choice, Segments, Switch
+from app.ui.widgets import ComboBox, Segments, Switch
 
 __all__ = [
     "NUMBERS", "ROW_HEIGHT", "Control", "NoPictures", "Pictures", "control_for", "sentence_case",
@@ -60,7 +60,7 @@ def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Contr
             lambda tell: connect(segments.changed, tell),
         )
     else:
-        combo = Choice(theme, pairs, name=parameter.title)
+        combo = ComboBox(theme, pairs, name=parameter.title)
         made = Control(
             combo,
             lambda: _chosen(values, combo.value),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QLinearGradient, QMouseEvent, QPainter, QPaintEvent, QPen
@@ -12,15 +13,99 @@ from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.base import Control, connect, line_field
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, ColourSwatches, label
+from app.ui.widgets import Button, label, paint
+from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.flow_layout import Flow
-from nep.i18n import _
+from nep.i18n import _, lazy
 
 _HEX = re.compile(r"#?([0-9a-fA-F]{6})")
+# What a robot's lamps show, not how Studio looks: values of the action, so they are no tokens.
+LAMP_COLOURS: tuple[tuple[str, str], ...] = (
+    ("#ffffff", lazy("white")),
+    ("#3ab7ff", lazy("sky blue")),
+    ("#35c26b", lazy("green")),
+    ("#ffc53d", lazy("amber")),
+    ("#ff6b5e", lazy("coral")),
+    ("#b06bff", lazy("violet")),
+)
+SWATCH = 32
 STRIP = QSize(168, 34)
 HUES = 360
 HUE_STEP, LIGHT_STEP = 5, 0.05
 PALEST, DARKEST = 0.95, 0.15
+
+
+class _Swatch(PaintedButton):
+    def __init__(self, theme: Theme, colour: str, name: str) -> None:
+        super().__init__(theme, radius="control", checkable=True)
+        self.colour = colour
+        self.setAutoExclusive(True)
+        self.setAccessibleName(name)
+        self.setToolTip(plain.tip(name))
+        self.setFixedSize(SWATCH + 8, SWATCH + 8)
+        self.setProperty("focusInset", 4)
+
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme = self._theme
+        rect = rect.adjusted(4, 4, -4, -4)
+        radius = theme.radius("control")
+        if self.isChecked():
+            paint.box(painter, rect.adjusted(-4, -4, 4, 4), radius + 4, None, theme.colour("accent"), 2)
+        paint.box(painter, rect, radius, QColor(self.colour), theme.colour("controlBorder"))
+
+
+class ColourSwatches(QWidget):
+    """Colours to choose from with the name of the chosen one beside them."""
+
+    changed = Signal(str)
+
+    def __init__(
+        self,
+        theme: Theme,
+        value: str = LAMP_COLOURS[0][0],
+        colours: Sequence[tuple[str, str]] = LAMP_COLOURS,
+        *,
+        name: str = "",
+    ) -> None:
+        super().__init__()
+        self._names = {colour.lower(): _(words) for colour, words in colours}
+        self._value = ""
+        name = name or _("Colour")
+        self.setAccessibleName(name)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
+        row = Flow(self, gap=2)
+        self._swatches: dict[str, _Swatch] = {}
+        for colour, words in self._names.items():
+            swatch = _Swatch(theme, colour, words)
+            swatch.clicked.connect(lambda _on=False, colour=colour: self._choose(colour))
+            self._swatches[colour] = swatch
+            row.addWidget(swatch)
+        self._name = label("", "bodyLarge", role="textSecondary")
+        self._name.setContentsMargins(6, 0, 0, 0)
+        row.addWidget(self._name)
+        self.set_value(value)
+
+    @property
+    def value(self) -> str:
+        """The chosen colour, ``#rrggbb``."""
+        return self._value
+
+    def set_value(self, value: str) -> None:
+        """Show a colour without telling; text that is no colour changes nothing."""
+        colour = QColor(value)
+        if not colour.isValid():
+            return
+        self._value = colour.name()
+        for key, swatch in self._swatches.items():
+            swatch.setAutoExclusive(False)
+            swatch.setChecked(key == self._value)
+            swatch.setAutoExclusive(True)
+        self._name.setText(self._names.get(self._value, self._value))
+
+    def _choose(self, value: str) -> None:
+        if value != self._value:
+            self.set_value(value)
+            self.changed.emit(self._value)
 
 
 class HueStrip(QWidget):
@@ -117,7 +202,6 @@ class ColourChoice(QWidget):
         start = parameter.default if isinstance(parameter.default, str) else "#ffffff"
         self.setAccessibleName(parameter.title)
         self.swatches = ColourSwatches(theme, start, name=parameter.title)
-        self.swatches._other.hide()  # noqa: SLF001  ours has a strip beside the number
         self.other = Button(theme, _("Other"), "palette", kind="ghost", size="small")
         self.other.setAccessibleName(_("Another colour for {value}").format(value=parameter.title))
         self.other.setCheckable(True)

@@ -1,0 +1,77 @@
+"""A combo box with our own arrow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QWheelEvent
+from PySide6.QtWidgets import QComboBox, QStyledItemDelegate
+
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.menus import cut, make_round
+
+SHOWN_AT_ONCE = 12
+
+
+class ComboBox(QComboBox):
+    """One of many words; the wheel turns it only with the focus."""
+
+    def __init__(self, theme: Theme, options: Sequence[tuple[str, str]] = (), *, name: str = "") -> None:
+        """Options are (value, label)."""
+        super().__init__()
+        self._theme = theme
+        self.setAccessibleName(name)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        for value, words in options:
+            self.addItem(words, value)
+        self.setItemDelegate(QStyledItemDelegate(self))  # which the style sheet can give room
+        self.setMaxVisibleItems(SHOWN_AT_ONCE)
+        make_round(self.view().window())
+
+    @property
+    def value(self) -> str:
+        """The chosen value, or "" when there is none."""
+        data = self.currentData()
+        return data if isinstance(data, str) else self.currentText()
+
+    def set_value(self, value: str) -> None:
+        """Choose a value that is offered; another changes nothing."""
+        index = self.findData(value)
+        if index >= 0:
+            self.setCurrentIndex(index)
+
+    def sizeHint(self) -> QSize:
+        font = self.font()
+        widest = max((paint.width_of(font, self.itemText(i)) for i in range(self.count())), default=60)
+        height = max(self._theme.size("control", "normal"), round(paint.height_of(font)) + 10)
+        return QSize(round(widest) + 46, height)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(min(80, self.sizeHint().width()), self.sizeHint().height())
+
+    def showPopup(self) -> None:
+        super().showPopup()
+        cut(self.view().window(), self._theme.radius("panel"))
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        fill = theme.colour("hover" if self.underMouse() else "sunken" if theme.dark else "panel")
+        paint.box(painter, rect, theme.radius("control"), fill, theme.colour("controlBorder"))
+        ink = theme.colour("text" if self.isEnabled() else "textDisabled")
+        paint.words(painter, rect.adjusted(10, 0, -30, 0), self.currentText(), self.font(), ink)
+        square = QRectF(rect.right() - 26, rect.center().y() - 8, 16, 16)
+        paint_icon(painter, square, "chevron-down", theme.colour("textSecondary"))
+        painter.end()
