@@ -8,7 +8,7 @@ from dataclasses import asdict
 import typer
 
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import UNKNOWN, Column, duration, say, show_alerts, show_json, show_table
+from nep.cli.screen import UNKNOWN, TextColumn, duration, say, show_alerts, show_json, show_table
 from nep.cli.typer_words import Group
 from nep.i18n import _, lazy
 from nep.masters.process import view
@@ -17,14 +17,14 @@ from nep.text import escaped
 
 app = typer.Typer(cls=Group, no_args_is_help=True, help=_("The programs that are there."))
 _COLUMNS = (
-    Column(lazy("node"), style="bold", is_whole=True),
-    Column(lazy("language")),
-    Column(lazy("wire")),
-    Column(lazy("pid"), "right"),
-    Column(lazy("since"), "right"),
-    Column(lazy("cpu"), "right"),
-    Column(lazy("publishes"), style="green"),
-    Column(lazy("subscribes"), style="cyan"),
+    TextColumn(lazy("node"), style="bold", is_whole=True),
+    TextColumn(lazy("language")),
+    TextColumn(lazy("wire")),
+    TextColumn(lazy("pid"), "right"),
+    TextColumn(lazy("since"), "right"),
+    TextColumn(lazy("cpu"), "right"),
+    TextColumn(lazy("publishes"), style="green"),
+    TextColumn(lazy("subscribes"), style="cyan"),
 )
 _WIRES = {
     "native": lazy("native"),

@@ -33,7 +33,7 @@ UNKNOWN = "\N{EN DASH}"
 
 
 @dataclass(frozen=True)
-class Column:
+class TextColumn:
     """One column of a table: its head, its side, and how it is coloured."""
 
     head: str
@@ -77,7 +77,7 @@ def json_painter() -> Callable[[str, str], Text]:
     return paint
 
 
-def show_table(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> None:
+def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> None:
     """A table on the standard output."""
     columns = [replace(column, head=_(column.head)) for column in columns]
     is_terminal = sys.stdout.isatty()  # else a file or a program: nothing to fold for
@@ -127,7 +127,7 @@ def _total(widths: Sequence[int]) -> int:
     return sum(widths) + _GAP * (len(widths) - 1)
 
 
-def _blocks(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def _blocks(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """The rows one below the other, for a terminal too narrow for a table; what is not known is left out."""
     for row in rows:
         yield f"{row[0]}\n"
@@ -145,7 +145,7 @@ def _fit(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> bool:
 
 
 def _laid_out(
-    columns: Sequence[Column], rows: Sequence[Sequence[str]], widths: Sequence[int]
+    columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], widths: Sequence[int]
 ) -> Iterator[str]:
     """The lines of a long table that needs no folding; rich takes a millisecond for each."""
     gap = " " * _GAP
@@ -161,7 +161,7 @@ def _laid_out(
     yield from map(line, rows)
 
 
-def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], room: int) -> list[int]:
+def _widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], room: int) -> list[int]:
     """How wide each column may be: what it needs, or less where others than whole ones have to give way."""
     widths = [
         max(cells(line) for cell in (column.head, *(row[at] for row in rows)) for line in cell.split("\n"))

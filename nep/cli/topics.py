@@ -10,7 +10,7 @@ from nep.cli.echo import echo
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
 from nep.cli.rates import bw, hz
-from nep.cli.screen import UNKNOWN, Column, rate, say, show_alerts, show_json, show_table, size
+from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_alerts, show_json, show_table, size
 from nep.cli.typer_words import Group
 from nep.cli.values import ids_as_text
 from nep.i18n import _, lazy
@@ -28,13 +28,13 @@ app.command("pub")(publish)
 app.command("hz")(hz)
 app.command("bw")(bw)
 _COLUMNS = (
-    Column(lazy("topic"), style="bold", is_whole=True),
-    Column(lazy("type")),
-    Column(lazy("publishers"), style="green"),
-    Column(lazy("subscribers"), style="cyan"),
-    Column(lazy("rate"), "right"),
-    Column(lazy("bandwidth"), "right"),
-    Column(lazy("lost"), "right"),
+    TextColumn(lazy("topic"), style="bold", is_whole=True),
+    TextColumn(lazy("type")),
+    TextColumn(lazy("publishers"), style="green"),
+    TextColumn(lazy("subscribers"), style="cyan"),
+    TextColumn(lazy("rate"), "right"),
+    TextColumn(lazy("bandwidth"), "right"),
+    TextColumn(lazy("lost"), "right"),
 )
 
 

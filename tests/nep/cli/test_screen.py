@@ -8,7 +8,7 @@ from rich.cells import cell_len
 
 from nep.cli.screen import (
     UNKNOWN,
-    Column,
+    TextColumn,
     duration,
     rate,
     say_error,
@@ -53,7 +53,8 @@ def test_durations(seconds, text):
 
 def test_a_table_has_a_head_and_a_row_for_each(capsys):
     show_table(
-        [Column("topic"), Column("rate", "right")], [("/camera", "30.0 /s"), ("[red]odd[/red]", UNKNOWN)]
+        [TextColumn("topic"), TextColumn("rate", "right")],
+        [("/camera", "30.0 /s"), ("[red]odd[/red]", UNKNOWN)],
     )
     lines = capsys.readouterr().out.splitlines()
     assert "topic" in lines[0]
@@ -62,7 +63,7 @@ def test_a_table_has_a_head_and_a_row_for_each(capsys):
 
 
 def test_a_long_table_is_laid_out_as_straight_as_a_short_one(capsys):
-    columns = [Column("topic"), Column("rate", "right")]
+    columns = [TextColumn("topic"), TextColumn("rate", "right")]
     rows = [(f"/robot{number}", f"{number}.0 /s") for number in range(1000)]
     show_table(columns, rows)
     lines = capsys.readouterr().out.splitlines()
@@ -77,7 +78,12 @@ def test_a_long_table_is_laid_out_as_straight_as_a_short_one(capsys):
 def test_topics_are_never_folded_on_a_narrow_terminal(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "72")
     monkeypatch.setenv("FORCE_COLOR", "1")
-    columns = [Column("topic", is_whole=True), Column("type"), Column("subscribers"), Column("rate", "right")]
+    columns = [
+        TextColumn("topic", is_whole=True),
+        TextColumn("type"),
+        TextColumn("subscribers"),
+        TextColumn("rate", "right"),
+    ]
     show_table(
         columns, [("/Pepper/a_very_long_name_of_a_topic", "robot/description", "nep-topic-echo-1", "30.0 /s")]
     )
@@ -88,7 +94,7 @@ def test_topics_are_never_folded_on_a_narrow_terminal(monkeypatch, capsys):
 
 def test_nothing_is_folded_for_a_file_or_a_program(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "40")
-    show_table([Column("topic"), Column("publishers")], [("t" * 50, "p" * 50)])
+    show_table([TextColumn("topic"), TextColumn("publishers")], [("t" * 50, "p" * 50)])
     assert "p" * 50 in capsys.readouterr().out
 
 
@@ -122,7 +128,12 @@ def test_a_terminal_too_narrow_for_a_table_gets_the_rows_one_below_the_other(mon
 
     monkeypatch.setenv("COLUMNS", "20")
     monkeypatch.setattr("sys.stdout", screen := Terminal())
-    columns = [Column("topic", is_whole=True), Column("type"), Column("publishers"), Column("rate", "right")]
+    columns = [
+        TextColumn("topic", is_whole=True),
+        TextColumn("type"),
+        TextColumn("publishers"),
+        TextColumn("rate", "right"),
+    ]
     show_table(
         columns, [("/Pepper/battery", "json", "one\ntwo", UNKNOWN), ("/b", "string", UNKNOWN, "1.0 /s")]
     )
@@ -136,7 +147,9 @@ WIDE = [("/日本語カメラ", "1"), ("/e\u0301te\u0301", "2"), ("/😀😀", "
 
 @pytest.mark.parametrize("rows", [WIDE, WIDE * 60], ids=["short", "long"])
 def test_columns_stand_below_each_other_whatever_the_script(rows, capsys):
-    show_table([Column("topic"), Column("rate"), Column("lost", "right")], [(*row, "9") for row in rows])
+    show_table(
+        [TextColumn("topic"), TextColumn("rate"), TextColumn("lost", "right")], [(*row, "9") for row in rows]
+    )
     lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("/")]
     assert len(lines) == len(rows), "each takes one line"
     ends = {cell_len(line.rstrip()) for line in lines}
@@ -149,6 +162,7 @@ def test_a_wide_name_is_whole_where_it_has_room(capsys, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setenv("COLUMNS", "30")
     show_table(
-        [Column("topic", is_whole=True), Column("type")], [("/" + "日本" * 5, "a/type/that/is/folded")]
+        [TextColumn("topic", is_whole=True), TextColumn("type")],
+        [("/" + "日本" * 5, "a/type/that/is/folded")],
     )
     assert "/" + "日本" * 5 in capsys.readouterr().out
