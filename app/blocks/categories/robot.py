@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from app.blocks.model.block import Block, RobotUse
-from app.blocks.model.category import Category, Entry, Group
+from app.blocks.model.category import Category, Group, ToolboxEntry
 from app.blocks.model.fields import ChoiceField, LiveField, NumberField, robot_field
 from app.blocks.model.robot_text import TextParts, about, field_of, input_of, type_of
 from app.robots.description.description import Action, Event, Robot, Sensor
@@ -46,13 +46,13 @@ def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
 def robot_groups(robot: Robot, known: Sequence[Robot]) -> tuple[Group, ...]:
     """The categories under a robot's heading, its sensors and events last."""
     titles = {action.name: _group_title(action) for action in robot.actions}
-    groups: dict[str, list[Entry]] = {title: [] for title in GROUPS}
+    groups: dict[str, list[ToolboxEntry]] = {title: [] for title in GROUPS}
     for block in robot_blocks(robot, known):
         use = block.robot
         if use is None:
             continue
         title = titles.get(use.name, "Movement") if use.kind == "action" else "Sensors"
-        groups.setdefault(title, []).append(Entry(block, {"ROBOT": robot.name}))
+        groups.setdefault(title, []).append(ToolboxEntry(block, {"ROBOT": robot.name}))
     sensors = groups.pop("Sensors")
     return tuple(
         Group(title, _ICONS.get(title, "bot"), "sensors" if title == "Sensors" else "robot", tuple(entries))

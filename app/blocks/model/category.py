@@ -11,7 +11,7 @@ from app.robots.description.description import Robot
 
 
 @dataclass(frozen=True)
-class Entry:
+class ToolboxEntry:
     """One block in the toolbox, with fields that are set there already."""
 
     block: Block
@@ -25,7 +25,7 @@ class Group:
     title: str
     icon: str
     style: str
-    entries: tuple[Entry, ...]
+    entries: tuple[ToolboxEntry, ...]
 
 
 @dataclass(frozen=True)

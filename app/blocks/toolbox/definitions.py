@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from app.blocks.model.category import Category, Entry, Group
+from app.blocks.model.category import Category, Group, ToolboxEntry
 from app.blocks.toolbox.catalogue import Catalogue, categories
 from app.blocks.toolbox.help import help_of
 from app.robots.description.description import Robot
@@ -71,7 +71,7 @@ def _group(robot: Robot, group: Group) -> dict[str, object]:
     return made | {"robot": robot.name}
 
 
-def _block(entry: Entry) -> Mapping[str, object]:
+def _block(entry: ToolboxEntry) -> Mapping[str, object]:
     return entry.block.to_toolbox(entry.fields)
 
 
