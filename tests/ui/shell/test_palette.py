@@ -18,7 +18,7 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import Example
 from app.ui.widgets.lists import fuzzy
 from app.ui.widgets.lists.entry_list import Heading
-from app.ui.widgets.lists.fuzzy import Entry, Finder, Found, match
+from app.ui.widgets.lists.fuzzy import Entry, Finder, Match, match
 from tests.ui.shell_parts import PlainPanel
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -109,7 +109,7 @@ def palette(qtbot, window: MainWindow, commands: Commands) -> Palette:
 
 
 def words(palette: Palette) -> list[str]:
-    return [line.entry.words for line in palette.rows.lines.lines if isinstance(line, Found)]
+    return [line.entry.words for line in palette.rows.lines.lines if isinstance(line, Match)]
 
 
 def headings(palette: Palette) -> list[str]:
@@ -226,7 +226,7 @@ def test_panels_topics_and_files_are_found(palette: Palette, window: MainWindow,
     palette.open()
     QTest.keyClicks(palette.field, "faces")
     assert {"Topics", "Recent files"} <= set(headings(palette))
-    lines = {line.entry.words: line.entry for line in palette.rows.lines.lines if isinstance(line, Found)}
+    lines = {line.entry.words: line.entry for line in palette.rows.lines.lines if isinstance(line, Match)}
     assert lines["old faces"].reason == "Not in gone any more"
     assert lines["faces"].reason == ""
     palette.field.setText("/faces")
@@ -249,7 +249,7 @@ def test_examples_are_found_and_open_as_new_behaviours(palette, window: MainWind
     palette.shut()
     palette.open()
     QTest.keyClicks(palette.field, "tour g")
-    rows = [each.entry.words for each in palette.rows.lines.lines if isinstance(each, Found)]
+    rows = [each.entry.words for each in palette.rows.lines.lines if isinstance(each, Match)]
     assert (rows, headings(palette)) == (["Tour guide"], ["Examples"])
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert window.session.document.name == "Tour"

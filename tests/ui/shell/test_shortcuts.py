@@ -25,7 +25,7 @@ from app.ui.text.numbers import spoken_key, tip_with_key
 from app.ui.theme.theme import Theme
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.lists.entry_list import Heading
-from app.ui.widgets.lists.fuzzy import Found
+from app.ui.widgets.lists.fuzzy import Match
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 CTRL = Qt.KeyboardModifier.ControlModifier
@@ -218,7 +218,7 @@ def press(sheet: ShortcutSheet, key: Qt.Key, held: Qt.KeyboardModifier = NONE) -
 
 
 def test_the_sheet_lists_every_command_and_every_fixed_key(sheet: ShortcutSheet) -> None:
-    shown = [line.entry.id for line in sheet.rows.lines.lines if isinstance(line, Found)]
+    shown = [line.entry.id for line in sheet.rows.lines.lines if isinstance(line, Match)]
     assert shown == list(dict.fromkeys(shown))
     assert set(shown) == {f"command:{row.id}" for row in COMMANDS if row.in_shortcuts} | {
         f"fixed:{number}" for number in range(len(FIXED))

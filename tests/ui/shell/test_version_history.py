@@ -18,7 +18,7 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.text.dates import when_words
 from app.ui.widgets import Button
 from app.ui.widgets.lists.entry_list import Heading
-from app.ui.widgets.lists.fuzzy import Found
+from app.ui.widgets.lists.fuzzy import Match
 from tests.ui.shell.test_files import BLOCKS, changed, saved
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -43,7 +43,7 @@ def opened(qtbot, commands: Commands, window: MainWindow) -> VersionHistorySheet
 def rows(sheet: VersionHistorySheet) -> list[tuple[str, str]]:
     told = []
     for line in sheet.rows.lines.lines:
-        if isinstance(line, Found):
+        if isinstance(line, Match):
             told.append((line.entry.words.partition(",")[0], line.entry.note or line.entry.reason))
         else:
             assert isinstance(line, Heading)

@@ -15,7 +15,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
-from app.ui.widgets.lists.fuzzy import Entry, Finder, Found
+from app.ui.widgets.lists.fuzzy import Entry, Finder, Match
 from nep.i18n import _, lazy, ngettext
 
 WIDE, TOP, FIELD, FOOT = 640, 128, 56, 36
@@ -190,12 +190,12 @@ class Palette(Overlay):
         entries = self._finder.entries
         known = {entry.id: entry for entry in entries if entry.id in self.last}
         last = [known[id] for id in self.last if id in known][:LAST_SHOWN]
-        lines: list[Line] = [Heading(_(TITLES["recent"])), *map(Found, last)] if last else []
-        kinds: dict[str, list[Found]] = {}
+        lines: list[Line] = [Heading(_(TITLES["recent"])), *map(Match, last)] if last else []
+        kinds: dict[str, list[Match]] = {}
         for entry in entries:
             of_kind = kinds.setdefault(entry.kind, [])
             if entry not in last and (entry.kind == "command" or len(of_kind) < MOST_EMPTY):
-                of_kind.append(Found(entry))
+                of_kind.append(Match(entry))
         for kind, of_kind in kinds.items():
             if of_kind:
                 lines += [Heading(_(TITLES[kind])), *of_kind]

@@ -15,7 +15,7 @@ from app.ui.text.numbers import spoken_key
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, SearchField, label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
-from app.ui.widgets.lists.fuzzy import Entry, Found, match
+from app.ui.widgets.lists.fuzzy import Entry, Match, match
 from nep.i18n import _, lazy
 
 WIDE, HIGH = 680, 640
@@ -119,7 +119,7 @@ class ShortcutSheet(Overlay):
                 lines.append(Heading(heading))
             end = len(entry.words)
             spans = tuple((begin, min(stop, end)) for begin, stop in fits[1] if begin < end)
-            lines.append(Found(entry, 0.0, spans if query else ()))
+            lines.append(Match(entry, 0.0, spans if query else ()))
         keep = chosen if chosen.startswith(("command:", "fixed:")) else before.id if before else ""
         self.rows.show_lines(lines, keep)
         self._chosen()

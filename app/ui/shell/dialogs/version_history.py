@@ -22,7 +22,7 @@ from app.ui.text.numbers import grouped
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton, label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
-from app.ui.widgets.lists.fuzzy import Entry, Found
+from app.ui.widgets.lists.fuzzy import Entry, Match
 from nep.i18n import _, day_text, lazy, ngettext
 
 WIDE, MOST_HIGH, EMPTY_HIGH = 680, 560, 330
@@ -140,9 +140,9 @@ class VersionHistorySheet(Overlay):
             self.empty.say(_("No earlier versions yet"), _(WHAT_MAKES_ONE))
             self.empty.set_actions([EmptyAction(_("Close"), self.shut)])
 
-    def _line(self, version: Version, now: dt.datetime) -> Found:
+    def _line(self, version: Version, now: dt.datetime) -> Match:
         then = dt.datetime.fromtimestamp(version.written_s, tz=now.tzinfo)
-        return Found(Entry(f"version:{version.copy}", when_words(then, now), "history"))
+        return Match(Entry(f"version:{version.copy}", when_words(then, now), "history"))
 
     def first(self) -> QWidget:
         return self.rows if self._versions else self.empty.findChild(Button) or self

@@ -15,7 +15,7 @@ from app.ui.text.numbers import spoken_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.lists.fuzzy import Entry, Found
+from app.ui.widgets.lists.fuzzy import Entry, Match
 from nep.i18n import _
 
 ROW, HEADING, INSET = 40, 30, 8
@@ -30,7 +30,7 @@ class Heading:
     words: str
 
 
-Line = Heading | Found
+Line = Heading | Match
 
 
 class EntryModel(QAbstractListModel):
@@ -49,7 +49,7 @@ class EntryModel(QAbstractListModel):
     def tell(self, id: str, note: str, reason: str) -> None:
         """Say something else beside an entry; it stays where it is."""
         for row, line in enumerate(self.lines):
-            if isinstance(line, Found) and line.entry.id == id:
+            if isinstance(line, Match) and line.entry.id == id:
                 told = replace(line, entry=replace(line.entry, note=note, reason=reason))
                 self.lines = [*self.lines[:row], told, *self.lines[row + 1 :]]
                 self.dataChanged.emit(self.index(row), self.index(row))
@@ -112,7 +112,7 @@ class EntryDelegate(QStyledItemDelegate):
             self._row(painter, rect.adjusted(INSET, 0, -INSET, 0), line, chosen=chosen)
         painter.restore()
 
-    def _row(self, painter: QPainter, rect: QRectF, found: Found, *, chosen: bool) -> None:
+    def _row(self, painter: QPainter, rect: QRectF, found: Match, *, chosen: bool) -> None:
         theme, entry = self._theme, found.entry
         if chosen:
             edge = theme.colour("controlBorder") if theme.high_contrast else None
@@ -157,7 +157,7 @@ class EntryDelegate(QStyledItemDelegate):
             paint.words(painter, area, said, font, theme.colour(quiet), paint.RIGHT)
         return right
 
-    def _words(self, painter: QPainter, area: QRectF, found: Found, ink: str, marked: str) -> None:
+    def _words(self, painter: QPainter, area: QRectF, found: Match, ink: str, marked: str) -> None:
         """The words, with the letters that fit in bold."""
         theme = self._theme
         plain = theme.font("code" if found.entry.kind == "topic" else "bodyLarge")
@@ -204,7 +204,7 @@ class EntryList(QListView):
     def show_lines(self, lines: Sequence[Line], chosen: str = "") -> None:
         """Show other lines and choose the one with this id, else the first that is no heading."""
         self.lines.show_lines(lines)
-        rows = [row for row, line in enumerate(lines) if isinstance(line, Found)]
+        rows = [row for row, line in enumerate(lines) if isinstance(line, Match)]
         wanted = (row for row in rows if chosen and _id(lines[row]) == chosen)
         self._choose(next(wanted, rows[0] if rows else -1))
         if not chosen:
@@ -219,16 +219,16 @@ class EntryList(QListView):
         """The entry that is chosen."""
         row = self.currentIndex().row()
         line = self.lines.lines[row] if 0 <= row < len(self.lines.lines) else None
-        return line.entry if isinstance(line, Found) else None
+        return line.entry if isinstance(line, Match) else None
 
     def height_of_all(self) -> int:
         """How high all lines are together."""
-        heights = {Heading: self._theme.scaled(HEADING), Found: self._theme.scaled(ROW)}
+        heights = {Heading: self._theme.scaled(HEADING), Match: self._theme.scaled(ROW)}
         return sum(round(heights[type(line)]) for line in self.lines.lines)
 
     def step(self, steps: int) -> None:
         """Choose another row that many rows away; it stops at the ends."""
-        rows = [row for row, line in enumerate(self.lines.lines) if isinstance(line, Found)]
+        rows = [row for row, line in enumerate(self.lines.lines) if isinstance(line, Match)]
         if rows:
             current = self.currentIndex().row()
             place = rows.index(current) if current in rows else 0
@@ -260,10 +260,10 @@ class EntryList(QListView):
         self.moved.emit()
 
     def _clicked(self, index: QModelIndex) -> None:
-        if isinstance(self.lines.lines[index.row()], Found):
+        if isinstance(self.lines.lines[index.row()], Match):
             self._choose(index.row())
             self.pressed_row.emit()
 
 
 def _id(line: Line) -> str:
-    return line.entry.id if isinstance(line, Found) else ""
+    return line.entry.id if isinstance(line, Match) else ""

@@ -46,7 +46,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Match:
     """An entry that fits, how well (more is better), and the letters that fit: (from, to)."""
 
     entry: Entry
@@ -135,10 +135,10 @@ class Finder:
         for entry in entries:
             self._kinds.setdefault(entry.kind, []).append((entry.words.lower(), entry))
 
-    def find(self, query: str, most: int) -> tuple[list[Found], int]:
+    def find(self, query: str, most: int) -> tuple[list[Match], int]:
         """The best for each kind, at most ``most`` of a kind, best first; and how many fit altogether."""
         pieces = query.lower().split()
-        best: list[list[Found]] = []
+        best: list[list[Match]] = []
         count = 0
         for pairs in self._kinds.values():
             few = [entry for _lower, entry in pairs]
@@ -154,9 +154,9 @@ class Finder:
         return [each for found in best for each in found], count
 
 
-def _fitting(query: str, entry: Entry) -> Found | None:
+def _fitting(query: str, entry: Entry) -> Match | None:
     fits = match(query, entry.words)
-    return None if fits is None else Found(entry, fits[0] - (LATER if entry.reason else 0.0), fits[1])
+    return None if fits is None else Match(entry, fits[0] - (LATER if entry.reason else 0.0), fits[1])
 
 
 def _soonest(pieces: Sequence[str]) -> Callable[[tuple[str, Entry]], tuple[int, int]]:
