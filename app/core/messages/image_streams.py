@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from app.core.messages.picture import Picture, Size, decode
-from app.core.network.watches import Look
+from app.core.network.watches import Suspendable
 from nep.i18n import _
 from nep.messages.message import Message
 
@@ -141,7 +141,7 @@ class ImageStream:
         self._watch.close()
 
 
-class Watching(Look, Protocol):
+class Watching(Suspendable, Protocol):
     """What keeps a stream's topic subscribed (`app.core.network.watches.Watch`)."""
 
     def close(self) -> None:

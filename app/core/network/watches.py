@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Protocol, final
 
 
-class Look(Protocol):
+class Suspendable(Protocol):
     """Something that costs while somebody looks: a watch, a stream of pictures."""
 
     def rest(self) -> None:

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QWidget
 from app.ui.theme.theme import Theme
 
 if TYPE_CHECKING:
-    from app.core.network.watches import Look
+    from app.core.network.watches import Suspendable
     from app.core.session import Session
 
 Density = Literal["compact", "comfortable"]
@@ -151,7 +151,7 @@ class PanelWidget(QWidget):
     def restore_state(self, state: Mapping[str, object]) -> None:
         """Take over what `save_state` gave; whatever does not fit is left out."""
 
-    def looks(self) -> Iterable[Look | None]:
+    def looks(self) -> Iterable[Suspendable | None]:
         """The watches and streams that only cost while the panel can be seen; None stands for none."""
         return ()
 

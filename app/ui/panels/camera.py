@@ -17,7 +17,7 @@ from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
-    from app.core.network.watches import Look
+    from app.core.network.watches import Suspendable
     from app.core.robots.robot_link import RobotLink
 
 
@@ -84,7 +84,7 @@ class CameraPanel(OneRobotPanel):
         self.empty.set_actions([])
         self.pages.setCurrentWidget(self.empty)
 
-    def looks(self) -> Iterable[Look | None]:
+    def looks(self) -> Iterable[Suspendable | None]:
         return (self._stream, self._watch)
 
     def shut(self) -> None:

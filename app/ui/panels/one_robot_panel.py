@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from app.ui.panels.base import PanelContext, PanelWidget
 
 if TYPE_CHECKING:
-    from app.core.network.watches import Look, Watch
+    from app.core.network.watches import Suspendable, Watch
     from app.core.robots.robot_link import RobotLink
 
 
@@ -63,7 +63,7 @@ class OneRobotPanel(PanelWidget):
     def refresh_robot(self, link: RobotLink | None) -> None:
         """Show how the robot is now; None while there has not been any."""
 
-    def looks(self) -> Iterable[Look | None]:
+    def looks(self) -> Iterable[Suspendable | None]:
         return (self._watch,)
 
     def shut(self) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from app.blocks import Program
     from app.core.documents.document import Document
     from app.core.documents.workspace_json import WorkspaceJson
-    from app.core.network.watches import Look, Watch
+    from app.core.network.watches import Suspendable, Watch
     from app.core.robots.robot_link import RobotLink
     from app.core.run.control import Runs
 
@@ -284,7 +284,7 @@ class BehaviourPanel(PanelWidget):
     def restore_state(self, state: Mapping[str, object]) -> None:
         self.set_mode("python" if state.get("mode") == "python" else "blocks")
 
-    def looks(self) -> Iterable[Look | None]:
+    def looks(self) -> Iterable[Suspendable | None]:
         return self._watches.values()
 
     def shut(self) -> None:

@@ -24,7 +24,7 @@ from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
-    from app.core.network.watches import Look, Watch
+    from app.core.network.watches import Suspendable, Watch
     from nep.messages.message import Message
 
 CODEC = "image"
@@ -254,7 +254,7 @@ class ImagePanel(PanelWidget):
             self._watch.close()
         self._watch, self._watched_robot = None, ""
 
-    def looks(self) -> Iterable[Look | None]:
+    def looks(self) -> Iterable[Suspendable | None]:
         return (self._stream, self._watch)
 
     def shut(self) -> None:

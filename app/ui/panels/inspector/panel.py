@@ -24,7 +24,7 @@ from nep.i18n import _, lazy, pgettext
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
     from app.core.network.topics import Topic
-    from app.core.network.watches import Look, Watch
+    from app.core.network.watches import Suspendable, Watch
     from nep.messages.message import Message
 
 FIRST_ROWS = 24
@@ -296,7 +296,7 @@ class InspectorPanel(PanelWidget):
             self._since_ns = time.time_ns()
         super().wake()
 
-    def looks(self) -> Iterable[Look | None]:
+    def looks(self) -> Iterable[Suspendable | None]:
         return (self._watch,)
 
     def shut(self) -> None:

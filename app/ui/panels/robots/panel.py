@@ -32,7 +32,7 @@ from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
-    from app.core.network.watches import Look
+    from app.core.network.watches import Suspendable
     from app.core.robots.robot_link import RobotLink
     from app.core.session import Session
 
@@ -340,7 +340,7 @@ class RobotsPanel(OneRobotPanel):
         self.finder.setFocus(Qt.FocusReason.ShortcutFocusReason)
         return True
 
-    def looks(self) -> Iterable[Look | None]:
+    def looks(self) -> Iterable[Suspendable | None]:
         return (self._watch, *self._pictures.streams)
 
     def shut(self) -> None:
