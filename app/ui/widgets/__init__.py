@@ -19,7 +19,7 @@ from app.ui.widgets.indicators import StatusItem as StatusItem
 from app.ui.widgets.indicators import ValueBar as ValueBar
 from app.ui.widgets.indicators import paint_sparkline as paint_sparkline
 from app.ui.widgets.inputs.combo_box import ComboBox as ComboBox
-from app.ui.widgets.inputs.fields import NumberField as NumberField
+from app.ui.widgets.inputs.fields import NumberEdit as NumberEdit
 from app.ui.widgets.inputs.fields import SearchField as SearchField
 from app.ui.widgets.inputs.segments import Segments as Segments
 from app.ui.widgets.inputs.slider import SliderWithUnit as SliderWithUnit

@@ -71,7 +71,7 @@ class FilterField(SearchField):
             super().keyPressEvent(event)
 
 
-class NumberField(QLineEdit):
+class NumberEdit(QLineEdit):
     """A number with its unit inside; a wrong one stays as it was typed and says what is wrong."""
 
     number = Signal(float)

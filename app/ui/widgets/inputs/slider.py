@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QSizePolicy, QSlider, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.inputs.fields import NumberField
+from app.ui.widgets.inputs.fields import NumberEdit
 from app.ui.widgets.labels import label
 
 MOST_STEPS = 100_000
@@ -126,7 +126,7 @@ class SliderWithUnit(QWidget):
         self._value = minimum
         digits = decimals_of(step)
         self.track = Track(theme, steps)
-        self.field = NumberField(theme, minimum, maximum, unit, digits)
+        self.field = NumberEdit(theme, minimum, maximum, unit, digits)
         self.field.setFixedWidth(FIELD_WIDTH)
         self._digits = digits
         self._sentence = label("", "small", role="error", wrap=True)

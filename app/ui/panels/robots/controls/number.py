@@ -10,7 +10,7 @@ from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.angle import AngleDial
 from app.ui.panels.robots.controls.base import VALUE_WIDTH, Control, Tell, connect
 from app.ui.theme.theme import Theme
-from app.ui.widgets import NumberField, SliderWithUnit, label
+from app.ui.widgets import NumberEdit, SliderWithUnit, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.slider import decimals_of
 from app.ui.widgets.keyboard import is_plain
@@ -121,7 +121,7 @@ def _beside(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
     return row
 
 
-class OpenNumber(NumberField):
+class OpenNumber(NumberEdit):
     """A number without limits on both sides: arrow keys step, Page by ten; empty is allowed."""
 
     def __init__(self, theme: Theme, parameter: Parameter) -> None:
