@@ -11,7 +11,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib import import_module
 from importlib.metadata import distribution
@@ -182,6 +182,26 @@ def test_plug_ins_do_not_import_each_other() -> None:
         if item.target in plug_ins or item.target.rpartition(".")[0] in plug_ins
     ]
     assert faults == []
+
+
+def classes_with_two_meanings(found: Iterable[Module]) -> dict[str, list[str]]:
+    """Names of classes in more than one place, and where; a private one is seen in its module only."""
+    places: dict[str, list[str]] = {}
+    for module in found:
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places.setdefault(node.name, []).append(f"{module.name}:{node.lineno}")
+    return {name: where for name, where in places.items() if len(where) > 1}
+
+
+def test_a_class_name_means_one_thing() -> None:
+    assert classes_with_two_meanings(modules()) == {}
+
+
+def test_a_class_name_with_two_meanings_is_found() -> None:
+    one = Module("nep.one", Path("one.py"), ast.parse("class Alert: ...\nclass _Tile: ...\n"))
+    two = Module("app.two", Path("two.py"), ast.parse("class _Tile:\n    class Alert: ...\n"))
+    assert classes_with_two_meanings([one, two]) == {"Alert": ["nep.one:1", "app.two:2"]}
 
 
 def test_nobody_sleeps() -> None:
