@@ -1,24 +1,28 @@
-"""The contract of back ends. `nep.backends.memory` is the template; one contract test runs over all of them.
+"""The contract of back ends, and choosing one by its name. One contract test runs over all of them.
 
-A `Backend` opens one `Transport` for a node; that makes a `PublisherTransport` for each publisher and a
-`SubscriberTransport` for each subscriber. All of them may be used from any thread. Sequence numbers and
-`count` begin with 1 at the first message published, whether somebody listens or not.
+`nep.backends.memory` is the template. A `Backend` opens one `Transport` for a node; that makes a
+`PublisherTransport` for each publisher and a `SubscriberTransport` for each subscriber. All of them may be
+used from any thread. Sequence numbers and `count` begin with 1 at the first message published, whether
+somebody listens or not.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from nep.backends.connection import Configuration
+from nep.errors import PluginsMissingError, UnknownBackendError
 from nep.messages.codecs import Codec
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.messages.queue import MAX_BYTES, MAX_MESSAGES, Keep
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord
+from nep.system.descriptors import check_room
+from nep.system.plugins import discover, discover_own
 
 __all__ = [
     "HANDSHAKE_S",
@@ -29,6 +33,7 @@ __all__ = [
     "SubscriberSpec",
     "SubscriberTransport",
     "Transport",
+    "backend_named",
 ]
 
 HANDSHAKE_S = 0.5
@@ -181,3 +186,27 @@ class Backend:
     open: Callable[[NodeRecord], Transport]
     needs: str = ""
     aliases: tuple[str, ...] = ()
+
+
+def backend_named(name: str) -> Backend:
+    """The back end of this name, or of which it is an alias.
+
+    Entry points are looked for only when it is none of ours: a node is made in less than a millisecond.
+    Raises `UnknownBackendError`, `TooManyFilesError`.
+    """
+    try:
+        own = discover_own("nep.backends", "BACKEND", Backend)
+    except PluginsMissingError:
+        check_room(1, "a node")  # without a file to open a folder seems to be empty
+        raise
+    backend = _named(name.lower(), own.values())
+    if backend is None:
+        known = discover("nep.backends", "BACKEND", Backend)
+        backend = _named(name.lower(), known.values())
+        if backend is None:
+            raise UnknownBackendError(name, sorted(known))
+    return backend
+
+
+def _named(name: str, backends: Iterable[Backend]) -> Backend | None:
+    return next((each for each in backends if name in {each.name, *each.aliases}), None)

@@ -16,9 +16,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
 
-from nep.backends.base import PublisherSpec, Sink, SubscriberSpec, SubscriberTransport, Transport
+from nep.backends.base import (
+    PublisherSpec,
+    Sink,
+    SubscriberSpec,
+    SubscriberTransport,
+    Transport,
+    backend_named,
+)
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port
-from nep.backends.lookup import backend_named
 from nep.errors import ClosedError, DecodeError, WrongTypeError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
