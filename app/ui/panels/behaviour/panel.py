@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol, cast
 
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.panels.behaviour.editor import Editor, blockly
 from app.ui.panels.behaviour.live_values import live_words
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.panels.behaviour.tab import TabFacts
@@ -35,6 +34,46 @@ EMPTY_SIZE = (460, 250)
 ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
 WAIT_WORDS = lazy("Getting the blocks ready.")
 WAIT_UNTIL_S = 0.5
+Json = Mapping[str, object]
+
+
+class Editor(Protocol):
+    """What the panel needs of the block editor (`app.ui.blockly.view.BlocklyView`)."""
+
+    changed: SignalInstance
+    history_changed: SignalInstance
+    key_pressed: SignalInstance
+    recovered: SignalInstance
+    sensors_offered: SignalInstance
+
+    @property
+    def is_ready(self) -> bool: ...
+    def set_definitions(self, definitions: Json) -> None: ...
+    def show_tab(self, key: str, workspace: Json) -> None: ...
+    def close_tab(self, key: str) -> None: ...
+    def load(self, workspace: Json) -> None: ...
+    def change(self, workspace: Json) -> None: ...
+    def flush(self, done: Callable[[WorkspaceJson], None]) -> None: ...
+    def set_theme(self, tokens: Json, dark: bool) -> None: ...
+    def highlight(self, ids: Sequence[str]) -> None: ...
+    def mark_stopped(self, ids: Sequence[str]) -> None: ...
+    def set_errors(self, errors: Mapping[str, str]) -> None: ...
+    def set_absent(self, ids: Sequence[str]) -> None: ...
+    def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None: ...
+    def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None: ...
+    def undo(self) -> None: ...
+    def open_find(self) -> None: ...
+    def open_search(self) -> None: ...
+    def redo(self) -> None: ...
+    def show_block(self, id: str) -> None: ...
+
+
+def blockly(parent: QWidget) -> Editor:
+    """The real editor, made when the panel is first seen."""
+    # Qt WebEngine takes a fifth of a second to import: only when the editor is seen for the first time.
+    from app.ui.blockly.view import BlocklyView  # noqa: PLC0415
+
+    return cast("Editor", BlocklyView(parent))  # its signals are instances, which mypy cannot see
 
 
 class BehaviourPanel(PanelWidget):
