@@ -267,34 +267,35 @@ Request = (
 
 
 @dataclass(frozen=True)
-class Done:
-    """It is done; also the answer to a ping."""
+class _FromMaster:
+    """A reply or push: `epoch` is another one after the master was started again, `revision` its graph's."""
 
     epoch: int
     revision: int
 
 
 @dataclass(frozen=True)
-class Added:
+class Done(_FromMaster):
+    """It is done; also the answer to a ping."""
+
+
+@dataclass(frozen=True)
+class Added(_FromMaster):
     """A publisher is registered. It waits for `expected`; `hung` are known not to answer at present.
 
     `hosts` (here and below) are the addresses at which the master serves other computers: publishers on the
     master's own computer serve there, too.
     """
 
-    epoch: int
-    revision: int
     expected: tuple[Expected, ...] = ()
     hung: tuple[Expected, ...] = ()
     hosts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
-class Found:
+class Found(_FromMaster):
     """A subscriber is registered, or a node has joined: the publishers to connect to."""
 
-    epoch: int
-    revision: int
     publishers: tuple[RemotePublisher, ...] = ()
     hosts: tuple[str, ...] = ()
 
@@ -308,7 +309,7 @@ class TopicPublishers:
 
 
 @dataclass(frozen=True)
-class Renewed:
+class Renewed(_FromMaster):
     """A lease is renewed. `again`: the master does not know this node as it is, it shall join again.
 
     `topics` are those of the node's subscribers that changed since its revision; `last_seqs` are the newest
@@ -316,8 +317,6 @@ class Renewed:
     seconds: the master lets the nodes of a large graph renew less often.
     """
 
-    epoch: int
-    revision: int
     again: bool = False
     topics: tuple[TopicPublishers, ...] = ()
     last_seqs: Mapping[int, int] = field(default_factory=dict)
@@ -326,20 +325,16 @@ class Renewed:
 
 
 @dataclass(frozen=True)
-class Seen:
+class Seen(_FromMaster):
     """The whole graph."""
 
-    epoch: int
-    revision: int
     view: GraphView
 
 
 @dataclass(frozen=True)
-class Refused:
+class Refused(_FromMaster):
     """The request could not be carried out; `reason` is a sentence."""
 
-    epoch: int
-    revision: int
     reason: str
 
 
@@ -350,24 +345,20 @@ Reply = Done | Added | Found | Renewed | Seen | Refused
 
 
 @dataclass(frozen=True)
-class PublisherCame:
+class PublisherCame(_FromMaster):
     """A topic that the node subscribes to has a new publisher."""
 
-    epoch: int
-    revision: int
     publisher: RemotePublisher
 
 
 @dataclass(frozen=True)
-class PublisherGone:
+class PublisherGone(_FromMaster):
     """A publisher of such a topic is no longer listed.
 
     `is_closed`: it said so itself, and `last_seq` was its last message; else its node is silent or dead, and
     the connection stays, because the publisher may only be suspended.
     """
 
-    epoch: int
-    revision: int
     id: int
     topic: str
     is_closed: bool = False
@@ -375,11 +366,8 @@ class PublisherGone:
 
 
 @dataclass(frozen=True)
-class Probe:
+class Probe(_FromMaster):
     """Sent to a node that has been silent, to find out whether its connection is still there. Ignored."""
-
-    epoch: int
-    revision: int
 
 
 Push = PublisherCame | PublisherGone | Probe
