@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction, QFont
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.theme.theme import Theme
 
@@ -86,6 +86,16 @@ class PanelWidget(QWidget):
         self._subtitle = ""
         self.setAccessibleName(title)
         self.theme.changed.connect(self.theme_changed)
+
+    def show_one_of(self, *pages: QWidget) -> QStackedWidget:
+        """Fill the panel, edge to edge, with one of these at a time; the first one to begin with."""
+        stack = QStackedWidget()
+        for page in pages:
+            stack.addWidget(page)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(stack)
+        return stack
 
     def title(self) -> str:
         """Its name in the title."""

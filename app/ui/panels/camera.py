@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
-
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.pictures.boxes import boxes_on, camera_of
@@ -45,12 +43,7 @@ class CameraPanel(OneRobotPanel):
         self.empty.set_actions(
             [EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")]
         )
-        self.pages = QStackedWidget()
-        self.pages.addWidget(self.empty)
-        self.pages.addWidget(self.view)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.pages)
+        self.pages = self.show_one_of(self.empty, self.view)
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if self._stream is None or link is None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.robots.health_facts import HealthFact, facts_of
 from app.ui.panels.base import Density, Panel, PanelContext
@@ -109,13 +109,8 @@ class HealthPanel(OneRobotPanel):
         self._scroll.setAccessibleName(_("How the robot is"))
         self._scroll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.pages = QStackedWidget()
-        self.pages.addWidget(self.empty)
-        self.pages.addWidget(self._scroll)
+        self.pages = self.show_one_of(self.empty, self._scroll)
         self.pages.setMinimumSize(1, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.pages)
 
     # -- what it shows ------------------------------------------------------------------------------------
 

@@ -9,8 +9,6 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QSizePolicy,
-    QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -130,12 +128,7 @@ class ProblemsPanel(PanelWidget):
         self._column.insertWidget(0, self.others)
         self.nothing = label(_(NOTHING), "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.pages = QStackedWidget()
-        self.pages.addWidget(Scrolled(self.nothing))
-        self.pages.addWidget(self._scroll)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.pages)
+        self.pages = self.show_one_of(Scrolled(self.nothing), self._scroll)
 
     def refresh(self) -> None:
         document = self.session.document

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.one_robot_panel import OneRobotPanel
@@ -154,12 +154,7 @@ class RobotPanel(OneRobotPanel):
             lambda what, x, y: self._change({"move": what, "x": round(x, 3), "y": round(y, 3)})
         )
         self.empty = EmptyState(theme=self.theme, icon="bot", title="", text="")
-        self.pages = QStackedWidget()
-        self.pages.addWidget(self.empty)
-        self.pages.addWidget(self.view)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.pages)
+        self.pages = self.show_one_of(self.empty, self.view)
         self._say_nothing(None)
 
     def fleet_changed(self) -> None:

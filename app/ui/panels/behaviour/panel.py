@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from PySide6.QtCore import QPoint, Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication, QResizeEvent
-from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -99,12 +99,7 @@ class BehaviourPanel(PanelWidget):
         self._place = QWidget()
         self._place_column = QVBoxLayout(self._place)
         self._place_column.setContentsMargins(0, 0, 0, 0)
-        self.pages = QStackedWidget()
-        self.pages.addWidget(self._place)
-        self.pages.addWidget(self.program)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.pages)
+        self.pages = self.show_one_of(self._place, self.program)
         self.empty = EmptyState(
             self.theme,
             "bot",

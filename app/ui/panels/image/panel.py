@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage, QResizeEvent
-from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.core.messages import snapshots
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -56,12 +55,7 @@ class ImagePanel(PanelWidget):
         self.view.customContextMenuRequested.connect(self._show_actions)
         self._make_actions()
         self.empty = EmptyState(self.theme, "image", "", "")
-        self.pages = QStackedWidget()
-        self.pages.addWidget(self.empty)
-        self.pages.addWidget(self.view)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.pages)
+        self.pages = self.show_one_of(self.empty, self.view)
         self.setFocusProxy(self.view)
         self._say_nothing()
 
