@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from app.robots.driver.call import Call, Canceled, Failed, Link, MonotonicClock
 from app.robots.driver.common_actions import battery_sensor, distance_sensor, position_sensor
-from app.robots.driver.declare import detections, event, picture, sensor
+from app.robots.driver.declare import EventSpec, detections, event, picture, sensor
 from app.robots.driver.schema import Suggested
 from app.robots.virtual.body import START_PITCH, Body
 from app.robots.virtual.camera import lens_of
@@ -25,6 +25,29 @@ FEEDBACK_S = 0.2
 Place: TypeAlias = Literal["head", "left_hand", "right_hand"]
 
 
+def _touch(text: str, title: str, rize_value: int) -> EventSpec:
+    """A place is touched or let go; RIZE says both as ``touched``, with 1 or 0."""
+    return event(
+        text,
+        title=title,
+        icon="hand",
+        fields={"place": Place},
+        choose=("place",),
+        rize=lambda data: ("touched", {str(data["place"]): rize_value}),
+    )
+
+
+def _face(text: str, title: str, rize_word: str) -> EventSpec:
+    """A face comes into sight or goes; RIZE says both as ``human_detected``, with yes or no."""
+    return event(
+        text,
+        title=title,
+        icon="scan-face",
+        fields={"name": str},
+        rize=lambda _data: ("human_detected", {rize_word: 1}),
+    )
+
+
 class Senses:
     """Its sensors and events; what fills them is :class:`~app.robots.virtual.life.Life`."""
 
@@ -40,36 +63,10 @@ class Senses:
     balls = detections(title="balls", camera="camera", icon="scan", rate_hz=5)
     markers = detections(title="markers", camera="camera", icon="scan-line", rate_hz=5)
 
-    touched = event(
-        "when %robot %place is touched",
-        title="touched",
-        icon="hand",
-        fields={"place": Place},
-        choose=("place",),
-        rize=lambda data: ("touched", {str(data["place"]): 1}),
-    )
-    released = event(
-        "when %robot %place is released",
-        title="released",
-        icon="hand",
-        fields={"place": Place},
-        choose=("place",),
-        rize=lambda data: ("touched", {str(data["place"]): 0}),
-    )
-    face_seen = event(
-        "when %robot sees a face",
-        title="face seen",
-        icon="scan-face",
-        fields={"name": str},
-        rize=lambda _: ("human_detected", {"yes": 1}),
-    )
-    face_lost = event(
-        "when %robot loses the face",
-        title="face lost",
-        icon="scan-face",
-        fields={"name": str},
-        rize=lambda _: ("human_detected", {"no": 1}),
-    )
+    touched = _touch("when %robot %place is touched", "touched", 1)
+    released = _touch("when %robot %place is released", "released", 0)
+    face_seen = _face("when %robot sees a face", "face seen", "yes")
+    face_lost = _face("when %robot loses the face", "face lost", "no")
     heard = event(
         "when %robot hears %word",
         title="heard",
