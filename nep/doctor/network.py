@@ -35,56 +35,71 @@ def masters(facts: Facts) -> Iterator[Finding]:
     """Whether a master answers, who it is, and whether there are two."""
     port = facts.master_port
     holder = port.holder if port is not None else None
-    number = facts.address.rpartition(":")[2]
     if facts.view is not None:
         yield _running(facts, holder)
         yield from _of_another_version(facts, holder)
     elif not facts.is_known:
-        yield Finding(
-            "master:unknown",
-            "error",
-            _("No computer is called “{host}” here, so no master is found.").format(
-                host=host_of(facts.address)
-            ),
-            _("Look for a typing error, or write its address in numbers."),
-        )
+        yield _unknown_host(facts)
     elif holder is not None and holder.is_master:
-        yield Finding(
-            "master:hung",
-            "error",
-            _("The master at {master} does not answer; it hangs or is halted.").format(
-                master=_master(facts, holder)
-            ),
-            _("End it and start a new one; programs that have found each other go on meanwhile."),
-            command=_kill(facts, holder),
-        )
+        yield _hung(facts, holder)
     elif port is not None and port.is_taken:
-        other = _other_port(number)
-        yield Finding(
-            "master:foreign",
-            "error",
-            _("Port {number} is held by {program}, which is no master.").format(
-                number=number, program=_who(holder)
-            ),
-            _(
-                "End that program, or start the master on port {other} and tell it to all programs "
-                "(NEP_MASTER=127.0.0.1:{other})."
-            ).format(other=other),
-            command=f"nep master --port {other}",
-        )
+        yield _foreign(facts, holder)
     else:
-        yield Finding(
-            "master:none",
-            "error",
-            _("No master runs at {address}, so new programs cannot find each other.").format(
-                address=facts.address
-            ),
-            _("Start one.")
-            if is_loopback(facts.address)
-            else _("Start one on that computer, and check that it is in the same network."),
-            command="nep master" if number == "7780" else f"nep master --port {number}",
-        )
+        yield _none(facts)
     yield from _several(facts)
+
+
+def _unknown_host(facts: Facts) -> Finding:
+    return Finding(
+        "master:unknown",
+        "error",
+        _("No computer is called “{host}” here, so no master is found.").format(host=host_of(facts.address)),
+        _("Look for a typing error, or write its address in numbers."),
+    )
+
+
+def _hung(facts: Facts, holder: ProcessFact) -> Finding:
+    return Finding(
+        "master:hung",
+        "error",
+        _("The master at {master} does not answer; it hangs or is halted.").format(
+            master=_master(facts, holder)
+        ),
+        _("End it and start a new one; programs that have found each other go on meanwhile."),
+        command=_kill(facts, holder),
+    )
+
+
+def _foreign(facts: Facts, holder: ProcessFact | None) -> Finding:
+    number = facts.address.rpartition(":")[2]
+    other = _other_port(number)
+    return Finding(
+        "master:foreign",
+        "error",
+        _("Port {number} is held by {program}, which is no master.").format(
+            number=number, program=_who(holder)
+        ),
+        _(
+            "End that program, or start the master on port {other} and tell it to all programs "
+            "(NEP_MASTER=127.0.0.1:{other})."
+        ).format(other=other),
+        command=f"nep master --port {other}",
+    )
+
+
+def _none(facts: Facts) -> Finding:
+    number = facts.address.rpartition(":")[2]
+    return Finding(
+        "master:none",
+        "error",
+        _("No master runs at {address}, so new programs cannot find each other.").format(
+            address=facts.address
+        ),
+        _("Start one.")
+        if is_loopback(facts.address)
+        else _("Start one on that computer, and check that it is in the same network."),
+        command="nep master" if number == "7780" else f"nep master --port {number}",
+    )
 
 
 def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
