@@ -34,7 +34,11 @@ _SLICE_S = 0.02
 """How long one topic is waited for while others may have something."""
 
 
-_MoreArgument = Annotated[
+TopicArgument = Annotated[
+    str,
+    typer.Argument(help=_("The topic to look into."), show_default=False, autocompletion=complete_topic),
+]
+MoreArgument = Annotated[
     list[str] | None,
     typer.Argument(
         metavar=_("TOPIC|FIELD"),
@@ -43,26 +47,26 @@ _MoreArgument = Annotated[
         autocompletion=complete_more,
     ),
 ]
+CountOption = Annotated[
+    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N messages; 0 goes on."))
+]
+CsvOption = Annotated[
+    bool, typer.Option("--csv", help=_("Write the fields as comma-separated values, with their time."))
+]
+FullOption = Annotated[
+    bool, typer.Option("--full", help=_("Show long lists and texts whole, on a terminal too."))
+]
 
 
 def echo(
-    topic: Annotated[
-        str,
-        typer.Argument(help=_("The topic to look into."), show_default=False, autocompletion=complete_topic),
-    ],
-    more: _MoreArgument = None,
-    count: Annotated[
-        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N messages; 0 goes on."))
-    ] = 0,
+    topic: TopicArgument,
+    more: MoreArgument = None,
+    count: CountOption = 0,
     timeout_s: TimeoutOption = None,
     master: MasterOption = None,
     as_json: JsonOption = False,
-    as_csv: Annotated[
-        bool, typer.Option("--csv", help=_("Write the fields as comma-separated values, with their time."))
-    ] = False,
-    full: Annotated[
-        bool, typer.Option("--full", help=_("Show long lists and texts whole, on a terminal too."))
-    ] = False,
+    as_csv: CsvOption = False,
+    full: FullOption = False,
 ) -> None:
     """Show the messages of topics as they come. Ctrl+C ends it.
 
@@ -81,13 +85,13 @@ def echo(
         picked = Fields(fields)
         waiting = Waiting(node, topics)
         waiting.look(graph)
-        is_one = len(topics) == 1
+        show: Callable[[Message], object]
         if as_csv:
-            show: Callable[[Message], object] = Table(picked, names_topic=not is_one)
+            show = Table(picked, names_topic=len(topics) > 1)
         elif as_json:
             show = partial(show_record, fields=picked)
         else:
-            show = Lines(picked, names_topic=not is_one, whole=full)
+            show = Lines(picked, names_topic=len(topics) > 1, whole=full)
         subscribers = [opened.enter_context(node.new_sub(each, waiting.msg_type(each))) for each in topics]
         try:
             for message in itertools.islice(_coming(subscribers, timeout_s, waiting), count or None):
