@@ -112,9 +112,8 @@ class Network:
         self._robot_of |= {event.topic: robot.name for robot in robots for event in robot.events}
         self._lock = threading.RLock()
         self._calls: dict[str, RobotCall] = {}
-        self._stops: dict[
-            str, tuple[str, set[str]]
-        ] = {}  # stop's id -> robot, and the nodes that must answer
+        # stop's id -> robot, and the nodes that must answer
+        self._stops: dict[str, tuple[str, set[str]]] = {}
         self._own_stops: set[str] = set()
         self._newest: dict[str, Message] = {}
         self._told: dict[str, list[Told]] = {}
@@ -126,17 +125,23 @@ class Network:
         self._closed = threading.Event()
         self._ending = False
         self._motions = Motions(self._rest, self._stand, self.invoke)
-        for robot in robots:
+        self._alive = Heartbeat(program, "program alive")
+        self._open((*sensors, *events), publishes, listens)
+
+    def _open(
+        self, parts: Iterable[tuple[str, str]], publishes: Iterable[str], listens: Iterable[str]
+    ) -> None:
+        """Make what the program is known to need, know who is there, and begin to say that it lives."""
+        for robot in self._robots.values():
             self._meet(robot)
-        for name, sensor in (*sensors, *events):
-            self._subscribe(self._topic(name, sensor))
+        for name, part in parts:
+            self._subscribe(self._topic(name, part))
         for topic in publishes:
             self._publisher(topic)
         for topic in listens:
             self._subscribe(topic)
         with suppress(NepError):  # the master has gone since: what is not known yet is looked for later
             self._look()
-        self._alive = Heartbeat(program, "program alive")
         for robot in self._robots.values():
             if robot.dialect != "rize":
                 self._alive.beat(robot.name, self._publishers[robot.topics.command].publish)
