@@ -83,7 +83,20 @@ class SettingsSheet(Overlay):
         head.addWidget(close)
         self._inside = QWidget()
         self._inside.setProperty("bare", "true")
-        grid = QGridLayout(self._inside)
+        self._fill(QGridLayout(self._inside))
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.viewport().setAutoFillBackground(False)
+        self._area.setWidget(self._inside)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 14, 1, 16)
+        column.setSpacing(12)
+        column.addLayout(head)
+        column.addWidget(self._area, 1)
+
+    def _fill(self, grid: QGridLayout) -> None:
+        """A row for each setting: what it is called, and its control."""
         grid.setContentsMargins(19, 4, 19, 4)
         grid.setHorizontalSpacing(16)
         grid.setVerticalSpacing(12)
@@ -111,16 +124,6 @@ class SettingsSheet(Overlay):
                 grid.addWidget(control, row, 1, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
             else:
                 grid.addLayout(control, row, 1)
-        self._area = QScrollArea()
-        self._area.setWidgetResizable(True)
-        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._area.viewport().setAutoFillBackground(False)
-        self._area.setWidget(self._inside)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(1, 14, 1, 16)
-        column.setSpacing(12)
-        column.addLayout(head)
-        column.addWidget(self._area, 1)
 
     def first(self) -> QWidget:
         if isinstance(self.language, ComboBox):
