@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TextIO
@@ -79,12 +79,9 @@ def run_file(
             used = [robot for robot in found.robots if robot.name in program.robots]
             if not allow_moving and _would_move(program, used, say):
                 return MAY_NOT_MOVE
-            stopper = RobotStopper(node)
-            try:
+            with closing(RobotStopper(node)) as stopper:
                 stopper.set_robots(StopTarget(robot, found.owners.get(robot.name)) for robot in used)
                 return _run(program, found, _Reach(master, node, stopper), say, ending)
-            finally:
-                stopper.close()
     except KeyboardInterrupt:
         return INTERRUPTED
     except (AppError, NepError) as error:
