@@ -13,7 +13,7 @@ KEY = "tabs"
 
 
 class KeptTabs:
-    """Writes the tabs into the settings whenever they change, and opens them again."""
+    """Keeps in the settings which tabs are open, and opens them again at the next start."""
 
     def __init__(self, settings: Settings, documents: Documents, complain: Callable[[str], object]) -> None:
         """``complain`` is told, in a sentence, that they can't be kept."""
