@@ -35,6 +35,18 @@ LAYERS = (
 )
 PLUG_INS = {"PANEL", "CATEGORY", "ROBOT", "BACKEND"}
 QT = {"PySide6", "shiboken6", "PyQt6", "PyQt5"}
+SMALL_LINES = 60
+# Small modules that one other module alone imports, and what each earns its file by (docs/adr/0020-rooms.md).
+EARNED = {
+    "nep.public": "a seam: imported at the first use of a name of `nep`, all of them at once",
+    "nep.cli.doctor": "one of a list: the commands of nep",
+    "nep.cli.interrupts": "imported before all else of a command, under the guard of its caller",
+    "nep.masters.rates": "pure, and tested alone",
+    "app.core.documents.saved_tabs": "tested alone, with settings and documents that are its own",
+    "app.ui.panels.registry": "a seam: panels, ours and those of plug-ins, are found through it",
+    "app.ui.shell.dialogs.about": "one of a list: the sheets; tested alone",
+    "app.ui.widgets.inputs.switch": "one of a list: the widgets; two use it through their face",
+}
 
 
 class Import(NamedTuple):
@@ -113,6 +125,25 @@ def sleeps(tree: ast.AST) -> list[int]:
     ]
 
 
+def small_with_one_importer(found: Iterable[Module]) -> set[str]:
+    """Modules of less than `SMALL_LINES` that one other imports; plug-ins are found by their folder."""
+    known = {module.name: module for module in found}
+    importers: dict[str, set[str]] = {name: set() for name in known}
+    for module in known.values():
+        for item in imports(module.tree):
+            target = item.target if item.target in known else item.target.rpartition(".")[0]
+            if target in known and target != module.name:
+                importers[target].add(module.name)
+    return {
+        name
+        for name, module in known.items()
+        if len(importers[name]) == 1
+        and module.path.name != "__init__.py"
+        and not bound_plug_ins(module.tree)
+        and len(module.path.read_text(encoding="utf-8").splitlines()) < SMALL_LINES
+    }
+
+
 def bound_plug_ins(tree: ast.Module) -> set[str]:
     """Which of the plug-in names a module binds."""
     targets = [
@@ -182,6 +213,27 @@ def test_plug_ins_do_not_import_each_other() -> None:
         if item.target in plug_ins or item.target.rpartition(".")[0] in plug_ins
     ]
     assert faults == []
+
+
+def test_a_small_module_with_one_importer_earns_its_file() -> None:
+    assert small_with_one_importer(modules()) == EARNED.keys()
+
+
+def test_a_small_module_with_one_importer_is_found(tmp_path: Path) -> None:
+    def module(name: str, source: str) -> Module:
+        path = tmp_path / f"{name}.py"
+        path.write_text(source, encoding="utf-8")
+        return Module(name, path, ast.parse(source))
+
+    long = "x = 1\n" * SMALL_LINES
+    made = [
+        module("a", "import b, d\ndef f():\n    from c import x\n    from plug import y\n"),
+        module("b", "x = 1\n"),
+        module("c", long),
+        module("d", "import b\n"),
+        module("plug", "PANEL = 1\n"),
+    ]
+    assert small_with_one_importer(made) == {"d"}
 
 
 def classes_with_two_meanings(found: Iterable[Module]) -> dict[str, list[str]]:
