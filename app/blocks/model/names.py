@@ -1,4 +1,4 @@
-"""Names for a program: what people call things, as names that Python takes."""
+"""Names for a program: what people call things, as names that Python takes, each given out once."""
 
 from __future__ import annotations
 
@@ -6,8 +6,28 @@ import builtins
 import keyword
 import re
 import unicodedata
+from collections.abc import Iterable
 
 _GAPS = re.compile(r"\W+")
+
+
+class Unique:
+    """Hands out each text once: one that is taken gets a number behind it, from 2 on."""
+
+    def __init__(self, before_number: str, taken: Iterable[str] = ()) -> None:
+        """`before_number` stands between text and number; `taken` are given out already."""
+        self._before_number = before_number
+        self._taken = set(taken)
+        self._next: dict[str, int] = {}  # the number to go on with: 4000 scripts may have one name
+
+    def of(self, text: str) -> str:
+        """The text, or the first of its numbers that nobody has."""
+        made, number = text, self._next.get(text, 2)
+        while made in self._taken:
+            made, number = f"{text}{self._before_number}{number}", number + 1
+        self._next[text] = number
+        self._taken.add(made)
+        return made
 
 
 class Names:
@@ -15,8 +35,7 @@ class Names:
 
     def __init__(self, taken: frozenset[str]) -> None:
         """`taken` are names that the program has already, besides Python's own."""
-        self._taken = {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
-        self._next: dict[str, int] = {}  # the number to go on with: 4000 scripts may have one name
+        self._unique = Unique("_", {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)})
 
     def new(self, words: str, otherwise: str) -> str:
         """A name that reads like `words`, such as ``when_started_2``.
@@ -29,10 +48,4 @@ class Names:
             longer = f"{otherwise}_{plain}"
             plain = longer if plain and longer.isidentifier() else otherwise
         plain = unicodedata.normalize("NFKC", plain)
-        name = stem = plain.lower() if plain.isascii() else plain
-        number = self._next.get(stem, 2)
-        while name in self._taken:
-            name, number = f"{stem}_{number}", number + 1
-        self._next[stem] = number
-        self._taken.add(name)
-        return name
+        return self._unique.of(plain.lower() if plain.isascii() else plain)

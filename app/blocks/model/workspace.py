@@ -9,6 +9,8 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from app.blocks.model.names import Unique
+
 MAX_DEPTH = 40
 _MANUAL = "MANUALLY_DISABLED"
 
@@ -73,8 +75,8 @@ def parse_workspace(saved: Mapping[str, object]) -> Workspace:
     """The workspace of Blockly's JSON, whatever it holds."""
     blocks = saved.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
-    numbers = _Numbers()
-    scripts = tuple(_chain(top, 0, numbers, shadow=False) for top in _list(tops))
+    ids = Unique("~")
+    scripts = tuple(_chain(top, 0, ids, shadow=False) for top in _list(tops))
     variables: dict[str, str] = {}
     for variable in _list(saved.get("variables")):
         if isinstance(variable, Mapping) and isinstance(variable.get("id"), str):
@@ -82,49 +84,33 @@ def parse_workspace(saved: Mapping[str, object]) -> Workspace:
     return Workspace(tuple(script for script in scripts if script), variables)
 
 
-class _Numbers:
-    """Ids for blocks that have none, or one that another has already."""
-
-    def __init__(self) -> None:
-        self._seen: set[str] = set()
-        self._next: dict[str, int] = {}  # the number to go on with: all blocks of a file may have one id
-
-    def id(self, saved: object) -> str:
-        made = stem = saved if isinstance(saved, str) and saved else "block"
-        number = self._next.get(stem, 2)
-        while made in self._seen:
-            made, number = f"{stem}~{number}", number + 1
-        self._next[stem] = number
-        self._seen.add(made)
-        return made
-
-
 def _list(saved: object) -> Sequence[object]:
     return saved if isinstance(saved, (list, tuple)) else ()
 
 
-def _chain(saved: object, depth: int, numbers: _Numbers, *, shadow: bool) -> tuple[Placed, ...]:
+def _chain(saved: object, depth: int, ids: Unique, *, shadow: bool) -> tuple[Placed, ...]:
     """A block and all that follow it; a loop, because a script may be long."""
     chain: list[Placed] = []
     while isinstance(saved, Mapping) and isinstance(saved.get("type"), str):
-        chain.append(_block(saved, depth, numbers, shadow=shadow))
+        chain.append(_block(saved, depth, ids, shadow=shadow))
         following = saved.get("next")
         saved = following.get("block") if isinstance(following, Mapping) else None
     return tuple(chain)
 
 
-def _block(saved: Mapping[str, object], depth: int, numbers: _Numbers, *, shadow: bool) -> Placed:
+def _block(saved: Mapping[str, object], depth: int, ids: Unique, *, shadow: bool) -> Placed:
     fields = saved.get("fields")
     raw = saved.get("inputs")
     connections = raw if isinstance(raw, Mapping) else {}
     inputs: dict[str, tuple[Placed, ...]] = {}
-    id = numbers.id(saved.get("id"))
+    saved_id = saved.get("id")
+    id = ids.of(saved_id if isinstance(saved_id, str) and saved_id else "block")
     if depth < MAX_DEPTH:
         for name, connection in connections.items():
             if isinstance(connection, Mapping):
                 real = connection.get("block")
                 inner = real if isinstance(real, Mapping) else connection.get("shadow")
-                inputs[str(name)] = _chain(inner, depth + 1, numbers, shadow=not isinstance(real, Mapping))
+                inputs[str(name)] = _chain(inner, depth + 1, ids, shadow=not isinstance(real, Mapping))
     return Placed(
         id=id,
         type=str(saved["type"]),
