@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.ui.widgets import Chip, Elided, StatusItem
+from app.ui.widgets.table.cells import PADDING, Head, head_font
 
 SLACK = 1.5
 LONGER = 0.35
@@ -54,7 +55,11 @@ def longer(text: str) -> str:
 
 def clipped(root: QWidget) -> list[str]:
     """What does not fit, one sentence each."""
-    return [fault for widget in shown(root) for fault in _faults(widget, root)]
+    heads = [widget for widget in shown(root) if isinstance(widget, Head)]
+    return [
+        *(fault for widget in shown(root) for fault in _faults(widget, root)),
+        *(fault for head in heads for fault in _heads(head)),
+    ]
 
 
 def sideways(root: QWidget) -> list[str]:
@@ -88,6 +93,22 @@ def _faults(widget: QWidget, root: QWidget) -> Iterator[str]:
         cut = _cut(widget, root)
         if cut:
             yield f"{said} is cut by {cut}"
+
+
+def _heads(head: Head) -> Iterator[str]:
+    """The heads of a table that have too little room, and no tip that says the whole."""
+    model, across = head.model(), Qt.Orientation.Horizontal
+    for place in range(head.count()):
+        words = str(model.headerData(place, across, Qt.ItemDataRole.DisplayRole))
+        tip = str(model.headerData(place, across, Qt.ItemDataRole.ToolTipRole))
+        wide, needed = head.sectionSize(place), head_needs(head, words)
+        if not head.isSectionHidden(place) and wide < needed and words not in tip:
+            yield f"the head “{words}” is {wide} wide and needs {needed:.0f}"
+
+
+def head_needs(head: Head, words: str) -> float:
+    """How wide a column is whose head is not shortened."""
+    return QFontMetricsF(head_font(head._theme)).horizontalAdvance(words) + 2 * PADDING
 
 
 def _label(label: QLabel, said: str) -> Iterator[str]:

@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 import pytest
 from PySide6.QtCore import QAbstractItemModel, QAbstractListModel, QModelIndex, Qt
+from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
 
 from app.robots.description.inputs import Parameter
@@ -16,14 +17,17 @@ from app.robots.description.model import Robot
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.behaviour import panel as behaviour
 from app.ui.panels.inspector.tree_view import TreeView
+from app.ui.panels.nodes import rows as nodes
+from app.ui.panels.topics import columns as topics
 from app.ui.shell.docking.dock import Dock
 from app.ui.theme.theme import Theme
-from app.ui.widgets.table.cells import head_width
+from app.ui.widgets.table.cells import PADDING, head_font, head_width
 from tests.pseudo import ROOT, texts_of, untranslated
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
 from tests.ui.panels.test_behaviour import Editor
 from tests.ui.show_panels import SIZES, prepare
+from tools import words
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 Show = Callable[[str, Session], AbstractContextManager[tuple[Dock, PanelWidget]]]
@@ -200,6 +204,18 @@ def test_the_head_of_a_table_takes_the_room_that_is_left(pseudo, shown, name) ->
         for place, column in enumerate(table.columns):
             assert table.columnWidth(place) >= head_width(table.theme, column) or table.isColumnHidden(place)
             assert table.model().headerData(place, Qt.Orientation.Horizontal, Qt.ItemDataRole.ToolTipRole)
+
+
+@pytest.mark.parametrize("language", words.languages(words.LOCALE))
+@pytest.mark.parametrize("columns", [topics.COLUMNS, nodes.COLUMNS], ids=["topics", "nodes"])
+def test_the_heads_of_the_narrowest_tables_are_whole_in_every_language(theme, language, columns) -> None:
+    """Else a translator finds a shorter word: the table gives a column no more room where it is narrow."""
+    catalog = words.read(words.po_file(words.LOCALE, language), language)
+    metrics = QFontMetricsF(head_font(theme))
+    for column in columns:
+        entry = catalog.get(column.title, getattr(column.title, "context", None))
+        for head in (column.title, entry.string if entry is not None else ""):
+            assert metrics.horizontalAdvance(head) + 2 * PADDING <= column.width, head
 
 
 def bare_words(folder: str) -> Iterator[str]:

@@ -143,7 +143,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
     Column(
         "subscribers",
         lazy("Subscribers"),
-        80,
+        82,
         subscribers_cell,
         lambda t: t.subscribers,
         figures=True,
@@ -151,7 +151,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
     ),
     Column("nodes", lazy("Published by"), 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
     Column("curve", "", 50, curve_cell, yields=5, words=lazy("Rate over time"), tip=_curve_tip),
-    Column("rate", lazy("Rate /s"), 53, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
+    Column("rate", lazy("Rate /s"), 56, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
     Column(
         "bandwidth", lazy("Bandwidth"), 75, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3
     ),
