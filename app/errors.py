@@ -20,6 +20,7 @@ next step behind a semicolon.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 from nep.i18n import _
 from nep.text import escaped, shortened
@@ -103,22 +104,45 @@ class DeclarationError(DescriptionError):
         self.args = (self.sentence,)
 
 
-class RobotInputError(AppError):
-    """An action's input that the robot would refuse; ``sentences`` has one for each wrong value."""
+class InputProblem(NamedTuple):
+    """What is wrong with one value of an action's input.
 
-    def __init__(self, sentences: tuple[str, ...]) -> None:
+    ``parameter`` is the value's name, "" when it is no parameter's; ``sentence`` is whole.
+    """
+
+    parameter: str
+    sentence: str
+
+
+class RobotInputError(AppError):
+    """An action's input that the robot would refuse; ``sentences`` has one for each wrong value.
+
+    ``problems`` says of which value each one is.
+    """
+
+    def __init__(self, sentences: tuple[str, ...], problems: tuple[InputProblem, ...] = ()) -> None:
         """Make the sentence from all of them."""
         self.sentences = sentences
+        self.problems = problems or tuple(InputProblem("", sentence) for sentence in sentences)
         super().__init__("; ".join(sentences))
 
 
 class RobotValueError(AppError, ValueError):
-    """What a driver tells is not of the type that it declared; ``reason`` says what it must be instead."""
+    """What a driver tells is not of the type that it declared.
 
-    def __init__(self, reason: str) -> None:
-        """Make the sentence from the reason."""
-        self.reason = reason
-        super().__init__(reason)
+    ``place`` says which value inside is meant; "" is the whole of it.
+    """
+
+    def __init__(self, words: str, place: str = "", **holes: object) -> None:
+        """Make the sentence from its `lazy` words, the place (hole ``place``) and what fills the others."""
+        self.place = place
+        self._words, self._holes = words, holes
+        super().__init__(_(words).format(place=place or _("the value"), **holes))
+
+    def inside(self, outer: str) -> RobotValueError:
+        """The same of a value that this one is in."""
+        place = _("{place} {inner}").format(place=outer, inner=self.place) if self.place else outer
+        return RobotValueError(self._words, place, **self._holes)
 
 
 class RobotUnknownError(AppError):

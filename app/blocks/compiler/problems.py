@@ -219,12 +219,11 @@ class Notes:
             if found is not None:
                 given[name] = found
         # What is wrong without these values too is not these values' fault: they come when the program runs.
-        without = set(action.check(action.complete({})))
-        for sentence in action.check(action.complete(given)):
-            if sentence not in without:
+        without = set(action.problems(action.complete({})))
+        for problem in action.problems(action.complete(given)):
+            if problem not in without:
                 name = self.label(placed, block)
-                reason = sentence.partition(": ")[2] or sentence
-                self._note("error", placed, block, name, f"{name}: {reason}.")
+                self._note("error", placed, block, name, f"{name}: {problem.sentence}.")
 
     def _note(
         self,

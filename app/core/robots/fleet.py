@@ -168,7 +168,7 @@ class Fleet:
             raise RobotInputError((_("{robot} can't {action}").format(robot=name, action=action),))
         wrong = described.check(input)
         if wrong:
-            raise RobotInputError(tuple(wrong))
+            raise RobotInputError(wrong, described.problems(input))
         if not self.moving.permits([(link.robot, [action])], lambda: self._try_again(name, action, input)):
             raise MayNotMoveError([name])
         invocation = self._tries.begin(link, described, input)

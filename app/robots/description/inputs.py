@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from app.errors import InputProblem
 from app.robots.description.json_access import as_part, names, number, number_of, part, spoken, text
 from nep.i18n import _, listed, ngettext, translate
 from nep.i18n import number as number_text
@@ -74,9 +75,8 @@ def pretty_number(value: float) -> str:
 
 
 def near_miss(wrong: str, known: Iterable[str]) -> str:
-    """``; did you mean "turn"?`` when a known word is close, else nothing."""
-    close = difflib.get_close_matches(wrong, list(known), n=1)
-    return _("; did you mean “{word}”?").format(word=close[0]) if close else ""
+    """The known word that is close to a wrong one; "" when none is."""
+    return next(iter(difflib.get_close_matches(wrong, list(known), n=1)), "")
 
 
 def parameter_of(name: str, data: Mapping[str, object], *, required: bool = False) -> Parameter:
@@ -190,98 +190,121 @@ def _of_word(parameter: Parameter, word: str) -> object:
 
 def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -> tuple[str, ...]:
     """One sentence for each thing wrong with the input; empty when the robot may be asked."""
+    return tuple(f"{action}: {problem.sentence}" for problem in problems_of(parameters, given))
+
+
+def problems_of(parameters: tuple[Parameter, ...], given: object) -> tuple[InputProblem, ...]:
+    """What is wrong with each value of an input, in the order of the parameters; strange values first."""
     if not isinstance(given, Mapping):
-        return (_("{action}: the input must be an object with named values").format(action=action),)
+        return (InputProblem("", _("the input must be an object with named values")),)
     known = {parameter.name: parameter for parameter in parameters}
-    sentences = []
+    problems = []
     for name in given:
         if name not in known:
-            word = str(name)
-            sentences.append(
-                _("{action}: there is no “{word}”{did_you_mean}").format(
-                    action=action, word=word, did_you_mean=near_miss(word, known)
-                )
-            )
+            close = near_miss(str(name), known)
+            words = _("there is no “{word}”; did you mean “{close}”?") if close else _("there is no “{word}”")
+            problems.append(InputProblem("", words.format(word=name, close=close)))
     for name, parameter in known.items():
         if name in given and given[name] is None and parameter.nullable:
             continue
         if name in given:
             wrong = wrong_value(parameter, given[name])
             if wrong is not None:
-                sentences.append(f"{action}: {parameter.title} {wrong}")
+                problems.append(InputProblem(name, wrong))
         elif parameter.required:
-            sentences.append(f"{action}: {parameter.title} {_('is missing')}")
-    return tuple(sentences)
+            problems.append(InputProblem(name, _("{place} is missing").format(place=parameter.title)))
+    return tuple(problems)
 
 
-def wrong_value(parameter: Parameter, value: object) -> str | None:
-    """What a value must be instead ("must be a number"); None when it is good."""
+def wrong_value(parameter: Parameter, value: object, place: str = "") -> str | None:
+    """What a value must be instead ("speed must be a number"); None when it is good.
+
+    ``place`` is what the sentence calls it, the parameter's title when nothing is said.
+    """
+    place = place or parameter.title
     if parameter.choices:
         if any(_same(choice.value, value) for choice in parameter.choices):
             return None
-        return _("must be {choices}").format(
-            choices=listed([choice.title for choice in parameter.choices], "or")
+        return _("{place} must be {choices}").format(
+            place=place, choices=listed([choice.title for choice in parameter.choices], "or")
         )
     if parameter.kind in {"number", "integer", "angle"}:
-        return _wrong_number(parameter, value)
+        return _wrong_number(parameter, value, place)
     if parameter.kind == "boolean":
-        return None if isinstance(value, bool) else _("must be yes or no")
+        return None if isinstance(value, bool) else _("{place} must be yes or no").format(place=place)
     if parameter.kind == "colour":
         good = isinstance(value, str) and _COLOUR.fullmatch(value) is not None
-        return None if good else _("must be a colour like #20c0e0")
+        return None if good else _("{place} must be a colour like #20c0e0").format(place=place)
     if parameter.kind == "list":
-        return _wrong_list(parameter, value)
+        return _wrong_list(parameter, value, place)
     if parameter.kind == "object":
-        return _wrong_object(parameter, value)
-    return _wrong_text(parameter, value)
+        return _wrong_object(parameter, value, place)
+    return _wrong_text(parameter, value, place)
 
 
-def _wrong_list(parameter: Parameter, value: object) -> str | None:
+def _wrong_list(parameter: Parameter, value: object, place: str) -> str | None:
     if not isinstance(value, (list, tuple)):
-        return _("must be a list")
+        return _("{place} must be a list").format(place=place)
     least, most = parameter.min_length, parameter.max_length
     if least == most and len(value) != least:
-        return ngettext("must have {count} value", "must have {count} values", least).format(count=least)
+        words = ngettext("{place} must have {count} value", "{place} must have {count} values", least)
+        return words.format(place=place, count=least)
     if len(value) < least:
-        return ngettext(
-            "must have at least {count} value", "must have at least {count} values", least
-        ).format(count=least)
-    if most is not None and len(value) > most:
-        return ngettext("must have at most {count} value", "must have at most {count} values", most).format(
-            count=most
+        words = ngettext(
+            "{place} must have at least {count} value", "{place} must have at least {count} values", least
         )
-    for place, item in enumerate(value):
-        held = parameter.places[place] if place < len(parameter.places) else parameter.each
-        wrong = None if held is None else wrong_value(held, item)
+        return words.format(place=place, count=least)
+    if most is not None and len(value) > most:
+        words = ngettext(
+            "{place} must have at most {count} value", "{place} must have at most {count} values", most
+        )
+        return words.format(place=place, count=most)
+    for at, item in enumerate(value):
+        held = parameter.places[at] if at < len(parameter.places) else parameter.each
+        inner = _("{place} value {number}").format(place=place, number=at + 1)
+        wrong = None if held is None else wrong_value(held, item, inner)
         if held is None and not _is_json(item):
-            wrong = _("is nothing that a list can hold")
+            wrong = _("{place} is nothing that a list can hold").format(place=inner)
         if wrong is not None:
-            return _("value {place} {wrong}").format(place=place + 1, wrong=wrong)
+            return wrong
     return None
 
 
-def _wrong_object(parameter: Parameter, value: object) -> str | None:
+def _wrong_object(parameter: Parameter, value: object, place: str) -> str | None:
     if not isinstance(value, Mapping):
-        return _("must be an object with named values")
+        return _("{place} must be an object with named values").format(place=place)
     known = {field.name: field for field in parameter.fields}
     for name, field in known.items():
         if name not in value and not field.required:
             continue
         if name in value and value[name] is None and field.nullable:
             continue
-        wrong = wrong_value(field, value[name]) if name in value else _("is missing")
+        inner = _("{place} {inner}").format(place=place, inner=field.title)
+        if name not in value:
+            return _("{place} is missing").format(place=inner)
+        wrong = wrong_value(field, value[name], inner)
         if wrong is not None:
-            return f"{field.title} {wrong}"
-    for name, item in value.items():
-        if name in known:
-            continue
-        wrong = None if parameter.each is None else wrong_value(parameter.each, item)
-        if known and parameter.each is None:
-            return _("has no “{word}”{did_you_mean}").format(
-                word=name, did_you_mean=near_miss(str(name), known)
+            return wrong
+    others = {name: item for name, item in value.items() if name not in known}
+    return _wrong_other(parameter, others, place)
+
+
+def _wrong_other(parameter: Parameter, others: Mapping[str, object], place: str) -> str | None:
+    """The same of what an object holds besides its fields."""
+    known = [field.name for field in parameter.fields]
+    for name, item in others.items():
+        if parameter.each is not None:
+            wrong = wrong_value(parameter.each, item, _("{place} “{name}”").format(place=place, name=name))
+            if wrong is not None:
+                return wrong
+        elif known:
+            close = near_miss(str(name), known)
+            words = (
+                _("{place} has no “{word}”; did you mean “{close}”?")
+                if close
+                else _("{place} has no “{word}”")
             )
-        if wrong is not None:
-            return f"“{name}” {wrong}"
+            return words.format(place=place, word=name, close=close)
     return None
 
 
@@ -298,21 +321,23 @@ def _same(allowed: object, given: object) -> bool:
     return allowed == given and isinstance(allowed, bool) == isinstance(given, bool)
 
 
-def _wrong_number(parameter: Parameter, value: object) -> str | None:
+def _wrong_number(parameter: Parameter, value: object, place: str) -> str | None:
     whole = parameter.kind == "integer"
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not _is_finite(value):
-        return _("must be a whole number") if whole else _("must be a number")
+        words = _("{place} must be a whole number") if whole else _("{place} must be a number")
+        return words.format(place=place)
     if whole and float(value) != int(value):
-        return _("must be a whole number")
+        return _("{place} must be a whole number").format(place=place)
     low, high = parameter.minimum, parameter.maximum
     if (low is None or value >= low) and (high is None or value <= high):
         return None
     unit = "" if parameter.unit is None else f" {parameter.unit}"
     if low is not None and high is not None:
-        return _("must be between {low} and {high}").format(low=_shown(low), high=f"{_shown(high)}{unit}")
+        words = _("{place} must be between {low} and {high}")
+        return words.format(place=place, low=_shown(low), high=f"{_shown(high)}{unit}")
     if low is not None:
-        return _("must be at least {low}").format(low=f"{_shown(low)}{unit}")
-    return _("must be at most {high}").format(high=f"{_shown(high or 0.0)}{unit}")
+        return _("{place} must be at least {limit}").format(place=place, limit=f"{_shown(low)}{unit}")
+    return _("{place} must be at most {limit}").format(place=place, limit=f"{_shown(high or 0.0)}{unit}")
 
 
 def _is_finite(value: float) -> bool:
@@ -322,21 +347,23 @@ def _is_finite(value: float) -> bool:
         return False
 
 
-def _wrong_text(parameter: Parameter, value: object) -> str | None:
+def _wrong_text(parameter: Parameter, value: object, place: str) -> str | None:
     if not isinstance(value, str):
-        return _("must be text")
+        return _("{place} must be text").format(place=place)
     if len(value) < parameter.min_length:
-        return (
-            _("must not be empty")
+        words = (
+            _("{place} must not be empty")
             if parameter.min_length == 1
-            else _("needs {count} characters").format(count=parameter.min_length)
+            else _("{place} needs {count} characters")
         )
+        return words.format(place=place, count=parameter.min_length)
     if parameter.max_length is not None and len(value) > parameter.max_length:
-        return ngettext(
-            "must be at most {count} character long",
-            "must be at most {count} characters long",
+        words = ngettext(
+            "{place} must be at most {count} character long",
+            "{place} must be at most {count} characters long",
             parameter.max_length,
-        ).format(count=parameter.max_length)
+        )
+        return words.format(place=place, count=parameter.max_length)
     return None
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from app.robots.description.inputs import Choice, Parameter, check_input
+from app.errors import InputProblem
+from app.robots.description.inputs import Choice, Parameter, check_input, problems_of
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,10 @@ class Action:
     def check(self, given: object) -> tuple[str, ...]:
         """One sentence for each thing wrong with an input; empty when the robot may be asked."""
         return check_input(self.name, self.parameters, given)
+
+    def problems(self, given: object) -> tuple[InputProblem, ...]:
+        """The same, each with the parameter that it is about, and without the action's name."""
+        return problems_of(self.parameters, given)
 
     def complete(self, given: Mapping[str, object]) -> dict[str, object]:
         """The input with the defaults of everything it leaves out."""

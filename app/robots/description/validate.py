@@ -222,9 +222,10 @@ def _of_data(place: str, data: Mapping[str, object]) -> Iterator[str]:
     if isinstance(low, (int, float)) and isinstance(high, (int, float)) and low > high:
         yield _("{place}: minimum {low} is above maximum {high}").format(place=place, low=low, high=high)
     elif data.get("default") is not None:
-        wrong = wrong_value(parameter_of(place, data), data["default"])
+        default = _("{place}: the default").format(place=place)
+        wrong = wrong_value(parameter_of(place, data), data["default"], default)
         if wrong is not None:
-            yield _("{place}: the default {wrong}").format(place=place, wrong=wrong)
+            yield wrong
 
 
 def _of_texts(place: str, owner: Mapping[str, object], fields: Mapping[str, object]) -> Iterator[str]:

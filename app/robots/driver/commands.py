@@ -125,11 +125,11 @@ class Desk:
 
     def unknown(self, name: str) -> str:
         """The sentence for an action that the robot has not."""
-        return _("{robot} can't “{action}”{did_you_mean}").format(
-            robot=self._robot.name,
-            action=name,
-            did_you_mean=near_miss(name, [each.name for each in self._robot.actions]),
+        close = near_miss(name, [each.name for each in self._robot.actions])
+        words = (
+            _("{robot} can't “{action}”; did you mean “{close}”?") if close else _("{robot} can't “{action}”")
         )
+        return words.format(robot=self._robot.name, action=name, close=close)
 
     def _invoke(
         self, wanted: str, name: str, given: object, program: ProgramId | None, publisher: int | None

@@ -24,7 +24,7 @@ from app.robots.driver.declare import Kind
 from app.robots.driver.rize_dialect import Dialect
 from app.robots.driver.schema_values import told_fields
 from app.robots.driver.tasks import Tasks
-from nep.i18n import _, number
+from nep.i18n import _, lazy, number
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -162,12 +162,8 @@ class Driver:
         try:
             told = spec.told(value)
         except RobotValueError as error:
-            words = (
-                _("{robot}'s sensor '{sensor}': {error}")
-                if spec.is_object
-                else _("{robot}'s sensor '{sensor}': the value {error}")
-            )
-            raise RobotValueError(words.format(robot=self.name, sensor=sensor, error=error)) from error
+            words = lazy("{robot}'s sensor '{sensor}': {error}")
+            raise RobotValueError(words, robot=self.name, sensor=sensor, error=error) from error
         self._publish(topic_of(self.name, sensor), told)
 
     def happen(self, event: str, **data: object) -> None:
@@ -179,9 +175,8 @@ class Driver:
         try:
             data = told_fields(spec.fields, data)
         except RobotValueError as error:
-            raise RobotValueError(
-                _("{robot}'s event '{event}': {error}").format(robot=self.name, event=event, error=error)
-            ) from error
+            words = lazy("{robot}'s event '{event}': {error}")
+            raise RobotValueError(words, robot=self.name, event=event, error=error) from error
         self._publish(topic_of(self.name, event), data)
         if spec.to_rize is not None:
             primitive, given = spec.to_rize(data)

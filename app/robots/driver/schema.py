@@ -286,7 +286,7 @@ def _default(kind: object, default: object, name: str) -> object:
     try:
         return told(kind, default)
     except RobotValueError as error:
-        raise TypeError(_("the default of '{name}' {error}").format(name=name, error=error)) from error
+        raise TypeError(str(error.inside(_("the default of '{name}'").format(name=name)))) from error
 
 
 def fields_schema(fields: Mapping[str, object]) -> Schema:

@@ -1,7 +1,7 @@
 """The values of typed Python: what a type is made of, and its values from JSON and to JSON.
 
 :func:`given` makes what a function takes from JSON that its description allows; :func:`told` makes JSON of
-what a driver tells, and raises RobotValueError with what it must be: "must be a number, not 'far'".
+what a driver tells, and raises RobotValueError with what it must be: "the value must be a number, not 'far'".
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from nep.i18n import _, lazy, listed
 
 _LONGEST_SHOWN = 40
 _SIMPLE = {
-    bool: lazy("must be True or False, not {value}"),
-    str: lazy("must be text, not {value}"),
-    int: lazy("must be a whole number, not {value}"),
-    float: lazy("must be a number, not {value}"),
+    bool: lazy("{place} must be True or False, not {value}"),
+    str: lazy("{place} must be text, not {value}"),
+    int: lazy("{place} must be a whole number, not {value}"),
+    float: lazy("{place} must be a number, not {value}"),
 }
 _DEEPEST = 40
 
@@ -154,9 +154,9 @@ def told(annotation: object, value: object) -> object:
         if not found:
             words = [str(json) for json, _python, _title in choices]
             raise RobotValueError(
-                _("must be {choices}, not {value}").format(
-                    choices=listed(words, "or"), value=_shown_value(value)
-                )
+                lazy("{place} must be {choices}, not {value}"),
+                choices=listed(words, "or"),
+                value=_shown_value(value),
             )
         return found[0]
     if kind in (float, int, bool, str):
@@ -181,7 +181,7 @@ def told_fields(
     if not isinstance(value, Mapping):
         wanted = listed(list(kinds)) or _("named values")
         raise RobotValueError(
-            _("must have {names}, not be {value}").format(names=wanted, value=_shown_value(value))
+            lazy("{place} must have {names}, not be {value}"), names=wanted, value=_shown_value(value)
         )
     made: dict[str, object] = {}
     for name, each in value.items():
@@ -189,10 +189,10 @@ def told_fields(
             is_unknown = each is None and name not in required
             made[str(name)] = told(kinds[name], each) if name in kinds and not is_unknown else plain(each)
         except RobotValueError as error:
-            raise RobotValueError(f"{name} {error}") from error
+            raise error.inside(str(name)) from error
     for name in required:
         if name not in made:
-            raise RobotValueError(_("{name} is missing").format(name=name))
+            raise RobotValueError(lazy("{place} is missing"), name)
     return made
 
 
@@ -208,22 +208,22 @@ def plain(value: object, depth: int = 0) -> object:
     if isinstance(value, numbers.Real):
         return float(value)
     if depth > _DEEPEST:
-        raise RobotValueError(_("is nested too deeply"))
+        raise RobotValueError(lazy("{place} is nested too deeply"))
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(name): plain(item, depth + 1) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item, depth + 1) for item in value]
-    raise RobotValueError(_("must be what JSON has, not {value}").format(value=_shown_value(value)))
+    raise RobotValueError(lazy("{place} must be what JSON has, not {value}"), value=_shown_value(value))
 
 
 def check_sendable(value: object) -> None:
     """RobotValueError when a message can't hold a JSON value: an endless number, half a letter."""
     if isinstance(value, str) and not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
-        raise RobotValueError(_("must be text of whole letters"))
+        raise RobotValueError(lazy("{place} must be text of whole letters"))
     if isinstance(value, float) and not math.isfinite(value):
-        raise RobotValueError(_("must be a finite number, not {value}").format(value=value))
+        raise RobotValueError(lazy("{place} must be a finite number, not {value}"), value=value)
     if isinstance(value, Mapping):
         for item in value.values():
             check_sendable(item)
@@ -247,7 +247,7 @@ def _simple(kind: object, value: object) -> object:
         if good and found is not None:
             return found if wanted is float else int(found)
     if not good:
-        raise RobotValueError(_(words).format(value=_shown_value(value)))
+        raise RobotValueError(words, value=_shown_value(value))
     return value
 
 
@@ -263,15 +263,15 @@ def _many(kind: object, value: object) -> object:
     if origin in {dict, Mapping}:
         if not isinstance(value, Mapping):
             raise RobotValueError(
-                _("must be an object with named values, not {value}").format(value=_shown_value(value))
+                lazy("{place} must be an object with named values, not {value}"), value=_shown_value(value)
             )
         return {str(name): _placed(arguments[1], item, str(name)) for name, item in value.items()}
     if not isinstance(value, (list, tuple)):
-        raise RobotValueError(_("must be a list, not {value}").format(value=_shown_value(value)))
+        raise RobotValueError(lazy("{place} must be a list, not {value}"), value=_shown_value(value))
     if origin is tuple and arguments[1:] != (Ellipsis,):
         if len(value) != len(arguments):
             raise RobotValueError(
-                _("must have {count} values, not {given}").format(count=len(arguments), given=len(value))
+                lazy("{place} must have {count} values, not {given}"), count=len(arguments), given=len(value)
             )
         return [
             _placed(each, item, place)
@@ -284,9 +284,8 @@ def _placed(kind: object, value: object, place: int | str) -> object:
     try:
         return told(kind, value)
     except RobotValueError as error:
-        if isinstance(place, str):
-            raise RobotValueError(f"“{place}” {error}") from error
-        raise RobotValueError(_("value {place} {wrong}").format(place=place, wrong=error)) from error
+        named = f"“{place}”" if isinstance(place, str) else _("value {number}").format(number=place)
+        raise error.inside(named) from error
 
 
 def _required(fields: Mapping[str, tuple[object, bool]]) -> list[str]:

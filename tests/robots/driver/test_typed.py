@@ -26,6 +26,7 @@ from app.robots.driver.schema import (
 )
 from app.robots.driver.schema_values import given, told
 from app.robots.kit import Call, Kind, Link, action, event, safe_stop, sensor
+from tests.pseudo import untranslated
 from tests.robots.conftest import Ears, eventually
 
 
@@ -219,23 +220,23 @@ def test_values_go_to_python_and_back(kind, json, python):
 @pytest.mark.parametrize(
     ("kind", "value", "sentence"),
     [
-        (float, "far", "must be a number, not 'far'"),
-        (float, True, "must be a number, not True"),
-        (float, None, "must be a number, not None"),
-        (int, 2.5, "must be a whole number, not 2.5"),
-        (int, float("nan"), "must be a whole number, not nan"),
-        (bool, 1, "must be True or False, not 1"),
-        (str, 1, "must be text, not 1"),
-        (Literal["a", "b"], "c", "must be a or b, not 'c'"),
-        (Side, "x", "must be l or r, not 'x'"),
-        (list[float], "abc", "must be a list, not 'abc'"),
+        (float, "far", "the value must be a number, not 'far'"),
+        (float, True, "the value must be a number, not True"),
+        (float, None, "the value must be a number, not None"),
+        (int, 2.5, "the value must be a whole number, not 2.5"),
+        (int, float("nan"), "the value must be a whole number, not nan"),
+        (bool, 1, "the value must be True or False, not 1"),
+        (str, 1, "the value must be text, not 1"),
+        (Literal["a", "b"], "c", "the value must be a or b, not 'c'"),
+        (Side, "x", "the value must be l or r, not 'x'"),
+        (list[float], "abc", "the value must be a list, not 'abc'"),
         (list[float], [1, "a"], "value 2 must be a number, not 'a'"),
-        (tuple[float, float], [1], "must have 2 values, not 1"),
+        (tuple[float, float], [1], "the value must have 2 values, not 1"),
         (dict[str, int], {"a": "b"}, "“a” must be a whole number, not 'b'"),
         (Pose, {"y": 1}, "x is missing"),
         (Pose, Pose("far"), "x must be a number, not 'far'"),  # type: ignore[arg-type]
-        (Pose, 7, "must have x, y and name, not be 7"),
-        (object, object(), "must be what JSON has, not object"),
+        (Pose, 7, "the value must have x, y and name, not be 7"),
+        (object, object(), "the value must be what JSON has, not object"),
     ],
 )
 def test_what_is_of_another_type_is_said(kind, value, sentence):
@@ -392,13 +393,13 @@ def test_what_a_function_returns_is_the_output(arm, asked, returned, output):
 @pytest.mark.parametrize(
     ("asked", "returned", "why"),
     [
-        ("measure", "wide", "must be a number, not 'wide'"),
-        ("measure", None, "must be a number, not None"),
-        ("measure", float("nan"), "must be a finite number, not nan"),
-        ("look", 7, "must have x, y and name, not be 7"),
+        ("measure", "wide", "the value must be a number, not 'wide'"),
+        ("measure", None, "the value must be a number, not None"),
+        ("measure", float("nan"), "the value must be a finite number, not nan"),
+        ("look", 7, "the value must have x, y and name, not be 7"),
         ("count", "many", "count must be a whole number, not 'many'"),
-        ("anything", {"a": float("inf")}, "must be a finite number, not inf"),
-        ("anything", {"a": ["\ud800"]}, "must be text of whole letters"),
+        ("anything", {"a": float("inf")}, "the value must be a finite number, not inf"),
+        ("anything", {"a": ["\ud800"]}, "the value must be text of whole letters"),
     ],
 )
 def test_a_wrong_return_is_a_failure_with_a_sentence(arm, asked, returned, why):
@@ -435,3 +436,16 @@ def test_sensors_and_events_tell_values_of_their_types(arm):
         body.link.sense("heat", "hot")
     with pytest.raises(RobotValueError, match="Arm's event 'bumped': force must be a number, not 'hard'"):
         body.link.happen("bumped", side="l", force="hard")
+
+
+@pytest.mark.usefixtures("pseudo")
+def test_what_is_of_another_type_is_one_translated_sentence():
+    for kind, value in (
+        (float, "zz"),
+        (Pose, {"y": 1}),
+        (list[float], [1, "zz"]),
+        (dict[str, int], {"y": "zz"}),
+    ):
+        with pytest.raises(RobotValueError) as caught:
+            told(kind, value)
+        assert untranslated(str(caught.value), "zz", "x", "y", "name") == []

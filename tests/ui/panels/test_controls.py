@@ -79,7 +79,7 @@ def test_a_number_out_of_its_limits_is_what_the_form_gives_so_that_it_is_never_t
     assert form.action.check(form.input()) == ("do: distance must be between -1 and 1 m",)
     QTest.keyClick(slider.field, Qt.Key.Key_Return)
     assert slider.field.text() == "12"
-    form.show_problems(form.action.check(form.input()))
+    form.show_problems(form.action.problems(form.input()))
     shown = [text for text in (slider._sentence.text(), form._sentences["d"].text()) if text]
     assert shown == ["The most is 1 m."]  # said once
     assert slider.field.property("wrong") == "true"
@@ -142,7 +142,7 @@ def test_zero_is_a_choice_and_a_wrong_advanced_value_unfolds_its_row(qtbot, them
     slider = child(form, SliderWithUnit)
     slider.field.setText("7")
     assert not slider.isVisible()
-    form.show_problems(form.action.check(form.input()))
+    form.show_problems(form.action.problems(form.input()))
     assert slider.isVisible()
 
 

@@ -5,6 +5,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QLineEdit
 
+from app.errors import InputProblem
 from app.robots.description.inputs import Choice as Option
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Action
@@ -81,7 +82,7 @@ def test_a_number_that_is_none_stays_as_it_was_typed_and_the_check_says_so(qtbot
     assert field is not None
     field.setText("two")
     assert form.input() == {"n": "two"}
-    form.show_problems(form.action.check(form.input()))
+    form.show_problems(form.action.problems(form.input()))
     assert field.property("wrong") == "true"
     assert field.text() == "two"
     QTest.keyClicks(field, "x")
@@ -110,7 +111,7 @@ def test_sentences_stand_below_their_rows_and_others_at_the_end(qtbot, theme) ->
     )
     qtbot.addWidget(form)
     form.show()
-    form.show_problems(("do: text must not be empty", "Pepper has gone"))
+    form.show_problems((InputProblem("t", "text must not be empty"), InputProblem("", "Pepper has gone")))
     below = form._sentences
     assert below["t"].text() == "Must not be empty." or below["t"].text() == "Text must not be empty."
     assert below["t"].isVisible()
@@ -167,7 +168,7 @@ def test_in_every_language_a_sentence_finds_its_row(qtbot, theme, pseudo) -> Non
     made = action(Parameter("p", "p", "number", required=True), Parameter("q", "q", "number"))
     form = ActionForm(theme, made)
     qtbot.addWidget(form)
-    form.show_problems(made.check({"q": "x"}))
+    form.show_problems(made.problems({"q": "x"}))
     below = {name: label.text() for name, label in form._sentences.items()}
     assert all(below.values())
     assert form.problem.isHidden()

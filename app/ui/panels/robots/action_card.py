@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.errors import InputProblem
 from app.robots.description.description import Action
 from app.ui.panels.robots.controls.chooser import Pictures
 from app.ui.panels.robots.form import ActionForm
@@ -140,11 +141,11 @@ class ActionCard(Card):
         self.form.set_input(given)
         self.form.show_problems(())
 
-    def show_problems(self, sentences: Sequence[str]) -> None:
+    def show_problems(self, problems: Sequence[InputProblem]) -> None:
         """The input was refused."""
-        if sentences and self._folded:
+        if problems and self._folded:
             self.set_folded(False)
-        self.form.show_problems(sentences)
+        self.form.show_problems(problems)
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
         """The robot's last tries; those of this action are listed behind the button with the clock."""

@@ -8,6 +8,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
+from app.errors import InputProblem
 from app.robots.description.description import Action, Parameter
 from app.robots.description.inputs import wrong_value
 from app.ui.panels.robots.controls.chooser import ROW_HEIGHT, Control, Pictures, control_for, sentence_case
@@ -137,7 +138,7 @@ class ActionForm(QWidget):
         """A person has left a field: what is wrong with it stands below it, before anything is tried."""
         value = self.controls[parameter.name].value()
         wrong = None if value is None else wrong_value(parameter, value)
-        said = [] if wrong is None else [f"{parameter.title} {wrong}"]
+        said = [] if wrong is None else [wrong]
         self._judge(parameter, said)
 
     def _show_advanced(self, on: bool) -> None:
@@ -161,14 +162,12 @@ class ActionForm(QWidget):
             if name in self.controls:
                 self.controls[name].show_value(value)
 
-    def show_problems(self, sentences: Sequence[str]) -> None:
-        """Put each sentence (``turn: angle must be a number``) below its row; others stand at the end."""
-        left = list(sentences)
+    def show_problems(self, problems: Sequence[InputProblem]) -> None:
+        """Put each sentence below the row of its parameter; those of none stand at the end."""
         for parameter in self.action.parameters:
-            mine = [one for one in left if one.startswith(f"{self.action.name}: {parameter.title} ")]
-            left = [one for one in left if one not in mine]
-            self._judge(parameter, [one.split(": ", 1)[1] for one in mine])
-        self._say(self.problem, left)
+            self._judge(parameter, [each.sentence for each in problems if each.parameter == parameter.name])
+        rows = {parameter.name for parameter in self.action.parameters}
+        self._say(self.problem, [each.sentence for each in problems if each.parameter not in rows])
 
     def _judge(self, parameter: Parameter, said: Sequence[str]) -> None:
         control = self.controls[parameter.name]

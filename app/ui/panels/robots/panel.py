@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from app.core.robots.motion_permission import MayNotMoveError
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
-from app.errors import AppError, RobotInputError
+from app.errors import AppError, InputProblem, RobotInputError
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.action_card import ActionCard
@@ -299,11 +299,11 @@ class RobotsPanel(OneRobotPanel):
         try:
             self.session.fleet.invoke(self._robot, action, given)
         except RobotInputError as error:
-            card.show_problems(error.sentences)
+            card.show_problems(error.problems)
         except MayNotMoveError:
             card.show_problems(())  # the question stands over the window
         except AppError as error:
-            card.show_problems((str(error),))
+            card.show_problems((InputProblem("", str(error)),))
         else:
             card.show_problems(())
 
