@@ -31,6 +31,7 @@ from app.core.network.source import (
     GraphSeen,
     JobFailed,
     LiveSource,
+    MakeSource,
     MasterFound,
     MasterLost,
     Source,
@@ -67,7 +68,7 @@ class Session:
         settings: Settings | None = None,
         *,
         address: str | None = None,
-        source: Source | None = None,
+        source: MakeSource | None = None,
         journal_folder: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
         clock_ns: Callable[[], int] = time.time_ns,
@@ -75,7 +76,7 @@ class Session:
     ) -> None:
         """Join the master at ``address`` (default: `nep.masters.master.master_address`).
 
-        ``source`` may replace the network.
+        ``source`` may make another source of messages than the network.
         """
         self.address = address if address is not None else master_address()
         self._clock, self._clock_ns = clock, clock_ns
@@ -88,7 +89,9 @@ class Session:
         self._mailbox, self._checks = Mailbox(), Checks()
         self._watches = Watches(self._begin_watch, self._end_watch, self._forget_watch)
         self.images = Images(self.watch, clock)
-        self.source: Source = source if source is not None else self._live_network()
+        make_source = source if source is not None else partial(LiveSource, always=LOGS)
+        sinks = [self._checks.look, self._mailbox.post, self._offer]
+        self.source: Source = make_source(self.address, sinks, self._mailbox.post_event)
         modules = VIRTUAL_ROBOTS.values()
         processes = VirtualProcesses(modules, lambda: self.companions.process_ids)
         self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)
@@ -117,10 +120,6 @@ class Session:
         self._topics_seen = -1
         self._next_check = 0.0
         self._learning = Learning()
-
-    def _live_network(self) -> LiveSource:
-        sinks = [self._checks.look, self._mailbox.post, self._offer]
-        return LiveSource(self.address, sinks, self._mailbox.post_event, always=LOGS)
 
     def _offer(self, _topic: str, messages: Sequence[Message]) -> None:
         self.images.offer(messages)

@@ -174,8 +174,7 @@ class Images:
             stream.arriving = Rate()
             self._arrived.notify()  # one that is held may be wanted larger
             if self._thread is None and not self._closing:
-                self._thread = threading.Thread(target=self._decode_all, name="studio-images", daemon=True)
-                self._thread.start()
+                self._thread = self._begin_decoding()
 
     def offer(self, messages: Sequence[Message]) -> None:
         """A sink: keep the newest message of each topic that somebody looks at. Called in nep's thread."""
@@ -229,6 +228,12 @@ class Images:
         if self._thread is not None:
             self._thread.join(timeout=2)
 
+    def _begin_decoding(self) -> threading.Thread | None:
+        """The thread that decodes; None: whoever offers pictures says `decode_waiting`."""
+        thread = threading.Thread(target=self._decode_all, name="studio-images", daemon=True)
+        thread.start()
+        return thread
+
     def _decode_all(self) -> None:
         while True:
             with self.lock:
@@ -236,20 +241,25 @@ class Images:
                     self._arrived.wait()
                 if self._closing:
                     return
-                work = self._take_waiting()
-            for streams, message, arrived_s, size in work:
-                try:
-                    picture, error = decode(message, arrived_s, size)
-                except Exception as problem:  # noqa: BLE001  one message must not end the pictures of all
-                    picture, error = (
-                        None,
-                        _("“{topic}” sends a picture that can't be shown: {problem}").format(
-                            topic=message.topic, problem=problem
-                        ),
-                    )
-                with self.lock:
-                    for stream in streams:
-                        _give(stream, message, picture, error)
+            self.decode_waiting()
+
+    def decode_waiting(self) -> None:
+        """Decode the newest picture of each stream that waits for one; its own thread does it."""
+        with self.lock:
+            work = self._take_waiting()
+        for streams, message, arrived_s, size in work:
+            try:
+                picture, error = decode(message, arrived_s, size)
+            except Exception as problem:  # noqa: BLE001  one message must not end the pictures of all
+                picture, error = (
+                    None,
+                    _("“{topic}” sends a picture that can't be shown: {problem}").format(
+                        topic=message.topic, problem=problem
+                    ),
+                )
+            with self.lock:
+                for stream in streams:
+                    _give(stream, message, picture, error)
 
     def _any_waiting(self) -> bool:
         every = (stream for streams in self._streams.values() for stream in streams)

@@ -99,6 +99,10 @@ class Source(Protocol):
         """End; returns when its thread has ended."""
 
 
+MakeSource = Callable[[str, Sequence[Sink], Callable[[object], None]], Source]
+"""Makes a source of a master's address, the sinks of its messages, and what takes its events."""
+
+
 class LiveSource:
     """The network of one master.
 

@@ -9,10 +9,10 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import IO
+from typing import IO, Protocol
 
 from app.core.network.master import MasterStart
 from app.robots.identity import Identity
@@ -58,6 +58,40 @@ def module_command(module: str) -> list[str]:
     return [sys.executable, "-m", module]
 
 
+class Process(Protocol):
+    """What is needed of a process, as `subprocess.Popen` has it."""
+
+    pid: int
+
+    def poll(self) -> int | None:
+        """Its exit code, None while it runs."""
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Its exit code, waited for. Raises `subprocess.TimeoutExpired`."""
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+
+    def kill(self) -> None:
+        """End it."""
+
+
+StartProcess = Callable[[Sequence[str], Mapping[str, str], IO[bytes]], Process]
+"""Starts a command in an environment; what it says is written into the file. Raises OSError."""
+
+
+def start_process(command: Sequence[str], environment: Mapping[str, str], log: IO[bytes]) -> Process:
+    """A process of the operating system. See `StartProcess`."""
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=log,
+        stderr=log,
+        env=environment,
+        creationflags=NO_CONSOLE,
+    )
+
+
 class Companions:
     """Starts processes, notices when one ends, ends them with the window."""
 
@@ -67,19 +101,21 @@ class Companions:
         post_event: Callable[[object], None],
         is_there: Callable[[str], bool | None] = lambda _name: False,
         clock: Callable[[], float] = time.monotonic,
+        start: StartProcess = start_process,
     ) -> None:
         """``address`` is the master's; failures are posted as `CompanionFailed`.
 
         ``is_there`` tells whether a robot of a name is there, whoever started it; None while that is not
-        known yet. ``clock`` gives monotonic seconds.
+        known yet. ``clock`` gives monotonic seconds. ``start`` starts the processes of virtual robots.
         """
         self._address = address
         self._is_there = is_there
         self._clock = clock
+        self._start = start
         self._wishes: dict[str, _Wish] = {}
         self._post_event = post_event
         self._lock = threading.Lock()
-        self._robots: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+        self._robots: dict[str, tuple[Process, IO[bytes]]] = {}
         self.ended: frozenset[str] = frozenset()
         """The virtual robots started here whose processes have ended by themselves."""
         self._master = MasterStart(
@@ -153,14 +189,7 @@ class Companions:
             ]
             environment = {**os.environ, "NEP_MASTER": self._address}
             try:
-                process = subprocess.Popen(
-                    command,
-                    stdin=subprocess.DEVNULL,
-                    stdout=log,
-                    stderr=log,
-                    env=environment,
-                    creationflags=NO_CONSOLE,
-                )
+                process = self._start(command, environment, log)
             except OSError as error:
                 log.close()
                 self._post_event(
@@ -214,7 +243,7 @@ class Companions:
         self._master.close()
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end(process: Process) -> None:
     process.terminate()
     try:
         process.wait(timeout=END_WAIT_S)

@@ -73,10 +73,12 @@ class Runs:
         console: Console,
         post_event: Callable[[object], None],
         clock: Callable[[], float] = time.monotonic,
+        make_runner: Callable[[Callable[[RunnerEvent], object]], Runner] = Runner,
     ) -> None:
-        """Nothing runs yet."""
+        """Nothing runs yet. ``make_runner`` makes what runs one program and tells what it does."""
         self._documents, self._fleet, self._network = documents, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
+        self._make_runner = make_runner
         self.document: Document | None = None  # which the run belongs to: its blocks glow, fail and stop
         self.pace_s = 0.0
         self._runner: Runner | None = None
@@ -323,7 +325,7 @@ class Runs:
             wanted = wanted_by(program, used)
             if not self._fleet.moving.permits(wanted, self.step if paused else self.run):
                 return  # a person is asked first; the question stands in the window
-            runner = Runner(self._post_event)
+            runner = self._make_runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
             owners = self._owners()
             runner.start(
