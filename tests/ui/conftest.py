@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from functools import partialmethod
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, QMessageLogContext, Qt, QtMsgType, qInstallMessageHandler
 from pytestqt.qtbot import QtBot
+
+from tests.ui.fakes import close_sessions
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_QUICK_BACKEND", "software")
@@ -42,6 +44,13 @@ class PatientBot(QtBot):
 def qtbot(qapp: object, request: pytest.FixtureRequest) -> QtBot:
     """A bot with patience."""
     return PatientBot(request)
+
+
+@pytest.fixture(autouse=True)
+def _sessions_end() -> Iterator[None]:
+    """Ends the sessions in memory that the test has made."""
+    yield
+    close_sessions()
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

@@ -1,4 +1,4 @@
-"""Plain panels, a person who answers, and an address where nobody listens: for tests of the window."""
+"""Plain panels, a person who answers, robots in every state, and an address where nobody listens."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from PySide6.QtWidgets import QLineEdit, QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.shell.start_page.page import Example
+from tests.blocks.fakes import until
+from tests.ui import fakes
+from tests.ui.sample_data import WORKSPACE, Invocation, pepper
 
 NAMES = {
     "behaviour": ("Behaviour", ()),
@@ -103,6 +106,46 @@ class Answers:
         self.asked.append(f"save {suggestion}")
         if self.path is not None:
             take(self.path)
+
+
+def robots_in(*states: str, run: str = "ready", silent: str | None = None) -> fakes.Session:
+    """Robots named "Robot 1" and so on, each in its state, while a program has come so far.
+
+    ``silent`` says how they are silent.
+    """
+    session = fakes.Session()
+    links = [session.join(pepper(f"Robot {number}")) for number in range(1, len(states) + 1)]
+    if run != "ready":
+        begin_run(session, run)
+    for link, state in zip(links, states, strict=True):
+        link.stopping, link.connected = state == "stopping", state != "away"
+        if state == "silent":
+            link.silent, link.mute = silent, silent is None
+        elif state == "not stopped":
+            link.not_stopped = f"{link.name} may still move: a joint is stuck"
+        elif state == "busy":
+            link.invocations["walk"] = Invocation("1", "walk")
+        assert link.state == state
+    assert session.runs.view().state == run
+    return session
+
+
+def begin_run(session: fakes.Session, state: str) -> None:
+    """Run a behaviour until its run is running, paused, or proven to have ended."""
+    session.document.edited(WORKSPACE)
+    session.runs.run()
+    assert session.runner is not None
+    session.runner.does("b2")
+    if state == "paused":
+        session.runs.pause()
+    elif state == "proven":
+        session.runner.ends()
+
+    def has_come() -> bool:
+        session.take_over()
+        return session.runs.view().state == state
+
+    until(has_come)
 
 
 def free_address() -> str:

@@ -25,6 +25,7 @@ from app.ui.shell.docking.dock import Dock
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session
+from tests.ui.sample_data import blackboard
 
 SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "topics": (topics.PANEL, 640, 461, "compact"),
@@ -80,7 +81,7 @@ def prepare(name: str, widget: PanelWidget) -> None:
         and "/blackboard" in widget.session.topics
     ):
         widget.show_topic("/blackboard")
-        widget.session.send("/blackboard", {**__import__("tests.ui.fakes").ui.fakes.blackboard(0.0)})  # type: ignore[attr-defined]
+        widget.session.send("/blackboard", blackboard())  # type: ignore[attr-defined]
         widget.refresh()
         widget.tree.setCurrentIndex(widget.model.reveal(("robots", "Pepper", "pose", "y")))
     if name == "nodes" and isinstance(widget, nodes.NodesPanel) and len(widget.session.nodes):

@@ -20,8 +20,9 @@ from app.ui.shell.bars.banner import AlertBanner
 from app.ui.shell.docking.dock import Dock
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
-from tests.ui.fakes import Session, pepper
+from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, ticks
+from tests.ui.sample_data import pepper
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

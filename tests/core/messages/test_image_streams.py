@@ -1,4 +1,7 @@
-"""Picture streams: only the newest is decoded, and only while somebody looks."""
+"""Picture streams: only the newest is decoded, and only while somebody looks.
+
+The streams for tests of panels, which decode without a thread, keep to the same.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from app.core.messages.image_streams import Images, Rate
 from app.core.messages.picture import decode
 from app.core.network.watches import Watches
 from nep.messages.message import Message
+from tests.ui import fakes
 
 
 def jpeg(colour: tuple[int, int, int], topic: str = "/camera", seq: int = 1) -> Message:
@@ -37,9 +41,14 @@ def watched() -> list[str]:
     return []
 
 
+@pytest.fixture(params=[Images, fakes.Images], ids=["beside", "at once"])
+def kind(request: pytest.FixtureRequest) -> type[Images]:
+    return request.param  # type: ignore[no-any-return]
+
+
 @pytest.fixture
-def images(watched: list[str]):
-    images = Images(lambda topic: Watches(watched.append, watched.remove).open([topic]))
+def images(kind: type[Images], watched: list[str]):
+    images = kind(lambda topic: Watches(watched.append, watched.remove).open([topic]))
     yield images
     images.close()
 
@@ -53,11 +62,19 @@ def test_a_picture_is_decoded_for_its_stream(images: Images) -> None:
     assert (stream.picture.width, stream.picture.height, stream.picture.seq) == (32, 24, 7)
 
 
-def test_of_a_batch_only_the_newest_is_decoded(images: Images) -> None:
+def test_of_a_batch_only_the_newest_is_decoded(images: Images, monkeypatch) -> None:
+    decoded: list[int | None] = []
+
+    def seen(message: Message, *more: object):
+        decoded.append(message.seq)
+        return decode(message, *more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("app.core.messages.image_streams.decode", seen)
     stream = images.stream("/camera")
     images.offer([jpeg((n, n, n), seq=n) for n in range(1, 50)])
     until(lambda: stream.picture is not None and stream.picture.seq == 49)
     until(lambda: stream.arriving_hz is not None)
+    assert decoded == [49]
 
 
 def test_other_topics_and_closed_streams_get_nothing(images: Images, watched: list[str]) -> None:
@@ -194,6 +211,7 @@ def test_a_held_picture_stays_is_decoded_whole_on_demand_and_arrivals_are_counte
     until(lambda: stream.picture is not None and stream.picture.seq == 3)
 
 
+@pytest.mark.parametrize("kind", [Images])
 def test_pictures_are_decoded_in_the_decoders_thread(images: Images) -> None:
     seen: list[int] = []
 
@@ -234,9 +252,9 @@ def test_a_stream_that_rests_decodes_nothing_and_keeps_its_picture(
     assert watched == [], "a stream that was closed stays closed"
 
 
-def test_a_camera_that_nobody_looked_at_is_not_silent_when_somebody_does() -> None:
+def test_a_camera_that_nobody_looked_at_is_not_silent_when_somebody_does(kind: type[Images]) -> None:
     now = [100.0]
-    images = Images(lambda topic: Watches(str, str).open([topic]), lambda: now[0])
+    images = kind(lambda topic: Watches(str, str).open([topic]), lambda: now[0])
     stream = images.stream("/camera")
     images.offer([jpeg((1, 2, 3))])
     until(lambda: stream.picture is not None)

@@ -7,25 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from app.core.network.source import GraphSeen, Job
+from app.core.network.source import GraphSeen
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
-
-
-class Recorded:
-    """A source that only tells what the test posts."""
-
-    address = "127.0.0.1:1"
-
-    def start(self) -> None: ...
-    def watch(self, topic: str) -> None: ...
-    def unwatch(self, topic: str) -> None: ...
-    def submit(self, what: str, job: Job) -> None: ...
-    def close(self) -> None: ...
-
-    def missed(self) -> Mapping[str, int]:
-        return {}
+from tests.ui.fakes.network import Network
 
 
 class Clocks:
@@ -48,8 +34,8 @@ def clocks() -> Clocks:
 def quiet(tmp_path: Path, clocks: Clocks) -> Iterator[Session]:
     session = Session(
         Settings(tmp_path),
-        address=Recorded.address,
-        source=Recorded(),
+        address="127.0.0.1:1",
+        source=Network,
         journal_folder=tmp_path,
         clock=lambda: clocks.now,
         clock_ns=lambda: clocks.wall_ns,

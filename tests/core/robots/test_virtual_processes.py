@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import IO
 
 import pytest
 
 import nep
 from app.core.network.watches import Watches
-from app.core.robots import virtual_processes
 from app.core.robots.fleet import Fleet
 from app.core.robots.virtual_processes import KNOWN_WITHIN_S, WISH_KEPT_S, Companions
 from app.core.session import Session
@@ -20,45 +19,25 @@ from app.robots.driver.driver import Driver
 from nep.masters.master import Master
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from tests.core.waiting import tick_until
-
-
-class Process:
-    """Lives until it is told otherwise."""
-
-    def __init__(self) -> None:
-        self.alive = True
-        self.pid = 1
-
-    def poll(self) -> int | None:
-        return None if self.alive else 1
-
-    def kill(self) -> None:
-        self.alive = False
-
-    terminate = kill
-
-    def wait(self, timeout: float | None = None) -> int:
-        return 1
+from tests.ui.fakes.processes import Process
 
 
 class World:
     """A clock, who is known to be there, and the processes that were started."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self) -> None:
         self.now = 100.0
         self.there: bool | None = False
-        self.started: list[list[str]] = []
+        self.started: list[Sequence[str]] = []
         self.processes: list[Process] = []
         self.events: list[object] = []
-        monkeypatch.setattr(virtual_processes.subprocess, "Popen", self._start)
-        monkeypatch.setattr(virtual_processes.tempfile, "TemporaryFile", io.BytesIO)
         self.companions = Companions(
-            "127.0.0.1:1", self.events.append, lambda _name: self.there, lambda: self.now
+            "127.0.0.1:1", self.events.append, lambda _name: self.there, lambda: self.now, self._start
         )
 
-    def _start(self, command: list[str], **_more: object) -> Process:
+    def _start(self, command: Sequence[str], _environment: Mapping[str, str], log: IO[bytes]) -> Process:
         self.started.append(command[2:5])
-        self.processes.append(Process())
+        self.processes.append(Process(log))
         return self.processes[-1]
 
     def after(self, seconds: float) -> None:
@@ -67,14 +46,16 @@ class World:
 
 
 @pytest.fixture
-def world(monkeypatch: pytest.MonkeyPatch) -> World:
-    return World(monkeypatch)
+def world() -> Iterator[World]:
+    made = World()
+    yield made
+    made.companions.close()
 
 
 def test_one_that_is_not_there_is_started_at_once(world: World) -> None:
     world.companions.start_virtual_robot("Turtle", "diffdrive")
     assert world.started == [["app.robots.turtle", "--name", "Turtle"]]
-    world.processes[0].alive = False
+    world.processes[0].die(b"", 1)
     world.after(0.1)
     assert len(world.started) == 1  # that it ended is another matter: it is told, not started again
 
@@ -143,7 +124,7 @@ def test_starting_it_anew_is_no_second_wish(world: World) -> None:
     world.companions.start_virtual_robot()
     world.companions.restart_virtual_robot("Pepper")
     world.there = False
-    world.processes[0].alive = False
+    world.processes[0].die(b"", 1)
     world.after(0.03)
     assert len(world.started) == 1
 

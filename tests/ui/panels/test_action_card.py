@@ -13,7 +13,7 @@ from app.robots.description.model import Action, DataField
 from app.ui.panels.robots.action_card import ActionCard
 from app.ui.panels.robots.tries import field_words, progress_of
 from app.ui.theme.theme import Theme
-from tests.ui.fakes import Invocation
+from tests.ui.sample_data import Invocation
 
 MOVE = Action(
     "go_far", "go far", "move", "Movement",

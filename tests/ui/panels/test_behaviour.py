@@ -11,8 +11,9 @@ from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.panel import BehaviourPanel
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.theme.theme import Theme
-from tests.ui.fakes import PROGRAM, Invocation, RobotLink, Session, pepper
+from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
+from tests.ui.sample_data import PROGRAM, Invocation, pepper
 
 
 class Editor(QWidget):
@@ -91,12 +92,14 @@ def test_only_replacing_the_document_loads_it_anew(panel, window) -> None:
 
 
 def test_what_runs_glows_and_what_failed_says_so_on_its_block(panel, window) -> None:
-    runs = window.session.runs
-    runs.running_blocks, runs.blocks_revision = ("b1",), 1
+    session = window.session
+    session.runs.run()
+    session.runner.does("b1")
+    session.take_over()
     panel.refresh()
     assert editor(panel).last("highlight") == ("b1",)
-    runs.running_blocks, runs.stopped_blocks, runs.blocks_revision = (), ("b1",), 2
-    runs.block_errors = {"b2": "“turn left” needs a number."}
+    session.runner.fails("b2", "“turn left” needs a number.")
+    session.take_over()
     panel.refresh()
     assert editor(panel).last("highlight") == ()
     assert editor(panel).last("mark_stopped") == ("b1",)
@@ -141,40 +144,39 @@ def test_sensor_blocks_say_their_newest_value(panel, window) -> None:
     document.sensors, document.edits = (("Pepper", "battery"), ("NAO", "battery")), 5
     ticks(window, panel, 6)
     assert editor(panel).last("set_live_values") == {"Pepper/battery": "84 %"}
-    assert window.session.fleet.looked_at == ["Pepper"]
+    assert window.session.looked_at == ["Pepper"]
     document.sensors, document.edits = (), 6
     panel.refresh()
-    assert window.session.fleet.looked_at == []
+    assert window.session.looked_at == []
 
 
 def test_sensors_in_the_open_toolbox_are_watched_until_it_closes(panel, window) -> None:
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
-    assert window.session.fleet.looked_at == []
+    assert window.session.looked_at == []
     editor(panel).sensors_offered.emit((("Pepper", "battery"), ("NAO", "battery")))
-    assert window.session.fleet.looked_at == ["Pepper"]
+    assert window.session.looked_at == ["Pepper"]
     assert editor(panel).last("set_live_values") == {"Pepper/battery": "84 %"}
     editor(panel).sensors_offered.emit(())
-    assert window.session.fleet.looked_at == []
+    assert window.session.looked_at == []
     assert editor(panel).last("set_live_values") == {}
 
 
 def test_a_robot_that_comes_while_its_sensors_are_shown_is_watched(panel, window) -> None:
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
-    link = window.session.fleet.leave("Pepper")
-    editor(panel).sensors_offered.emit((("Pepper", "battery"),))
-    assert window.session.fleet.looked_at == []
-    window.session.fleet.join(link)
+    editor(panel).sensors_offered.emit((("Ada", "battery"),))
+    assert window.session.looked_at == []
+    window.session.join(pepper("Ada"))
     ticks(window, panel, 6)
-    assert window.session.fleet.looked_at == ["Pepper"]
+    assert window.session.looked_at == ["Ada"]
 
 
 def test_python_shows_the_newest_program_and_copies_it(panel, window) -> None:
     editor(panel).late = {"blocks": {"blocks": [{"type": "late"}]}}
     panel.replaces_title().show()
     press(button(panel.replaces_title(), "Python"))
-    assert ("edited", editor(panel).late) in window.session.calls  # the last 150 ms are not missing
+    assert window.session.document.workspace == editor(panel).late  # the last 150 ms are not missing
     assert panel.program.toPlainText() == PROGRAM
     assert panel.program.isReadOnly()
     press(button(panel.replaces_title(), "Copy the program"))
@@ -228,7 +230,7 @@ def test_over_an_empty_workspace_without_a_robot_the_virtual_one_is_offered(qtbo
     window.theme.set_text_percent(100)
     press(button(panel.empty, "Use the virtual robot"))
     assert window.commands == ["robots.virtual"]
-    window.session.fleet.join(RobotLink("Pepper", pepper()))
+    window.session.join(pepper())
     panel.refresh()
     assert not panel.empty.isVisible()
 

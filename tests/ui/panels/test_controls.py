@@ -29,6 +29,7 @@ from app.ui.widgets.inputs.fields import LEAST_HEIGHT, LongText
 from app.ui.widgets.menus import Menu
 from tests.nep.bad_pictures import BOMBS, chunk, exif, segment
 from tests.ui import fakes
+from tests.ui.sample_data import picture
 
 KEEP = Option(0, "keep"), Option(1, "turn")
 
@@ -268,8 +269,13 @@ def test_another_colour_comes_from_the_strip_or_by_its_number(qtbot, theme) -> N
 class Cameras:
     def __init__(self) -> None:
         self.images = fakes.Images()
-        self.made = fakes.ImageStream("/Pepper/camera")
-        self.made.awaits_picture = False  # what comes is there at once
+        self.made = self.images.stream("/Pepper/camera")
+
+    def send(self, width: int, height: int) -> None:
+        """The camera sends a picture of this size."""
+        message = picture(width, height).message
+        assert message is not None
+        self.images.offer([fakes.on_topic(message, "/Pepper/camera")])
 
     def topics(self) -> Sequence[str]:
         return ["/Pepper/camera"]
@@ -380,14 +386,15 @@ def test_the_newest_picture_of_a_topic_at_the_moment_of_try_is_sent(qtbot, theme
     choice = child(form, PictureChoice)
     choice.use_topic("/Pepper/camera")
     assert form.input() == {}  # none has come yet
-    cameras.made.picture = fakes.picture(320, 240)
+    cameras.send(320, 240)
     qtbot.waitUntil(lambda: choice.thumbnail.image is not None)
-    cameras.made.picture = fakes.picture(160, 120)
+    cameras.send(160, 120)
     sent = decoded(form.input()["p"])
     assert (sent.width(), sent.height()) == (160, 120)
-    cameras.made.awaits_picture = True  # its panel was hidden: what it has may be from long ago
+    cameras.made.rest()
+    cameras.made.wake()  # its panel was hidden: what it has may be from long ago
     assert form.input() == {}
-    cameras.made.awaits_picture = False
+    cameras.send(160, 120)
     assert decoded(form.input()["p"]).width() == 160
     form.shut()
     assert not choice._timer.isActive()

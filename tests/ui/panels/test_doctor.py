@@ -1,15 +1,15 @@
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 
+from app.core.network.master import MasterState
 from app.ui.panels.doctor import PANEL, DoctorPanel
 from nep.doctor import Finding
-from tests.ui.fakes import FOUND, Session
+from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
+from tests.ui.sample_data import FOUND
 
 
 @pytest.fixture
@@ -28,13 +28,13 @@ def panel(qtbot, window) -> DoctorPanel:
 
 
 def test_it_looks_when_it_is_first_seen_and_shows_the_worst_first(panel, window) -> None:
-    assert window.session.calls == [("look",)]
+    assert window.session.doctor.looked == 1
     assert panel.shown == list(FOUND)
     assert len(panel.rows) == len(FOUND)
     assert panel.rows[0].accessibleName().startswith("error: Port 7780 is held by")
     assert panel.chip.accessibleName() == "2"
     panel.refresh()
-    assert window.session.calls == [("look",)]  # nothing changed, nothing done
+    assert window.session.doctor.looked == 1  # nothing changed, nothing done
 
 
 def test_a_command_is_copied(qtbot, panel, window) -> None:
@@ -54,9 +54,9 @@ def test_studio_starts_the_master_and_looks_again_when_it_is_there(qtbot, panel,
     (row,) = panel.rows
     assert row.button.accessibleName() == "Start the master"
     qtbot.mouseClick(row.button, Qt.MouseButton.LeftButton)
-    assert ("ensure_master",) in window.session.calls
+    assert window.session.companions.masters_asked_for == 1
     window.session.doctor.found = (Finding("master", "ok", "A master runs."),)
-    window.session.master = SimpleNamespace(kind="searching", address="127.0.0.1:7780", sentence="")
+    window.session.master = MasterState("searching", "127.0.0.1:7780")
     panel.refresh()
     assert [each.id for each in panel.shown] == ["master"]
     assert panel.chip.accessibleName() == "all is well"

@@ -16,7 +16,7 @@ from app.ui.panels.robots.input_text import input_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ComboBox, Segments, SliderWithUnit, Switch
 from nep.i18n import _, translate
-from tests.ui.fakes import ACTIONS
+from tests.ui.sample_data import ACTIONS
 
 FEW = (Option("en", "English"), Option("fr", "French"))
 MANY = tuple(Option(number, f"number {number}") for number in range(6))

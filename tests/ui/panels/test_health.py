@@ -10,8 +10,9 @@ import pytest
 from app.ui.panels.health import PANEL, HealthPanel
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
-from tests.ui.fakes import RobotLink, Session, pepper
+from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press
+from tests.ui.sample_data import pepper
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -77,22 +78,22 @@ def test_without_a_robot_it_says_what_to_do(qapp) -> None:
     for button in panel.empty._buttons:
         press(button)
     assert asked.commands == ["robots.virtual", "help.doctor"]
-    asked.session.fleet.join(RobotLink("Pepper", pepper()))
+    asked.session.join(pepper())
     panel.refresh()
     assert panel.pages.currentWidget() is not panel.empty
     panel.shut()
 
 
 def test_it_looks_at_the_robot_that_is_shown_and_names_it_when_there_are_two(panel, asked) -> None:
-    assert asked.session.fleet.looked_at == ["Pepper"]
+    assert asked.session.looked_at == ["Pepper"]
     assert panel.subtitle() == ""
-    asked.session.fleet.join(RobotLink("Turtle", pepper("Turtle")))
+    asked.session.join(pepper("Turtle"))
     asked.session.fleet.choose("Turtle")
     panel.refresh()
-    assert asked.session.fleet.looked_at == ["Turtle"]
+    assert asked.session.looked_at == ["Turtle"]
     assert panel.subtitle() == "Turtle"
     panel.shut()
-    assert asked.session.fleet.looked_at == []
+    assert asked.session.looked_at == []
 
 
 def test_rows_are_made_anew_for_another_text_size(panel) -> None:

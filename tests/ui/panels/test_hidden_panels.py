@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QEvent, QObject
 from PySide6.QtWidgets import QApplication, QMainWindow
 
-from app.core.network.source import GraphSeen, Job
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
@@ -24,40 +23,12 @@ from app.ui.shell.main_window import TICK_MS, MainWindow
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from tests.ui.fakes.network import Network
 from tests.ui.shell_parts import PANELS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
 CAMERA, OTHER, STATE = "/Pepper/camera", "/webcam", "/Pepper/state"
-
-
-class Wishes:
-    """A source that only writes down which topics are wanted."""
-
-    address = "127.0.0.1:1"
-
-    def __init__(self) -> None:
-        self.wanted: set[str] = set()
-        self.asked: list[str] = []
-
-    def start(self) -> None:
-        """Nothing to begin."""
-
-    def watch(self, topic: str) -> None:
-        self.wanted.add(topic)
-        self.asked.append(topic)
-
-    def unwatch(self, topic: str) -> None:
-        self.wanted.discard(topic)
-
-    def submit(self, what: str, job: Job) -> None:
-        """Nobody does it."""
-
-    def missed(self) -> Mapping[str, int]:
-        return {}
-
-    def close(self) -> None:
-        """Nothing to end."""
 
 
 def graph() -> GraphView:
@@ -72,16 +43,17 @@ class Case:
 
     def __init__(self, home: Path, theme: Theme, *, own_clock: bool = True) -> None:
         self.now = 100.0
-        self.source = Wishes()
         self.session = Session(
             Settings(home),
-            address=self.source.address,
-            source=self.source,
+            address="127.0.0.1:1",
+            source=Network,
             journal_folder=home / "journal",
             start_companions=False,
         )
+        assert isinstance(self.session.source, Network)
+        self.source = self.session.source
         self.session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
-        self.session._mailbox.post_event(GraphSeen(graph(), 0.0))
+        self.source.tell(graph())
         panels = {**PanelShelf(), "behaviour": PANELS["behaviour"]}
         clock = {"clock": lambda: self.now} if own_clock else {}
         self.window = MainWindow(self.session, theme, panels, **clock)
@@ -103,9 +75,7 @@ class Case:
         return dock
 
     def arrive(self, topic: str, data: bytes, codec: str = "json") -> None:
-        message = Message(topic, data, codec, codec)
-        self.session._checks.look(topic, [message])
-        self.session._mailbox.post(topic, [message])
+        self.source.send(Message(topic, data, codec, codec))
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
 from PySide6.QtGui import QGuiApplication, QWheelEvent
 from PySide6.QtTest import QTest
 
+from app.core.messages.picture import Picture
 from app.ui.panels.camera import PANEL as CAMERA
 from app.ui.panels.camera import CameraPanel
 from app.ui.panels.image.actions import ROWS
@@ -21,8 +23,10 @@ from app.ui.pictures.placement import PicturePlace
 from app.ui.pictures.view import PictureView, pixel_words, rate_sentence
 from app.ui.pictures.zoom import ZoomablePicture
 from app.ui.theme.theme import Theme
-from tests.ui.fakes import ImageStream, Picture, RobotLink, Session, Topic, pepper, picture
+from nep.messages.message import Message
+from tests.ui.fakes import Clock, Images, ImageStream, Session, on_topic
 from tests.ui.panel_case import Window
+from tests.ui.sample_data import Topic, pepper, picture
 
 FACE = {"name": "face", "confidence": 0.97, "box": [160, 60, 80, 60]}
 FACES = {"count": 1, "width": 320, "height": 240, "items": [FACE]}
@@ -46,12 +50,14 @@ def made(qtbot, window: Window) -> ImagePanel:
     return panel
 
 
-def stream_of(shown: Picture, **figures: float) -> ImageStream:
-    stream = ImageStream("/c")
-    stream.picture = shown
-    stream.arriving_hz, stream.shown_hz, stream.silent_s = 60.0, 30.0, 0.01
-    for name, value in figures.items():
-        setattr(stream, name, value)
+def stream_of(shown: Picture, silent_s: float = 0.01) -> ImageStream:
+    """A stream whose last picture came so long ago."""
+    clock = Clock(behind_s=silent_s)
+    stream = Images(clock=clock).stream("/c")
+    assert shown.message is not None
+    stream.came(60.0, 30.0)
+    stream._images.offer([on_topic(shown.message, "/c")])
+    clock.now += silent_s
     return stream
 
 
@@ -77,10 +83,10 @@ def test_it_says_how_many_are_shown_and_their_size(view) -> None:
 def test_the_boxes_of_a_frozen_picture_are_frozen_too(view) -> None:
     stream, boxes = stream_of(picture()), boxes_of(FACES)
     view.take(stream, boxes)  # type: ignore[arg-type]
-    stream.held = True
+    stream.hold(True)
     view.take(stream, ())  # type: ignore[arg-type]
     assert view.boxes == boxes
-    stream.held = False
+    stream.hold(False)
     view.take(stream, ())  # type: ignore[arg-type]
     assert view.boxes == ()
 
@@ -176,25 +182,25 @@ def test_the_image_panel_shows_the_first_picture_topic_and_others_on_demand(qtbo
 
 def test_the_image_panel_marks_what_the_cameras_robot_recognises(qtbot, qapp) -> None:
     window = Window(Session.full())
-    window.session.topics.put(Topic("/Pepper/camera", "image", "image"))
+    window.session.put(Topic("/Pepper/camera", "image", "image"))
     panel = made(qtbot, window)
     panel.refresh()
     assert panel.view.boxes == ()
     panel.show_topic("/Pepper/camera")
     panel.refresh()
     assert [box.words for box in panel.view.boxes] == ["face"]
-    assert window.session.fleet.looked_at == ["Pepper"]
+    assert window.session.looked_at == ["Pepper"]
     panel.show_topic("/robot/camera")
     panel.refresh()
-    assert window.session.fleet.looked_at == []
+    assert window.session.looked_at == []
 
 
 def test_without_pictures_it_says_what_will_appear(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.images.source = lambda _topic: None
+    window.session.images.camera = lambda _topic: None
     panel = made(qtbot, window)
     assert panel.empty.isVisible()
-    window.session.topics.put(Topic("/cam", "image", "image"))
+    window.session.put(Topic("/cam", "image", "image"))
     panel.refresh()
     assert panel.empty._text.text() == "The next picture on /cam appears here."
     window.session.images.streams[0].error = "'/cam' does not send pictures"
@@ -204,13 +210,13 @@ def test_without_pictures_it_says_what_will_appear(qtbot, qapp) -> None:
 
 def test_the_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.images.source = lambda _topic: Picture(np.zeros((24, 32, 4), np.uint8), 32, 24, 1, 1, 0.0)
+    window.session.images.camera = lambda _topic: picture(32, 24)
     panel = window.make(CAMERA)
     for widget in (panel, *panel.header_widgets()):
         qtbot.addWidget(widget)
     assert isinstance(panel, CameraPanel)
     assert panel.empty.isVisible()
-    link = window.session.fleet.join(RobotLink("Pepper", pepper()))
+    link = window.session.join(pepper())
     link.values["faces"] = FACES
     panel.refresh()
     assert panel.subtitle() == "/Pepper/camera"
@@ -218,14 +224,14 @@ def test_the_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> 
     assert len(panel.view.boxes) == 1
     link.connected = False
     window.session.fleet.revision += 1
-    window.session.images.streams[0].silent_s = 4.0
+    window.session.clock.now += 4.0
     panel.refresh()
     assert panel.view.words == "Last picture, 4 s old"  # the last picture stays, grey
     assert panel.rate.text() == ""
     assert (panel.chip.text, panel.chip.status) == ("silent for 4 s", "error")
     panel.shut()
     assert window.session.images.streams[0].closed
-    assert window.session.fleet.looked_at == []
+    assert window.session.looked_at == []
 
 
 # -- zoom, move, turn, keep ---------------------------------------------------------------------------
@@ -257,10 +263,10 @@ def test_the_wheel_zooms_where_the_mouse_is(view) -> None:
 
 
 def test_from_twice_its_size_on_pixels_have_edges(view) -> None:
-    shown = picture(4, 4)
-    shown.bgra[:] = 0
-    shown.bgra[0, 0] = (255, 255, 255, 255)
-    view.take(stream_of(shown))  # type: ignore[arg-type]
+    corner = bytes([255] * 3 + [0] * 45)
+    layout = {"shape": [4, 4, 3], "encoding": "bgr8"}
+    message = Message("/c", corner, "image", "image", stamp_ns=time.time_ns(), extension=layout)
+    view.take(stream_of(replace(picture(4, 4), message=message)))  # type: ignore[arg-type]
     image = view.grab().toImage()
     assert {image.pixelColor(x, 20).name() for x in range(0, 200, 3)} == {"#ffffff", "#000000"}
     view.place.set_zoom(1.9)
@@ -309,17 +315,17 @@ def test_a_double_click_goes_between_the_whole_and_one_for_one(view) -> None:
 def test_as_many_pixels_are_wanted_as_are_shown_and_all_of_them_under_the_mouse(view) -> None:
     stream = stream_of(picture(640, 320))
     view.take(stream)  # type: ignore[arg-type]
-    assert stream.wishes[-1] == (400, 200)
+    assert stream.wish == (400, 200)
     view.place.turn(90)
     view.take(stream)  # type: ignore[arg-type]
-    assert stream.wishes[-1] == (400, 200)
+    assert stream.wish == (400, 200)
     view.place.set_zoom(3.0)
     view.take(stream)  # type: ignore[arg-type]
-    assert stream.wishes[-1] == (1920, 960)
+    assert stream.wish == (1920, 960)
     view.place.set_zoom(None)
     view.mouse = QPointF(200, 200)
     view.take(stream)  # type: ignore[arg-type]
-    assert stream.wishes[-1] is None
+    assert stream.wish is None
 
 
 def test_a_pixel_is_said_as_colour_or_number_or_not_at_all() -> None:
@@ -468,7 +474,7 @@ def test_a_job_tells_in_the_windows_thread_and_nothing_after_the_end(qtbot, qapp
 
 def test_what_is_no_picture_offers_to_look_at_the_message(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.topics.put(Topic("/cam", "image", "image"))
+    window.session.put(Topic("/cam", "image", "image"))
     panel = made(qtbot, window)
     window.session.images.streams[0].error = "they are no picture"
     panel.refresh()
@@ -480,13 +486,13 @@ def test_what_is_no_picture_offers_to_look_at_the_message(qtbot, qapp) -> None:
 
 def test_the_camera_panel_shows_the_robot_that_was_chosen(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.images.source = lambda _topic: picture()
+    window.session.images.camera = lambda _topic: picture()
     for name in ("Pepper", "Nao"):
         described = replace(pepper(), name=name)
         sensors = [
             replace(each, topic=f"/{name}/camera") if each.is_image else each for each in described.sensors
         ]
-        window.session.fleet.join(RobotLink(name, replace(described, sensors=tuple(sensors))))
+        window.session.join(replace(described, sensors=tuple(sensors)))
     panel = window.make(CAMERA)
     for widget in (panel, *panel.header_widgets()):
         qtbot.addWidget(widget)

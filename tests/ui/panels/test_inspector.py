@@ -20,8 +20,9 @@ from app.ui.panels.inspector.panel import PANEL, InspectorPanel
 from app.ui.panels.inspector.tree_model import TreeNode
 from app.ui.panels.inspector.values import image_summary, plain_words
 from nep.messages.message import Message, kind_of
-from tests.ui.fakes import Session, blackboard
+from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
+from tests.ui.sample_data import blackboard
 
 
 @pytest.fixture
@@ -386,7 +387,7 @@ def test_a_topic_that_has_gone_says_since_when_and_keeps_its_last_message(panel,
     window.session.topics["/blackboard"].gone_s = 3.2
     panel.refresh()
     assert panel.live.text == "gone 3 s"
-    window.session.topics.remove("/blackboard")
+    window.session.remove("/blackboard")
     panel.refresh()
     assert panel.live.text == "gone"
     assert panel.model.value() == {"n": 1}

@@ -110,7 +110,7 @@ def test_a_node_without_topics_opens_too(panel, window) -> None:
 def test_new_nodes_are_bold_until_opened_and_studio_is_no_news(panel, window) -> None:
     nodes = window.session.nodes
     more = (NodeInfo("4", "arm", "h", 1, "", "native", 1), NodeInfo("5", "Pepper", "h", 1, "", "native", 1))
-    window.session.companions.virtual_robots = ("Pepper",)
+    window.session.companions.restart_virtual_robot("Pepper")
     nodes.update(graph(2, (*NODES, *more)), 1.0)
     panel.refresh()
 
@@ -211,7 +211,7 @@ def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed)
     assert panel.empty._title.text() == words
     if pressed is not None:
         press(button(panel.empty, pressed))
-        assert ("ensure_master",) in window.session.calls
+        assert window.session.companions.masters_asked_for == 1
 
 
 def test_order_and_columns_come_back_with_the_layout(qtbot, panel, window) -> None:

@@ -66,7 +66,7 @@ def test_each_panel_lives_through_everything(qtbot, qapp, name, session) -> None
     for topic in list(window.session.topics):
         panel.show_topic(topic.name)
         ticks(window, panel, 2)
-        window.session.topics.remove(topic.name)
+        window.session.remove(topic.name)
     for link in window.session.fleet.links:
         link.connected = False
     window.session.fleet.revision += 1
@@ -75,7 +75,7 @@ def test_each_panel_lives_through_everything(qtbot, qapp, name, session) -> None
     panel.shut()
     panel.shut()
     assert window.session.watched == []
-    assert window.session.fleet.looked_at == []
+    assert window.session.looked_at == []
     assert all(stream.closed for stream in window.session.images.streams)
 
 

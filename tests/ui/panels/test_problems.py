@@ -6,8 +6,9 @@ from PySide6.QtTest import QTest
 
 from app.blocks import Problem
 from app.ui.panels.problems import PANEL, ProblemsPanel
-from tests.ui.fakes import Session, pepper
+from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press
+from tests.ui.sample_data import pepper
 
 
 @pytest.fixture

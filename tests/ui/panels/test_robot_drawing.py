@@ -10,7 +10,7 @@ from app.ui.robot_drawing.pepper import EMOTIONS
 from app.ui.robot_drawing.room import Stage
 from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, RoomBounds, Thing
-from tests.ui.fakes import drawing
+from tests.ui.sample_data import drawing
 
 AREA = QRectF(0, 0, 382, 286)
 

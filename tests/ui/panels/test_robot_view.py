@@ -9,8 +9,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
 from app.ui.panels.robot import PANEL, STALE_AFTER_S, RobotPanel
-from tests.ui.fakes import RobotLink, Session, drawing, pepper
+from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press
+from tests.ui.sample_data import drawing, pepper
 
 
 @pytest.fixture
@@ -43,7 +44,7 @@ def test_it_is_drawn_from_its_state_with_its_name_and_its_chip(panel, window) ->
     panel.refresh()
     assert panel.view.grab().toImage() != before
     assert panel.chip.status == "warn"
-    assert window.session.fleet.looked_at == ["Pepper"]
+    assert window.session.looked_at == ["Pepper"]
 
 
 def test_the_same_state_is_not_painted_again(panel, window, monkeypatch) -> None:
@@ -89,15 +90,15 @@ def test_one_that_fell_silent_is_grey_and_says_nothing_any_more(panel, window, m
 @pytest.mark.parametrize("part", ["head", "left_hand", "right_hand"])
 def test_pressing_a_part_touches_it_and_letting_go_ends_it(panel, window, part) -> None:
     QTest.mousePress(panel.view, Qt.MouseButton.LeftButton, pos=point(panel, part))
-    assert window.session.calls == [("world", "Pepper", {"touch": part, "down": True})]
+    assert window.session.changes("Pepper") == [{"touch": part, "down": True}]
     QTest.mouseRelease(panel.view, Qt.MouseButton.LeftButton, pos=point(panel, part))
-    assert window.session.calls[1:] == [("world", "Pepper", {"touch": part, "down": False})]
+    assert window.session.changes("Pepper") == [{"touch": part, "down": False}]
 
 
 def test_the_keyboard_can_touch_it_too(panel, window) -> None:
     QTest.keyPress(panel.view, Qt.Key.Key_H)
     QTest.keyRelease(panel.view, Qt.Key.Key_H)
-    assert [call[2]["down"] for call in window.session.calls] == [True, False]
+    assert [change["down"] for change in window.session.changes("Pepper")] == [True, False]
 
 
 def test_the_ball_is_dragged_over_the_floor(panel, window) -> None:
@@ -107,7 +108,7 @@ def test_the_ball_is_dragged_over_the_floor(panel, window) -> None:
     end.setY(start.y() + 8)
     QTest.mouseMove(panel.view, end)
     QTest.mouseRelease(panel.view, Qt.MouseButton.LeftButton, pos=end)
-    moves = [call[2] for call in window.session.calls]
+    moves = window.session.changes("Pepper")
     assert moves
     assert moves[-1]["move"] == "ball"
     assert moves[-1]["y"] > -1.65  # to the right
@@ -116,13 +117,13 @@ def test_the_ball_is_dragged_over_the_floor(panel, window) -> None:
 
 def test_a_press_beside_everything_does_nothing(panel, window) -> None:
     QTest.mouseClick(panel.view, Qt.MouseButton.LeftButton, pos=panel.view.rect().topLeft())
-    assert window.session.calls == []
+    assert window.session.changes("Pepper") == []
 
 
 def test_reset_puts_everything_back(panel, window) -> None:
     panel.reset.show()
     press(panel.reset)
-    assert window.session.calls == [("world", "Pepper", {"reset": True})]
+    assert window.session.changes("Pepper") == [{"reset": True}]
 
 
 def test_without_a_robot_the_virtual_one_is_offered(qtbot, qapp) -> None:
@@ -131,14 +132,14 @@ def test_without_a_robot_the_virtual_one_is_offered(qtbot, qapp) -> None:
     qtbot.addWidget(panel)
     press(button(panel, "Use the virtual robot"))
     assert window.commands == ["robots.virtual"]
-    window.session.fleet.join(RobotLink("Ada", pepper("Ada")))
+    window.session.join(pepper("Ada"))
     panel.refresh()
     assert panel.title() == "Ada"
 
 
 def test_a_real_robot_has_no_drawing_but_a_way_to_its_actions(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.fleet.join(RobotLink("Turtle", pepper("Turtle"), virtual=False))
+    window.session.join(pepper("Turtle"), virtual=False)
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
     assert isinstance(panel, RobotPanel)
@@ -146,7 +147,7 @@ def test_a_real_robot_has_no_drawing_but_a_way_to_its_actions(qtbot, qapp) -> No
     press(button(panel, "Show its actions"))
     assert window.commands == ["panel:robots"]
     panel.shut()
-    assert window.session.fleet.looked_at == []
+    assert window.session.looked_at == []
 
 
 @pytest.mark.parametrize(
@@ -162,7 +163,7 @@ def test_a_robot_that_is_not_drawn_names_only_what_it_has(qtbot, kept, words) ->
     window = Window(Session())
     whole = pepper("Table")
     robot = replace(whole, virtual=False, sensors=tuple(sensor for sensor in whole.sensors if kept(sensor)))
-    window.session.fleet.join(RobotLink("Table", robot, virtual=False))
+    window.session.join(robot, virtual=False)
     panel = window.make(PANEL, (384, 288))
     qtbot.addWidget(panel)
     assert words in [shown.text() for shown in panel.empty.findChildren(QLabel)]

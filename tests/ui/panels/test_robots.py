@@ -14,8 +14,9 @@ from app.ui.panels.robots.list import seen_words
 from app.ui.panels.robots.panel import PANEL, RobotsPanel
 from app.ui.panels.robots.tries import feedback_words, progress_of
 from app.ui.widgets.inputs.fields import LongText
-from tests.ui.fakes import ACTIONS, Invocation, RobotLink, Session, pepper
+from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press
+from tests.ui.sample_data import ACTIONS, Invocation, pepper
 
 
 @pytest.fixture
@@ -44,7 +45,7 @@ def test_every_action_but_the_stop_is_a_card(panel) -> None:
 def test_trying_sends_what_the_form_says(panel, window) -> None:
     panel.cards["turn"].form.set_input({"angle": -45.0})
     press(panel.cards["turn"].try_button)
-    assert window.session.calls == [("invoke", "Pepper", "turn", {"angle": -45.0, "speed": 40.0})]
+    assert window.session.asked("Pepper") == [("invoke", "turn", {"angle": -45.0, "speed": 40.0})]
 
 
 def test_a_refused_input_stands_below_its_row(panel, window) -> None:
@@ -85,7 +86,7 @@ def test_while_it_runs_it_shows_its_progress_and_can_be_cancelled(panel, window)
     assert card.progress.fraction == pytest.approx(0.4)
     assert card.words.text() == "for 0.6 s"
     press(card.try_button)
-    assert window.session.calls == [("cancel", "Pepper", "walk")]
+    assert window.session.asked("Pepper") == [("cancel", "walk", None)]
     made.state = "canceled"
     panel.refresh()
     assert not card.progress.isVisible()
@@ -137,25 +138,25 @@ def test_later_cards_are_folded_and_say_their_values(panel) -> None:
 def test_stop_stops_the_chosen_robot(panel, window) -> None:
     assert panel.stop.text() == "Stop Pepper"
     press(panel.stop)
-    assert window.session.calls == [("stop_robot", "Pepper")]
+    assert window.session.fleet.stopping == ("Pepper",)
 
 
 def test_another_robot_can_be_chosen_and_only_it_is_looked_at(panel, window) -> None:
-    link = window.session.fleet.join(RobotLink("Turtle", pepper("Turtle"), virtual=False))
+    link = window.session.join(pepper("Turtle"), virtual=False)
     link.invocations["walk"] = Invocation("1", "walk")
     panel.refresh()
     press(panel.items["Turtle"])
     assert panel.name.text() == "Turtle"
-    assert window.session.fleet.looked_at == ["Turtle"]
+    assert window.session.looked_at == ["Turtle"]
     panel.refresh()
     assert panel.items["Turtle"].chip.text == "busy"
     panel.shut()
-    assert window.session.fleet.looked_at == []
+    assert window.session.looked_at == []
 
 
 def test_forms_keep_what_was_typed_while_other_robots_come(panel, window) -> None:
     panel.cards["say"].form.set_input({"text": "half a sentence"})
-    window.session.fleet.join(RobotLink("Turtle", pepper("Turtle")))
+    window.session.join(pepper("Turtle"))
     panel.refresh()
     assert panel.cards["say"].form.input()["text"] == "half a sentence"
 
@@ -199,7 +200,7 @@ def test_without_any_robot_those_that_are_away_stand_beside_the_words(qtbot) -> 
 
 def test_a_robot_that_goes_says_when_it_was_seen_and_goes_from_the_list_when_forgotten(panel, window) -> None:
     fleet = window.session.fleet
-    link = fleet.join(RobotLink("Rover", replace(pepper(), name="Rover", virtual=False), virtual=False))
+    link = window.session.join(pepper("Rover"), virtual=False)
     fleet.known.saw([link.robot])
     link.connected = False
     fleet.revision += 1

@@ -7,8 +7,9 @@ from app.robots.description.model import DataField, Sensor
 from app.ui.panels import sensors
 from app.ui.panels.sensors import PANEL, SensorsPanel
 from app.ui.text.sensor_values import ReadingWords, number_words, reading_of
-from tests.ui.fakes import RobotLink, Session, pepper
+from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
+from tests.ui.sample_data import pepper
 
 POSE = Sensor("pose", "position", "object", "/p", fields=(
     DataField("x", "x", "number", "m"), DataField("y", "y", "number", "m"),
@@ -67,9 +68,9 @@ def test_one_row_for_each_sensor_but_pictures(qtbot, window) -> None:
     assert shown["Head touch"] == "no"
     assert shown["Distance"] == "0.82 m"
     assert shown["Position"] == "1.3, \u22120.3 m"
-    assert window.session.fleet.looked_at == ["Pepper"]
+    assert window.session.looked_at == ["Pepper"]
     panel.shut()
-    assert window.session.fleet.looked_at == []
+    assert window.session.looked_at == []
 
 
 def test_what_people_look_for_comes_first_and_no_row_is_cut(qtbot, window) -> None:
@@ -128,11 +129,11 @@ def test_with_no_robot_it_says_so_and_another_description_makes_other_rows(qtbot
     qtbot.addWidget(panel)
     assert isinstance(panel, SensorsPanel)
     assert panel.empty.isVisible()
-    link = window.session.fleet.join(RobotLink("Pepper", pepper()))
+    link = window.session.join(pepper())
     panel.refresh()
     count = len(panel.rows)
     link.robot = type(link.robot)(**{**vars(link.robot), "sensors": link.robot.sensors[:2]})
     window.session.fleet.revision += 1
     panel.refresh()
     assert (count, len(panel.rows)) == (8, 2)
-    assert window.session.fleet.looked_at == ["Pepper"]
+    assert window.session.looked_at == ["Pepper"]

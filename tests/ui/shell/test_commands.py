@@ -21,7 +21,8 @@ from app.ui.shell.commands.menus import ARRANGING
 from app.ui.shell.commands.robots import RobotSwap
 from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS
 from app.ui.shell.main_window import MainWindow
-from tests.ui import fakes
+from tests.ui import sample_data
+from tests.ui.fakes import session as full_session
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -130,8 +131,10 @@ def test_the_menu_of_a_tab_names_commands_about_a_tab() -> None:
 
 
 def test_the_alerts_of_the_tests_name_commands_too() -> None:
-    source = Path(fakes.__file__)
-    assert all(is_known(words) for words, _ in named(source) if "." in words or ":" in words)
+    sources = (Path(full_session.__file__), Path(sample_data.__file__))
+    found = [words for source in sources for words, _ in named(source) if "." in words or ":" in words]
+    assert found
+    assert all(map(is_known, found))
 
 
 @pytest.mark.parametrize("name", ["nonsense", "nonsense:x", "panel.nonsense", "run.run:x", ""])

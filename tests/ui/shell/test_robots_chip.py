@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
 
 from app.ui.shell.bars.app_bar import robots_chip
+from tests.ui.shell_parts import robots_in
 
 
-def chip(*states: str, run: str = "idle", silent: str | None = None) -> tuple[str, str]:
-    links = [
-        SimpleNamespace(name=f"Robot {number}", state=state, silent=silent)
-        for number, state in enumerate(states, 1)
-    ]
-    runs = SimpleNamespace(
-        active=run in {"starting", "running", "paused", "stopping"}, view=lambda: SimpleNamespace(state=run)
-    )
-    return robots_chip(SimpleNamespace(fleet=SimpleNamespace(links=links), runs=runs))  # type: ignore[arg-type]
+def chip(*states: str, run: str = "ready", silent: str | None = None) -> tuple[str, str]:
+    return robots_chip(robots_in(*states, run=run, silent=silent))
 
 
 @pytest.mark.parametrize(
     ("state", "run", "words"),
     [
-        ("ready", "idle", "Robot 1 ready"),
-        ("busy", "idle", "Robot 1 moving"),
+        ("ready", "ready", "Robot 1 ready"),
+        ("busy", "ready", "Robot 1 moving"),
         ("ready", "running", "Robot 1 running"),
         ("ready", "paused", "Robot 1 holds still"),
-        ("ready", "error", "Robot 1 ready"),
+        ("ready", "proven", "Robot 1 ready"),
     ],
 )
 def test_one_robot_says_what_it_does(state: str, run: str, words: str) -> None:

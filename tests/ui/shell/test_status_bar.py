@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from types import SimpleNamespace
 
 import pytest
 
@@ -12,17 +11,9 @@ from app.ui.shell.bars.app_bar import robots_chip
 from app.ui.shell.bars.status_bar import StatusBar, StatusFacts
 from app.ui.theme.theme import Theme
 from tests.ui import fakes
+from tests.ui.shell_parts import robots_in
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
-
-
-def link(name: str, state: str) -> SimpleNamespace:
-    return SimpleNamespace(name=name, state=state, silent="camera silent" if state == "silent" else None)
-
-
-def with_robots(*links: SimpleNamespace, active: bool = False) -> SimpleNamespace:
-    runs = SimpleNamespace(active=active, view=lambda: SimpleNamespace(state="running" if active else "idle"))
-    return SimpleNamespace(fleet=SimpleNamespace(links=list(links)), runs=runs)
 
 
 @pytest.fixture
@@ -127,18 +118,18 @@ def test_facts_without_words_leave_no_gap(qtbot, theme: Theme) -> None:
 
 
 @pytest.mark.parametrize(
-    ("links", "active", "chip"),
+    ("states", "run", "chip"),
     [
-        ([], False, ("No robot", "off")),
-        ([link("NAO", "away")], False, ("No robot", "off")),
-        ([link("Pepper", "ready")], False, ("Pepper ready", "ok")),
-        ([link("Pepper", "ready")], True, ("Pepper running", "ok")),
-        ([link("Pepper", "busy")], False, ("Pepper moving", "ok")),
-        ([link("Pepper", "ready"), link("Turtle", "ready")], False, ("2 robots", "ok")),
-        ([link("Pepper", "ready"), link("Turtle", "silent")], True, ("Turtle: camera silent", "error")),
-        ([link("Pepper", "silent")], True, ("Camera silent", "error")),
-        ([link("Pepper", "silent"), link("NAO", "silent")], True, ("2 robots silent", "error")),
+        ([], "ready", ("No robot", "off")),
+        (["away"], "ready", ("No robot", "off")),
+        (["ready"], "ready", ("Robot 1 ready", "ok")),
+        (["ready"], "running", ("Robot 1 running", "ok")),
+        (["busy"], "ready", ("Robot 1 moving", "ok")),
+        (["ready", "ready"], "ready", ("2 robots", "ok")),
+        (["ready", "silent"], "running", ("Robot 2: camera silent", "error")),
+        (["silent"], "running", ("Camera silent", "error")),
+        (["silent", "silent"], "running", ("2 robots silent", "error")),
     ],
 )
-def test_the_chip_of_the_robots(links, active: bool, chip: tuple[str, str]) -> None:
-    assert robots_chip(with_robots(*links, active=active)) == chip  # type: ignore[arg-type]
+def test_the_chip_of_the_robots(states: list[str], run: str, chip: tuple[str, str]) -> None:
+    assert robots_chip(robots_in(*states, run=run, silent="camera silent")) == chip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QKeyCombination, Qt
@@ -46,7 +45,7 @@ from tests.ui import fakes
 from tests.ui.clipping import clipped
 from tests.ui.shell.test_files import changed, saved
 from tests.ui.shell.test_motion_permission import ROVER
-from tests.ui.shell_parts import NAMES, PANELS, Answers
+from tests.ui.shell_parts import NAMES, PANELS, Answers, robots_in
 
 # without a screen nothing can grab the keyboard, which every popup asks for
 pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
@@ -302,13 +301,11 @@ def test_the_question_before_a_robot_moves(qtbot, pseudo, tmp_path: Path) -> Non
         ("silent", "ready"), ("silent", "silent"), ("not stopped",), ("not stopped", "not stopped"),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("run", ["idle", "running", "paused"])
+@pytest.mark.parametrize("run", ["ready", "running", "paused"])
 def test_the_chip_of_robots(pseudo, states: tuple[str, ...], run: str) -> None:
-    links = [SimpleNamespace(name="Rover", state=state, silent="", state_words="") for state in states]
-    runs = SimpleNamespace(active=run != "idle", view=lambda: SimpleNamespace(state=run))
-    words, _status = robots_chip(SimpleNamespace(fleet=SimpleNamespace(links=links), runs=runs))  # type: ignore[arg-type]
+    words, _status = robots_chip(robots_in(*states, run=run))
     assert words
-    assert untranslated(words, "Rover") == []
+    assert untranslated(words, "Robot 1", "Robot 2") == []
 
 
 @pytest.mark.parametrize("session", [fakes.Session, fakes.Session.full], ids=["empty", "full"])

@@ -1,0 +1,82 @@
+"""Pictures that are decoded in the thread that offers them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from app.core.messages import image_streams as images_module
+from app.core.messages.picture import Picture
+from app.core.network.watches import Watches
+from nep.messages.message import Message
+
+
+@dataclass(eq=False)
+class ImageStream(images_module.ImageStream):
+    """The real one; a test asks it for what was painted."""
+
+    painted: list[Picture] = field(default_factory=list)
+
+    def shown(self) -> None:
+        super().shown()
+        if self.picture is not None:
+            self.painted.append(self.picture)
+
+    def came(self, arriving_hz: float, shown_hz: float) -> None:
+        """As if pictures had come and had been painted for two seconds; the next ones come after these."""
+        begin = self._images.clock() - images_module.RATE_DELAY_S - images_module.RATE_WINDOW_S
+        for rate, hz in ((self.arriving, arriving_hz), (self._shown, shown_hz)):
+            for number in range(round(hz * images_module.RATE_WINDOW_S)):
+                rate.add(begin + (number + 1e-3) / hz)
+
+
+class Images(images_module.Images):
+    """The real ones, but decoded in the thread that offers them; ``camera`` tells what a topic sends."""
+
+    def __init__(
+        self,
+        watch: Callable[[str], images_module.Watching] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        super().__init__(watch or (lambda topic: Watches(str, str).open([topic])), clock)
+        self.streams: list[ImageStream] = []
+        self.camera: Callable[[str], Picture | None] = lambda _topic: None
+
+    def stream(self, topic: str) -> ImageStream:
+        stream = ImageStream(topic, self, self._watch(topic))
+        self.add(stream)
+        self.streams.append(stream)
+        if self.camera(topic) is not None:
+            stream.came(15.0, 15.0)
+        self.look(topic)
+        return stream
+
+    def look(self, topic: str) -> None:
+        """The camera of a topic sends what it sees, if there is one."""
+        seen = self.camera(topic)
+        if seen is not None and seen.message is not None:
+            self.offer([on_topic(seen.message, topic)])
+
+    def add(self, stream: images_module.ImageStream) -> None:
+        super().add(stream)
+        self.decode_waiting()
+
+    def offer(self, messages: Sequence[Message]) -> None:
+        super().offer(messages)
+        self.decode_waiting()
+
+    def want(self, stream: images_module.ImageStream, size: tuple[int, int] | None) -> None:
+        super().want(stream, size)
+        self.decode_waiting()
+
+    def _begin_decoding(self) -> None:
+        return None
+
+
+def on_topic(message: Message, topic: str) -> Message:
+    """The same message on another topic."""
+    return Message(
+        topic, message.data, message.codec, message.msg_type,
+        stamp_ns=message.stamp_ns, seq=message.seq, extension=message.extension,
+    )  # fmt: skip

@@ -1,0 +1,264 @@
+"""The real session over a network that a test makes up.
+
+`Session.full()` has a master, thirteen topics, the virtual Pepper and a behaviour;
+`Session()` has nothing. `tick()` makes the figures move.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+
+from app.core import session as session_module
+from app.core.console import Console
+from app.core.documents.open_documents import Documents
+from app.core.documents.saved_tabs import KeptTabs
+from app.core.network import doctor as doctor_module
+from app.core.network.master import MasterState
+from app.core.network.topics import Topic
+from app.core.robots.fleet import COMMAND_TYPE
+from app.core.robots.robot_link import RobotLink, topics_of
+from app.core.run.control import Runs
+from app.core.run.runner import RunnerEvent
+from app.robots.description.model import Robot
+from nep.doctor import Finding
+from nep.messages.message import Message
+from nep.nodes.subscriber import Subscriber
+from tests.ui import sample_data
+from tests.ui.fakes.images import Images
+from tests.ui.fakes.network import Network
+from tests.ui.fakes.processes import Companions, Runner
+from tests.ui.fakes.storage import Document, Settings
+
+ADDRESS = "127.0.0.1:7780"
+TICK_S = 1 / 30
+
+
+class Clock:
+    """Goes on only when a test says so; it begins at the computer's time, which some panels look at."""
+
+    def __init__(self, behind_s: float = 0.0) -> None:
+        self.now = time.monotonic() - behind_s
+        self._epoch_ns = time.time_ns() - round(time.monotonic() * 1e9)
+
+    def __call__(self) -> float:
+        """Monotonic seconds."""
+        return self.now
+
+    def ns(self) -> int:
+        """Nanoseconds since 1970."""
+        return self._epoch_ns + round(self.now * 1e9)
+
+    def epoch_s(self) -> float:
+        """Seconds since 1970."""
+        return self.ns() / 1e9
+
+
+class Doctor(doctor_module.Doctor):
+    """The real one; finds what the test says, at once and in the thread that asks."""
+
+    looking = False  # type: ignore[assignment]  # what a test says instead of a thread
+
+    def __init__(self) -> None:
+        super().__init__(lambda: self.found, lambda: 1_795_164_093.0)
+        self.looked = 0
+        self.found: tuple[Finding, ...] = ()
+
+    def look(self) -> None:
+        self.looked += 1
+        self._run()
+
+
+_open: list[Session] = []
+
+
+class Session(session_module.Session):
+    """Has nothing: no master, no topic, no robot, an empty behaviour. `close_sessions` ends it."""
+
+    source: Network
+    documents: Documents
+    images: Images
+    companions: Companions
+    doctor: Doctor
+
+    def __init__(self, clock: Clock | None = None) -> None:
+        self.clock = clock if clock is not None else Clock()
+        super().__init__(
+            Settings(),
+            address=ADDRESS,
+            source=Network,
+            clock=self.clock,
+            clock_ns=self.clock.ns,
+            start_companions=False,
+        )
+        post = self._mailbox.post_event
+        self.console = Console(self.clock.epoch_s)
+        self.documents = Documents(Document)
+        self.document.key = "behaviour-1"
+        self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
+        self.runs = Runs(
+            self.documents, self.fleet, self,
+            alerts=self.alerts, console=self.console, post_event=post, clock=self.clock,
+            make_runner=self._make_runner,  # type: ignore[arg-type]
+        )  # fmt: skip
+        self.doctor = Doctor()
+        self.companions = Companions(ADDRESS, post, self.fleet.is_there, self.clock)
+        self.images = Images(self.watch, self.clock)
+        self.master = MasterState("none", ADDRESS)
+        self.ticks = 0
+        self.runner: Runner | None = None
+        """The program that runs, or ran last."""
+        self._ears: dict[str, list[Subscriber]] = {}
+        _open.append(self)
+
+    @property
+    def document(self) -> Document:
+        """The behaviour whose tab shows."""
+        current = self.documents.current
+        assert isinstance(current, Document)
+        return current
+
+    @property
+    def watched(self) -> list[str]:
+        """The topics that panels look at, in the order in which they began."""
+        answers = {link.robot.topics.answer for link in self.fleet.links}
+        watched = self.source.wanted - answers
+        return [topic for topic in dict.fromkeys(self.source.asked) if topic in watched]
+
+    @property
+    def looked_at(self) -> list[str]:
+        """The robots whose sensors somebody sees."""
+        return [link.name for link in self.fleet.links if set(topics_of(link.robot)) <= self.source.wanted]
+
+    def _make_runner(self, on_event: Callable[[RunnerEvent], object]) -> Runner:
+        self.runner = Runner(on_event)
+        return self.runner
+
+    # -- what a test lets happen
+
+    def take_over(self) -> None:
+        """What was posted is taken over; no time goes by."""
+        super().tick()
+
+    def tick(self) -> None:
+        """A thirtieth of a second goes by."""
+        self.ticks += 1
+        self.clock.now += TICK_S
+        now_ns = self.clock.ns()
+        for topic in self.topics.live():
+            if topic.rate_hz:
+                topic.last_stamp_ns = now_ns - round(self.ticks * 0.033 % (1 / topic.rate_hz) * 1e9)
+        if self.ticks % 3 == 0:
+            self.source.send(self._message("/blackboard", sample_data.blackboard(self.ticks / 30)))
+        for stream in self.images.streams:
+            if not stream.resting:
+                self.images.look(stream.topic)
+        super().tick()
+
+    def put(self, topic: Topic) -> Topic:
+        """A topic is there, with everything that is known of it."""
+        if topic.age_s is not None:
+            topic.last_stamp_ns = self.clock.ns() - round(topic.age_s * 1e9)
+        if topic.gone_s is not None:
+            topic.gone_since = self.clock() - topic.gone_s
+        self.topics._topics[topic.name] = topic
+        self.topics.revision += 1
+        self.topics.values_revision += 1
+        return topic
+
+    def remove(self, name: str) -> None:
+        """A topic is not known any more."""
+        del self.topics._topics[name]
+        self.topics.revision += 1
+
+    def send(self, topic: str, payload: object) -> Message:
+        """A message arrives on a topic that is watched."""
+        message = self._message(topic, payload)
+        self.source.send(message)
+        self.take_over()
+        return message
+
+    def _message(self, topic: str, payload: object) -> Message:
+        known = self.topics.get(topic) or Topic(topic, "json", "json")
+        data = payload if isinstance(payload, bytes) else json.dumps(payload).encode()
+        seq = (known.newest.seq or 0) + 1 if known.newest is not None else 18204
+        return Message(
+            topic, data, known.codec, known.msg_type, stamp_ns=time.time_ns() - 600_000, seq=seq, publisher=1
+        )
+
+    def join(self, robot: Robot, *, virtual: bool = True) -> RobotLink:
+        """A robot comes. It hears what it is told (`asked`, `changes`), and has answered a stop."""
+        topics = robot.topics
+        self._ears[robot.name] = [
+            self.source.listen(topics.command, COMMAND_TYPE),
+            *([self.source.listen(topics.world, "json")] if topics.world is not None else []),
+        ]
+        self.fleet.join(replace(robot, virtual=virtual), topics.description)
+        self.fleet.stopped({robot.name: ("answered in 41 ms, at 8:40", "ok")}, {})
+        self.take_over()
+        link = self.fleet.link(robot.name)
+        assert link is not None
+        return link
+
+    def asked(self, name: str) -> list[tuple[object, object, object]]:
+        """What a robot was told since the last time: (op, action, input); no signs of life."""
+        told = _heard(self._ears[name][0])
+        return [(one["op"], one["action"], one.get("input")) for one in told if one["op"] != "alive"]
+
+    def changes(self, name: str) -> list[Mapping[str, object]]:
+        """What was changed in a robot's world since the last time."""
+        return _heard(self._ears[name][1])
+
+    @classmethod
+    def full(cls) -> Session:
+        """A session as in the design's pictures."""
+        session = cls(Clock(behind_s=sample_data.LOG[0][0]))
+        clock, end = session.clock, session.clock.now + sample_data.LOG[0][0]
+        at_ns = clock.ns() + sample_data.LOG[0][0] * 1_000_000_000
+        session.source.find_master()
+        for revision, ago in ((1, 5.2), (2, 4.2)):
+            clock.now = end - ago
+            session.source.tell(sample_data.graph(revision, at_ns))
+            session.take_over()
+        for place, topic in enumerate(session.topics):
+            wave = 0.02 if place % 3 == 0 else 0.5
+            usual = topic.rate_hz or 1.0
+            topic.rates.clear()
+            topic.rates.extend(usual * (1 + wave * math.sin(k * 0.7 + place)) for k in range(40))
+        clock.now = end
+        link = session.join(sample_data.pepper())
+        link.values.update(sample_data.VALUES)
+        link.drawing = sample_data.drawing()
+        session.doctor.found = sample_data.FOUND
+        session.images.camera = lambda _topic: sample_data.picture()
+        session.document.name = "Greeting"
+        session.document.source = sample_data.PROGRAM
+        session.document.workspace = sample_data.WORKSPACE
+        session.document.found = sample_data.PROBLEMS
+        session.document.absent_blocks = ("b8", "b9")
+        session.console.clear()
+        for ago, level, origin, text in sample_data.LOG:
+            clock.now = end - ago
+            session.console.add(level, origin, text)
+        session.alerts.put(
+            "message:/faces", "error", "/faces sends text that is not JSON since 8:41.",
+            "1 204 messages could not be read.", button="Look at the raw bytes", action="inspect:/faces",
+        )  # fmt: skip
+        return session
+
+
+def _heard(ear: Subscriber) -> list[Mapping[str, object]]:
+    heard = []
+    while (message := ear.receive(0.0)) is not None:
+        heard.append(message.payload)
+    return heard
+
+
+def close_sessions() -> None:
+    """End all sessions that a test has made, with their threads."""
+    while _open:
+        _open.pop().close()

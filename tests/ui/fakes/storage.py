@@ -1,0 +1,68 @@
+"""What is kept in memory alone: settings, and the journal of a behaviour whose compiler a test may lead."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from app.blocks import Problem, Program
+from app.core.documents import document as document_module
+from app.core.documents import journal as journal_module
+from app.core.storage import settings as settings_module
+
+
+class Settings(settings_module.Settings):
+    """Settings that are kept in memory alone."""
+
+    def __init__(self) -> None:
+        super().__init__(Path("no such folder"))
+
+    def set(self, key: str, value: object) -> None:
+        json.dumps(value)
+        self._values[key] = value
+
+
+class Journal(journal_module.Journal):
+    """Keeps the work in memory alone."""
+
+    def __init__(self) -> None:
+        super().__init__(Path("no such folder"))
+        self.kept: str | None = None
+
+    def write(
+        self,
+        name: str,
+        path: Path | None,
+        text: str,
+        robots: Mapping[str, Mapping[str, object]],
+        others: Mapping[str, object] | None = None,
+    ) -> None:
+        self.kept = text
+
+    def discard(self) -> None:
+        self.kept = None
+
+
+class Document(document_module.Document):
+    """The real one; a test may tell what its compiler says."""
+
+    def __init__(self) -> None:
+        super().__init__(Journal)
+        self._timer = lambda: 0.0  # takes no time, so nothing is compiled beside
+        self.found: tuple[Problem, ...] | None = None
+        self.sensors: tuple[tuple[str, str], ...] | None = None
+        self.source: str | None = None
+        self.absent_blocks: tuple[str, ...] | None = None
+
+    def _compiling(self) -> Callable[[], Program]:
+        compiling = super()._compiling()
+        told = {
+            "problems": self.found,
+            "sensors": self.sensors,
+            "source": self.source,
+            "absent": self.absent_blocks,
+        }
+        given = {name: value for name, value in told.items() if value is not None}
+        return lambda: replace(compiling(), **given)  # type: ignore[arg-type]

@@ -1,0 +1,165 @@
+"""The network for tests of panels brings what the live one brings."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Protocol
+
+import pytest
+
+import nep
+from app.core.network.source import GraphSeen, JobFailed, LiveSource, MasterFound, Source
+from nep.masters.master import Master
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
+from tests.blocks.fakes import until
+from tests.ui.fakes.network import Network
+
+
+class World(Protocol):
+    """A network with one program that sends, and what Studio hears of it."""
+
+    source: Source
+    events: list[object]
+    heard: list[tuple[str, object]]
+
+    def begin(self) -> None:
+        """The master answers, and tells that the program publishes /a."""
+
+    def send(self, payload: object) -> None:
+        """The program publishes on /a; it has come to all who listen when this returns."""
+
+    def listens(self, listens: bool) -> bool:
+        """Wait until the program is heard, or is not; whether that is so."""
+
+
+class RealWorld:
+    """On sockets, with a master."""
+
+    def __init__(self, master: Master) -> None:
+        self.events: list[object] = []
+        self.heard: list[tuple[str, object]] = []
+        self.source = LiveSource(master.address, [self._take, self._take], self.events.append)
+        self.node = nep.node("talker", master=master.address)
+        self.publisher = self.node.new_pub("/a", "json")
+        self._sent = 0
+
+    def _take(self, topic: str, messages: Sequence[Message]) -> None:
+        self.heard += [(topic, message.payload) for message in messages]
+
+    def begin(self) -> None:
+        self.source.start()
+        until(lambda: any(isinstance(each, GraphSeen) and "/a" in each.view.topics for each in self.events))
+
+    def send(self, payload: object) -> None:
+        before = len(self.heard)
+        self.publisher.publish(payload)
+        if self.publisher.subscribers:
+            until(lambda: len(self.heard) == before + 2)
+
+    def listens(self, listens: bool) -> bool:
+        until(lambda: (self.publisher.subscribers == 1) is listens)
+        return True
+
+    def close(self) -> None:
+        self.source.close()
+        self.node.close()
+
+
+class MadeUpWorld:
+    """As tests of panels make it up."""
+
+    def __init__(self) -> None:
+        self.events: list[object] = []
+        self.heard: list[tuple[str, object]] = []
+        self.source = Network("127.0.0.1:7780", [self._take, self._take], self.events.append)
+
+    def _take(self, topic: str, messages: Sequence[Message]) -> None:
+        self.heard += [(topic, message.payload) for message in messages]
+
+    def begin(self) -> None:
+        self.source.start()
+        self.source.find_master()
+        self.source.tell(GraphView(1, 1))
+
+    def send(self, payload: object) -> None:
+        self.source.send(Message("/a", json.dumps(payload).encode(), "json", "json"))
+
+    def listens(self, listens: bool) -> bool:
+        return ("/a" in self.source.wanted) is listens
+
+    def close(self) -> None:
+        self.source.close()
+
+
+@pytest.fixture(params=["real", "made up"])
+def world(request: pytest.FixtureRequest) -> Iterator[World]:
+    made = RealWorld(request.getfixturevalue("master")) if request.param == "real" else MadeUpWorld()
+    yield made
+    made.close()
+
+
+def test_the_master_is_found_before_the_graph_is_told(world: World) -> None:
+    assert world.events == []
+    world.begin()
+    assert [type(event) for event in world.events[:2]] == [MasterFound, GraphSeen]
+    assert world.events[0] == MasterFound(world.source.address)
+
+
+def test_messages_come_to_every_sink_while_their_topic_is_watched(world: World) -> None:
+    world.begin()
+    world.send("nobody listens")
+    assert world.heard == []
+    world.source.watch("/a")
+    assert world.listens(True)
+    world.send(1)
+    world.send({"two": 2})
+    assert world.heard == [("/a", 1), ("/a", 1), ("/a", {"two": 2}), ("/a", {"two": 2})]
+    world.source.watch("/a")  # said twice it is one watch
+    world.source.unwatch("/a")
+    assert world.listens(False)
+    world.send("nobody listens")
+    assert len(world.heard) == 4
+    world.source.unwatch("/a")  # nor does this
+
+
+def test_what_was_missed_is_counted_of_topics_that_are_watched(world: World) -> None:
+    world.begin()
+    assert world.source.missed() == {}
+    world.source.watch("/a")
+    assert world.listens(True)
+    until(lambda: world.source.missed() == {"/a": 0})
+    world.source.unwatch("/a")
+    assert world.listens(False)
+    until(lambda: world.source.missed() == {})
+
+
+def test_jobs_have_a_node_keep_their_order_and_one_that_fails_is_told(world: World) -> None:
+    world.begin()
+    done: list[object] = []
+
+    def talk(node: Node) -> None:
+        with node.new_sub("/b", "json") as ear, node.new_pub("/b", "json") as publisher:
+            until(lambda: publisher.subscribers == 1)
+            publisher.publish({"n": 1})
+            done.append(ear.receive(20).payload)  # type: ignore[union-attr]
+
+    def wrong(_node: Node) -> None:
+        raise nep.NepError("no such thing")
+
+    def broken(_node: Node) -> None:
+        raise ValueError("no such luck")
+
+    for what, job in (
+        ("talk", talk),
+        ("ask", wrong),
+        ("count", broken),
+        ("end", lambda _n: done.append("end")),
+    ):
+        world.source.submit(what, job)
+    until(lambda: "end" in done)
+    assert done == [{"n": 1}, "end"]
+    failed = [event for event in world.events if isinstance(event, JobFailed)]
+    assert failed == [JobFailed("ask", "no such thing"), JobFailed("count", "ValueError: no such luck")]

@@ -1,0 +1,129 @@
+"""Virtual robots of processes that a test makes up come and go as those of the computer."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import IO
+
+import pytest
+
+from app.core.robots.virtual_processes import CompanionFailed, Companions, Process, start_process
+from tests.ui.fakes.processes import Process as MadeUpProcess
+
+WAITS = """
+import os, sys, time
+while not os.path.exists(sys.argv[1]):
+    time.sleep(0.002)
+print("no room left")
+sys.exit(3)
+"""
+"""Lives until its file is there; then it says why, and ends."""
+
+
+class RealProcesses:
+    """Processes of the operating system that end by themselves when a test says so."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.made: list[Process] = []
+
+    def start(self, _command: Sequence[str], environment: Mapping[str, str], log: IO[bytes]) -> Process:
+        file = self.folder / f"{len(self.made)}"
+        self.made.append(start_process([sys.executable, "-S", "-c", WAITS, str(file)], environment, log))
+        return self.made[-1]
+
+    def die(self, place: int) -> None:
+        (self.folder / f"{place}").touch()
+        self.made[place].wait(60)
+
+
+class MadeUpProcesses:
+    """Those for tests of panels."""
+
+    def __init__(self) -> None:
+        self.made: list[MadeUpProcess] = []
+
+    def start(self, _command: Sequence[str], _environment: Mapping[str, str], log: IO[bytes]) -> Process:
+        self.made.append(MadeUpProcess(log))
+        return self.made[-1]
+
+    def die(self, place: int) -> None:
+        self.made[place].die(b"no room left\n", 3)
+
+
+@pytest.fixture(params=["real", "made up"])
+def started_here(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[RealProcesses | MadeUpProcesses]:
+    made = RealProcesses(tmp_path) if request.param == "real" else MadeUpProcesses()
+    yield made
+    for process in made.made:
+        process.kill()
+        process.wait(60)
+
+
+@pytest.fixture
+def told() -> list[object]:
+    return []
+
+
+@pytest.fixture
+def companions(started_here: RealProcesses | MadeUpProcesses, told: list[object]) -> Iterator[Companions]:
+    made = Companions("127.0.0.1:1", told.append, start=started_here.start)
+    yield made
+    made.close()
+
+
+def test_robots_come_and_go_with_their_processes(companions: Companions, started_here, told) -> None:
+    assert (companions.virtual_robots, companions.process_ids) == ((), ())
+    companions.start_virtual_robot("Pepper")
+    companions.start_virtual_robot("Turtle", "diffdrive")
+    companions.start_virtual_robot("Pepper")  # it is there
+    assert companions.virtual_robots == ("Pepper", "Turtle")
+    pepper, turtle = started_here.made
+    assert companions.process_ids == (pepper.pid, turtle.pid)
+    assert pepper.pid != turtle.pid
+    assert (pepper.poll(), turtle.poll()) == (None, None)
+    companions.stop_virtual_robot("Pepper")
+    assert (companions.virtual_robots, pepper.poll()) == (("Turtle",), -15 if os.name == "posix" else 1)
+    companions.check()
+    assert told == [], "it was told to go"
+    companions.close()
+    assert (companions.virtual_robots, turtle.poll() is None) == ((), False)
+
+
+def test_one_that_ends_by_itself_says_its_last_words_once(companions: Companions, started_here, told) -> None:
+    companions.start_virtual_robot("Pepper")
+    companions.check()
+    assert told == []
+    started_here.die(0)
+    assert (companions.virtual_robots, companions.process_ids) == ((), ())
+    assert started_here.made[0].poll() == 3
+    for _ in range(2):
+        companions.check()
+    assert told == [CompanionFailed("Pepper", "The virtual robot Pepper has ended.", "no room left")]
+    assert companions.ended == {"Pepper"}
+    companions.start_virtual_robot("Pepper")
+    assert (companions.virtual_robots, companions.ended) == (("Pepper",), frozenset())
+
+
+def test_one_that_is_started_anew_is_another_process(companions: Companions, started_here, told) -> None:
+    companions.start_virtual_robot("Pepper")
+    companions.restart_virtual_robot("Pepper")
+    before, now = started_here.made
+    assert (before.poll(), now.poll()) == (-9 if os.name == "posix" else 1, None)
+    assert companions.process_ids == (now.pid,)
+    for process in (before, now):
+        process.terminate()
+        process.wait(60)
+        process.kill()  # what has ended stays as it ended
+    assert [before.poll(), now.poll()] == ([-9, -15] if os.name == "posix" else [1, 1])
+    assert told == []
+
+
+def test_waiting_for_one_that_lives_takes_no_longer_than_it_may(companions: Companions, started_here) -> None:
+    companions.start_virtual_robot("Pepper")
+    with pytest.raises(subprocess.TimeoutExpired):
+        started_here.made[0].wait(0.01)

@@ -1,0 +1,269 @@
+"""The real control of runs says the same of a program that a test makes up as of one in a process."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Protocol
+
+import pytest
+
+from app.blocks import compile_behaviour
+from app.core.run.runner import Runner, RunnerEvent
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from app.errors import RunnerError
+from nep.masters.master import Master
+from tests.blocks.fakes import until
+from tests.blocks.samples import block, number, started, text, workspace, write
+from tests.core.waiting import tick_until
+from tests.ui import fakes
+
+
+class Run(Protocol):
+    """A session with its programs. Each method returns when the window has taken it over."""
+
+    session: Session
+
+    def make_runner(self, on_event: Callable[[RunnerEvent], object]) -> Runner:
+        """What runs one program."""
+
+    def works(self, block: str) -> None:
+        """The program that runs comes to this block by itself."""
+
+    def fails(self, block: str) -> None:
+        """It comes to this block, which fails."""
+
+    def ends(self) -> None:
+        """It comes to its end by itself."""
+
+    def is_killed(self) -> None:
+        """Its process is killed."""
+
+
+class RealRun:
+    """Programs in processes of their own."""
+
+    def __init__(self, master: Master, folder: Path) -> None:
+        self.session = Session(
+            Settings(folder), address=master.address, journal_folder=folder, start_companions=False
+        )
+
+    def make_runner(self, on_event: Callable[[RunnerEvent], object]) -> Runner:
+        return Runner(on_event)
+
+    def works(self, block: str) -> None:
+        tick_until(self.session, lambda: block in self.session.runs.running_blocks)
+
+    def fails(self, block: str) -> None:
+        tick_until(self.session, lambda: block in self.session.runs.block_errors)
+
+    def ends(self) -> None:
+        tick_until(self.session, lambda: not self.session.runs.active)
+
+    def is_killed(self) -> None:
+        runner = self.session.runs._runner
+        assert runner is not None
+        assert runner.pid is not None
+        os.kill(runner.pid, signal.SIGTERM if os.name == "nt" else signal.SIGKILL)
+        self.ends()
+
+    def close(self) -> None:
+        self.session.close()
+
+
+class MadeUpRun:
+    """Programs of which a test says what they do."""
+
+    def __init__(self) -> None:
+        self.session = fakes.Session()
+
+    def make_runner(self, on_event: Callable[[RunnerEvent], object]) -> fakes.Runner:
+        return fakes.Runner(on_event)
+
+    @property
+    def _runner(self) -> fakes.Runner:
+        runner = self.session.runner
+        assert runner is not None
+        return runner
+
+    def works(self, block: str) -> None:
+        self._runner.does(block)
+        self.session.tick()
+
+    def fails(self, block: str) -> None:
+        self._runner.fails(block, "a number can't be divided by 0")
+        self.session.tick()
+
+    def ends(self) -> None:
+        self._runner.ends()
+        self.session.tick()
+
+    def is_killed(self) -> None:
+        self._runner.ends(ok=False, why="The program's process was killed (signal 9).")
+        self.session.tick()
+
+    def close(self) -> None:
+        self.session.close()
+
+
+@pytest.fixture(params=["real", "made up"])
+def run(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Run]:
+    if request.param == "made up":
+        made: RealRun | MadeUpRun = MadeUpRun()
+    else:
+        made = RealRun(request.getfixturevalue("master"), tmp_path)
+    yield made
+    made.close()
+
+
+def endless() -> Mapping[str, object]:
+    """Counts for ever."""
+    change = block("variables_change", "c", VAR={"id": "n"}, BY=number(1))
+    return workspace(started(block("control_forever", "loop", BODY=[change])), variables=("n",))
+
+
+def shown(run: Run) -> tuple[object, ...]:
+    """What can be pressed, and what stands there."""
+    view = run.session.runs.view()
+    return view.state, view.can_run, view.can_pause, view.can_step, view.run_word, view.stop_word
+
+
+READY = ("ready", True, False, True, "Run", "Stop")
+RUNNING = ("running", False, True, True, "Run", "Stop")
+PAUSED = ("paused", True, False, True, "Go on", "Stop")
+PROVEN = ("proven", True, False, True, "Run", "Stop")
+
+
+def test_run_pause_step_go_on_and_stop(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(endless())
+    assert (shown(run), runs.active) == (READY, False)
+    runs.run()
+    assert (shown(run), runs.active) == (RUNNING, True)
+    assert runs.document is run.session.document
+    run.works("c")
+    runs.pause()
+    tick_until(run.session, lambda: runs.view().state == "paused")
+    assert (shown(run), runs.active) == (PAUSED, True)
+    assert (bool(runs.stopped_blocks), runs.running_blocks) == (True, ())
+    seen = runs.blocks_revision
+    runs.step()
+    tick_until(run.session, lambda: runs.blocks_revision > seen and not runs.running_blocks)
+    assert shown(run) == PAUSED
+    runs.run()
+    assert (shown(run), runs.stopped_blocks) == (RUNNING, ())
+    run.works("c")
+    runs.set_pace(0.5)
+    assert runs.view().slow
+    runs.stop()
+    assert not runs.active
+    tick_until(run.session, lambda: runs.view().state == "proven")
+    assert shown(run) == PROVEN
+    assert runs.view().title.startswith("Stopped after ")
+    assert runs.view().detail == "The dashed outline shows where"
+    assert (runs.running_blocks, runs.stopped_blocks) == ((), ("c",))
+
+
+def test_what_is_told_of_a_program_and_its_state(run: Run) -> None:
+    told: list[RunnerEvent] = []
+    runner = run.make_runner(told.append)
+
+    def come(kind: str) -> None:
+        """Wait until this is the newest kind of what was told, and forget what was before."""
+        until(lambda: bool(told) and told[-1].kind == kind)
+        assert {event.run for event in told} == {runner.run}
+        assert all(event.ok for event in told)
+        told.clear()
+
+    program = compile_behaviour(endless(), [])
+    assert runner.state == "ready"
+    runner.start(program, [], run.session.address, paused=True)
+    come("paused")
+    for _ in range(2):
+        runner.step()
+        come("paused")
+        assert runner.state == "paused"
+    with pytest.raises(RunnerError, match="make another"):
+        runner.start(program, [], run.session.address)
+    runner.go_on()
+    assert runner.state == "running"
+    come("running")
+    runner.stop()
+    until(lambda: bool(told) and told[-1].kind == "ended")
+    assert (told[-1].ok, told[-1].text, runner.state) == (True, "", "ended")
+    seen = len(told)
+    runner.stop()  # it has ended already
+    assert len(told) == seen
+    assert runner.program_key != run.make_runner(told.append).program_key
+
+
+def test_step_begins_a_program_at_its_first_block(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(workspace(started(write(text("Hi")) | {"id": "w"})))
+    runs.step()
+    assert runs.active
+    tick_until(run.session, lambda: runs.view().state == "paused")
+    assert runs.stopped_blocks == ("w",)
+    assert runs.view().title == "Paused at “write”"
+    runs.stop()
+    tick_until(run.session, lambda: runs.view().state == "proven")
+
+
+def test_a_program_that_ends_has_finished_and_another_can_run(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(workspace(started(write(text("Hi")))))
+    for _ in range(2):
+        runs.run()
+        run.ends()
+        tick_until(run.session, lambda: runs.view().state == "proven")
+        assert shown(run) == PROVEN
+        assert runs.view().title.startswith("Finished after ")
+        assert (runs.running_blocks, runs.stopped_blocks, runs.block_errors) == ((), (), {})
+    assert not run.session.alerts.active
+
+
+def test_a_block_that_fails_ends_the_program_and_is_marked(run: Run) -> None:
+    runs = run.session.runs
+    half = block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0))
+    run.session.document.edited(workspace(started(write(half))))
+    runs.run()
+    run.fails("v")
+    tick_until(run.session, lambda: runs.view().state == "proven")
+    assert runs.view().title.startswith("Stopped by a problem")
+    assert list(runs.block_errors) == ["v"]
+    assert runs.view().detail == runs.block_errors["v"]
+    assert not run.session.alerts.active, "it stands on its block"
+
+
+def test_a_process_that_is_killed_is_told(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(endless())
+    runs.run()
+    run.works("c")
+    run.is_killed()
+    tick_until(run.session, lambda: runs.view().state == "proven")
+    (alert,) = run.session.alerts.active
+    assert (alert.id, alert.title) == ("program", "The behaviour ended by itself.")
+    assert alert.detail.startswith("The program's process was killed")
+    assert runs.view().title.startswith("Stopped after ")
+
+
+def test_what_an_earlier_run_still_says_is_ignored(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(endless())
+    runs.run()
+    earlier = runs._runner
+    assert earlier is not None
+    runs.stop()
+    tick_until(run.session, lambda: runs.view().state == "proven")
+    runs.run()
+    run.works("c")
+    assert runs._runner is not None
+    assert runs._runner.run != earlier.run
+    runs.on_runner(RunnerEvent("running", earlier.run, ("other",)))
+    assert runs.running_blocks != ("other",)
+    runs.stop()
+    tick_until(run.session, lambda: runs.view().state == "proven")

@@ -1,0 +1,188 @@
+"""What tests of panels keep in memory is kept as on a disk; their doctor finds what the real one finds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.blocks import Problem, Program
+from app.core.documents.document import Document
+from app.core.documents.journal import Journal
+from app.core.network.doctor import Doctor
+from app.core.storage.settings import RECENT_LIMIT, Settings
+from nep.doctor import Finding
+from tests.blocks.samples import block, started, text, workspace, write
+from tests.ui.fakes import session, storage
+
+
+@pytest.fixture(params=["on a disk", "in memory"])
+def is_real(request: pytest.FixtureRequest) -> bool:
+    return bool(request.param == "on a disk")
+
+
+# -- settings ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def settings(is_real: bool, tmp_path: Path) -> Settings:
+    return Settings(tmp_path / "home") if is_real else storage.Settings()
+
+
+def test_a_value_is_kept_and_one_of_another_type_is_not_taken(settings: Settings) -> None:
+    assert settings.get("theme", "light") == "light"
+    settings.set("theme", "dark")
+    assert settings.get("theme", "light") == "dark"
+    assert settings.get("theme", 5) == 5
+    settings.set("theme", "dark")
+    settings.set("theme", ["a", {"b": None}])
+    assert settings.get("theme", []) == ["a", {"b": None}]
+    assert (settings.not_kept, settings.damaged) == (None, None)
+
+
+@pytest.mark.parametrize("value", [object(), {"a": {1, 2}}, b"bytes"])
+def test_what_json_cannot_say_is_refused_and_not_kept(settings: Settings, value: object) -> None:
+    settings.set("theme", "dark")
+    with pytest.raises(TypeError):
+        settings.set("theme", value)
+    assert settings.get("theme", "light") == "dark"
+
+
+def test_recent_files_are_newest_first(settings: Settings, tmp_path: Path) -> None:
+    files = [tmp_path / f"{number}.nepb" for number in range(RECENT_LIMIT + 2)]
+    for file in files:
+        file.write_text("x", "utf-8")
+        settings.add_recent(file)
+    settings.add_recent(files[5], "Five")
+    files[-1].unlink()
+    assert [each.name for each in settings.recent][:2] == ["Five", files[-2].stem]
+    assert len(settings.recent_known) == RECENT_LIMIT
+    settings.set_recent([])
+    assert settings.recent == []
+
+
+# -- a behaviour and its journal --------------------------------------------------------------------------
+
+
+class Kept:
+    """A document, and what its journal keeps."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self._folder = folder
+        self.document = Document(lambda: Journal(folder)) if folder is not None else storage.Document()
+
+    @property
+    def blocks(self) -> object:
+        """The blocks in the journal, None when it keeps none."""
+        if self._folder is not None:
+            file = self._folder / self.document.journal
+            return json.loads(file.read_text("utf-8"))["workspace"] if file.exists() else None
+        journal = self.document._journal
+        assert isinstance(journal, storage.Journal)
+        return json.loads(journal.kept) if journal.kept is not None else None
+
+
+@pytest.fixture
+def kept(is_real: bool, tmp_path: Path) -> Kept:
+    return Kept(tmp_path / "journal" if is_real else None)
+
+
+FIRST = workspace(started(write(text("one"))))
+SECOND = workspace(started(write(text("two"))))
+
+
+def test_an_edit_is_in_the_journal_until_it_is_saved(kept: Kept, tmp_path: Path) -> None:
+    document = kept.document
+    assert (kept.blocks, document.dirty, document.edits) == (None, False, 0)
+    document.edited(FIRST)
+    document.edited(FIRST)  # the same once more is no edit
+    assert (kept.blocks, document.dirty, document.edits) == (FIRST, True, 1)
+    document.edited(SECOND)
+    assert (kept.blocks, document.edits) == (SECOND, 2)
+    document.save(tmp_path / "mine.nepb")
+    assert (kept.blocks, document.dirty, document.name) == (None, False, "mine")
+
+
+def test_each_behaviour_has_a_journal_of_its_own(kept: Kept) -> None:
+    document = kept.document
+    document.edited(FIRST)
+    before = document.journal
+    assert document.journal == before
+    document.new("Other")
+    assert document.journal != before
+    assert kept.blocks is None
+    document.close()
+    document.close()  # there is nothing to give up
+    assert document.journal_error is None
+
+
+def test_its_program_is_that_of_its_blocks_and_compiled_once_an_edit(kept: Kept) -> None:
+    document = kept.document
+    document.edited(FIRST)
+    program = document.program()
+    assert type(program) is Program
+    assert "one" in program.source
+    assert document.newest() is document.program() is program
+    document.edited(workspace(started(block("control_wait", "w"))))
+    assert [problem.block_id for problem in document.problems() if problem.severity == "error"] == ["w"]
+    assert document.definitions() is document.definitions()
+    document.set_topics(["/a"])
+    assert document.newest() is not program
+
+
+def test_a_test_tells_what_a_compiler_says() -> None:
+    document = storage.Document()
+    document.edited(FIRST)
+    told = (Problem("info", "b", None, "x", "x is slow."),)
+    document.found, document.source, document.sensors, document.absent_blocks = (
+        told,
+        "pass",
+        (("A", "b"),),
+        ("c",),
+    )
+    program = document.program()
+    document.found = ()
+    assert document.problems() == told, "nothing was edited since"
+    assert (program.source, program.sensors, program.absent) == ("pass", (("A", "b"),), ("c",))
+    assert program.starts == 1
+
+
+# -- the doctor -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def look(is_real: bool) -> Callable[[list[Finding]], Doctor]:
+    """A doctor who has looked and found these; who finds None breaks off."""
+
+    def found(findings: list[Finding] | None) -> Doctor:
+        if is_real:
+            made = Doctor(lambda: tuple(findings))  # type: ignore[arg-type]
+        else:
+            made = session.Doctor()
+            made.found = findings  # type: ignore[assignment]
+        assert (made.looking, made.looked_s, tuple(made.findings), made.revision) == (False, None, (), 0)
+        made.look()
+        made.close()
+        return made
+
+    return found
+
+
+def test_a_doctor_keeps_what_it_found(look: Callable[[object], Doctor]) -> None:
+    fine = Finding("master", "ok", "A master runs.")
+    doctor = look([fine])
+    assert (tuple(doctor.findings), doctor.looking) == ((fine,), False)
+    assert doctor.looked_s is not None
+    seen = doctor.revision
+    assert seen > 0
+    doctor.look()
+    doctor.close()
+    assert doctor.revision > seen
+
+
+def test_a_doctor_that_breaks_off_says_so(look: Callable[[object], Doctor]) -> None:
+    (finding,) = look(None).findings
+    assert (finding.id, finding.severity) == ("doctor", "error")
+    assert finding.sentence.startswith("The doctor could not finish: TypeError")
