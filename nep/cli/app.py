@@ -12,7 +12,7 @@ from typer.models import CommandInfo
 
 from nep.cli import doctor, log, masters, nodes, topics
 from nep.cli.screen import say_error, write
-from nep.cli.typer_words import Command, Group
+from nep.cli.typer_words import TranslatedCommand, TranslatedGroup
 from nep.errors import NepError
 from nep.i18n import _
 from nep.system.addresses import MASTER_VARIABLE, master_address
@@ -28,7 +28,7 @@ def _say_version(is_wanted: bool) -> None:
 
 app = typer.Typer(
     name="nep",
-    cls=Group,
+    cls=TranslatedGroup,
     help=_("See and make messages between robots, programs and people."),
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -69,7 +69,7 @@ def docstrings(group: typer.Typer) -> Iterator[tuple[CommandInfo, str]]:
 
 for _command, _english in docstrings(app):
     _command.help = _(_english)
-    _command.cls = Command
+    _command.cls = TranslatedCommand
 
 
 def run() -> int:

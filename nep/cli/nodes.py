@@ -9,13 +9,13 @@ import typer
 
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import UNKNOWN, TextColumn, duration, say, show_alerts, show_json, show_table
-from nep.cli.typer_words import Group
+from nep.cli.typer_words import TranslatedGroup
 from nep.i18n import _, lazy
 from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, NodeInfo
 from nep.text import escaped
 
-app = typer.Typer(cls=Group, no_args_is_help=True, help=_("The programs that are there."))
+app = typer.Typer(cls=TranslatedGroup, no_args_is_help=True, help=_("The programs that are there."))
 _COLUMNS = (
     TextColumn(lazy("node"), style="bold", is_whole=True),
     TextColumn(lazy("language")),

@@ -11,7 +11,7 @@ from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
 from nep.cli.rates import bw, hz
 from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_alerts, show_json, show_table, size
-from nep.cli.typer_words import Group
+from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import ids_as_text
 from nep.i18n import _, lazy
 from nep.masters.process import view
@@ -19,7 +19,7 @@ from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.text import escaped
 
 app = typer.Typer(
-    cls=Group,
+    cls=TranslatedGroup,
     no_args_is_help=True,
     help=_("What is published: list it, look into it, measure it, publish."),
 )

@@ -17,7 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from nep.i18n import _, lazy
 
-__all__ = ["Command", "Group", "translated"]
+__all__ = ["TranslatedCommand", "TranslatedGroup", "translated"]
 
 _HELPS = frozenset({
     lazy("Show this message and exit."),
@@ -88,7 +88,7 @@ def _write_usage(command: Any, ctx: Any, formatter: Any) -> None:  # noqa: ANN40
     formatter.write_usage(ctx.command_path, " ".join(pieces), prefix=_("Usage:") + " ")
 
 
-class Command(TyperCommand):
+class TranslatedCommand(TyperCommand):
     """A command whose help is all in one language."""
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
@@ -100,7 +100,7 @@ class Command(TyperCommand):
         _write_usage(self, ctx, formatter)
 
 
-class Group(TyperGroup):
+class TranslatedGroup(TyperGroup):
     """A group of them, which also says in that language what is wrong with a command line."""
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401

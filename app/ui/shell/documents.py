@@ -298,27 +298,27 @@ class DocumentController:
     def _cant_save(self, error: Exception) -> None:
         self._complain(words_of(error), "file.save_as", _("Save somewhere else"))
 
-    def _complain(self, words: Words, action: str, button: str, alert: str = "file") -> None:
+    def _complain(self, words: AlertText, action: str, button: str, alert: str = "file") -> None:
         self._session.alerts.put(alert, "error", words.title, words.detail, button=button, action=action)
 
 
-class Words(NamedTuple):
+class AlertText(NamedTuple):
     """What an alert says: what is wrong, and what to do."""
 
     title: str
     detail: str
 
 
-def words_of(error: Exception) -> Words:
+def words_of(error: Exception) -> AlertText:
     """What is wrong with a file, and what to do."""
     if not isinstance(error, DocumentError):
-        return Words(_sentence(str(error)), "")
+        return AlertText(_sentence(str(error)), "")
     named = error.path is not None and error.reason.startswith(error.path.name)  # a name stays as it is
     title = f"{error.reason}." if named else _sentence(error.reason)
-    return Words(title, _sentence(error.advice))
+    return AlertText(title, _sentence(error.advice))
 
 
-def strange_words(paths: Sequence[Path]) -> Words:
+def strange_words(paths: Sequence[Path]) -> AlertText:
     """What is wrong with files that are no behaviours, and what behaviours are."""
     names = [path.name or str(path) for path in paths]
     words, others = _("{file} is no behaviour"), len(names) - 1
@@ -326,7 +326,7 @@ def strange_words(paths: Sequence[Path]) -> Words:
         words = ngettext(
             "{file} and {count} more are no behaviours", "{file} and {count} more are no behaviours", others
         )
-    return Words(f"{words.format(file=names[0], count=others)}.", _sentence(what_behaviours_are()))
+    return AlertText(f"{words.format(file=names[0], count=others)}.", _sentence(what_behaviours_are()))
 
 
 def _sentence(words: str) -> str:
