@@ -211,7 +211,7 @@ def main() -> int:
         file = session.settings.path.parent / "Soak.nepb"
         file.write_text(json.dumps(behaviour()), encoding="utf-8")
         opened.commands.files.open(file)
-        session.companions.start_virtual_robot("Pepper")
+        session.launcher.start_virtual_robot("Pepper")
         until(lambda: session.fleet.connected, "the virtual robot is there", 60.0)
         session.runs.run()
         until(lambda: session.runs.running_blocks, "the behaviour runs", 30.0)

@@ -19,7 +19,7 @@ from app.core.alerts import Alerts
 from app.core.documents.file_format import parse_file
 from app.core.network import graph_changes
 from app.core.network.decode_checks import Checked
-from app.core.network.remote_access import Reach, ReachChanged
+from app.core.network.remote_access import RemoteAccess, RemoteAccessChanged
 from app.core.network.topics import Topic, Topics
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import AWAY_S, Health
@@ -285,8 +285,8 @@ def test_findings_of_the_doctor() -> None:
 def test_who_may_connect() -> None:
     alerts = Alerts()
     settings = SimpleNamespace(get=lambda _key, default: default, set=lambda _key, _value: None)
-    reach = Reach("127.0.0.1:7780", settings, alerts, lambda _event: None)
-    reach.changed(ReachChanged(("127.0.0.1",), "Xx"))
+    reach = RemoteAccess("127.0.0.1:7780", settings, alerts, lambda _event: None)
+    reach.changed(RemoteAccessChanged(("127.0.0.1",), "Xx"))
     for alert in alerts.active:
         said(alert.title, alert.detail, alert.button or "")
 

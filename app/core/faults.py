@@ -1,7 +1,7 @@
 """Errors of Studio itself: heard wherever they are, said once, and never the end of what comes after.
 
-Everything goes through `logging`: what is raised and caught nowhere (`hear_all`, in any thread), what a
-guard caught (`survived`), and what Qt says. Handlers that a person reads have a `SaidOnce`.
+Everything goes through `logging`: what is raised and caught nowhere (`install_hooks`, in any thread), what a
+guard caught (`log_errors`), and what Qt says. Handlers that a person reads have a `RepeatFilter`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def log_folder() -> Path:
 
 
 @contextmanager
-def survived(what: str) -> Iterator[None]:
+def log_errors(what: str) -> Iterator[None]:
     """Log what goes wrong inside as "can't ``what``", with its traceback, and go on behind it."""
     try:
         yield
@@ -54,7 +54,7 @@ def survived(what: str) -> Iterator[None]:
         _log.exception("can't %s", what)
 
 
-class SaidOnce:
+class RepeatFilter:
     """Says a fault when it is new, and when it has happened 10, 100, 1000 ... times, with the count.
 
     The same are records of one logger and level, raised at one place or with one text. The newest 500 faults
@@ -64,7 +64,7 @@ class SaidOnce:
     def __init__(self) -> None:
         self._counts: dict[tuple[object, ...], int] = {}
 
-    def told(self, record: logging.LogRecord) -> logging.LogRecord | None:
+    def filter(self, record: logging.LogRecord) -> logging.LogRecord | None:
         """The record as it is to be written, or None; one that was written before says how often it came.
 
         It never raises: whoever logs must not end because of the words.
@@ -122,11 +122,11 @@ class LogFile(RotatingFileHandler):
         )
         self.setLevel(logging.WARNING)
         self.setFormatter(logging.Formatter(FORMAT))
-        self._once = SaidOnce()
+        self._once = RepeatFilter()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a line, once."""
-        told = self._once.told(record)
+        told = self._once.filter(record)
         if told is not None:
             super().emit(told)
 
@@ -140,7 +140,7 @@ class LogFile(RotatingFileHandler):
         """Nothing: there is no better place to say it, and the Console has the line."""
 
 
-def hear_all() -> None:
+def install_hooks() -> None:
     """From now on log what is raised and caught nowhere: in this thread, in others, and while things end."""
     sys.excepthook = _raised
     threading.excepthook = _raised_in_thread
@@ -151,7 +151,7 @@ def _raised(kind: type[BaseException], error: BaseException, trace: TracebackTyp
     if issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, trace)
         return
-    _log.error("a fault of Studio: %s", words_of(error), exc_info=(kind, error, trace))
+    _log.error("a fault of Studio: %s", error_words(error), exc_info=(kind, error, trace))
 
 
 def _raised_in_thread(raised: threading.ExceptHookArgs) -> None:
@@ -159,17 +159,19 @@ def _raised_in_thread(raised: threading.ExceptHookArgs) -> None:
     if error is None or isinstance(error, SystemExit):
         return
     name = raised.thread.name if raised.thread is not None else "a thread"
-    _log.error("'%s' ended: %s", name, words_of(error), exc_info=(type(error), error, raised.exc_traceback))
+    _log.error(
+        "'%s' ended: %s", name, error_words(error), exc_info=(type(error), error, raised.exc_traceback)
+    )
 
 
 def _raised_at_end(raised: sys.UnraisableHookArgs) -> None:
     error = raised.exc_value
     if error is not None:
         trace = raised.exc_traceback
-        _log.error("while something ended: %s", words_of(error), exc_info=(type(error), error, trace))
+        _log.error("while something ended: %s", error_words(error), exc_info=(type(error), error, trace))
 
 
-def words_of(error: BaseException) -> str:
+def error_words(error: BaseException) -> str:
     """An exception in one line: its type and what it says."""
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
@@ -184,7 +186,7 @@ class _Fault:
     is_well: bool = False
 
 
-class OwnFaults:
+class FaultAlerts:
     """What Studio could not do. One thread uses it (the window's)."""
 
     def __init__(self, alerts: Alerts, clock: Callable[[], float]) -> None:
@@ -193,7 +195,7 @@ class OwnFaults:
         self._faults: dict[str, _Fault] = {}
 
     @contextmanager
-    def surviving(self, what: str, **holes: object) -> Iterator[None]:
+    def guarded(self, what: str, **holes: object) -> Iterator[None]:
         """One thing: when it raises, the log and an alert say so, and the next has its turn.
 
         ``what`` completes the sentence "can't ..."; it is marked with `lazy`, its ``holes`` are filled here.
@@ -203,7 +205,7 @@ class OwnFaults:
         except Exception as error:  # noqa: BLE001  whatever it is: what comes after must still arrive
             english, told = what.format(**holes), _(what).format(**holes)
             _log.exception("can't %s", english)
-            self._failed(english, _("It can't {what}: {error}").format(what=told, error=words_of(error)))
+            self._failed(english, _("It can't {what}: {error}").format(what=told, error=error_words(error)))
         else:
             if self._faults and what in self._faults:
                 self._faults[what].is_well = True

@@ -18,15 +18,15 @@ from app.core.documents.document import Document
 from app.core.documents.journal import Journal
 from app.core.documents.open_documents import Documents
 from app.core.documents.saved_tabs import KeptTabs
-from app.core.faults import OwnFaults, survived
+from app.core.faults import FaultAlerts, log_errors
 from app.core.messages.image_streams import Images
 from app.core.network.decode_checks import Checks
 from app.core.network.doctor import doctor_of
 from app.core.network.graph_changes import arrivals
 from app.core.network.mailbox import Batch, Drained, Mailbox
-from app.core.network.master import Learning, MasterState
+from app.core.network.master import MasterChange, MasterState
 from app.core.network.nodes import Nodes
-from app.core.network.remote_access import Reach, ReachChanged
+from app.core.network.remote_access import RemoteAccess, RemoteAccessChanged
 from app.core.network.source import (
     GraphSeen,
     JobFailed,
@@ -42,9 +42,9 @@ from app.core.network.traffic import Traffic
 from app.core.network.watches import Watch, Watches
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
+from app.core.robots.launcher import VIRTUAL_ROBOTS, Launcher, LaunchFailed, VirtualProcesses
 from app.core.robots.stop import RobotStopper, StopTarget
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
-from app.core.robots.virtual_processes import VIRTUAL_ROBOTS, CompanionFailed, Companions, VirtualProcesses
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.core.storage.settings import Settings
@@ -83,7 +83,7 @@ class Session:
         self._start_companions = start_companions
         self.settings = settings if settings is not None else Settings()
         self.alerts, self.console, self.topics = Alerts(), Console(), Topics()
-        self._faults = OwnFaults(self.alerts, clock)
+        self._faults = FaultAlerts(self.alerts, clock)
         self.traffic = Traffic(self.topics)
         self.nodes = Nodes()
         self._mailbox, self._checks = Mailbox(), Checks()
@@ -93,12 +93,12 @@ class Session:
         sinks = [self._checks.look, self._mailbox.post, self._offer]
         self.source: Source = make_source(self.address, sinks, self._mailbox.post_event)
         modules = VIRTUAL_ROBOTS.values()
-        processes = VirtualProcesses(modules, lambda: self.companions.process_ids)
+        processes = VirtualProcesses(modules, lambda: self.launcher.process_ids)
         self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
-        self.companions = Companions(self.address, self._mailbox.post_event, self.fleet.is_there)
+        self.launcher = Launcher(self.address, self._mailbox.post_event, self.fleet.is_there)
         self.doctor = doctor_of(self.address, self.settings.path.parent)
         self.runs = Runs(
             self.documents,
@@ -112,14 +112,14 @@ class Session:
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
-        self.reach = Reach(self.address, self.settings, self.alerts, self._mailbox.post_event)
+        self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, self._mailbox.post_event)
         self.tick_ms = 0.0
         self._robots_seen = -1
         self._reachable: tuple[StopTarget, ...] = ()
         self._tries_to_reach = False
         self._topics_seen = -1
         self._next_check = 0.0
-        self._learning = Learning()
+        self._learning = MasterChange()
 
     def _offer(self, _topic: str, messages: Sequence[Message]) -> None:
         self.images.offer(messages)
@@ -136,7 +136,7 @@ class Session:
         self.source.start()
         self.source.submit(_("watch over the robots"), self._make_stopper)
         if self._start_companions:
-            self.companions.ensure_master()
+            self.launcher.ensure_master()
 
     def watch(self, topic: str) -> Watch:
         """Look at a topic until the watch is closed: its messages arrive in `Topics`."""
@@ -152,51 +152,51 @@ class Session:
         now, now_ns = began, self._clock_ns()
         drained = self._mailbox.drain()
         for event in drained.events:
-            with self.surviving(lazy("take over {event}"), event=type(event).__name__):
+            with self.guarded(lazy("take over {event}"), event=type(event).__name__):
                 self._on_event(event, now)
         self._on_messages(drained, now)
-        with self.surviving(lazy("let topics and nodes age")):
+        with self.guarded(lazy("let topics and nodes age")):
             self.topics.age(now, now_ns)
             self.nodes.age(now)
-        with self.surviving(lazy("follow the robots")):
+        with self.guarded(lazy("follow the robots")):
             self._follow_robots()
-        with self.surviving(lazy("tell the program of its robots")):
+        with self.guarded(lazy("tell the program of its robots")):
             self.runs.follow_robots()
-        with self.surviving(lazy("stop robots again")):
+        with self.guarded(lazy("stop robots again")):
             for name in self.fleet.take_settled():
                 self.runs.stop_again(name)
-        with self.surviving(lazy("follow what was started here")):
-            self.companions.follow()
-        with self.surviving(lazy("show the run")):
+        with self.guarded(lazy("follow what was started here")):
+            self.launcher.follow()
+        with self.guarded(lazy("show the run")):
             self.runs.tick()
         if now >= self._next_check:
             self._next_check = now + CHECK_S
             self._check(now)
         self.tick_ms = (self._clock() - began) * 1000
 
-    def surviving(self, what: str, **holes: object) -> AbstractContextManager[None]:
+    def guarded(self, what: str, **holes: object) -> AbstractContextManager[None]:
         """One thing of a tick: when it raises, the log and an alert say so, and the next has its turn.
 
         ``what`` completes the sentence "can't ..."; it is marked with `lazy`, its ``holes`` are filled later.
         """
-        return self._faults.surviving(what, **holes)
+        return self._faults.guarded(what, **holes)
 
     def _check(self, now: float) -> None:
         """What is looked at once a second."""
         self._faults.check()
-        with self.surviving(lazy("check what was started here")):
-            self.companions.check()
+        with self.guarded(lazy("check what was started here")):
+            self.launcher.check()
             if self.master.kind == "none" and self._start_companions:
-                self.companions.keep_master()
-        with self.surviving(lazy("count what was missed")):
+                self.launcher.keep_master()
+        with self.guarded(lazy("count what was missed")):
             missed = self.source.missed()
             self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
-        with self.surviving(lazy("tell what is wrong with Stop")):
+        with self.guarded(lazy("tell what is wrong with Stop")):
             self._look_for_problems_of_stop()
-            if self.runs.kept and self.companions.ended >= self.runs.kept:
+            if self.runs.kept and self.launcher.ended >= self.runs.kept:
                 self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
-        with self.surviving(lazy("check what is wrong")):
-            self._health.check(self.runs.kept if self.runs.active else (), self.companions.virtual_robots)
+        with self.guarded(lazy("check what is wrong")):
+            self._health.check(self.runs.kept if self.runs.active else (), self.launcher.virtual_robots)
             self.documents.unkept()
             self._health.journal(self.documents.journal_error)
             self._health.settings(self.settings.not_kept)
@@ -212,11 +212,11 @@ class Session:
             (lazy("end the pictures"), self.images.close),
             (lazy("end the doctor"), self.doctor.close),
             (lazy("leave the network"), self.source.close),
-            (lazy("end what was started here"), self.companions.close),
-            (lazy("end the reach"), self.reach.close),
+            (lazy("end what was started here"), self.launcher.close),
+            (lazy("end the reach"), self.remote_access.close),
         ]
         for what, end in ends:
-            with survived(what):
+            with log_errors(what):
                 end()
 
     # -- inside ----------------------------------------------------------------------------------------------
@@ -240,13 +240,13 @@ class Session:
 
     def _on_messages(self, drained: Drained, now: float) -> None:
         for topic, batch in drained.batches.items():
-            with self.surviving(lazy("take over messages of {topic}"), topic=topic):
+            with self.guarded(lazy("take over messages of {topic}"), topic=topic):
                 self._on_batch(topic, batch, now)
-        with self.surviving(lazy("count messages")):
+        with self.guarded(lazy("count messages")):
             self.traffic.add(drained.batches, now)
-        with self.surviving(lazy("take over what robots say")):
+        with self.guarded(lazy("take over what robots say")):
             self.fleet.add(drained.batches)
-        with self.surviving(lazy("check messages")):
+        with self.guarded(lazy("check messages")):
             found = self._checks.take()
             self._health.look({topic: what for topic, what in found.items() if self._watches.watched(topic)})
         if drained.lost_events:
@@ -284,7 +284,7 @@ class Session:
                 self.runs.on_runner(event)
             case StopDone() | RobotAnswered() | OneStopped() | LateAnswer():
                 self.runs.on_stop(event)
-            case CompanionFailed():
+            case LaunchFailed():
                 self.console.add("error", event.what, f"{event.sentence} {event.detail}".strip())
                 self.alerts.put(
                     f"companion:{event.what}",
@@ -301,8 +301,8 @@ class Session:
                     _("{topic} can't be read.").format(topic=event.topic),
                     event.sentence,
                 )
-            case ReachChanged():
-                self.reach.changed(event)
+            case RemoteAccessChanged():
+                self.remote_access.changed(event)
             case JobFailed() if event.what:
                 self.console.add(
                     "error",
@@ -313,7 +313,7 @@ class Session:
                 pass
 
     def _on_graph(self, view: GraphView, now: float) -> None:
-        self.reach.follow(view)
+        self.remote_access.follow(view)
         if self._learning.still(self.graph, view, now):
             return
         before = self.graph

@@ -20,7 +20,7 @@ from app import resources
 from app.core.documents.journal import left_behind
 from app.core.documents.versions import bring_here
 from app.core.session import Session
-from app.core.storage.file_lock import Turn
+from app.core.storage.file_lock import FileLock
 from app.core.storage.settings import home
 from app.ui.panels.registry import PanelShelf
 from app.ui.self_drive import SelfDrive
@@ -185,7 +185,7 @@ def run(options: Options) -> int:
     """Show the window until it is closed; the exit code is 0 when that was in order, 2 when none can open."""
     bring_here()
     meeting_place = single_instance.place(home())
-    turn = Turn(home() / "starting")
+    turn = FileLock(home() / "starting")
     if not options.alone and single_instance.found(
         meeting_place, StartRequest(options.files, options.demo), turn
     ):
@@ -214,7 +214,7 @@ def run(options: Options) -> int:
         first.append(
             lambda: single_instance.SingleInstanceServer(meeting_place, partial(open_asked, window), window)
         )
-        first.append(turn.leave)
+        first.append(turn.release)
     soon.put_first(first)
     IncomingFiles(window, window.commands.files.open_all)
     if isinstance(application, Application):

@@ -13,7 +13,7 @@ import pytest
 
 import nep
 from app.core import faults
-from app.core.faults import LogFile, OwnFaults, SaidOnce, words_of
+from app.core.faults import FaultAlerts, LogFile, RepeatFilter, error_words
 from app.core.network.source import GraphSeen, JobFailed, LiveSource, MasterFound
 from app.core.robots.stop_report import StopDone, StopReport
 from app.core.run.runner import RunnerEvent
@@ -61,10 +61,10 @@ def test_the_same_fault_is_said_once_then_with_its_count(log: logging.Logger, tm
 
 
 def test_other_places_and_texts_are_other_faults() -> None:
-    once = SaidOnce()
+    once = RepeatFilter()
 
     def said(text: str) -> bool:
-        return once.told(logging.LogRecord("qt", logging.WARNING, "", 0, text, (), None)) is not None
+        return once.filter(logging.LogRecord("qt", logging.WARNING, "", 0, text, (), None)) is not None
 
     assert [said(text) for text in ("one", "other", "one", "other")] == [True, True, False, False]
     assert all(said(f"text {number}") for number in range(2 * faults.FAULTS_KEPT))
@@ -103,7 +103,7 @@ def heard(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> 
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
     monkeypatch.setattr(threading, "excepthook", threading.excepthook)
-    faults.hear_all()
+    faults.install_hooks()
     return caplog
 
 
@@ -140,8 +140,8 @@ def test_an_end_that_is_meant_is_no_fault(
 
 
 def test_an_exception_is_one_line() -> None:
-    assert words_of(ValueError("two\nlines")) == "ValueError: two lines"
-    assert words_of(KeyError()) == "KeyError"
+    assert error_words(ValueError("two\nlines")) == "ValueError: two lines"
+    assert error_words(KeyError()) == "KeyError"
 
 
 # -- a tick ----------------------------------------------------------------------------------------
@@ -173,8 +173,8 @@ def test_an_event_that_raises_takes_no_other_with_it(
     (alert,) = [alert for alert in session.alerts.active if alert.id == "studio"]
     assert alert.detail.startswith("It can't take over RunnerEvent: ValueError")
     assert alert.action == "help.log"
-    once = SaidOnce()
-    assert sum(once.told(record) is not None for record in caplog.records) == 2  # the first, and the tenth
+    once = RepeatFilter()
+    assert sum(once.filter(record) is not None for record in caplog.records) == 2  # the first, and the tenth
 
 
 @pytest.mark.parametrize(
@@ -187,8 +187,8 @@ def test_an_event_that_raises_takes_no_other_with_it(
         "traffic.miss",
         "fleet.add",
         "fleet.take_settled",
-        "companions.follow",
-        "companions.check",
+        "launcher.follow",
+        "launcher.check",
         "documents.set_topics",
         "runs.on_runner",
         "_checks.take",
@@ -255,9 +255,9 @@ def test_the_alert_of_a_fault_is_cured_when_what_failed_goes_well(
 def test_a_fault_that_nothing_can_repeat_is_over_after_a_while(session: Session) -> None:
     now = [0.0]
     alerts = session.alerts
-    faults = OwnFaults(alerts, lambda: now[0])
+    faults = FaultAlerts(alerts, lambda: now[0])
     for number in range(300):
-        with faults.surviving(f"take over messages of /t{number}"):
+        with faults.guarded(f"take over messages of /t{number}"):
             raising()
     faults.check()
     assert alerts.has("studio")
@@ -268,12 +268,12 @@ def test_a_fault_that_nothing_can_repeat_is_over_after_a_while(session: Session)
 
 def test_closing_ends_everything_whatever_fails(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     ended: list[str] = []
-    for part in ("fleet", "images", "doctor", "companions", "reach"):
+    for part in ("fleet", "images", "doctor", "launcher", "remote_access"):
         monkeypatch.setattr(getattr(session, part), "close", partial(ended.append, part))
     monkeypatch.setattr(session.runs, "close", raising)
     monkeypatch.setattr(session.source, "close", raising)
     session.close()
-    assert ended == ["fleet", "images", "doctor", "companions", "reach"]
+    assert ended == ["fleet", "images", "doctor", "launcher", "remote_access"]
 
 
 def test_the_source_outlives_what_its_jobs_and_sinks_raise(master: Master) -> None:

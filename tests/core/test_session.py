@@ -101,7 +101,7 @@ def test_bad_messages_are_one_alert_that_a_good_one_cures(session: Session) -> N
 
 
 def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) -> None:
-    session.companions.start_virtual_robot("Pepper")
+    session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected)
     link = session.fleet.link("Pepper")
     assert link is not None
@@ -122,31 +122,31 @@ def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) 
         assert walk.state == "canceled"
         assert link.last_stop is not None
         assert link.last_stop.startswith("answered in ")
-    session.companions.stop_virtual_robot("Pepper")
+    session.launcher.stop_virtual_robot("Pepper")
     tick_until(session, lambda: link.state == "away")
     with pytest.raises(RobotInputError):
         session.fleet.invoke("Pepper", "fly", {})
 
 
 def test_a_virtual_robot_that_died_is_told_with_its_next_step(session: Session) -> None:
-    session.companions.start_virtual_robot("Pepper")
+    session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected)
-    session.companions._robots["Pepper"][0].kill()
+    session.launcher._robots["Pepper"][0].kill()
     tick_until(session, lambda: session.alerts.has("companion:Pepper"))
     (alert,) = [alert for alert in session.alerts.active if alert.id == "companion:Pepper"]
     assert (alert.button, alert.action) == ("Start it again", "connect:Pepper")
     tick_until(session, lambda: not session.fleet.connected)
-    session.companions.start_virtual_robot("Pepper")
+    session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: not session.alerts.has("companion:Pepper"))
 
 
 def test_a_virtual_robot_that_hangs_can_be_connected_again(session: Session) -> None:
-    session.companions.start_virtual_robot("Pepper")
+    session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected)
-    hung = session.companions._robots["Pepper"][0]
+    hung = session.launcher._robots["Pepper"][0]
     psutil.Process(hung.pid).suspend()
     tick_until(session, lambda: not session.fleet.connected)
-    session.companions.restart_virtual_robot("Pepper")
+    session.launcher.restart_virtual_robot("Pepper")
     assert hung.poll() is not None
     tick_until(session, lambda: session.fleet.connected)
 
@@ -176,7 +176,7 @@ def test_a_wrong_input_is_refused_before_it_is_sent(session: Session) -> None:
 
 
 def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
-    session.companions.start_virtual_robot("Pepper")
+    session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots)
     session.document.example(EXAMPLES / "1-greeting.nepb")
     assert not [p for p in session.document.problems() if p.severity == "error"]
@@ -201,18 +201,18 @@ def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
 
 
 def test_a_virtual_robot_whose_process_is_gone_needs_no_hand_to_switch_it_off(session: Session) -> None:
-    session.companions.start_virtual_robot("Pepper")
+    session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots)
     session.document.example(EXAMPLES / "1-greeting.nepb")
     session.runs.run()
     tick_until(session, lambda: session.runs.running_blocks)
-    session.companions._robots["Pepper"][0].kill()
+    session.launcher._robots["Pepper"][0].kill()
     tick_until(session, lambda: not session.runs.active)
     tick_until(session, lambda: session.runs.view().can_run)
     assert not session.alerts.has("stop")
     assert session.alerts.has("companion:Pepper")
-    session.companions.start_virtual_robot("Pepper")
-    assert session.companions.ended == frozenset()
+    session.launcher.start_virtual_robot("Pepper")
+    assert session.launcher.ended == frozenset()
 
 
 def test_a_program_with_an_error_marks_its_block_and_does_not_run(session: Session) -> None:

@@ -10,7 +10,7 @@ import pytest
 import nep
 from app.core.alerts import Alerts
 from app.core.network.source import MasterFound, MasterLost
-from app.core.robots.virtual_processes import CompanionFailed
+from app.core.robots.launcher import LaunchFailed
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC
@@ -110,7 +110,7 @@ def test_alerts_of_the_connection_lead_to_the_doctor(session: Session) -> None:
 
     session._on_event(MasterFound("127.0.0.1:1"), 0.0)
     session._on_event(MasterLost("127.0.0.1:1", "no master answers"), 0.0)
-    session._on_event(CompanionFailed("master", "The master can't be started.", "Port …", False), 0.0)
+    session._on_event(LaunchFailed("master", "The master can't be started.", "Port …", False), 0.0)
     assert next_steps(session.alerts) == {"master": "help.doctor", "companion:master": "help.doctor"}
     assert {alert.button for alert in session.alerts.active} == {"Open the connection doctor"}
 

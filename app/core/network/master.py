@@ -36,7 +36,7 @@ class MasterState:
     sentence: str = ""
 
 
-class Learning:
+class MasterChange:
     """Notices that another master has come. One thread uses it (the window's)."""
 
     def __init__(self) -> None:
@@ -78,7 +78,7 @@ class MasterStart:
         """Start one now if there is none; returns at once."""
         if self._thread is not None and self._thread.is_alive():
             return
-        self._thread = threading.Thread(target=self._start, name="studio-companions", daemon=True)
+        self._thread = threading.Thread(target=self._start, name="studio-launcher", daemon=True)
         self._thread.start()
 
     def keep(self) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from app.core.alerts import Alerts
-from app.core.storage.settings import KeepsLists
+from app.core.storage.settings import ListSettings
 from app.errors import SettingsError
 from nep.errors import NepError
 from nep.i18n import _
@@ -20,20 +20,20 @@ ALERT, NOT_KEPT = "reach", "reach:kept"
 
 
 @dataclass(frozen=True, slots=True)
-class ReachChanged:
+class RemoteAccessChanged:
     """The master was asked to serve other computers at ``hosts``; ``sentence`` says why it does not."""
 
     hosts: tuple[str, ...]
     sentence: str = ""
 
 
-class Reach:
+class RemoteAccess:
     """The switch. One thread uses it (the window's); what waits is done in another."""
 
     def __init__(
         self,
         address: str,
-        settings: KeepsLists,
+        settings: ListSettings,
         alerts: Alerts,
         post_event: Callable[[object], None],
         *,
@@ -66,7 +66,7 @@ class Reach:
         """What a program on another computer needs to know."""
         return f"NEP_MASTER={host}:{self._address.rpartition(':')[2]}"
 
-    def let_in(self, hosts: Sequence[str]) -> None:
+    def listen_at(self, hosts: Sequence[str]) -> None:
         """Serve other computers at these addresses, none: no more. Kept for the next start."""
         self._tell(tuple(hosts))  # first: whoever shuts others out must not wait for a disk
         try:
@@ -99,7 +99,7 @@ class Reach:
             if kept and self.is_near and set(kept) - set(self.hosts):
                 self._tell(kept)
 
-    def changed(self, event: ReachChanged) -> None:
+    def changed(self, event: RemoteAccessChanged) -> None:
         """The master has answered."""
         if not event.sentence:
             self.hosts = event.hosts
@@ -128,15 +128,15 @@ class Reach:
             try:
                 self._ask(hosts, self._address)
             except NepError as error:
-                self._post_event(ReachChanged(hosts, str(error)))
+                self._post_event(RemoteAccessChanged(hosts, str(error)))
             else:
-                self._post_event(ReachChanged(hosts))
+                self._post_event(RemoteAccessChanged(hosts))
 
         self._asking = threading.Thread(target=work, name="studio-reach", daemon=True)
         self._asking.start()
 
 
-def words_of(reach: Reach) -> tuple[str, str, str | None]:
+def access_words(reach: RemoteAccess) -> tuple[str, str, str | None]:
     """What the status bar says of it: icon, words, status."""
     if reach.hosts:
         return (

@@ -14,7 +14,7 @@ from itertools import count
 from typing import Protocol
 
 import nep
-from app.core.faults import survived, words_of
+from app.core.faults import error_words, log_errors
 from nep.errors import NepError
 from nep.i18n import _
 from nep.masters.process import look
@@ -178,13 +178,13 @@ class LiveSource:
         try:
             while not self._closing.is_set():
                 went_well = False
-                with survived("follow the network"):
+                with log_errors("follow the network"):
                     went_well = self._turn()
                 if not went_well:
                     self._closing.wait(POLL_S)
         finally:
             for _, subscriber in self._subscribers.values():
-                with survived("end a subscription"):
+                with log_errors("end a subscription"):
                     subscriber.close()
             if self._node is not None:
                 self._node.close()
@@ -249,7 +249,7 @@ class LiveSource:
                 self._post_event(JobFailed(what, str(error)))
             except Exception as error:  # noqa: BLE001  one job that fails must not end all others
                 _log.exception("can't %s", what or "meet a wish")
-                self._post_event(JobFailed(what, words_of(error)))
+                self._post_event(JobFailed(what, error_words(error)))
             self._reconcile()
 
     def _reconcile(self) -> None:
@@ -294,7 +294,7 @@ class LiveSource:
 
     def _deliver(self, topic: str, messages: Sequence[Message]) -> None:
         for sink in self._sinks:
-            with survived(f"take messages of {topic}"):
+            with log_errors(f"take messages of {topic}"):
                 sink(topic, messages)
 
 

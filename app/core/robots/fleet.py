@@ -15,7 +15,7 @@ from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.known import KnownRobots
-from app.core.robots.motion_permission import MayNotMoveError, Moving
+from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
 from app.core.robots.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.robots.stop import MOST_TOPICS
 from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S
@@ -56,7 +56,7 @@ class RobotProcesses(Protocol):
         """Whether it is sure that this program runs no more."""
 
 
-class Believed:
+class AllVirtual:
     """Believes every robot that says that it is virtual (what tests need)."""
 
     def is_ours(self, identity: Identity) -> bool:  # noqa: ARG002
@@ -88,7 +88,7 @@ class Fleet:
         self._submit = submit
         self._clock = clock
         self._links: dict[str, RobotLink] = {}
-        self._processes = processes if processes is not None else Believed()
+        self._processes = processes if processes is not None else AllVirtual()
         self._senders = Senders()
         self._announcements = Announcements(watches, self._senders, clock)
         self._names: dict[str, str] = {}
@@ -99,7 +99,10 @@ class Fleet:
         self._rize = RizeNames()
         self._rize_events: Watch | None = None
         self._alive = Heartbeat(SENDER, "studio-alive")
-        self.moving, self.known = Moving(settings, self._identity_of), KnownRobots(settings)
+        self.permission, self.known = (
+            MotionPermission(settings, self._identity_of),
+            KnownRobots(settings),
+        )
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
         self._told = False
@@ -194,7 +197,7 @@ class Fleet:
         """
         link = self._get(name)
         actions = [action.name for action in link.robot.actions]
-        may = self.moving.permits([(link.robot, actions)], lambda: self._change_again(name, change))
+        may = self.permission.permits([(link.robot, actions)], lambda: self._change_again(name, change))
         if may and link.world is not None:
             link.world.publish(dict(change))
 
@@ -458,8 +461,8 @@ class Fleet:
             link.watch.close()
             link.watch = None
         link.mute = False
-        if self.moving.question is not None and link.name in self.moving.question.moves:
-            self.moving.withdraw()
+        if self.permission.question is not None and link.name in self.permission.question.moves:
+            self.permission.withdraw()
         self._tries.end_all(
             link, "failed", _("{robot} has gone; check that it is on").format(robot=link.name)
         )

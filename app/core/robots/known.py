@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.storage.settings import KeepsLists
+from app.core.storage.settings import ListSettings
 from app.errors import SettingsError
 from app.robots.description.description import Robot
 
@@ -28,7 +28,7 @@ class KnownRobot:
 class KnownRobots:
     """The real robots that were here, the one seen last first. Virtual ones come whenever they are wanted."""
 
-    def __init__(self, settings: KeepsLists | None = None, clock: Callable[[], float] = time.time) -> None:
+    def __init__(self, settings: ListSettings | None = None, clock: Callable[[], float] = time.time) -> None:
         """``settings`` keep them; without it nothing is remembered."""
         self._settings, self._clock = settings, clock
 

@@ -1,6 +1,6 @@
 """Which real robots may move: a person is asked once for each robot, before it moves for the first time.
 
-A virtual robot may always, if Studio knows the program that it is (`app.core.robots.virtual_processes`).
+A virtual robot may always, if Studio knows the program that it is (`app.core.robots.launcher`).
 Everything that makes a robot act comes through here: the forms, the palette, keys and programs, also those
 that publish on a robot's topics. Stop does not. A yes counts for the program that the robot is now, *always*
 for its name, model, program and computer.
@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.blocks.model.program import Program
-from app.core.storage.settings import KeepsLists
+from app.core.storage.settings import ListSettings
 from app.errors import AppError
 from app.robots.description.description import Robot
 from app.robots.identity import Identity
@@ -59,12 +59,12 @@ class Question:
         )
 
 
-class Moving:
+class MotionPermission:
     """Who may move. One thread uses it (the window's)."""
 
     def __init__(
         self,
-        settings: KeepsLists | None = None,
+        settings: ListSettings | None = None,
         identity_of: Callable[[str], Identity | None] = lambda _name: None,
     ) -> None:
         """`settings` keep the robots that may always; `identity_of` tells the program that a robot is."""

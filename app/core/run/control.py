@@ -14,7 +14,7 @@ from app.blocks.runtime.publishing import guarded
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.document import Document
-from app.core.faults import survived, words_of
+from app.core.faults import error_words, log_errors
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion_permission import wanted_by
 from app.core.robots.stop import STOP_TIMEOUT_S as STOP_TIMEOUT_S
@@ -162,7 +162,7 @@ class Runs:
         """End the program and stop every robot; what they answer is the run bar's result."""
         self._asked_again.clear()
         self._stop(None)
-        self._fleet.moving.withdraw()
+        self._fleet.permission.withdraw()
 
     def stop_robot(self, name: str) -> None:
         """Stop one robot; while a program runs this is `stop`, because it would move the robot again."""
@@ -210,7 +210,9 @@ class Runs:
             and link.name in owners
             and owners[link.name] != self._told_owners.get(link.name)
         ]
-        if self._fleet.moving.permits([(link.robot, asked[link.name]) for link in anew], self._tell_robots):
+        if self._fleet.permission.permits(
+            [(link.robot, asked[link.name]) for link in anew], self._tell_robots
+        ):
             self._tell_robots()
         else:
             self._tell_robots(without=[link.name for link in anew])
@@ -323,7 +325,7 @@ class Runs:
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
             wanted = wanted_by(program, used)
-            if not self._fleet.moving.permits(wanted, self.step if paused else self.run):
+            if not self._fleet.permission.permits(wanted, self.step if paused else self.run):
                 return  # a person is asked first; the question stands in the window
             runner = self._make_runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
@@ -424,11 +426,11 @@ class Runs:
 
         if runner is not None:
             if stopper is not None:
-                with survived(
+                with log_errors(
                     "tell the robots at once"
                 ):  # they are told again below, also those without `ends`
                     stopper.send_stop(ends=ends)
-            with survived("end the program"):
+            with log_errors("end the program"):
                 runner.stop()
         self._post_event(
             StopDone(number, _asked(stopper, names, on_answer=answered, ends=ends, on_late=late))
@@ -483,5 +485,5 @@ def _asked(
             return stopper.stop_all(names, on_answer=on_answer, ends=ends, on_late=on_late)
         except Exception as error:  # noqa: BLE001  whatever it is: these robots are not proven to stand still
             _log.exception("can't stop the robots")
-            why = words_of(error)
+            why = error_words(error)
     return StopReport((), 0.0).with_asked(names, why)

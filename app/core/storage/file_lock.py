@@ -43,7 +43,7 @@ def _opened(path: Path) -> int:
     return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NONBLOCK", 0), 0o600)
 
 
-class Turn:
+class FileLock:
     """A lock that is kept until it is left, or until this process ends."""
 
     def __init__(self, path: Path) -> None:
@@ -51,7 +51,7 @@ class Turn:
         self._path = path
         self._file: IO[bytes] | None = None
 
-    def take(self) -> bool:
+    def acquire(self) -> bool:
         """Whether nobody else has it; then it is ours. Also where there is no lock to be had."""
         if self._file is not None:
             return True
@@ -68,7 +68,7 @@ class Turn:
         self._file = file
         return True
 
-    def leave(self) -> None:
+    def release(self) -> None:
         """Let others have it; said twice it does nothing."""
         if self._file is not None:
             self._file.close()

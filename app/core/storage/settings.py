@@ -43,7 +43,7 @@ class RecentFile:
     there: bool = True
 
 
-class KeepsLists(Protocol):
+class ListSettings(Protocol):
     """What is needed of the settings to keep lists there."""
 
     def get(self, key: str, default: list[T]) -> list[T]:

@@ -91,7 +91,7 @@ class DoctorPanel(PanelWidget):
 
     def _mend(self, finding: Finding) -> None:
         if finding.id in STARTABLE:
-            self.session.companions.ensure_master()
+            self.session.launcher.ensure_master()
             self.context.toast(_("Starting the master"))
             return
         QGuiApplication.clipboard().setText(finding.command)

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.documents.problems import Listed, Mend, listed
-from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
+from app.core.robots.launcher import VIRTUAL_ROBOTS
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.text import plain
 from app.ui.theme.theme import Theme

@@ -101,7 +101,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         elif self.session.master.kind == "none":
             said = _("A master lets programs find each other.")
             self.empty.say(_("No master is running"), said, "radio-tower")
-            start = self.session.companions.ensure_master
+            start = self.session.launcher.ensure_master
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
         else:
             self.say_empty()

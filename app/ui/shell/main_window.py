@@ -9,7 +9,7 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QMenuBar, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.faults import survived
+from app.core.faults import log_errors
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelContext, ShowToast
@@ -118,7 +118,7 @@ class MainWindow(QMainWindow):
         self.banner.setParent(middle)  # over the pages, which it does not move
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
-        self.question = MotionQuestion(theme, self, self.session.fleet.moving, self.complain)
+        self.question = MotionQuestion(theme, self, self.session.fleet.permission, self.complain)
 
     def _connect(self) -> None:
         commands, start, run = self.commands, self.start, self._run
@@ -302,18 +302,18 @@ class MainWindow(QMainWindow):
         """Take what is new, and let everything that can be seen show it."""
         began = time.perf_counter()
         self._ticks += 1
-        surviving = self.session.surviving
-        with surviving(lazy("take over what is new")):
+        guarded = self.session.guarded
+        with guarded(lazy("take over what is new")):
             self.session.tick()
-        with surviving(lazy("show how it is")):
+        with guarded(lazy("show how it is")):
             self._show_session()
-        with surviving(lazy("ask a question")):
+        with guarded(lazy("ask a question")):
             self.question.refresh()
-        with surviving(lazy("make room for what is said")):
+        with guarded(lazy("make room for what is said")):
             self.room.follow()
-        with surviving(lazy("let panels rest")):
+        with guarded(lazy("let panels rest")):
             self._follow_panels()
-        with surviving(lazy("show the panels")):
+        with guarded(lazy("show the panels")):
             if self.bench is not None:
                 self.bench.refresh()
         spent = (time.perf_counter() - began) * 1000
@@ -335,19 +335,21 @@ class MainWindow(QMainWindow):
             self.tool_bar.show_view(view)
             self.use_robot.setVisible(not self.session.fleet.links)
         if self._ticks % FACTS_EVERY == 0:
-            with self.session.surviving(lazy("show the figures")):
+            with self.session.guarded(lazy("show the figures")):
                 self._show_facts()
-        with self.session.surviving(lazy("show the alerts")):
+        with self.session.guarded(lazy("show the alerts")):
             self._show_alerts()
 
     def _show_facts(self) -> None:
         """Figures that nobody can read 30 times a second."""
         facts, document = self._facts, self.session.document
-        self.status.link = facts.reach()[1]
+        self.status.link = facts.remote_access()[1]
         if self.showing == "behaviour":
-            self.status.show_facts((facts.health(), facts.saved()), (facts.topics(), facts.reach_quietly()))
+            self.status.show_facts(
+                (facts.health(), facts.saved()), (facts.topics(), facts.remote_access_quietly())
+            )
         elif self.showing == "developer":
-            left = (facts.master(), facts.reach(), facts.traffic(), facts.lost())
+            left = (facts.master(), facts.remote_access(), facts.traffic(), facts.lost())
             self.status.show_facts(left, (facts.shown(), facts.window()))
         title = "NEP Studio" if self.showing == START else f"{document.name} - NEP Studio"
         if title != self.windowTitle():
@@ -395,7 +397,7 @@ class MainWindow(QMainWindow):
                 return
             self._shut = True
             self.timer.stop()
-            with survived("keep how the window looks"):
+            with log_errors("keep how the window looks"):
                 self._keep()
             self.hide()
             for bench in self.benches.values():

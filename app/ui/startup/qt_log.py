@@ -17,7 +17,7 @@ from typing import TextIO
 from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
 
 from app.core import faults
-from app.core.faults import SaidOnce
+from app.core.faults import RepeatFilter
 from nep.system import terminal
 
 FLAGS = "QTWEBENGINE_CHROMIUM_FLAGS"
@@ -74,14 +74,14 @@ class Log(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self._once = SaidOnce()
+        self._once = RepeatFilter()
         self._kept: deque[tuple[str, str, str]] = deque(maxlen=KEPT)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep one line; what happens again and again is kept with its count."""
         if getattr(record, "in_console", False):
             return
-        told = self._once.told(record)
+        told = self._once.filter(record)
         if told is not None:
             level = "error" if told.levelno >= logging.ERROR else "warn"
             self._kept.append((level, told.name.partition(".")[0], told.getMessage()))
@@ -100,13 +100,13 @@ class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
 
     def __init__(self, stream: TextIO | None) -> None:
         super().__init__(terminal.Terminal(stream))
-        self._once = SaidOnce()
+        self._once = RepeatFilter()
         self.setLevel(logging.WARNING)
         self.setFormatter(terminal.LineFormatter("%(name)s: %(message)s"))
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write one line; what happens again and again comes with its count."""
-        told = self._once.told(record)
+        told = self._once.filter(record)
         if told is not None:
             super().emit(told)
             if told.levelno >= logging.CRITICAL:  # Qt ends the program behind it
@@ -123,7 +123,7 @@ def listen() -> Log:
 
     It also goes to the standard error output and into the log files (`app.core.faults`).
     """
-    faults.hear_all()
+    faults.install_hooks()
     qInstallMessageHandler(on_qt_message)
     root = logging.getLogger()
     if not root.handlers:

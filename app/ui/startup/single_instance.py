@@ -26,7 +26,7 @@ from PySide6.QtCore import QObject
 from shiboken6 import isValid
 
 from app.core.storage.atomic_file import private_folder
-from app.core.storage.file_lock import Turn
+from app.core.storage.file_lock import FileLock
 from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ def hand_over(name: str, asked: StartRequest) -> bool:
     return answer == OK
 
 
-def found(name: str, asked: StartRequest, turn: Turn, within_s: float = START_S) -> bool:
+def found(name: str, asked: StartRequest, turn: FileLock, within_s: float = START_S) -> bool:
     """Whether the window that runs, or one that another start is bringing up, does it.
 
     When not, this start has the ``turn`` and brings up a window; it leaves the turn when that can be found.
@@ -145,9 +145,9 @@ def found(name: str, asked: StartRequest, turn: Turn, within_s: float = START_S)
     while not hand_over(name, asked):
         if not name or time.monotonic() >= until:
             return False
-        if turn.take():
+        if turn.acquire():
             if waited and hand_over(name, asked):  # it came between the two questions
-                turn.leave()
+                turn.release()
                 return True
             return False
         waited = True

@@ -9,7 +9,7 @@ import psutil
 import pytest
 
 import nep
-from app.core.network.master import AGAIN_AT_MOST_S, LEARNING_S, Learning, MasterStart
+from app.core.network.master import AGAIN_AT_MOST_S, LEARNING_S, MasterChange, MasterStart
 from nep.protocol.graph_view import GraphView
 from tests.nep.programs import eventually
 
@@ -80,19 +80,19 @@ def view(epoch: int) -> GraphView:
 
 
 def test_the_first_master_and_the_same_one_are_believed_at_once() -> None:
-    learning = Learning()
+    learning = MasterChange()
     assert not learning.still(None, view(1), 0.0)
     assert not learning.still(view(1), view(1), 1.0)
 
 
 def test_another_master_is_believed_when_it_had_time_to_learn() -> None:
-    learning = Learning()
+    learning = MasterChange()
     assert learning.still(view(1), view(2), 10.0)
     assert learning.still(view(1), view(2), 10.0 + LEARNING_S - 0.1)
     assert not learning.still(view(1), view(2), 10.0 + LEARNING_S)
 
 
 def test_a_third_one_begins_to_learn_anew() -> None:
-    learning = Learning()
+    learning = MasterChange()
     learning.still(view(1), view(2), 10.0)
     assert learning.still(view(1), view(3), 10.0 + LEARNING_S)

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from app.core.alerts import Alerts
-from app.core.network.remote_access import ALERT, Reach
+from app.core.network.remote_access import ALERT, RemoteAccess
 from app.core.storage.settings import Settings
 from nep.errors import RequestRefusedError
 from nep.protocol.graph_view import GraphView
@@ -48,7 +48,9 @@ def make(world, tmp_path):
     def make(address="127.0.0.1:7780"):
         here = (OwnAddress("192.168.1.20", "wlan0"),)
         alerts = Alerts()
-        reach = Reach(address, Settings(tmp_path), alerts, world.post, ask=world.ask, here=lambda: here)
+        reach = RemoteAccess(
+            address, Settings(tmp_path), alerts, world.post, ask=world.ask, here=lambda: here
+        )
         return reach, alerts
 
     return make
@@ -57,11 +59,11 @@ def make(world, tmp_path):
 def test_a_person_lets_others_in_and_no_more(world, make):
     reach, alerts = make()
     assert reach.typed_by_others("192.168.1.20") == "NEP_MASTER=192.168.1.20:7780"
-    reach.let_in(["192.168.1.20"])
+    reach.listen_at(["192.168.1.20"])
     world.answer(reach)
     assert world.asked == [(("192.168.1.20",), "127.0.0.1:7780")]
     assert reach.hosts == ("192.168.1.20",)
-    reach.let_in([])
+    reach.listen_at([])
     world.answer(reach)
     assert reach.hosts == ()
     assert not alerts.active
@@ -70,7 +72,7 @@ def test_a_person_lets_others_in_and_no_more(world, make):
 
 def test_what_was_chosen_is_asked_of_the_next_master_but_only_once(world, make):
     reach, _alerts = make()
-    reach.let_in(["192.168.1.20"])
+    reach.listen_at(["192.168.1.20"])
     world.answer(reach)
     again, _alerts = make()
     again.follow(GraphView(epoch=7, revision=1))
@@ -85,14 +87,14 @@ def test_what_was_chosen_is_asked_of_the_next_master_but_only_once(world, make):
 def test_a_refusal_is_an_alert_with_the_way_out_until_it_works(world, make):
     reach, alerts = make()
     world.refusal = "'192.168.1.20' is no address of this computer; it has 10.0.0.7"
-    reach.let_in(["192.168.1.20"])
+    reach.listen_at(["192.168.1.20"])
     world.answer(reach)
     (alert,) = alerts.active
     assert (alert.id, alert.action) == (ALERT, "network.others")
     assert "it has 10.0.0.7." in alert.detail
     assert reach.hosts == ()
     world.refusal = ""
-    reach.let_in(["10.0.0.7"])
+    reach.listen_at(["10.0.0.7"])
     world.answer(reach)
     assert not alerts.active
     reach.close()
@@ -102,7 +104,7 @@ def test_a_choice_that_can_not_be_kept_is_done_and_said(world, make, tmp_path):
     reach, alerts = make()
     (tmp_path / "settings.json").mkdir()  # as a full disk: nothing can be written there
     for hosts, words in ((["192.168.1.20"], "They can't connect any more"), ([], "Other computers may")):
-        reach.let_in(hosts)
+        reach.listen_at(hosts)
         world.answer(reach)
         assert world.asked[-1][0] == tuple(hosts)
         assert reach.hosts == tuple(hosts)
@@ -110,7 +112,7 @@ def test_a_choice_that_can_not_be_kept_is_done_and_said(world, make, tmp_path):
         assert alert.title == "Who may connect is not kept."
         assert alert.detail.startswith(words)
     (tmp_path / "settings.json").rmdir()
-    reach.let_in(["192.168.1.20"])
+    reach.listen_at(["192.168.1.20"])
     world.answer(reach)
     assert not alerts.active
     reach.close()
@@ -118,7 +120,7 @@ def test_a_choice_that_can_not_be_kept_is_done_and_said(world, make, tmp_path):
 
 def test_the_master_of_another_computer_is_not_told(make, world):
     near, _alerts = make()
-    near.let_in(["192.168.1.20"])  # kept, for the master of this computer
+    near.listen_at(["192.168.1.20"])  # kept, for the master of this computer
     world.answer(near)
     world.asked.clear()
     near.close()
@@ -140,8 +142,8 @@ def test_the_last_wish_is_told_last_however_long_the_first_takes(world, make, mo
 
     monkeypatch.setattr(world, "ask", slow)
     reach, _alerts = make()
-    reach.let_in(["192.168.1.20"])
-    reach.let_in([])
+    reach.listen_at(["192.168.1.20"])
+    reach.listen_at([])
     assert told == []
     may_go_on.set()
     reach.close()

@@ -9,7 +9,7 @@ import pytest
 
 from app.blocks.compiler.compiler import asked_actions
 from app.blocks.model.program import Program
-from app.core.robots.motion_permission import MayNotMoveError, Moving, risky, wanted_by
+from app.core.robots.motion_permission import MayNotMoveError, MotionPermission, risky, wanted_by
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
@@ -22,13 +22,13 @@ def rover() -> Robot:
 
 
 def test_a_virtual_robot_is_never_asked_for(rover) -> None:
-    moving = Moving()
+    moving = MotionPermission()
     assert moving.permits([(replace(rover, virtual=True), ["move"])], pytest.fail)
     assert moving.question is None
 
 
 def test_the_question_names_what_moves_and_says_that_stop_is_f12(rover) -> None:
-    moving = Moving()
+    moving = MotionPermission()
     assert not moving.permits([(rover, ["move", "light", "turn"])], lambda: None)
     question = moving.question
     assert question is not None
@@ -38,11 +38,11 @@ def test_the_question_names_what_moves_and_says_that_stop_is_f12(rover) -> None:
 
 
 def test_actions_without_risk_need_no_answer(rover) -> None:
-    assert Moving().permits([(rover, ["light", "stop"])], pytest.fail)
+    assert MotionPermission().permits([(rover, ["light", "stop"])], pytest.fail)
 
 
 def test_a_yes_goes_on_once_and_counts_for_the_session(rover) -> None:
-    moving, done = Moving(), []
+    moving, done = MotionPermission(), []
     moving.permits([(rover, ["move"])], lambda: done.append(1))
     moving.answer(let=True)
     moving.answer(let=True)  # a second press
@@ -50,11 +50,11 @@ def test_a_yes_goes_on_once_and_counts_for_the_session(rover) -> None:
     assert moving.permits([(rover, ["turn"])], pytest.fail)
     other = replace(rover, name="Other")
     assert not moving.permits([(other, ["turn"])], lambda: None)  # each robot for itself
-    assert not Moving().permits([(rover, ["move"])], lambda: None)  # and each session
+    assert not MotionPermission().permits([(rover, ["move"])], lambda: None)  # and each session
 
 
 def test_not_now_moves_nothing_and_asks_again(rover) -> None:
-    moving = Moving()
+    moving = MotionPermission()
     moving.permits([(rover, ["move"])], pytest.fail)
     moving.answer(let=False, always=True)
     assert moving.question is None
@@ -66,18 +66,18 @@ def test_not_now_moves_nothing_and_asks_again(rover) -> None:
 
 
 def test_always_is_kept_for_this_robot_until_it_is_forgotten(rover, tmp_path) -> None:
-    moving = Moving(Settings(tmp_path))
+    moving = MotionPermission(Settings(tmp_path))
     moving.permits([(rover, ["move"])], lambda: None)
     moving.answer(let=True, always=True)
-    assert Moving(Settings(tmp_path)).allowed(rover)
-    assert not Moving(Settings(tmp_path)).allowed(replace(rover, model="other"))
+    assert MotionPermission(Settings(tmp_path)).allowed(rover)
+    assert not MotionPermission(Settings(tmp_path)).allowed(replace(rover, model="other"))
     moving.forget()
-    assert not Moving(Settings(tmp_path)).allowed(rover)
+    assert not MotionPermission(Settings(tmp_path)).allowed(rover)
     assert not moving.allowed(rover)
 
 
 def test_the_question_replaces_an_older_one(rover) -> None:
-    moving, done = Moving(), []
+    moving, done = MotionPermission(), []
     moving.permits([(rover, ["move"])], lambda: done.append("old"))
     moving.permits([(rover, ["turn"])], lambda: done.append("new"))
     moving.answer(let=True)
@@ -103,7 +103,7 @@ def test_a_program_that_hides_what_it_does_may_do_anything(rover, source) -> Non
     assert program.actions is None
     ((_, actions),) = wanted_by(program, [rover])
     assert "move" in actions
-    assert not Moving().permits(wanted_by(program, [rover]), lambda: None)
+    assert not MotionPermission().permits(wanted_by(program, [rover]), lambda: None)
 
 
 def test_a_robot_that_a_program_moves_by_publishing_may_do_anything(rover) -> None:
@@ -117,7 +117,7 @@ def test_the_error_names_the_robots() -> None:
 
 
 def test_one_yes_counts_for_all_robots_of_the_question(rover) -> None:
-    moving, other = Moving(), replace(rover, name="Other")
+    moving, other = MotionPermission(), replace(rover, name="Other")
     assert not moving.permits([(rover, ["move"]), (other, ["turn"])], lambda: None)
     assert moving.question is not None
     assert moving.question.title == "Let Rover and Other move?"

@@ -84,7 +84,7 @@ def test_nothing_moves_a_real_robot_before_the_answer(session: Session, node: ne
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
         session.document.edited(workspace(started(turn(180, "x"))))
-        moving = session.fleet.moving
+        moving = session.fleet.permission
         with pytest.raises(MayNotMoveError):
             session.fleet.invoke("Turtle", "move", {"distance": 0.5})
         assert moving.question is not None
@@ -113,7 +113,7 @@ def test_a_behaviour_that_publishes_on_a_robots_topic_asks_and_is_stopped_too(
         publish = block("messages_publish", "p", TOPIC=topic, VALUE=text("drive"))
         session.document.edited(workspace(started(publish, wait(600))))
         session.runs.run()
-        moving = session.fleet.moving
+        moving = session.fleet.permission
         assert not session.runs.active
         assert moving.question is not None
         assert moving.question.title == "Let Turtle move?"
@@ -151,7 +151,7 @@ def test_let_it_move_runs_what_was_wanted_and_asks_no_more(session: Session, nod
         wheels = driver.body.wheels  # type: ignore[attr-defined]
         session.document.edited(workspace(started(turn(180, "x"))))
         session.runs.run()
-        session.fleet.moving.answer(let=True)
+        session.fleet.permission.answer(let=True)
         tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
         tick_until(session, lambda: not wheels.still())
         session.runs.stop()
@@ -166,13 +166,13 @@ def test_a_try_goes_on_after_the_answer(session: Session, node: nep.Node) -> Non
         there(session, "Turtle")
         with pytest.raises(MayNotMoveError, match="Turtle may not move yet"):
             session.fleet.invoke("Turtle", "move", {"distance": -0.1})
-        session.fleet.moving.answer(let=False)
+        session.fleet.permission.answer(let=False)
         link = session.fleet.link("Turtle")
         assert link is not None
         assert not link.invocations
         with pytest.raises(MayNotMoveError):
             session.fleet.invoke("Turtle", "move", {"distance": -0.1})
-        session.fleet.moving.answer(let=True)
+        session.fleet.permission.answer(let=True)
         tick_until(session, lambda: link.invocations["move"].state == "succeeded", FOUND_S)
 
 

@@ -16,8 +16,8 @@ import pytest
 
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
-from app.core.robots.motion_permission import MayNotMoveError, Moving
-from app.core.robots.virtual_processes import VirtualProcesses
+from app.core.robots.launcher import VirtualProcesses
+from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for
@@ -160,9 +160,9 @@ def test_the_world_of_a_strangers_robot_is_not_changed_before_the_answer(fleet: 
     assert link is not None
     link.world = cast("Publisher", world)
     fleet.world("Turtle", {"touch": "head"})
-    assert fleet.moving.question is not None
+    assert fleet.permission.question is not None
     assert world.changes == []
-    fleet.moving.answer(let=True)
+    fleet.permission.answer(let=True)
     assert world.changes == [{"touch": "head"}]
     fleet.join(turtle(), "/Turtle/description", Identity("1", "Turtle", HERE, os.getpid()))
     fleet.world("Turtle", {"reset": True})
@@ -172,19 +172,19 @@ def test_the_world_of_a_strangers_robot_is_not_changed_before_the_answer(fleet: 
 def test_a_yes_is_for_this_program_and_always_for_its_computer(fleet: Fleet, tmp_path: Path) -> None:
     fleet.join(turtle(virtual=False), "/Turtle/description", STRANGE)
     assert asks(fleet)
-    fleet.moving.answer(let=True)
+    fleet.permission.answer(let=True)
     assert not asks(fleet)
     fleet.join(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="2"))  # started anew
     assert asks(fleet)
-    fleet.moving.answer(let=True, always=True)
+    fleet.permission.answer(let=True, always=True)
     fleet.join(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="3"))
     assert not asks(fleet)
     for other in (replace(STRANGE, host="evil"), replace(STRANGE, node="evil")):
         fleet.join(turtle(virtual=False), "/Turtle/description", other)
         assert asks(fleet)
-    kept = Moving(Settings(tmp_path), lambda _name: STRANGE)
+    kept = MotionPermission(Settings(tmp_path), lambda _name: STRANGE)
     assert kept.allowed(turtle(virtual=False))
-    assert not Moving(Settings(tmp_path)).allowed(turtle(virtual=False))
+    assert not MotionPermission(Settings(tmp_path)).allowed(turtle(virtual=False))
 
 
 def test_a_strangers_virtual_robot_on_the_network_is_asked_about(session: Session, master: Master) -> None:
@@ -196,6 +196,6 @@ def test_a_strangers_virtual_robot_on_the_network_is_asked_about(session: Sessio
         assert link is not None
         assert not link.virtual
         assert asks(session.fleet)
-        assert session.fleet.moving.question is not None
+        assert session.fleet.permission.question is not None
     finally:
         made.communicate()

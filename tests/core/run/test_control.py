@@ -97,7 +97,7 @@ def test_a_fault_in_the_words_of_a_stop_leaves_nothing_stopping(
 
 
 def test_stop_stops_whatever_the_question_does(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(session.fleet.moving, "withdraw", failing)
+    monkeypatch.setattr(session.fleet.permission, "withdraw", failing)
     with pytest.raises(OSError, match="out of order"):
         session.runs.stop()
     assert session.runs._stop_thread is not None

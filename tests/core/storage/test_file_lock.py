@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.storage.file_lock import Turn, locked
+from app.core.storage.file_lock import FileLock, locked
 
 HOLDER = """
 import sys
@@ -72,19 +72,19 @@ def test_a_folder_that_cant_be_made_is_no_reason_to_stop(tmp_path: Path) -> None
 def test_a_turn_is_one_process_s_until_it_leaves_or_dies(
     holder: subprocess.Popen[str], tmp_path: Path
 ) -> None:
-    turn, other = Turn(tmp_path / "file"), Turn(tmp_path / "file")
-    assert not turn.take()
+    turn, other = FileLock(tmp_path / "file"), FileLock(tmp_path / "file")
+    assert not turn.acquire()
     holder.kill()
     holder.wait(30)
-    assert turn.take()
-    assert turn.take()
-    assert not other.take()
-    turn.leave()
-    turn.leave()
-    assert other.take()
-    other.leave()
+    assert turn.acquire()
+    assert turn.acquire()
+    assert not other.acquire()
+    turn.release()
+    turn.release()
+    assert other.acquire()
+    other.release()
 
 
 def test_where_there_are_no_locks_everybody_has_the_turn(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
-    assert Turn(tmp_path / "file" / "starting").take()
+    assert FileLock(tmp_path / "file" / "starting").acquire()

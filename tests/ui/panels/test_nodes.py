@@ -110,7 +110,7 @@ def test_a_node_without_topics_opens_too(panel, window) -> None:
 def test_new_nodes_are_bold_until_opened_and_studio_is_no_news(panel, window) -> None:
     nodes = window.session.nodes
     more = (NodeInfo("4", "arm", "h", 1, "", "native", 1), NodeInfo("5", "Pepper", "h", 1, "", "native", 1))
-    window.session.companions.restart_virtual_robot("Pepper")
+    window.session.launcher.restart_virtual_robot("Pepper")
     nodes.update(graph(2, (*NODES, *more)), 1.0)
     panel.refresh()
 

@@ -71,7 +71,7 @@ def test_new_ones_are_bold_until_somebody_looks(panel, window) -> None:
 
 
 def test_what_studio_itself_brought_is_no_news(panel, window) -> None:
-    window.session.companions.restart_virtual_robot("Pepper")
+    window.session.launcher.restart_virtual_robot("Pepper")
     topics = [
         Topic("/Pepper/pose", new=True, publisher_nodes=("Pepper",)),
         Topic("/Pepper/command", new=True, publisher_nodes=("Pepper", "studio")),

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
 
 from app.core.documents.journal import Journal, left_behind
-from app.core.faults import SaidOnce
+from app.core.faults import RepeatFilter
 from app.core.run.view import RunState, RunView
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -527,8 +527,8 @@ def test_a_fault_of_the_session_is_said_once_and_the_window_lives_on(
     window.tick()
     assert panel(window, "developer", "topics").refreshed == before + 2
     assert window.banner.banner.accessibleName().endswith("RuntimeError: broken")
-    once = SaidOnce()
-    assert sum(once.told(record) is not None for record in caplog.records) == 1
+    once = RepeatFilter()
+    assert sum(once.filter(record) is not None for record in caplog.records) == 1
 
 
 def test_closing_while_a_program_runs_stops_the_robots_at_once(

@@ -10,7 +10,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
 
-from app.core.robots.motion_permission import Moving
+from app.core.robots.motion_permission import MotionPermission
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
@@ -30,13 +30,13 @@ class Window(QWidget):
         self.field = QLineEdit()
         column = QVBoxLayout(self)
         column.addWidget(self.field)
-        self.moving = Moving(Settings(folder))
+        self.permission = MotionPermission(Settings(folder))
         self.complaints: list[str] = []
-        self.question = MotionQuestion(Theme("light"), self, self.moving, self.complaints.append)
+        self.question = MotionQuestion(Theme("light"), self, self.permission, self.complaints.append)
         self.done: list[str] = []
 
     def ask(self, *actions: str) -> None:
-        self.moving.permits([(ROVER, actions)], lambda: self.done.append("moved"))
+        self.permission.permits([(ROVER, actions)], lambda: self.done.append("moved"))
         self.question.refresh()
 
 
@@ -73,7 +73,7 @@ def test_let_it_move_goes_on(window) -> None:
     assert window.done == ["moved"]
     assert not window.question.isVisible()
     assert window.focusWidget() is window.field
-    assert window.moving.allowed(ROVER)
+    assert window.motion_permission.allowed(ROVER)
 
 
 @pytest.mark.parametrize("how", ["button", "escape", "enter"])
@@ -87,7 +87,7 @@ def test_not_now_moves_nothing(window, how) -> None:
         QTest.keyClick(window.question.not_now, Qt.Key.Key_Space)
     assert window.done == []
     assert not window.question.isVisible()
-    assert not window.moving.allowed(ROVER)
+    assert not window.motion_permission.allowed(ROVER)
 
 
 def test_always_is_kept(window, tmp_path) -> None:
@@ -97,7 +97,7 @@ def test_always_is_kept(window, tmp_path) -> None:
     )
     assert window.question.always.isChecked()
     QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
-    assert Moving(Settings(tmp_path)).allowed(ROVER)
+    assert MotionPermission(Settings(tmp_path)).allowed(ROVER)
 
 
 def test_an_always_that_can_not_be_kept_is_told_and_it_moves_all_the_same(window, tmp_path) -> None:
@@ -111,7 +111,7 @@ def test_an_always_that_can_not_be_kept_is_told_and_it_moves_all_the_same(window
 
 def test_a_stop_takes_the_question_away(window) -> None:
     window.ask("move")
-    window.moving.withdraw()
+    window.motion_permission.withdraw()
     window.question.refresh()
     assert not window.question.isVisible()
     assert window.done == []
@@ -153,7 +153,7 @@ def test_the_whole_name_is_to_be_read_however_long(qtbot, tmp_path, name, size, 
     window.resize(*size)
     window.show()
     rover = replace(ROVER, name=name)
-    window.moving.permits([(rover, ("move",))], lambda: None)
+    window.motion_permission.permits([(rover, ("move",))], lambda: None)
     window.question.refresh()
     assert clipped(window.question) == []
     for words in (window.question.title, window.question.sentence):

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.alerts import Alerts
-from app.core.network.remote_access import Reach, words_of
+from app.core.network.remote_access import RemoteAccess, access_words
 from app.core.storage.settings import Settings
 from app.ui.shell.dialogs.network_access import NetworkAccessSheet
 from app.ui.theme.theme import Theme
@@ -22,7 +22,7 @@ def make(qtbot, tmp_path):
     def make(address="127.0.0.1:7780", here=(("192.168.1.20", "wlan0"), ("10.8.0.2", "tun0"))):
         asked = []
         own = tuple(OwnAddress(*each) for each in here)
-        reach = Reach(
+        reach = RemoteAccess(
             address,
             Settings(tmp_path),
             Alerts(),
@@ -71,7 +71,7 @@ def test_not_now_changes_nothing(make):
 def test_it_is_taken_back_where_it_was_given(make):
     sheet, reach, asked = make()
     reach.follow(GraphView(epoch=1, revision=1, listens=("192.168.1.20",)))
-    assert words_of(reach) == ("wifi", "Other computers connect at 192.168.1.20", "warn")
+    assert access_words(reach) == ("wifi", "Other computers connect at 192.168.1.20", "warn")
     sheet.open()
     assert sheet.heading.text() == "Other computers can connect at 192.168.1.20"
     assert not sheet.yes.isVisible()
@@ -85,7 +85,7 @@ def test_without_a_network_it_says_what_to_do_first(make):
     sheet.open()
     assert sheet.heading.text() == "This computer is in no network"
     assert not sheet.yes.isVisible()
-    assert words_of(reach)[1] == "This computer only"
+    assert access_words(reach)[1] == "This computer only"
 
 
 def test_the_master_of_another_computer_decides_there(make):
@@ -94,4 +94,4 @@ def test_the_master_of_another_computer_decides_there(make):
     assert "192.168.1.9" in sheet.heading.text()
     assert not sheet.yes.isVisible()
     assert not sheet.end.isVisible()
-    assert words_of(reach) == ("network", "Master on 192.168.1.9", None)
+    assert access_words(reach) == ("network", "Master on 192.168.1.9", None)

@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QMenu, QWidget
 from app import resources
 from app.core.alerts import Alerts
 from app.core.messages import snapshots
-from app.core.network.remote_access import Reach
-from app.core.robots.motion_permission import Moving
+from app.core.network.remote_access import RemoteAccess
+from app.core.robots.motion_permission import MotionPermission
 from app.core.robots.stop_report import RobotStop, StopReport
 from app.core.run.view import RunState, RunView, view_of
 from app.core.session import Session
@@ -265,7 +265,7 @@ def test_the_question_for_a_name(whole: MainWindow) -> None:
 @pytest.mark.parametrize("address", ["127.0.0.1:7780", "192.168.1.9:7780"])
 def test_the_sheet_for_other_computers(qtbot, pseudo, tmp_path: Path, here, address: str) -> None:
     own = tuple(OwnAddress(*each) for each in here)
-    reach = Reach(
+    reach = RemoteAccess(
         address, Settings(tmp_path), Alerts(), print, ask=lambda _hosts, _address: None, here=lambda: own
     )
     window = QWidget()
@@ -285,7 +285,7 @@ def test_the_question_before_a_robot_moves(qtbot, pseudo, tmp_path: Path) -> Non
     window.resize(1100, 700)
     qtbot.addWidget(window)
     window.show()
-    moving = Moving(Settings(tmp_path))
+    moving = MotionPermission(Settings(tmp_path))
     question = MotionQuestion(Theme("light"), window, moving, print)
     moving.permits([(ROVER, ("move",))], lambda: None)
     question.refresh()

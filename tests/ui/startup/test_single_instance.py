@@ -15,7 +15,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtNetwork import QLocalSocket
 from PySide6.QtWidgets import QApplication
 
-from app.core.storage.file_lock import Turn
+from app.core.storage.file_lock import FileLock
 from app.ui.startup import single_instance
 from app.ui.startup.single_instance import (
     SingleInstanceServer,
@@ -96,7 +96,7 @@ def starting(name: str, turn: Path) -> subprocess.Popen[str]:
 def test_of_two_starts_at_once_the_second_waits_for_the_window_of_the_first(
     qtbot, name: str, tmp_path: Path
 ) -> None:
-    turn, asked = Turn(tmp_path / "starting"), []
+    turn, asked = FileLock(tmp_path / "starting"), []
     assert not found(name, StartRequest(), turn)
     process = starting(name, tmp_path / "starting")
     assert process.stdout is not None
@@ -105,20 +105,20 @@ def test_of_two_starts_at_once_the_second_waits_for_the_window_of_the_first(
     qtbot.waitUntil(lambda: bool(asked), timeout=12 * WAIT_MS)
     assert process.communicate(timeout=60)[0] == "found\n"
     meeting.close()
-    turn.leave()
+    turn.release()
 
 
 def test_a_start_that_dies_before_its_window_is_there_is_not_waited_for(name: str, tmp_path: Path) -> None:
-    turn = Turn(tmp_path / "starting")
+    turn = FileLock(tmp_path / "starting")
     process = starting(name, tmp_path / "starting")
     assert process.stdout is not None
     assert [process.stdout.readline() for _ in range(2)] == ["begun\n", "first\n"]
-    assert not turn.take()
+    assert not turn.acquire()
     process.kill()
     process.communicate(timeout=60)
     assert not found(name, StartRequest(), turn, 60.0)
-    assert not Turn(tmp_path / "starting").take(), "it has the turn"
-    turn.leave()
+    assert not FileLock(tmp_path / "starting").acquire(), "it has the turn"
+    turn.release()
 
 
 def test_the_second_window_does_not_take_the_place_of_the_first(qtbot, name: str, tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ class NodesPanel(TablePanel[NodeRow]):
 
     def _own(self, node: NodeEntry) -> bool:
         """Whether it is Studio, or a virtual robot that Studio itself started."""
-        return node.name in {NODE_NAME, *self.session.companions.virtual_robots}
+        return node.name in {NODE_NAME, *self.session.launcher.virtual_robots}
 
     def refresh(self) -> None:
         self._ticks += 1

@@ -75,7 +75,7 @@ class TopicsPanel(TablePanel["Topic"]):
     def rebuild(self) -> None:
         topics = self.session.topics
         self._seen = (topics.revision, len(topics), self.session.master.kind)
-        self._ours = self.session.companions.virtual_robots
+        self._ours = self.session.launcher.virtual_robots
         words = self.filter_words()
         rows = [topic for topic in topics if all(word in _haystack(topic) for word in words)]
         self.model.set_rows(self.table.order.sort(rows))

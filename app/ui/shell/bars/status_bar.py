@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.core.network.remote_access import words_of
+from app.core.network.remote_access import access_words
 from app.core.robots.health_facts import facts_of, has_told
 from app.core.robots.robot_link import STOPPING
 from app.core.session import Session
@@ -90,13 +90,13 @@ class StatusFacts:
         live = sum(1 for topic in self._session.topics if topic.gone_s is None)
         return "", ngettext("{count} topic live", "{count} topics live", live).format(count=live), None
 
-    def reach(self) -> Fact:
+    def remote_access(self) -> Fact:
         """Who can reach this master."""
-        return words_of(self._session.reach)
+        return access_words(self._session.remote_access)
 
-    def reach_quietly(self) -> Fact:
+    def remote_access_quietly(self) -> Fact:
         """The same; without an icon while it is as it always is."""
-        icon, words, status = self.reach()
+        icon, words, status = self.remote_access()
         return ("" if status is None else icon), words, status
 
     def master(self) -> Fact:

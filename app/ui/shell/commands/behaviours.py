@@ -100,7 +100,7 @@ class BehaviourCommands:
 
     def demo(self) -> None:
         """Begin with the virtual Pepper and the first example."""
-        self._session.companions.start_virtual_robot()
+        self._session.launcher.start_virtual_robot()
         self._shell.show_layout("behaviour")
         if self._shell.examples:
             self._files.example(self._shell.examples[0].path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
+from app.core.robots.launcher import VIRTUAL_ROBOTS
 from app.core.session import Session
 from app.errors import SettingsError
 from app.ui.shell.commands.shell import Shell
@@ -42,7 +42,7 @@ class RobotCommands:
 
     def start_pepper(self) -> None:
         """Start the virtual Pepper; what shows stays."""
-        self._session.companions.start_virtual_robot()
+        self._session.launcher.start_virtual_robot()
 
     def virtual_pepper(self) -> None:
         """Start the virtual Pepper and show the Behaviour layout."""
@@ -51,7 +51,7 @@ class RobotCommands:
 
     def virtual_turtle(self) -> None:
         """Start the virtual Turtle."""
-        self._session.companions.start_virtual_robot("Turtle", "diffdrive")
+        self._session.launcher.start_virtual_robot("Turtle", "diffdrive")
         if self._shell.bench is None:
             self._shell.show_layout("behaviour")
         self._shell.say(_("The virtual Turtle is coming"))
@@ -65,7 +65,7 @@ class RobotCommands:
         kind = described.get("rb:robot")
         model = _model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
         if model is not None:
-            self._session.companions.restart_virtual_robot(name, model)
+            self._session.launcher.restart_virtual_robot(name, model)
         else:
             self._shell.open_panel("robots")
 
@@ -74,12 +74,12 @@ class RobotCommands:
         model = _model(self._session.document.robots.get(missing, {}).get("rb:robot"))
         if model is None:
             return False
-        companions = self._session.companions
-        companions.restart_virtual_robot(missing, model)
+        launcher = self._session.launcher
+        launcher.restart_virtual_robot(missing, model)
         self._shell.say(
             _("The virtual {robot} is coming").format(robot=missing),
             _("Undo"),
-            lambda: companions.stop_virtual_robot(missing),
+            lambda: launcher.stop_virtual_robot(missing),
         )
         return True
 
@@ -108,7 +108,7 @@ class RobotCommands:
         """Ask again before a real robot moves."""
         words = _("Studio asks again before a real robot moves")
         try:
-            self._session.fleet.moving.forget()
+            self._session.fleet.permission.forget()
         except SettingsError as error:
             self._shell.complain(str(error))
             words = _("Studio asks again before a real robot moves, until Studio ends")
@@ -118,7 +118,7 @@ class RobotCommands:
         """Ask whether other computers may connect."""
         if self._network_access is None:
             self._network_access = NetworkAccessSheet(
-                self._shell.theme, self._shell.surface, self._session.reach
+                self._shell.theme, self._shell.surface, self._session.remote_access
             )
         self._network_access.open()
 

@@ -9,7 +9,7 @@ from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QApplication, QGraphicsDropShadowEffect, QHBoxLayout, QVBoxLayout, QWidget
 from shiboken6 import isValid
 
-from app.core.robots.motion_permission import Moving
+from app.core.robots.motion_permission import MotionPermission
 from app.errors import SettingsError
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
@@ -40,13 +40,13 @@ class _Tile(QWidget):
 
 
 class MotionQuestion(QWidget):
-    """Shows the question of `Moving` while it stands; Escape is "Not now".
+    """Shows the question of `MotionPermission` while it stands; Escape is "Not now".
 
     The keyboard is on "Not now" first: an Enter that was meant for something else moves nothing.
     """
 
     def __init__(
-        self, theme: Theme, window: QWidget, moving: Moving, complain: Callable[[str], object]
+        self, theme: Theme, window: QWidget, moving: MotionPermission, complain: Callable[[str], object]
     ) -> None:
         """``complain`` is told when an "always" can't be kept."""
         super().__init__(window)

@@ -6,7 +6,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.core.network.remote_access import Reach
+from app.core.network.remote_access import RemoteAccess
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, IconButton, label, paint
@@ -24,9 +24,9 @@ class NetworkAccessSheet(Overlay):
 
     top = 128
 
-    def __init__(self, theme: Theme, window: QWidget, reach: Reach) -> None:
+    def __init__(self, theme: Theme, window: QWidget, access: RemoteAccess) -> None:
         super().__init__(theme, window, _("Other computers"))
-        self._reach = reach
+        self._access = access
         self.heading = label("", "heading", wrap=True)
         self.warning = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.where = QHBoxLayout()
@@ -84,9 +84,9 @@ class NetworkAccessSheet(Overlay):
         super().open()
 
     def _show(self) -> None:
-        reach = self._reach
-        addresses = reach.addresses()
-        is_open, can_open = bool(reach.hosts), reach.is_near and bool(addresses)
+        access = self._access
+        addresses = access.addresses()
+        is_open, can_open = bool(access.hosts), access.is_near and bool(addresses)
         self.heading.setText(self._heading(is_open=is_open, can_open=can_open))
         self.warning.setText(self._words(is_open=is_open, can_open=can_open))
         if self.choice is not None:
@@ -99,31 +99,31 @@ class NetworkAccessSheet(Overlay):
             self.choice.currentIndexChanged.connect(lambda _index: self._say_chosen())
             self.where.insertWidget(1, self.choice)
         paint.show_when(self.where_word, self.choice is not None)
-        self._say_typed(reach.hosts[0] if is_open else addresses[0].host if addresses else "")
+        self._say_typed(access.hosts[0] if is_open else addresses[0].host if addresses else "")
         for shown in (self.typed, self.copy, self.typed_word):
             paint.show_when(shown, is_open or can_open)
         paint.show_when(self.yes, can_open and not is_open)
-        paint.show_when(self.end, is_open and reach.is_near)
+        paint.show_when(self.end, is_open and access.is_near)
         self.no.set_word(_("Leave it so") if is_open or not can_open else _("Not now"))
         self.setAccessibleName(f"{self.heading.text()} {self.warning.text()}")
 
     def _heading(self, *, is_open: bool, can_open: bool) -> str:
-        if not self._reach.is_near:
-            return _("The master is on another computer, {host}").format(host=self._reach.master_host)
+        if not self._access.is_near:
+            return _("The master is on another computer, {host}").format(host=self._access.master_host)
         if is_open:
-            addresses = ", ".join(self._reach.hosts)
+            addresses = ", ".join(self._access.hosts)
             return _("Other computers can connect at {addresses}").format(addresses=addresses)
         return _("Let other computers connect?") if can_open else _("This computer is in no network")
 
     def _words(self, *, is_open: bool, can_open: bool) -> str:
-        if not self._reach.is_near:
+        if not self._access.is_near:
             return _("Who may connect is decided there.")
         if is_open or can_open:
             return _(WARNING)
         return _("Join a Wi-Fi or plug in a cable, then open this again.")
 
     def _say_typed(self, host: str) -> None:
-        self.typed.setText(self._reach.typed_by_others(host))
+        self.typed.setText(self._access.typed_by_others(host))
 
     def _say_chosen(self) -> None:
         if self.choice is not None:
@@ -131,9 +131,9 @@ class NetworkAccessSheet(Overlay):
 
     def _let_in(self) -> None:
         if self.choice is not None:
-            self._reach.let_in((self.choice.value,))
+            self._access.listen_at((self.choice.value,))
         self.shut()
 
     def _let_nobody_in(self) -> None:
-        self._reach.let_in(())
+        self._access.listen_at(())
         self.shut()

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.faults import IN_CONSOLE, words_of
+from app.core.faults import IN_CONSOLE, error_words
 from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelContext, PanelWidget
 from app.ui.shell.docking.dock_title import DockTitle
 from app.ui.theme.theme import Theme
@@ -210,7 +210,7 @@ class Dock(QDockWidget):
             self.failed = True
             with suppress(*FAULTS):  # it shows nothing now, so it looks at nothing
                 self.panel.rest()
-            sentence = words_of(error)[:SENTENCE_LIMIT]
+            sentence = error_words(error)[:SENTENCE_LIMIT]
             said = ("the panel '%s' stopped: %s", self.description.name, sentence)
             _log.error(*said, exc_info=error, extra=IN_CONSOLE)
             traceback.clear_frames(error.__traceback__)

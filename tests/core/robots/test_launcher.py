@@ -11,7 +11,7 @@ import pytest
 import nep
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
-from app.core.robots.virtual_processes import KNOWN_WITHIN_S, WISH_KEPT_S, Companions
+from app.core.robots.launcher import KNOWN_WITHIN_S, WISH_KEPT_S, Launcher
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
@@ -31,7 +31,7 @@ class World:
         self.started: list[Sequence[str]] = []
         self.processes: list[Process] = []
         self.events: list[object] = []
-        self.companions = Companions(
+        self.launcher = Launcher(
             "127.0.0.1:1", self.events.append, lambda _name: self.there, lambda: self.now, self._start
         )
 
@@ -42,7 +42,7 @@ class World:
 
     def after(self, seconds: float) -> None:
         self.now += seconds
-        self.companions.follow()
+        self.launcher.follow()
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def world() -> Iterator[World]:
 
 
 def test_one_that_is_not_there_is_started_at_once(world: World) -> None:
-    world.companions.start_virtual_robot("Turtle", "diffdrive")
+    world.launcher.start_virtual_robot("Turtle", "diffdrive")
     assert world.started == [["app.robots.turtle", "--name", "Turtle"]]
     world.processes[0].die(b"", 1)
     world.after(0.1)
@@ -62,7 +62,7 @@ def test_one_that_is_not_there_is_started_at_once(world: World) -> None:
 
 def test_one_that_was_there_and_has_ended_is_started_when_that_is_noticed(world: World) -> None:
     world.there = True
-    world.companions.start_virtual_robot()
+    world.launcher.start_virtual_robot()
     world.after(WISH_KEPT_S - 1)
     assert not world.started
     world.there = False
@@ -74,7 +74,7 @@ def test_one_that_was_there_and_has_ended_is_started_when_that_is_noticed(world:
 
 def test_the_wish_is_forgotten_when_the_one_that_is_there_stays(world: World) -> None:
     world.there = True
-    world.companions.start_virtual_robot()
+    world.launcher.start_virtual_robot()
     world.after(WISH_KEPT_S)
     world.there = False
     world.after(0.03)
@@ -83,7 +83,7 @@ def test_the_wish_is_forgotten_when_the_one_that_is_there_stays(world: World) ->
 
 def test_it_waits_until_it_is_known_who_is_there(world: World) -> None:
     world.there = None
-    world.companions.start_virtual_robot()
+    world.launcher.start_virtual_robot()
     world.after(KNOWN_WITHIN_S - 0.1)
     assert not world.started
     world.there = True
@@ -93,27 +93,27 @@ def test_it_waits_until_it_is_known_who_is_there(world: World) -> None:
 
 def test_it_does_not_wait_where_no_master_was_before(world: World) -> None:
     world.there = None
-    world.companions.start_virtual_robot()
+    world.launcher.start_virtual_robot()
     assert not world.started
-    world.companions._master.first = True
+    world.launcher._master.first = True
     world.after(0.03)
     assert len(world.started) == 1
 
 
 def test_it_does_not_wait_any_longer_than_some_seconds(world: World) -> None:
     world.there = None
-    world.companions.start_virtual_robot()
+    world.launcher.start_virtual_robot()
     world.after(KNOWN_WITHIN_S)
     assert len(world.started) == 1
 
 
-@pytest.mark.parametrize("end", [Companions.stop_virtual_robot, lambda some, _name: some.close()])
+@pytest.mark.parametrize("end", [Launcher.stop_virtual_robot, lambda some, _name: some.close()])
 def test_what_was_taken_back_is_not_wished_any_more(
-    world: World, end: Callable[[Companions, str], None]
+    world: World, end: Callable[[Launcher, str], None]
 ) -> None:
     world.there = True
-    world.companions.start_virtual_robot()
-    end(world.companions, "Pepper")
+    world.launcher.start_virtual_robot()
+    end(world.launcher, "Pepper")
     world.there = False
     world.after(0.03)
     assert not world.started
@@ -121,8 +121,8 @@ def test_what_was_taken_back_is_not_wished_any_more(
 
 def test_starting_it_anew_is_no_second_wish(world: World) -> None:
     world.there = True
-    world.companions.start_virtual_robot()
-    world.companions.restart_virtual_robot("Pepper")
+    world.launcher.start_virtual_robot()
+    world.launcher.restart_virtual_robot("Pepper")
     world.there = False
     world.processes[0].die(b"", 1)
     world.after(0.03)
@@ -136,10 +136,10 @@ def test_a_second_studio_uses_the_pepper_that_is_there(master: Master, tmp_path:
         )
         second.start()
         try:
-            second.companions.start_virtual_robot()  # in its first moment: it knows nobody yet
+            second.launcher.start_virtual_robot()  # in its first moment: it knows nobody yet
             assert second.graph is None
             tick_until(second, lambda: second.fleet.connected)
-            assert second.companions._robots == {}
+            assert second.launcher._robots == {}
         finally:
             second.close()
 

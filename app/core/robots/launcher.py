@@ -42,7 +42,7 @@ class _Wish:
 
 
 @dataclass(frozen=True, slots=True)
-class CompanionFailed:
+class LaunchFailed:
     """A process did not start or ended by itself; ``detail`` is the end of what it said."""
 
     what: str
@@ -92,7 +92,7 @@ def start_process(command: Sequence[str], environment: Mapping[str, str], log: I
     )
 
 
-class Companions:
+class Launcher:
     """Starts processes, notices when one ends, ends them with the window."""
 
     def __init__(
@@ -103,7 +103,7 @@ class Companions:
         clock: Callable[[], float] = time.monotonic,
         start: StartProcess = start_process,
     ) -> None:
-        """``address`` is the master's; failures are posted as `CompanionFailed`.
+        """``address`` is the master's; failures are posted as `LaunchFailed`.
 
         ``is_there`` tells whether a robot of a name is there, whoever started it; None while that is not
         known yet. ``clock`` gives monotonic seconds. ``start`` starts the processes of virtual robots.
@@ -120,7 +120,7 @@ class Companions:
         """The virtual robots started here whose processes have ended by themselves."""
         self._master = MasterStart(
             address,
-            lambda why: post_event(CompanionFailed("master", _("The master can't be started."), why, False)),
+            lambda why: post_event(LaunchFailed("master", _("The master can't be started."), why, False)),
         )
 
     @property
@@ -193,7 +193,7 @@ class Companions:
             except OSError as error:
                 log.close()
                 self._post_event(
-                    CompanionFailed(
+                    LaunchFailed(
                         name, _("The virtual robot {robot} can't be started.").format(robot=name), str(error)
                     )
                 )
@@ -229,7 +229,7 @@ class Companions:
                 _process, log = self._robots.pop(name)
                 self.ended |= {name}
                 self._post_event(
-                    CompanionFailed(
+                    LaunchFailed(
                         name, _("The virtual robot {robot} has ended.").format(robot=name), _tail(log)
                     )
                 )
