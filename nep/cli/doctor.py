@@ -27,7 +27,7 @@ def doctor(master: MasterOption = None, as_json: JsonOption = False) -> None:
 
     Ends with 0 when all is well, 1 with a warning, 2 when something is wrong.
     """
-    found = doctors.findings(doctors.gather(master))
+    found = doctors.findings(doctors.collect_facts(master))
     if as_json:
         show_json(doctors.to_plain(found))
     else:

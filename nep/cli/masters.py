@@ -113,7 +113,7 @@ def _started(address: str, owner_pid: int | None, terminal: Terminal, *, joins_o
                     address=address
                 )
             ) from error
-        hindered = doctor.hindrance(address)
+        hindered = doctor.start_obstacle(address)
         if hindered is None:
             raise
         raise NepError(hindered.as_error) from error

@@ -1,12 +1,22 @@
 """The connection doctor: why programs do not find each other, and what to do about it.
 
-`gather` collects facts (processes, ports, the master's graph, this Python); `findings` judges them and is a
+`collect_facts` collects facts (processes, ports, the master's graph, this Python); `findings` judges them and is a
 function of the facts alone.
 """
 
-from nep.doctor.collect import gather, hindrance
+from nep.doctor.collect import collect_facts, start_obstacle
+from nep.doctor.diagnosis import findings, report, to_plain, worst
 from nep.doctor.facts import Facts
-from nep.doctor.judge import findings, report, to_plain, worst
-from nep.doctor.verdict import Finding, Severity
+from nep.doctor.finding import Finding, Severity
 
-__all__ = ["Facts", "Finding", "Severity", "findings", "gather", "hindrance", "report", "to_plain", "worst"]
+__all__ = [
+    "Facts",
+    "Finding",
+    "Severity",
+    "collect_facts",
+    "findings",
+    "report",
+    "start_obstacle",
+    "to_plain",
+    "worst",
+]

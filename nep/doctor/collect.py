@@ -17,8 +17,8 @@ import zmq
 import nep.errors
 from nep.doctor import installs, processes
 from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact, PortFact, ProgramFact
+from nep.doctor.finding import Finding
 from nep.doctor.network import loopback, masters
-from nep.doctor.verdict import Finding
 from nep.gateway.portmap import default_file
 from nep.i18n import _, lazy
 from nep.nodes.node import Node
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 else:
     metadata, psutil = later("importlib.metadata"), later("psutil")
 
-__all__ = ["PORTS", "gather", "hindrance", "loopback_problem"]
+__all__ = ["PORTS", "collect_facts", "loopback_problem", "start_obstacle"]
 
 PORTS: Mapping[int, str] = {
     7000: lazy("where programs of nep up to 0.5.4.5, nep-js and C# ask"),
@@ -50,7 +50,7 @@ _ORIGINAL_FILES = ("helpers.py", "master.py", "publisher.py", "subscriber.py")
 _GATEWAY_OFF = {"0", "false", "no", "off"}
 
 
-def gather(
+def collect_facts(
     address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
 ) -> Facts:
     """Look at everything; takes up to two seconds when no master answers.
@@ -92,7 +92,7 @@ def gather(
     )
 
 
-def hindrance(address: str | None = None) -> Finding | None:
+def start_obstacle(address: str | None = None) -> Finding | None:
     """Why no master can be started at the address; None when nothing is known to be in its way."""
     chosen = master_address(address)
     here = _is_here(chosen)

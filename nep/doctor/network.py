@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from nep.doctor.facts import Facts, PortFact, ProcessFact
-from nep.doctor.verdict import Finding, ago
+from nep.doctor.finding import Finding, ago
 from nep.i18n import _, ngettext, number
 from nep.system.addresses import host_of, is_loopback
 
-__all__ = ["clocks", "loopback", "masters", "originals", "ports", "told_by_master"]
+__all__ = ["clocks", "loopback", "master_alerts", "masters", "originals", "ports"]
 
 SLOW_S = 0.5
 NOT_SERVED = ("0.5.4.6", "0.5.4.7")
@@ -262,7 +262,7 @@ def originals(facts: Facts) -> Iterator[Finding]:
         yield Finding("originals", "info", words.format(count=len(served), names=names))
 
 
-def told_by_master(facts: Facts) -> Iterator[Finding]:
+def master_alerts(facts: Facts) -> Iterator[Finding]:
     """What the master itself has noticed; ports are judged here already."""
     if facts.view is None:
         return

@@ -75,4 +75,4 @@ class Doctor:
 def doctor_of(address: str, folder: Path) -> Doctor:
     """A doctor for the master at this address, who also looks at Studio's own folder."""
     folders = [(_("Settings and unsaved work"), folder)]
-    return Doctor(lambda: doctor.findings(doctor.gather(address, folders=folders)))
+    return Doctor(lambda: doctor.findings(doctor.collect_facts(address, folders=folders)))

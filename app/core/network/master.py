@@ -106,7 +106,7 @@ class MasterStart:
         """Start it; "" when there is one now."""
         if is_running(self._address, timeout_s=0.5):
             return ""
-        hindered = doctor.hindrance(self._address)
+        hindered = doctor.start_obstacle(self._address)
         if hindered is not None:
             return f"{hindered.sentence} {hindered.mend}"
         self.first = True

@@ -15,7 +15,7 @@ import typer
 
 import nep
 from nep.cli.doctor import doctor
-from nep.doctor import gather, hindrance, installs, processes
+from nep.doctor import collect_facts, installs, processes, start_obstacle
 from nep.doctor.collect import loopback_problem
 from tests.nep.programs import running
 
@@ -35,7 +35,7 @@ def test_a_master_of_this_computer_is_found_with_its_process(master):
     with nep.node("Pepper") as node:
         node.new_pub("/odom")
         began = time.monotonic()
-        facts = gather(master.address)
+        facts = collect_facts(master.address)
         took_s = time.monotonic() - began
     assert {each.name for each in facts.view.nodes.values()} == {"Pepper"}
     assert 0.0 < facts.answered_s < took_s  # it is a part of the look
@@ -47,7 +47,7 @@ def test_a_master_of_this_computer_is_found_with_its_process(master):
 
 
 def test_who_holds_the_port_is_found(foreign):
-    facts = gather(f"127.0.0.1:{foreign}")
+    facts = collect_facts(f"127.0.0.1:{foreign}")
     assert facts.view is None
     assert facts.master_port.holder.pid == os.getpid()
     assert not facts.master_port.holder.is_master
@@ -58,7 +58,7 @@ def test_a_free_port_is_free():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    facts = gather(f"127.0.0.1:{port}")
+    facts = collect_facts(f"127.0.0.1:{port}")
     assert not facts.master_port.is_taken
     assert processes.is_free(port)
 
@@ -110,9 +110,9 @@ def test_the_version_of_a_running_master_is_gathered(tmp_path, master, monkeypat
     asked = []
     known = installs.Install("0.0.9", 1000.0, str(tmp_path))
     monkeypatch.setattr(installs, "install_of", lambda pid: asked.append(pid) or known)
-    assert gather(master.address).master_install == known
+    assert collect_facts(master.address).master_install == known
     assert asked == [os.getpid()]
-    assert gather("127.0.0.1:1").master_install is None
+    assert collect_facts("127.0.0.1:1").master_install is None
 
 
 def test_a_program_that_has_ended_tells_no_version():
@@ -122,14 +122,14 @@ def test_a_program_that_has_ended_tells_no_version():
 
 
 def test_a_far_masters_port_is_not_looked_for_here():
-    assert gather("192.0.2.1:7780").master_port is None
+    assert collect_facts("192.0.2.1:7780").master_port is None
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps permissions in another way")
 def test_folders_that_take_no_files_say_why(tmp_path):
     file = tmp_path / "file"
     file.touch()
-    facts = gather("127.0.0.1:1", folders=[("Settings", tmp_path / "new"), ("Work", file / "below")])
+    facts = collect_facts("127.0.0.1:1", folders=[("Settings", tmp_path / "new"), ("Work", file / "below")])
     problems = {fact.purpose: fact.problem for fact in facts.folders}
     assert problems["Settings"] == ""
     assert problems["Work"] == "not a directory"
@@ -138,10 +138,10 @@ def test_folders_that_take_no_files_say_why(tmp_path):
 
 
 def test_a_file_that_hides_the_package_is_found(tmp_path):
-    assert gather("127.0.0.1:1", here=tmp_path).shadow == ""
+    assert collect_facts("127.0.0.1:1", here=tmp_path).shadow == ""
     (tmp_path / "nep.py").touch()
-    assert gather("127.0.0.1:1", here=tmp_path).shadow == str(tmp_path / "nep.py")
-    assert gather("127.0.0.1:1", here=REPOSITORY).shadow == ""
+    assert collect_facts("127.0.0.1:1", here=tmp_path).shadow == str(tmp_path / "nep.py")
+    assert collect_facts("127.0.0.1:1", here=REPOSITORY).shadow == ""
 
 
 def test_loopback_works_here():
@@ -188,7 +188,7 @@ def test_people_see_a_sentence_and_the_next_step(foreign):
 
 
 def test_what_hinders_a_master_is_one_finding(foreign, master):
-    one = hindrance(f"127.0.0.1:{foreign}")
+    one = start_obstacle(f"127.0.0.1:{foreign}")
     assert one is not None
     assert one.id == "master:foreign"
     assert one.as_error.startswith(f"port {foreign} is held by ")
@@ -197,7 +197,7 @@ def test_what_hinders_a_master_is_one_finding(foreign, master):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = probe.getsockname()[1]
-    assert hindrance(f"127.0.0.1:{free}") is None
+    assert start_obstacle(f"127.0.0.1:{free}") is None
 
 
 def test_connections_that_a_killed_program_left_do_not_hold_its_port():
@@ -222,7 +222,7 @@ def test_programs_with_nodes_are_looked_at_for_their_files(master):
     """
     with running(code, NEP_MASTER=master.address) as program:
         program.line()
-        (found,) = gather(master.address).programs
+        (found,) = collect_facts(master.address).programs
         assert (found.pid, found.name) == (program.process.pid, "Pepper")
         assert 5 < found.opened < 100
         assert found.limit == 256 or sys.platform == "darwin"

@@ -1,4 +1,4 @@
-"""The doctor's judgement: facts in, findings out. No sockets, no files, no clock."""
+"""The doctor's diagnosis: facts in, findings out. No sockets, no files, no clock."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import asdict
 from typing import Literal
 
 from nep.doctor.facts import Facts, FolderFact
-from nep.doctor.network import clocks, loopback, masters, originals, ports, told_by_master
-from nep.doctor.verdict import Finding, Severity
+from nep.doctor.finding import Finding, Severity
+from nep.doctor.network import clocks, loopback, master_alerts, masters, originals, ports
 from nep.i18n import _
 
 __all__ = ["findings", "report", "to_plain", "worst"]
@@ -26,7 +26,7 @@ EARLIEST_S = 1_704_067_200.0
 def findings(facts: Facts) -> tuple[Finding, ...]:
     """Everything that the facts say, the worst first."""
     parts: Sequence[Callable[[Facts], Iterator[Finding]]] = (
-        loopback, masters, ports, _packages, originals, told_by_master, _files, _programs, _folders, clocks,
+        loopback, masters, ports, _packages, originals, master_alerts, _files, _programs, _folders, clocks,
         _clock, _versions,
     )  # fmt: skip
     found = [finding for part in parts for finding in part(facts)]
