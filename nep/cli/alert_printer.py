@@ -13,12 +13,12 @@ from nep.protocol.graph_view import Alert, GraphView
 from nep.system.terminal import Terminal
 from nep.text import escaped
 
-__all__ = ["AlertLog", "AlertPrinter", "Changes"]
+__all__ = ["AlertChanges", "AlertLog", "AlertPrinter"]
 
 _LIBRARY = "nep"
 
 
-class Changes:
+class AlertChanges:
     """Which alerts are new or say something else than before, and which are cured."""
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ class AlertPrinter:
 
     def __init__(self, out: Terminal) -> None:
         self._out = out
-        self._changes = Changes()
+        self._changes = AlertChanges()
 
     def start(self, _master: Master) -> None:
         """See `Attachment`."""
@@ -65,7 +65,7 @@ class AlertLog:
     """
 
     def __init__(self) -> None:
-        self._changes = Changes()
+        self._changes = AlertChanges()
         self._node: Node | None = None
 
     def start(self, master: Master) -> None:

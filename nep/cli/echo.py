@@ -14,10 +14,10 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_more, complete_topic
-from nep.cli.graphs import Waiting, node_for
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import UNKNOWN, cells, console, json_painter, say, show_json, size, write
 from nep.cli.table_file import Fields, Table
+from nep.cli.topic_wait import TopicWait, node_for
 from nep.cli.values import cleaned, json_of, presented
 from nep.errors import DecodeError, WaitTimeoutError
 from nep.i18n import _, listed, ngettext
@@ -77,13 +77,13 @@ def echo(
         raise typer.BadParameter(_("--csv and --json are two ways to write; choose one"))
     with ExitStack() as opened, node_for("echo", master) as node:
         graph = node.graph()
-        topics, fields = sorted_out(topic, more or (), graph)
+        topics, fields = topics_and_fields(topic, more or (), graph)
         if as_csv and not fields:
             raise typer.BadParameter(
                 _("name the fields: nep topic echo {topic} pose.x pose.y --csv").format(topic=topic)
             )
         picked = Fields(fields)
-        waiting = Waiting(node, topics)
+        waiting = TopicWait(node, topics)
         waiting.look(graph)
         show: Callable[[Message], object]
         if as_csv:
@@ -100,7 +100,7 @@ def echo(
             picked.say_missing()
 
 
-def sorted_out(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:
+def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:
     """The topics and the fields that the words mean: what is a topic now, or begins with "/", is a topic."""
     topics, fields = [topic], []
     for word in more:
@@ -115,7 +115,7 @@ def sorted_out(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[
 
 
 def _coming(
-    subscribers: Sequence[Subscriber], timeout_s: float | None, waiting: Waiting
+    subscribers: Sequence[Subscriber], timeout_s: float | None, waiting: TopicWait
 ) -> Iterator[Message]:
     """Their messages as they come; what was lost between them is said. Raises `WaitTimeoutError`."""
     lost = dict.fromkeys((each.topic for each in subscribers), 0)

@@ -16,9 +16,9 @@ import orjson
 import typer
 
 from nep.cli.complete import complete_topic
-from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
 from nep.cli.screen import say, size
+from nep.cli.topic_wait import node_for
 from nep.errors import EncodeError, NepError
 from nep.i18n import _, ngettext
 from nep.messages.codecs import CODECS, codec_for

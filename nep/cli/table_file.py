@@ -21,7 +21,7 @@ __all__ = ["Fields", "Table"]
 STAMP = "stamp_s"
 
 
-class Writes(Protocol):
+class TextSink(Protocol):
     """A text stream."""
 
     def write(self, text: str, /) -> object:
@@ -79,7 +79,7 @@ class Fields:
 class Table:
     """Rows of comma-separated values: when each message was published (s since 1970), then its fields."""
 
-    def __init__(self, fields: Fields, out: Writes | None = None, *, names_topic: bool = False) -> None:
+    def __init__(self, fields: Fields, out: TextSink | None = None, *, names_topic: bool = False) -> None:
         """`names_topic`: several topics come, and a column tells which."""
         self._fields = fields
         self._names_topic = names_topic
@@ -101,7 +101,7 @@ class Table:
             self._out.flush()
 
 
-def _unchanged_stdout() -> Writes:
+def _unchanged_stdout() -> TextSink:
     """The standard output without translation of line ends, which Windows would double."""
     reconfigure = getattr(sys.stdout, "reconfigure", None)
     if reconfigure is not None:

@@ -7,6 +7,7 @@ from dataclasses import asdict
 import typer
 
 from nep.cli.echo import echo
+from nep.cli.hz_bw import bw, hz
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
 from nep.cli.rates import bw, hz

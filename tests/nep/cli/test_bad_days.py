@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from nep.cli.alert_printer import Changes
+from nep.cli.alert_printer import AlertChanges
 from nep.errors import AddressInUseError
 from nep.protocol.graph_view import Alert, GraphView
 
@@ -157,7 +157,7 @@ def test_the_sentence_for_any_port_names_the_computer():
 
 
 def test_alerts_are_told_when_they_come_change_and_go():
-    changes = Changes()
+    changes = AlertChanges()
     first, other = Alert("a", "one"), Alert("a", "two")
     assert changes.take(GraphView(1, 1, alerts=(first,))) == ([first], [])
     assert changes.take(GraphView(1, 2, alerts=(first,))) == ([], [])

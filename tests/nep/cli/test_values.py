@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.cli.echo import Lines, echo, show_record, sorted_out
+from nep.cli.echo import Lines, echo, show_record, topics_and_fields
 from nep.cli.values import ids_as_text, json_of, presented
 from nep.errors import WaitTimeoutError
 from nep.messages.message import Message
@@ -149,13 +149,13 @@ def test_two_topics_are_shown_together_by_name(robots, capsys):
 def test_which_words_are_topics_and_which_are_fields(robots, capsys):
     node, _ = robots
     graph = node.graph()
-    assert sorted_out("/a", ["x", "/b", "joints[0]", "/later"], graph) == (
+    assert topics_and_fields("/a", ["x", "/b", "joints[0]", "/later"], graph) == (
         ["/a", "/b", "/later"],
         ["x", "joints[0]"],
     )
-    assert sorted_out("/a", ["battery"], graph) == (["/a", "battery"], [])
+    assert topics_and_fields("/a", ["battery"], graph) == (["/a", "battery"], [])
     assert "write .battery for a field" in capsys.readouterr().err
-    assert sorted_out("/a", [".battery"], graph) == (["/a"], [".battery"])
+    assert topics_and_fields("/a", [".battery"], graph) == (["/a"], [".battery"])
 
 
 def test_what_was_lost_between_is_said(master, capsys):

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["MOST", "Bandwidth", "Frequency", "Window"]
+__all__ = ["MOST", "Bandwidth", "Frequency", "RateWindow"]
 
 MOST = 100_000
 """Messages that a window holds at most; a faster topic is measured over a shorter time."""
@@ -37,7 +37,7 @@ class Bandwidth:
     messages: int
 
 
-class Window:
+class RateWindow:
     """The messages of one topic that arrived within the last `seconds`. Works in any thread."""
 
     def __init__(self, seconds: float) -> None:

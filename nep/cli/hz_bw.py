@@ -13,10 +13,10 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_topic
-from nep.cli.graphs import Waiting, node_for
-from nep.cli.measure import Bandwidth, Frequency, Window
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
+from nep.cli.rate_window import Bandwidth, Frequency, RateWindow
 from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
+from nep.cli.topic_wait import TopicWait, node_for
 from nep.errors import WaitTimeoutError
 from nep.i18n import _, lazy, listed
 from nep.messages.message import Message
@@ -93,9 +93,9 @@ class _Report:
         topics: Sequence[str],
         window_s: float,
         heads: Sequence[str],
-        figures: Callable[[Window, float], tuple[Frequency | Bandwidth | None, Sequence[str]]],
+        figures: Callable[[RateWindow, float], tuple[Frequency | Bandwidth | None, Sequence[str]]],
     ) -> None:
-        self._windows = {topic: Window(window_s) for topic in topics}
+        self._windows = {topic: RateWindow(window_s) for topic in topics}
         self._heads = heads
         self._figures = figures
         self._subscribers: dict[str, Subscriber] = {}
@@ -106,7 +106,7 @@ class _Report:
     def run(self, count: int, timeout_s: float | None, master: str | None, *, as_json: bool) -> None:
         """Report until Ctrl+C, or `count` times. Raises `BadTopicError`, `WaitTimeoutError`."""
         with ExitStack() as opened, node_for("measure", master) as node:
-            waiting = Waiting(node, list(self._windows))
+            waiting = TopicWait(node, list(self._windows))
             waiting.look(node.graph())
             for topic in self._windows:
                 heard = self._listen(node, topic, waiting.msg_type(topic))
@@ -124,7 +124,7 @@ class _Report:
                     return
                 self._judge(waiting, timeout_s)
 
-    def _judge(self, waiting: Waiting, timeout_s: float | None) -> None:
+    def _judge(self, waiting: TopicWait, timeout_s: float | None) -> None:
         """Say what is published no more; raises `WaitTimeoutError` when nothing came for so long."""
         totals = {topic: window.total for topic, window in self._windows.items()}
         came = {topic for topic, total in totals.items() if total != self._totals.get(topic, 0)}
@@ -168,14 +168,14 @@ class _Report:
         return padded(topic, self._width) + "".join(figure.rjust(12) for figure in figures)
 
 
-def _frequency_cells(window: Window, now: float) -> tuple[Frequency | None, Sequence[str]]:
+def _frequency_cells(window: RateWindow, now: float) -> tuple[Frequency | None, Sequence[str]]:
     found = window.frequency(now)
     if found is None:
         return None, (UNKNOWN,) * 4
     return found, (rate(found.rate_hz), *(gap(each) for each in (found.min_s, found.max_s, found.std_s)))
 
 
-def _traffic_cells(window: Window, now: float) -> tuple[Bandwidth | None, Sequence[str]]:
+def _traffic_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Sequence[str]]:
     found = window.traffic(now)
     if found is None:
         return None, (UNKNOWN,) * 4

@@ -8,14 +8,14 @@ import threading
 import pytest
 
 import nep
-from nep.cli.measure import MOST, Window
-from nep.cli.rates import bw, gap, hz
+from nep.cli.hz_bw import bw, gap, hz
+from nep.cli.rate_window import MOST, RateWindow
 from nep.cli.screen import say
 from nep.errors import BadTopicError, WaitTimeoutError
 
 
 def test_gaps_are_those_of_the_publishers_clock():
-    window = Window(10.0)
+    window = RateWindow(10.0)
     for number, stamp in enumerate((0.0, 0.1, 0.2, 0.4)):
         window.add(5.0 + number * 0.005, stamp, 10)  # they arrived in one heap
     found = window.frequency(6.0)
@@ -26,18 +26,18 @@ def test_gaps_are_those_of_the_publishers_clock():
 
 
 def test_without_stamps_the_arrival_counts_and_order_does_not():
-    window = Window(10.0)
+    window = RateWindow(10.0)
     for arrived in (1.0, 2.0, 3.0):
         window.add(arrived, None, 10)
     assert window.frequency(3.0).rate_hz == pytest.approx(1.0)
-    mixed = Window(10.0)
+    mixed = RateWindow(10.0)
     for stamp in (3.0, 1.0, 2.0):  # two publishers
         mixed.add(5.0, stamp, 10)
     assert mixed.frequency(5.0).rate_hz == pytest.approx(1.0)
 
 
 def test_what_is_older_than_the_window_counts_no_more():
-    window = Window(2.0)
+    window = RateWindow(2.0)
     for arrived in range(10):
         window.add(float(arrived), None, 100)
     assert window.frequency(9.0).messages == 3
@@ -47,7 +47,7 @@ def test_what_is_older_than_the_window_counts_no_more():
 
 
 def test_bytes_a_second_and_sizes():
-    window = Window(10.0)
+    window = RateWindow(10.0)
     for arrived, size in ((0.0, 900), (1.0, 100), (2.0, 300)):
         window.add(arrived, None, size)
     found = window.traffic(2.0)
@@ -56,7 +56,7 @@ def test_bytes_a_second_and_sizes():
 
 
 def test_one_message_is_no_rate_and_a_flood_is_bounded():
-    window = Window(10.0)
+    window = RateWindow(10.0)
     window.add(0.0, None, 1)
     assert (window.frequency(0.0), window.traffic(0.0)) == (None, None)
     for number in range(MOST + 10):
@@ -130,7 +130,7 @@ def test_what_comes_later_is_measured(master, capsys, monkeypatch):
             say(sentence)
             talking.start()
 
-        monkeypatch.setattr("nep.cli.graphs.say", said)
+        monkeypatch.setattr("nep.cli.topic_wait.say", said)
         hz(["/odom"], 60.0, 2, master.address)
         ended.set()
         talking.join()

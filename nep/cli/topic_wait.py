@@ -1,4 +1,4 @@
-"""The graph, as the command line asks for it."""
+"""Waiting for topics that nobody publishes yet: who is missing is said once, and the graph asked again."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def node_for(command: str, master: str | None) -> Node:
     return Node(f"nep-topic-{command}-{os.getpid()}", master=master)
 
 
-class Waiting:
+class TopicWait:
     """Topics that a command waits for: says which of them nobody publishes, when that is so and not again.
 
     The graph is asked again only while no message comes.
