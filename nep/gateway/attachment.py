@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from nep.errors import BadTopicError, ClosedError, DecodeError, EncodeError, NepError, WaitTimeoutError
 from nep.gateway.gateway import Gateway
+from nep.gateway.graph_registrar import GraphRegistrar
 from nep.gateway.inbox import NativeInbox
-from nep.gateway.listing import Listing
 from nep.gateway.portmap import default_file
 from nep.gateway.processes import SystemProcesses
 from nep.gateway.programs import OriginalProgram
@@ -75,7 +75,7 @@ class GatewayAttachment:
         def report(alerts: tuple[Alert, ...]) -> None:
             submit(ReportAlerts("gateway", alerts))
 
-        native = NativeNetwork(make_node, Listing(submit, master.epoch), report)
+        native = NativeNetwork(make_node, GraphRegistrar(submit, master.epoch), report)
         file = self._file or default_file(int(address.rpartition(":")[2]))
         self._gateway = Gateway(native, SystemProcesses(), file, ports=self._ports, boot=psutil.boot_time())
         self._gateway.start()
@@ -91,7 +91,7 @@ class GatewayAttachment:
 
 
 class NativeNetwork:
-    """The native network as the gateway uses it (see `Outside`).
+    """The native network as the gateway uses it (see `NativeSideOfGateway`).
 
     `make_node` joins the network; it is called when the first topic is carried over, so that a master without
     original programs has no node of a gateway.
@@ -100,7 +100,7 @@ class NativeNetwork:
     def __init__(
         self,
         make_node: Callable[[], Node],
-        listing: Listing,
+        listing: GraphRegistrar,
         report: Callable[[tuple[Alert, ...]], None],
     ) -> None:
         self._make_node = make_node
@@ -118,7 +118,7 @@ class NativeNetwork:
     # ---- the network
 
     def start(self, inbox: NativeInbox) -> None:
-        """See `Outside`."""
+        """See `NativeSideOfGateway`."""
         self._inbox = inbox
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
@@ -154,7 +154,7 @@ class NativeNetwork:
             subscriber.close()
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
-        """See `Outside`."""
+        """See `NativeSideOfGateway`."""
         if message.codec != "image":
             return message.data
         try:
@@ -210,11 +210,11 @@ class NativeNetwork:
     # ---- the graph and the alerts
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """See `Outside`."""
+        """See `NativeSideOfGateway`."""
         self._listing.show(programs)
 
     def look(self) -> None:
-        """See `Outside`."""
+        """See `NativeSideOfGateway`."""
         self._listing.renew()
         if self._inbox is not None and self._inbox.dropped != self._dropped:
             lost = self._inbox.dropped - self._dropped
@@ -243,7 +243,7 @@ class NativeNetwork:
             self._report(tuple(self._alerts.values()))
 
     def close(self) -> None:
-        """See `Outside`."""
+        """See `NativeSideOfGateway`."""
         self._listing.close()
         if self._node is not None:
             self._node.close()

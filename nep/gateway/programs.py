@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from nep.gateway.portmap import PortMap, Registration, TopicLine
 from nep.gateway.processes import Processes
-from nep.gateway.proxy_pair import End, ProxyPair
+from nep.gateway.proxy_pair import Endpoint, ProxyPair
 from nep.gateway.requests import Member, Role
 
 _SAME_PROCESS_S = 5.0
@@ -178,7 +178,7 @@ class ProgramTable:
             if pair.connections[end.role] and self._is_joined(registration, end):
                 yield end.role
 
-    def _is_joined(self, registration: Registration, end: End) -> bool:
+    def _is_joined(self, registration: Registration, end: Endpoint) -> bool:
         """By the system's list of connections; where that cannot be had, by what the program said."""
         if registration.pid is not None and registration.started is not None:
             known = self._processes.is_joined(registration.pid, end.port, binds=end.bound_by_program)

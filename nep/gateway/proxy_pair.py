@@ -29,7 +29,7 @@ _FILTERS_MAX = 1000
 
 
 @dataclass(frozen=True)
-class End:
+class Endpoint:
     """One of the two ports of a line: who joins it, and whether the program binds it or we do."""
 
     role: Role
@@ -37,11 +37,11 @@ class End:
     bound_by_program: bool
 
 
-def ends_of(line: TopicLine, base: int) -> tuple[End, End]:
+def endpoints_of(line: TopicLine, base: int) -> tuple[Endpoint, Endpoint]:
     """Where publishers and where subscribers of `line` join, its base port being `base`."""
     return (
-        End("publisher", base, bound_by_program=line.mode == "one2many"),
-        End("subscriber", base + 1, bound_by_program=line.mode == "many2one"),
+        Endpoint("publisher", base, bound_by_program=line.mode == "one2many"),
+        Endpoint("subscriber", base + 1, bound_by_program=line.mode == "many2one"),
     )
 
 
@@ -75,7 +75,7 @@ class ProxyPair:
         self.line = line
         self.base = base
         self.shape = Shape(line.topic, line.framing, line.codec)
-        self.ends = ends_of(line, base)
+        self.ends = endpoints_of(line, base)
         self.filters: set[bytes] = set()
         self.openings = 0
         self.unserved: dict[Role, str] = {}
@@ -93,7 +93,7 @@ class ProxyPair:
         self,
         context: zmq.Context[zmq.Socket[bytes]],
         kind: int,
-        end: End,
+        end: Endpoint,
         undo: contextlib.ExitStack,
         largest_bytes: int,
     ) -> zmq.Socket[bytes]:

@@ -4,8 +4,8 @@ import pytest
 
 import nep
 from nep.gateway.attachment import NativeNetwork
+from nep.gateway.graph_registrar import GraphRegistrar
 from nep.gateway.inbox import NativeInbox
-from nep.gateway.listing import Listing
 from nep.messages.message import Message
 from tests.nep.bad_pictures import BOMBS
 
@@ -17,7 +17,7 @@ class Scene:
         self.alerts = ()
         self.made = 0
         self.inbox = NativeInbox()
-        self.native = NativeNetwork(self._node, Listing(master.submit, master.epoch), self._report)
+        self.native = NativeNetwork(self._node, GraphRegistrar(master.submit, master.epoch), self._report)
         self.native.start(self.inbox)
         self.address = master.address
 

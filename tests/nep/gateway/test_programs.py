@@ -6,7 +6,7 @@ import pytest
 
 from nep.gateway.portmap import PortMap, Registration, TopicLine
 from nep.gateway.programs import ProgramTable, TopicLink
-from nep.gateway.proxy_pair import ends_of
+from nep.gateway.proxy_pair import endpoints_of
 
 LINE = TopicLine("t", "prefixed", "json", "many2many")
 
@@ -32,7 +32,7 @@ def scene():
     known, processes = PortMap(None), FakeProcesses()
     known.give(LINE, 9000)
     pair = SimpleNamespace(
-        ends=ends_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0}, openings=0, unserved={}
+        ends=endpoints_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0}, openings=0, unserved={}
     )
     now = [0.0]
     programs = ProgramTable(known, processes, lambda line: pair if line == LINE else None, lambda: now[0])

@@ -13,7 +13,7 @@ import zmq
 from nep.backends.zeromq.rpc import RpcClient
 from nep.gateway.attachment import NativeNetwork
 from nep.gateway.framing import PORT_A
-from nep.gateway.listing import Listing
+from nep.gateway.graph_registrar import GraphRegistrar
 from nep.gateway.portmap import PortMap, Registration, TopicLine
 from nep.gateway.programs import OriginalProgram, ProgramTable, TopicLink
 from nep.gateway.requests import RequestError, read_request
@@ -181,7 +181,7 @@ CONTROLS = "Arm\x1b[2J\u202e\n\u2028"
 
 def test_names_of_originals_are_cleaned_and_cut_for_they_cannot_be_told_to_change_them() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
-    listing = Listing(lambda request: graph.apply(request, -1, 0.0, "")[-1].answer, 7)  # type: ignore[arg-type, return-value]
+    listing = GraphRegistrar(lambda request: graph.apply(request, -1, 0.0, "")[-1].answer, 7)  # type: ignore[arg-type, return-value]
     line = TopicLine("t", "bare", "json", "many2many")
     registration = Registration(line, CONTROLS, "publisher", "json", "A", None, None, None)
     link = TopicLink("t", "json", "json", "publisher")
@@ -202,7 +202,7 @@ def test_alerts_about_originals_are_cleaned_and_bounded() -> None:
         shown.extend(each.sentence for each in alerts[-1:])  # type: ignore[attr-defined]
 
     native = NativeNetwork(
-        lambda: pytest.fail("no node is needed"), Listing(lambda _request: None, 7), report
+        lambda: pytest.fail("no node is needed"), GraphRegistrar(lambda _request: None, 7), report
     )  # type: ignore[arg-type, return-value]
     for n in range(1000):
         native.tell(f"topic:{n}", f"“{n}{CONTROLS}” stays")

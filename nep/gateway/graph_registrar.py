@@ -47,7 +47,7 @@ class _Count:
     last_ns: int | None = None
 
 
-class Listing:
+class GraphRegistrar:
     """Keeps the graph's picture of the originals. `submit` carries a request out in the master.
 
     Nobody can tell which of several originals on a topic a message came from: the first of them carries the

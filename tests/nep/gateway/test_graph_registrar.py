@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from nep.gateway.listing import Listing
+from nep.gateway.graph_registrar import GraphRegistrar
 from nep.gateway.processes import load_of
 from nep.gateway.programs import OriginalProgram, TopicLink
 from nep.masters.graph import Graph
@@ -40,7 +40,7 @@ def desk():
 
 @pytest.fixture
 def listing(desk):
-    return Listing(desk.submit, EPOCH)
+    return GraphRegistrar(desk.submit, EPOCH)
 
 
 def program(name, *links, pid=1, language="python"):
@@ -101,7 +101,7 @@ def test_the_system_tells_the_load_of_an_original(desk):
     used = {1: 0.0}
     now = iter([0.0, 1.0])
     loads = {1: CpuLoad(lambda: used[1], lambda: next(now))}
-    listing = Listing(desk.submit, EPOCH, loads.__getitem__)
+    listing = GraphRegistrar(desk.submit, EPOCH, loads.__getitem__)
     listing.show((program("a", publishes("t")), program("b", pid=None)))
     listing.renew()
     assert {node.cpu_ratio for node in desk.view().nodes.values()} == {None}
