@@ -80,16 +80,16 @@ class Alerts:
             self._alerts[id] = new
             self._changed()
 
-    def cure(self, id: str) -> None:
+    def resolve(self, id: str) -> None:
         """The problem is gone; nothing happens when there was none."""
         self._dismissed.discard(id)
         if self._alerts.pop(id, None) is not None:
             self._changed()
 
-    def cure_all(self, prefix: str) -> None:
+    def resolve_all(self, prefix: str) -> None:
         """Cure every problem whose id begins with ``prefix``."""
         for id in [id for id in self._alerts if id.startswith(prefix)]:
-            self.cure(id)
+            self.resolve(id)
 
     def has(self, id: str) -> bool:
         """Whether this problem is present."""

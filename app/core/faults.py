@@ -221,7 +221,7 @@ class FaultAlerts:
         for what in over:
             del self._faults[what]
         if over and not self._faults:
-            self._alerts.cure(ALERT)
+            self._alerts.resolve(ALERT)
         elif over:
             self._tell(next(iter(self._faults.values())), count=0)
 

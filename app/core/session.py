@@ -275,8 +275,8 @@ class Session:
                 self._on_graph(event.view, now)
             case MasterFound():
                 self.master = MasterState("connected", event.address)
-                self.alerts.cure("master")
-                self.alerts.cure("companion:master")
+                self.alerts.resolve("master")
+                self.alerts.resolve("companion:master")
                 self.console.add("info", "master", _("connected to {address}").format(address=event.address))
             case MasterLost():
                 self._on_master_lost(event)
@@ -352,7 +352,7 @@ class Session:
             robots = [link.robot for link in self.fleet.connected]
             self.documents.set_connected(robots)
             for robot in robots:
-                self.alerts.cure(f"companion:{robot.name}")
+                self.alerts.resolve(f"companion:{robot.name}")
         self._keep_within_reach()
         if self.topics.revision != self._topics_seen:
             self._topics_seen = self.topics.revision

@@ -8,13 +8,13 @@ import typer
 
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, show_json
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 from nep.text import escaped
 
 if TYPE_CHECKING:
     from nep import doctor as doctors
 else:  # the other commands need not wait for it
-    doctors = later("nep.doctor")
+    doctors = lazy_module("nep.doctor")
 
 _STYLES = {"error": "bold red", "warning": "bold yellow", "info": "dim", "ok": "green"}
 _SIGNS = dict(zip(_STYLES, "✗!·✓", strict=True))

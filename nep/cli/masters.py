@@ -19,7 +19,7 @@ from nep.i18n import _
 from nep.masters.master import Attachment, Master, is_running
 from nep.system.addresses import ANY, host_of, is_loopback, master_address, own_addresses
 from nep.system.descriptors import allow_many
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 from nep.system.terminal import Terminal, log_to
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from nep.doctor import collect
     from nep.gateway import attachment
 else:  # the other commands need not wait for them
-    doctor, collect = later("nep.doctor"), later("nep.doctor.collect")
-    attachment = later("nep.gateway.attachment")
+    doctor, collect = lazy_module("nep.doctor"), lazy_module("nep.doctor.collect")
+    attachment = lazy_module("nep.gateway.attachment")
 
 
 _ListenOption = Annotated[

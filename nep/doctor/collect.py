@@ -25,7 +25,7 @@ from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from nep.system import descriptors
 from nep.system.addresses import host_of, master_address
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 from nep.version import __version__
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     import psutil
 else:
-    metadata, psutil = later("importlib.metadata"), later("psutil")
+    metadata, psutil = lazy_module("importlib.metadata"), lazy_module("psutil")
 
 __all__ = ["PORTS", "collect_facts", "loopback_problem", "start_obstacle"]
 

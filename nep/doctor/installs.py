@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from importlib import metadata
 
     import psutil
 else:
-    metadata, psutil = later("importlib.metadata"), later("psutil")
+    metadata, psutil = lazy_module("importlib.metadata"), lazy_module("psutil")
 
 __all__ = ["Install", "environment_of", "install_in", "install_of"]
 

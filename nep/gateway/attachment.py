@@ -30,13 +30,13 @@ from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import Alert, GraphView
 from nep.protocol.requests import Reply, ReportAlerts, Request
 from nep.system.descriptors import allow_many
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 from nep.text import escaped
 
 if TYPE_CHECKING:
     import psutil
 else:
-    psutil = later("psutil")
+    psutil = lazy_module("psutil")
 
 _WAIT_S = 3.0
 """A master that has just started keeps newcomers waiting for a second."""
@@ -204,7 +204,7 @@ class NativeNetwork:
             )
             return None
         self._again_at.pop(topic, None)
-        self.cure(id)
+        self.resolve(id)
         return made
 
     # ---- the graph and the alerts
@@ -228,7 +228,7 @@ class NativeNetwork:
                 ).format(count=lost),
             )
         else:
-            self.cure("gateway:full")
+            self.resolve("gateway:full")
 
     def tell(self, id: str, sentence: str, hint: str = "") -> None:
         """See `AlertSink`."""
@@ -237,7 +237,7 @@ class NativeNetwork:
             self._alerts[id] = alert
             self._report(tuple(self._alerts.values()))
 
-    def cure(self, id: str) -> None:
+    def resolve(self, id: str) -> None:
         """See `AlertSink`."""
         if self._alerts.pop(id, None) is not None:
             self._report(tuple(self._alerts.values()))

@@ -272,4 +272,4 @@ class Gateway:
                 _("Restart the programs of the original NEP when the master was restarted."),
             )
         else:
-            self._outside.cure("gateway:file")
+            self._outside.resolve("gateway:file")

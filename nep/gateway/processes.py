@@ -6,12 +6,12 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Protocol
 
 from nep.system.cpu import CpuLoad
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     import psutil
 else:
-    psutil = later("psutil")
+    psutil = lazy_module("psutil")
 
 
 class Processes(Protocol):

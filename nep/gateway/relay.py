@@ -43,7 +43,7 @@ class AlertSink(Protocol):
     def tell(self, id: str, sentence: str, hint: str = "") -> None:
         """A problem is there; telling it again changes nothing."""
 
-    def cure(self, id: str) -> None:
+    def resolve(self, id: str) -> None:
         """It is there no more."""
 
 
@@ -147,7 +147,7 @@ class Relay:
                 self._tell_refused(topic, refused)
             elif refused.is_cured:
                 del self._refused[topic]
-                self._alerts.cure(f"message:{topic}")
+                self._alerts.resolve(f"message:{topic}")
 
     def settle(self, key: Key) -> None:
         """Hold native publishers and subscriptions exactly while originals need them."""
@@ -162,7 +162,7 @@ class Relay:
         if key in self._publishing and not any(pair.connections["publisher"] for pair in pairs):
             self._publishing.discard(key)
             self._native.stop_publishing(*key)
-            self._alerts.cure(f"nan:{key[0]}")
+            self._alerts.resolve(f"nan:{key[0]}")
         for pair in pairs:
             self._judge(pair)
 
@@ -239,4 +239,4 @@ class Relay:
 
     def _serve_again(self, pair: ProxyPair, role: Role) -> None:
         if pair.unserved.pop(role, None) is not None:
-            self._alerts.cure(f"version:{pair.line.topic}:{role}")
+            self._alerts.resolve(f"version:{pair.line.topic}:{role}")

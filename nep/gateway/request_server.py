@@ -135,5 +135,5 @@ class RequestServer:
                 _("Close that program: another master, or on macOS the AirPlay Receiver."),
             )
             return None
-        self._alerts.cure(f"port:{port}")
+        self._alerts.resolve(f"port:{port}")
         return socket

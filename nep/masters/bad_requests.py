@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from nep.i18n import _, lazy, ngettext
 from nep.protocol.graph_view import Alert
-from nep.system.log_rarely import is_told
+from nep.system.log_rarely import is_logged
 from nep.text import escaped, shortened
 
 __all__ = ["BadRequests", "who_sends"]
@@ -56,7 +56,7 @@ class BadRequests:
         known.count += 1
         self._may_log = min(_LINES, self._may_log + (now - self._counted_at) * _LINES_A_S)
         self._counted_at = now
-        if is_told(known.count) and self._may_log >= 1.0:
+        if is_logged(known.count) and self._may_log >= 1.0:
             self._may_log -= 1.0
             _logger.warning("%s", _sentence(known))
         while len(self._senders) > _SENDERS:

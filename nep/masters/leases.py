@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from nep.masters.registry import Counts, RegisteredNode, Registry
-from nep.messages.packing import pack_surely, unpack, unpack_bounded
+from nep.messages.packing import pack_saturated, unpack, unpack_bounded
 from nep.protocol.requests import RENEW_S
 
 __all__ = ["LEASE_S", "Leases", "RawRenewal", "is_renewal", "read_renewal", "renewed_body"]
@@ -151,4 +151,4 @@ def renewed_body(
         what["hosts"] = hosts
     if next_s != RENEW_S:
         what["next_s"] = next_s
-    return pack_surely({"is": "renewed", "re": call, "what": what})
+    return pack_saturated({"is": "renewed", "re": call, "what": what})

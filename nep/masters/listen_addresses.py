@@ -1,4 +1,4 @@
-"""Listening: the addresses, beside the loopback one, at which a master serves other computers."""
+"""ListenAddresses: the addresses, beside the loopback one, at which a master serves other computers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.i18n import _
 from nep.protocol.graph_view import Alert
 from nep.system.addresses import ANY, OwnAddress, endpoint_of, own_addresses
 
-__all__ = ["Listening", "check_hosts"]
+__all__ = ["ListenAddresses", "check_hosts"]
 
 _logger = logging.getLogger("nep.master")
 
@@ -38,7 +38,7 @@ def check_hosts(hosts: Iterable[str], here: Iterable[OwnAddress]) -> tuple[str, 
     return checked
 
 
-class Listening:
+class ListenAddresses:
     """Binds `router` to further addresses, all with `port`. Follows addresses that come and go.
 
     Belongs to the master's thread. `here` tells the addresses of this computer.

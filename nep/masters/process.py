@@ -18,12 +18,12 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import Done, Listen, Look, Ping, Refused, Reply, Request, Seen
 from nep.system.addresses import MasterName, endpoint_of, master_address
 from nep.system.descriptors import check_room
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     import psutil
 else:
-    psutil = later("psutil")
+    psutil = lazy_module("psutil")
 
 _FILES = 16
 _AGAIN_S = 0.5

@@ -18,15 +18,15 @@ from nep.i18n import _
 from nep.masters.bad_requests import BadRequests, who_sends
 from nep.masters.graph import Graph, Outgoing, with_hosts, without
 from nep.masters.leases import is_renewal, read_renewal, renewed_body
-from nep.masters.listen_addresses import Listening
+from nep.masters.listen_addresses import ListenAddresses
 from nep.masters.process import Owner
 from nep.masters.router import MasterRouter
-from nep.protocol.encoding import AnswerEncoder, Asked, collecting_later, decode_request
+from nep.protocol.encoding import AnswerEncoder, ReceivedRequest, collecting_later, decode_request
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import Done, Listen, Look, Refused, Reply, ReportAlerts, Request
 from nep.system.addresses import endpoint_of
 from nep.system.forks import watch
-from nep.system.log_rarely import is_told
+from nep.system.log_rarely import is_logged
 from nep.system.wakeup import Waker
 
 __all__ = ["MasterServer", "Submission"]
@@ -83,7 +83,7 @@ class MasterServer:
         self._told_revision = graph.revision
         self.ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
-        self._listening = Listening(self._port.socket, int(self.address.rpartition(":")[2]))
+        self._listening = ListenAddresses(self._port.socket, int(self.address.rpartition(":")[2]))
         self._follow_at = 0.0
         self._failures = 0
         self._ticked_at = time.monotonic()
@@ -171,7 +171,7 @@ class MasterServer:
     def _failed(self, error: Exception, what: str) -> None:
         """Log what went wrong; rarely, when it does again and again."""
         self._failures += 1
-        if is_told(self._failures):
+        if is_logged(self._failures):
             sentence = "the master could not carry out %s (%d times so far)"
             _logger.error(sentence, what, self._failures, exc_info=error)
 
@@ -216,7 +216,7 @@ class MasterServer:
             submission = self._submitted.popleft()
             self._calls -= 1  # calls from inside count downwards, so that they never meet a node's
             self._pending[self._calls] = submission
-            self._apply(Asked(self._calls, submission.request), "")
+            self._apply(ReceivedRequest(self._calls, submission.request), "")
 
     def _serve_router(self) -> None:
         enough_at = time.monotonic() + _TICK_S
@@ -269,7 +269,7 @@ class MasterServer:
     def _serve(self, sender: bytes, body: list[bytes], peer: str) -> None:
         asked = decode_request(body[-1] if len(body) == 1 else b"")
         if isinstance(asked.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
-            asked = Asked(asked.call, _("who may connect is decided on the master's own computer"))
+            asked = ReceivedRequest(asked.call, _("who may connect is decided on the master's own computer"))
         name = _name_of(sender)
         reason = self._apply(asked, name)
         if reason:
@@ -277,7 +277,7 @@ class MasterServer:
             node_id, node_name = ("", "") if member is None else (member.node.id, member.node.name)
             self._bad.add(*who_sends(node_id, node_name, peer), reason, time.monotonic())
 
-    def _apply(self, asked: Asked, sender: str) -> str:
+    def _apply(self, asked: ReceivedRequest, sender: str) -> str:
         """Carry out a request, of this process when `sender` is empty; why it was refused, or ""."""
         request, outgoing = asked.request, tuple[Outgoing, ...]()
         try:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from nep.i18n import _, listed
 from nep.masters.registry import RegisteredNode, RegisteredPublisher, RegisteredSubscriber, Registry
-from nep.protocol.encoding import made
+from nep.protocol.encoding import make_frozen
 from nep.protocol.graph_view import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 from nep.protocol.requests import as_count
 
@@ -70,7 +70,7 @@ def _node_info(member: RegisteredNode) -> NodeInfo:
         "since_ns": node.since_ns,
         "cpu_ratio": member.cpu_ratio,
     }
-    return made(NodeInfo, every_field)
+    return make_frozen(NodeInfo, every_field)
 
 
 def _look_at(
@@ -113,7 +113,7 @@ def _look_at(
         "lost": lost,
         "loss_ratio": None if lost is None else lost / (lost + received) if lost else 0.0,
     }
-    return made(TopicInfo, every_field)
+    return make_frozen(TopicInfo, every_field)
 
 
 def _counted(
@@ -140,7 +140,7 @@ def _publisher_info(
         "rate_hz": None if rates is None else rates[0],
         "bandwidth_Bps": None if rates is None else rates[1],
     }
-    return made(PublisherInfo, every_field)
+    return make_frozen(PublisherInfo, every_field)
 
 
 def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -> SubscriberInfo:
@@ -150,7 +150,7 @@ def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -
         "received": subscriber.received,
         "lost": subscriber.lost,
     }
-    return made(SubscriberInfo, every_field)
+    return make_frozen(SubscriberInfo, every_field)
 
 
 def _name_alerts(registry: Registry) -> Iterator[Alert]:

@@ -9,7 +9,7 @@
 | image   | 5      | a picture: an array (height, width, 3) in BGR order, see `nep.messages.image_codec`    |
 
 JSON has no NaN and no infinity: they are sent as `null`, and a publisher tells of it
-(`NullTeller`): a sensor without a value must not end its robot's program, and its readers must be
+(`JsonEncoder`): a sensor without a value must not end its robot's program, and its readers must be
 able to read on. The original NEP up to 0.5.4.5 raised `ValueError`, 0.5.4.8 sends the bare word `NaN`,
 which no strict reader takes. Keys that are numbers become strings. msgpack takes numpy arrays and dataclasses
 as JSON does. Readers in other languages may want keys that are text or numbers; ours reads all that Python
@@ -38,7 +38,7 @@ from nep.messages import image_codec
 from nep.messages.encoded import Encoded, encoded
 from nep.messages.packing import pack, unpack
 
-__all__ = ["CODECS", "Codec", "Encoded", "NullTeller", "codec", "codec_for", "codec_numbered", "nan_in"]
+__all__ = ["CODECS", "Codec", "Encoded", "JsonEncoder", "codec", "codec_for", "codec_numbered", "nan_in"]
 
 _BYTES = (bytes, bytearray, memoryview)
 _NUMPY = orjson.OPT_SERIALIZE_NUMPY
@@ -229,7 +229,7 @@ def codec_for(msg_type: str) -> Codec:
 # ---- NaN and infinity, of which JSON has neither
 
 
-class NullTeller:
+class JsonEncoder:
     """Encodes JSON for one publisher. `count` messages had NaN or infinity, which were sent as `null`."""
 
     def __init__(self, topic: str, clock: Callable[[], float] = monotonic) -> None:

@@ -9,7 +9,7 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.i18n import _
 
-__all__ = ["pack", "pack_surely", "saturated", "unpack", "unpack_bounded", "unpack_first"]
+__all__ = ["pack", "pack_saturated", "saturated", "unpack", "unpack_bounded", "unpack_first"]
 
 _Made = TypeVar("_Made")
 _LEAST, _MOST = -(2**63), 2**64 - 1
@@ -35,7 +35,7 @@ def saturated(value: object) -> int:
     return max(_LEAST, min(_MOST, value))
 
 
-def pack_surely(value: object) -> bytes:
+def pack_saturated(value: object) -> bytes:
     """What nodes and the master say as msgpack; of plain values only.
 
     Nothing that the network can bring about makes it fail: numbers saturate, halves of letters become "?".

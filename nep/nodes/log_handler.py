@@ -149,19 +149,19 @@ class ShownErrors:
         return [record for record in records if record.stamp_ns and self.is_new(record)]
 
 
-class Publishes(Protocol):
+class LogPublisher(Protocol):
     """What a handler needs of a publisher."""
 
     def publish(self, payload: object) -> None:
         """Publish one payload."""
 
 
-class MakesPublishers(Protocol):
+class LogNode(Protocol):
     """What a node's handler needs of the node."""
 
     name: str
 
-    def new_pub(self, topic: str, msg_type: str, *, latched: bool = False) -> Publishes:
+    def new_pub(self, topic: str, msg_type: str, *, latched: bool = False) -> LogPublisher:
         """A publisher."""
 
 
@@ -176,9 +176,9 @@ class LogHandler(logging.Handler):
     def __init__(
         self,
         node: str,
-        open_publisher: Callable[[], Publishes],
+        open_publisher: Callable[[], LogPublisher],
         *,
-        open_errors: Callable[[], Publishes] | None = None,
+        open_errors: Callable[[], LogPublisher] | None = None,
         rate_hz: float = RATE_HZ,
         burst: int = BURST,
         clock: Callable[[], float] = time.monotonic,
@@ -192,7 +192,7 @@ class LogHandler(logging.Handler):
         self._open = open_publisher
         self._open_errors = open_errors
         self._errors: deque[dict[str, object]] = deque(maxlen=LAST_ERRORS)
-        self._errors_publisher: Publishes | None = None
+        self._errors_publisher: LogPublisher | None = None
         self._rate_hz, self._burst, self._clock = rate_hz, burst, clock
         self._tokens, self._counted_at = float(burst), clock()
         self._waiting: deque[dict[str, object]] = deque()
@@ -313,7 +313,7 @@ class LogHandler(logging.Handler):
                 self._errors_publisher = self._open_errors()
             self._errors_publisher.publish(list(self._errors))
 
-    def _opened(self) -> Publishes | None:
+    def _opened(self) -> LogPublisher | None:
         """The publisher, as soon as there is one; None when the handler was closed meanwhile."""
         while True:
             try:
@@ -355,7 +355,7 @@ class LogHandler(logging.Handler):
         return LogRecord("warning", text, "nep.log", self._node, time.time_ns(), pid=os.getpid()).to_plain()
 
 
-def handler_of(node: MakesPublishers) -> LogHandler:
+def handler_of(node: LogNode) -> LogHandler:
     """A handler that publishes on `LOG_TOPIC` as this node."""
     return LogHandler(
         node.name,

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 from nep.backends.base import PublisherSpec, PublisherTransport
 from nep.errors import ClosedError, EncodeError, WireError
 from nep.i18n import _
-from nep.messages.codecs import NullTeller
+from nep.messages.codecs import JsonEncoder
 from nep.messages.encoded import Encoded, encoded
 from nep.nodes.arguments import limit
 from nep.protocol.wire import extension_part
-from nep.system.log_rarely import is_told
+from nep.system.log_rarely import is_logged
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Publisher:
         self._is_forked = False
         self._transport = transport
         self._spec = spec
-        self._nulls = NullTeller(spec.topic) if spec.codec.name == "json" else None
+        self._nulls = JsonEncoder(spec.topic) if spec.codec.name == "json" else None
         self._encode = spec.codec.encode if self._nulls is None else self._nulls.encode
         self._unsendable = Unsendable(spec.topic, spec.codec.encode, transport.report)
         self._is_latched = spec.is_latched
@@ -136,7 +136,7 @@ class Publisher:
             self._unsendable.add(made, error)
             return
         if self._unsendable.problem:
-            self._unsendable.cure()
+            self._unsendable.resolve()
 
     def _check(self, payload: object) -> None:
         """Raises `EncodeError` for what can be seen at once."""
@@ -221,7 +221,7 @@ class Unsendable:
         except Exception as error:  # noqa: BLE001 - a payload may be of any class, which may raise anything
             self.add(payload, error)
         else:
-            self.cure()
+            self.resolve()
         ended = self._clock()
         self._look_at = ended + max(_LOOK_S, _SHARE * (ended - started))
         return not self.problem
@@ -236,7 +236,7 @@ class Unsendable:
             place = _place_of(payload, self._encode)
             self._known = (said, f"{said}; it is at '{place}'" if place else said)
         sentence = self._known[1] if self._known[0] == said else said
-        if is_told(self.count):
+        if is_logged(self.count):
             _logger.warning(
                 "a message on '%s' cannot be sent (%d so far): %s", self._topic, self.count, sentence
             )
@@ -244,7 +244,7 @@ class Unsendable:
             self.problem = sentence
             self._report(sentence)
 
-    def cure(self) -> None:
+    def resolve(self) -> None:
         """A payload could be sent."""
         if self.problem:
             self.problem = ""

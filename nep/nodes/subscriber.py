@@ -12,7 +12,7 @@ from nep.errors import ClosedError, DecodeError
 from nep.messages.codecs import codec_for
 from nep.messages.message import Message
 from nep.nodes.arguments import seconds
-from nep.system.log_rarely import is_told
+from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -173,7 +173,7 @@ class Subscriber:
     def _tell(self, error: DecodeError) -> None:
         """A message cannot be read: tell the graph, and log it rarely."""
         self._unreadable += 1
-        if is_told(self._unreadable):
+        if is_logged(self._unreadable):
             _logger.warning(
                 "a message on '%s' cannot be read (%d so far): %s", self.topic, self._unreadable, error
             )

@@ -20,7 +20,7 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.errors import WireError
 from nep.i18n import _, lazy
-from nep.messages.packing import pack_surely, saturated, unpack, unpack_bounded, unpack_first
+from nep.messages.packing import pack_saturated, saturated, unpack, unpack_bounded, unpack_first
 from nep.protocol.graph_view import NodeInfo, TopicInfo
 from nep.protocol.requests import (
     Added,
@@ -50,14 +50,14 @@ from nep.protocol.requests import (
 
 __all__ = [
     "AnswerEncoder",
-    "Asked",
+    "ReceivedRequest",
     "call_of_view",
     "collecting_later",
     "decode_answer",
     "decode_request",
     "encode_answer",
     "encode_request",
-    "made",
+    "make_frozen",
     "read",
     "write",
 ]
@@ -103,7 +103,7 @@ _VIEW_BEGINS = b"\x83\xa2is\xa4seen\xa2re"
 """How an answer with a graph begins that `AnswerEncoder` made."""
 
 
-class Asked(NamedTuple):
+class ReceivedRequest(NamedTuple):
     """A request as it came in: the number to repeat, and the request or the sentence why it is none."""
 
     call: int
@@ -112,10 +112,10 @@ class Asked(NamedTuple):
 
 def encode_request(request: Request, call: int) -> bytes:
     """The body of a request."""
-    return pack_surely({"do": _REQUEST_NAMES[type(request)], "call": call, "what": write(request)})
+    return pack_saturated({"do": _REQUEST_NAMES[type(request)], "call": call, "what": write(request)})
 
 
-def decode_request(body: bytes) -> Asked:
+def decode_request(body: bytes) -> ReceivedRequest:
     """The request in a body; never raises, so that every sender gets an answer."""
     call = 0
     try:
@@ -130,9 +130,9 @@ def decode_request(body: bytes) -> Asked:
         kind = _REQUESTS.get(name) if isinstance(name, str) else None
         if kind is None:
             raise WireError(_("'{name}' is no request of this version").format(name=name))
-        return Asked(call, read(kind, envelope.get("what", {})))
+        return ReceivedRequest(call, read(kind, envelope.get("what", {})))
     except WireError as error:
-        return Asked(call, error.reason)
+        return ReceivedRequest(call, error.reason)
 
 
 class AnswerEncoder:
@@ -149,7 +149,7 @@ class AnswerEncoder:
         """The body of a reply to `call`, or of a push."""
         if isinstance(answer, Seen):
             return self._seen(answer, call)
-        return pack_surely({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
+        return pack_saturated({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
 
     def _seen(self, answer: Seen, call: int) -> bytes:
         view = answer.view
@@ -167,15 +167,15 @@ class AnswerEncoder:
         return b"".join(
             (
                 header(3),
-                *map(pack_surely, ("is", "seen", "re", call, "what")),
+                *map(pack_saturated, ("is", "seen", "re", call, "what")),
                 header(3),
-                *map(pack_surely, ("epoch", answer.epoch, "revision", answer.revision, "view")),
+                *map(pack_saturated, ("epoch", answer.epoch, "revision", answer.revision, "view")),
                 header(len(rest) + 2),
-                *(pack_surely(key) + pack_surely(item) for key, item in rest.items()),
-                pack_surely("nodes"),
+                *(pack_saturated(key) + pack_saturated(item) for key, item in rest.items()),
+                pack_saturated("nodes"),
                 header(len(nodes)),
                 *nodes,
-                pack_surely("topics"),
+                pack_saturated("topics"),
                 header(len(topics)),
                 *topics,
             )
@@ -306,7 +306,7 @@ class _MisfitError(Exception):
         self.path: list[str] = []
 
 
-def made(kind: type[T], every_field: dict[str, object]) -> T:
+def make_frozen(kind: type[T], every_field: dict[str, object]) -> T:
     """A frozen `kind` of all its fields, in a fifth of the time: its own way to set them is slow.
 
     It keeps `every_field`, which nobody else may change from now on.
@@ -391,7 +391,7 @@ def _of_dataclass(kind: type) -> Reader:
                 except _MisfitError as misfit:
                     misfit.path.append(name)
                     raise
-        return made(kind, found)
+        return make_frozen(kind, found)
 
     return parse
 
@@ -422,7 +422,7 @@ def _quickly(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object
                 fields_of_it[name] = reader(value[name])
         except (LookupError, _MisfitError):
             return None
-        fresh: object = made(kind, fields_of_it)
+        fresh: object = make_frozen(kind, fields_of_it)
         return fresh
 
     return quickly

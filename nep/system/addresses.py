@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     import psutil
 else:
-    psutil = later("psutil")
+    psutil = lazy_module("psutil")
 
 __all__ = [
     "ANY",

@@ -3,17 +3,17 @@
 if TYPE_CHECKING:
 import psutil
 else:
-psutil = later("psutil")
+psutil = lazy_module("psutil")
 """
 
 from __future__ import annotations
 
 import importlib
 
-__all__ = ["later"]
+__all__ = ["lazy_module"]
 
 
-class Later:
+class LazyModule:
     """Stands for a module, and imports it when something of it is asked for. Any thread may ask."""
 
     __slots__ = ("_name",)
@@ -28,6 +28,6 @@ class Later:
         return f"<'{self._name}', imported when it is used>"
 
 
-def later(name: str) -> Later:
+def lazy_module(name: str) -> LazyModule:
     """A stand-in for the module of this name. What the import raises is raised where it is first used."""
-    return Later(name)
+    return LazyModule(name)

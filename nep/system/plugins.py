@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from nep.errors import PluginsMissingError
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from importlib import metadata
 else:
-    metadata = later("importlib.metadata")
+    metadata = lazy_module("importlib.metadata")
 
 __all__ = ["Named", "discover", "discover_own"]
 

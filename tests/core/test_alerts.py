@@ -40,7 +40,7 @@ def test_a_cured_alert_is_gone_and_its_return_is_shown_again() -> None:
     alerts.dismiss("a")
     assert alerts.dismissed("a")
     assert alerts.active
-    alerts.cure("a")
+    alerts.resolve("a")
     assert not alerts.active
     alerts.put("a", "warn", "a")
     assert not alerts.dismissed("a")
@@ -50,7 +50,7 @@ def test_cure_all_takes_a_prefix() -> None:
     alerts = Alerts(lambda: 1.0)
     for id in ("message:/a", "message:/b", "master"):
         alerts.put(id, "warn", id)
-    alerts.cure_all("message:")
+    alerts.resolve_all("message:")
     assert [alert.id for alert in alerts.active] == ["master"]
 
 

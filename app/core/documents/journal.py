@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING
 from app.core.storage import deep_json
 from app.core.storage.atomic_file import make_private, read_whole, write_atomically
 from app.core.storage.settings import home
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     import psutil
 else:
-    psutil = later("psutil")
+    psutil = lazy_module("psutil")
 
 LARGEST_JOURNAL_BYTES = 64_000_000
 """Unsaved work comes back also when it is larger than a file may be: it can be made smaller then."""

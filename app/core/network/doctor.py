@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nep.i18n import _
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from nep import doctor
 else:
-    doctor = later("nep.doctor")
+    doctor = lazy_module("nep.doctor")
 
 JOIN_S = 4.0
 

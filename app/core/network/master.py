@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 from nep.errors import NepError
 from nep.masters.master import is_running, start_process
 from nep.protocol.graph_view import GraphView
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from nep import doctor
 else:
-    doctor = later("nep.doctor")
+    doctor = lazy_module("nep.doctor")
 
 LEARNING_S = 1.5
 """How long a master that has just started may not know everybody yet (it learns for one second)."""

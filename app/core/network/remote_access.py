@@ -87,7 +87,7 @@ class RemoteAccess:
                 count=0,
             )
         else:
-            self._alerts.cure(NOT_KEPT)
+            self._alerts.resolve(NOT_KEPT)
 
     def follow(self, view: GraphView) -> None:
         """See what the master does; another one is told what a person chose."""
@@ -103,7 +103,7 @@ class RemoteAccess:
         """The master has answered."""
         if not event.sentence:
             self.hosts = event.hosts
-            self._alerts.cure(ALERT)
+            self._alerts.resolve(ALERT)
             return
         self._alerts.put(
             ALERT,

@@ -67,7 +67,7 @@ class Health:
     def forget(self, topic: str) -> None:
         """Nobody looks at a topic any more, or it is well again."""
         self._bad.pop(topic, None)
-        self._alerts.cure(f"message:{topic}")
+        self._alerts.resolve(f"message:{topic}")
 
     def check(self, used: Container[str] = (), started: Container[str] = ()) -> None:
         """Once a second: which topics are well again, which robots' pictures have stopped, who has gone.
@@ -84,7 +84,7 @@ class Health:
             self._check_motion(link)
             if link.connected:
                 self._away.pop(link.name, None)
-                self._alerts.cure(f"robot:{link.name}")
+                self._alerts.resolve(f"robot:{link.name}")
             elif link.name in used:
                 self._alerts.put(
                     f"robot:{link.name}",
@@ -103,8 +103,8 @@ class Health:
     def journal(self, sentence: str | None) -> None:
         """Whether unsaved work is kept: the sentence that says why not, or None."""
         if sentence is None:
-            self._alerts.cure("journal")
-            self._alerts.cure(GIVES_UP)
+            self._alerts.resolve("journal")
+            self._alerts.resolve(GIVES_UP)
             return
         self._alerts.put(
             "journal",
@@ -123,7 +123,7 @@ class Health:
         """
         if self._alerts.has(GIVES_UP):
             return True
-        self._alerts.cure("journal")  # it comes again, behind this one
+        self._alerts.resolve("journal")  # it comes again, behind this one
         self._alerts.put(
             GIVES_UP,
             "error",
@@ -138,7 +138,7 @@ class Health:
     def settings(self, sentence: str | None) -> None:
         """Whether what a person chooses is kept: the sentence that says why not, or None."""
         if sentence is None:
-            self._alerts.cure("settings")
+            self._alerts.resolve("settings")
             return
         self._alerts.put(
             "settings",
@@ -164,7 +164,7 @@ class Health:
                 count=0,
             )
         for gone in self._from_graph - ids:
-            self._alerts.cure(gone)
+            self._alerts.resolve(gone)
         self._from_graph = ids
 
     def _tell(self, topic: str, bad: _Bad, checked: Checked) -> None:
@@ -193,7 +193,7 @@ class Health:
         """Tell of a robot that was there and is no more: a real one, or a virtual one that hangs."""
         since = self._away.setdefault(link.name, now)
         if now - since < AWAY_S or (link.virtual and not runs_here):
-            self._alerts.cure(f"robot:{link.name}")
+            self._alerts.resolve(f"robot:{link.name}")
             return
         self._alerts.put(
             f"robot:{link.name}",
@@ -211,7 +211,7 @@ class Health:
         """Tell of programs that say that they are a robot and are not believed."""
         claims = self._fleet.claims
         for id in self._claims - claims.keys():
-            self._alerts.cure(f"claim:{id}")
+            self._alerts.resolve(f"claim:{id}")
         for id, claim in claims.items():
             self._alerts.put(f"claim:{id}", "error", claim.title, claim.detail, count=0)
         self._claims = set(claims)
@@ -219,7 +219,7 @@ class Health:
     def unreachable(self, problems: Mapping[str, str]) -> None:
         """Tell of robots that a stop can't reach, by their names, and why."""
         for name in self._unreachable - problems.keys():
-            self._alerts.cure(f"stop:{name}")
+            self._alerts.resolve(f"stop:{name}")
         for name, why in problems.items():
             said = _("{why}. It is tried again each second.").format(why=f"{why[:1].upper()}{why[1:]}")
             title = _("Stop can't reach {robot}.").format(robot=name)
@@ -229,7 +229,7 @@ class Health:
     def _check_motion(self, link: RobotLink) -> None:
         """Tell of a robot that says itself that it could not end an action."""
         if not (link.connected and link.goes_on):
-            self._alerts.cure(f"moving:{link.name}")
+            self._alerts.resolve(f"moving:{link.name}")
             return
         said = _("Switch it off by hand if it does not stand still.")
         self._alerts.put(
@@ -255,7 +255,7 @@ class Health:
         )
         if not silent or topic is None or topic.silent_s is None:
             link.silent = None
-            self._alerts.cure(id)
+            self._alerts.resolve(id)
             return
         link.silent = _("camera silent")
         self._alerts.put(

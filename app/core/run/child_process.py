@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 from app.errors import RunnerError
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     import psutil
 else:
-    psutil = later("psutil")
+    psutil = lazy_module("psutil")
 
 MOST_BYTES = 1_000_000_000
 """How much memory a program may use, together with what it starts."""

@@ -235,7 +235,7 @@ class Runs:
             self._run = replace(self._run, state="ready", report=None)
             self._fleet.stands_still(self.kept)
             self.kept = frozenset()
-            self._alerts.cure("stop")
+            self._alerts.resolve("stop")
 
     def close(self) -> None:
         """The window closes: end the program; its robots are told by its end."""
@@ -311,7 +311,7 @@ class Runs:
 
     def _begin(self, *, paused: bool) -> None:
         document = self.document = self._documents.current
-        self._alerts.cure("program")
+        self._alerts.resolve("program")
         self._set_errors({})
         self._mark()
         try:
@@ -447,7 +447,7 @@ class Runs:
         words, good = result_words(report)
         if good:
             self._console.add("info", origin, words)
-            self._alerts.cure("stop")
+            self._alerts.resolve("stop")
         else:
             title, detail, _compact, _confirm = unanswered_words_of(report)
             self._console.add("error", origin, f"{words}: {title}")

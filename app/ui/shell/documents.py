@@ -64,7 +64,7 @@ class DocumentController:
 
     def ask_open(self) -> None:
         """Let a person choose a file and open it."""
-        self._session.alerts.cure("strange")
+        self._session.alerts.resolve("strange")
         path = self._session.document.path
         self._asks.open(str(path.parent if path is not None else Path.home()), self.open)
 
@@ -82,7 +82,7 @@ class DocumentController:
 
         Those that are no behaviours become one alert, the others open.
         """
-        self._session.alerts.cure("strange")
+        self._session.alerts.resolve("strange")
         strange = [path for path in paths if path.suffix.lower() != SUFFIX]
         for path in paths:
             if path not in strange:
@@ -197,7 +197,7 @@ class DocumentController:
             return
         self._documents.saved(document)
         self._session.tabs.keep()
-        self._session.alerts.cure("file")
+        self._session.alerts.resolve("file")
         if document.path is not None:
             self._remember(document.path)
         if earlier is None:
@@ -236,7 +236,7 @@ class DocumentController:
             self._complain(words_of(error), "file.open", _("Open another file"))
             return
         self._session.tabs.keep()
-        self._session.alerts.cure("file")
+        self._session.alerts.resolve("file")
         self._shown()
 
     def _keep(self, document: Document) -> Closed | None:

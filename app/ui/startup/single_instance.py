@@ -27,12 +27,12 @@ from shiboken6 import isValid
 
 from app.core.storage.atomic_file import private_folder
 from app.core.storage.file_lock import FileLock
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from PySide6 import QtNetwork
 else:
-    QtNetwork = later("PySide6.QtNetwork")
+    QtNetwork = lazy_module("PySide6.QtNetwork")
 
 CONNECT_MS = 300
 ANSWER_MS = 3000

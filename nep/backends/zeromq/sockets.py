@@ -14,7 +14,7 @@ from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
 from nep.system.addresses import endpoint_of, host_of, in_numbers, is_endpoint, is_loopback
 from nep.system.descriptors import check_room
-from nep.system.log_rarely import is_told
+from nep.system.log_rarely import is_logged
 
 __all__ = [
     "LOOPBACK",
@@ -67,7 +67,7 @@ class Refusals:
         self.count += 1
         self._reason = reason
         self._last_at = time.monotonic()
-        return is_told(self.count)
+        return is_logged(self.count)
 
     def told(self) -> str:
         """The newest reason and how many there were; empty when there was none in the last seconds."""

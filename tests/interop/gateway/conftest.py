@@ -64,7 +64,7 @@ class FakeNative:
     def tell(self, id, sentence, hint=""):
         self._set(lambda: self.alerts.update({id: sentence}))
 
-    def cure(self, id):
+    def resolve(self, id):
         self._set(lambda: self.alerts.pop(id, None))
 
     def close(self):

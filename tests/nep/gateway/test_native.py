@@ -134,5 +134,5 @@ def test_an_alert_is_reported_once_and_taken_back_when_cured(scene):
     told = scene.alerts
     scene.native.tell("port:7000", "Port 7000 is taken")
     assert scene.alerts is told
-    scene.native.cure("port:7000")
+    scene.native.resolve("port:7000")
     assert scene.alerts == ()

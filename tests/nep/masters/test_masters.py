@@ -87,7 +87,7 @@ def test_malformed_requests_get_an_error_and_do_not_kill(master: Master) -> None
 
 def test_nobody_takes_replies_that_are_for_the_masters_own_process(master: Master) -> None:
     asked = encoding.decode_request(pack({"do": "ping", "call": -1}))
-    assert asked == encoding.Asked(0, Ping())
+    assert asked == encoding.ReceivedRequest(0, Ping())
     assert encoding.decode_request(pack({"do": "ping", "call": True})).call == 0
 
 

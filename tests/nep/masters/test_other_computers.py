@@ -177,7 +177,7 @@ def test_the_loss_of_a_served_address_is_an_alert_until_it_is_back():
         def unbind(self, endpoint):
             bound.remove(endpoint)
 
-    listening = nep.masters.listen_addresses.Listening(Router(), 7780, lambda: here[0])
+    listening = nep.masters.listen_addresses.ListenAddresses(Router(), 7780, lambda: here[0])
     listening.serve(["192.168.1.20"])
     assert bound == ["tcp://192.168.1.20:7780"]
     assert listening.follow() == ()
@@ -208,7 +208,7 @@ def test_when_one_address_can_not_be_bound_none_is():
         def unbind(self, endpoint):
             bound.remove(endpoint)
 
-    listening = nep.masters.listen_addresses.Listening(Router(), 7780, lambda: HERE)
+    listening = nep.masters.listen_addresses.ListenAddresses(Router(), 7780, lambda: HERE)
     with pytest.raises(AddressInUseError):
         listening.serve([own.host for own in HERE])
     assert (bound, listening.hosts) == ([], ())

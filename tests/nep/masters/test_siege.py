@@ -12,7 +12,7 @@ import pytest
 import zmq
 
 import nep
-from nep.messages.packing import pack, pack_surely
+from nep.messages.packing import pack, pack_saturated
 from nep.protocol import encoding
 from nep.protocol.requests import (
     AddPublisher,
@@ -168,7 +168,7 @@ def numbers_that_cannot_be(siege: Siege) -> None:
                 say(socket, Renew(me.id, epoch, revision, publishers, subscribers, ratio))
                 count += 1
     for what in (math.nan, [], {}, "x", -1, 2**64 - 1):
-        socket.send(pack_surely({"do": "renew", "call": what, "what": {"node_id": what, "epoch": what}}))
+        socket.send(pack_saturated({"do": "renew", "call": what, "what": {"node_id": what, "epoch": what}}))
         count += 1
     answers(socket, count)
     say(socket, Leave(me.id))

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.messages.codecs import AGAIN_S, NullTeller, nan_in
+from nep.messages.codecs import AGAIN_S, JsonEncoder, nan_in
 
 
 @dataclasses.dataclass
@@ -35,7 +35,7 @@ class Pose:
     ],
 )
 def test_it_is_told_with_its_place(payload, where, caplog):
-    teller = NullTeller("/odom")
+    teller = JsonEncoder("/odom")
     assert b"null" in teller.encode(payload).data
     assert teller.count == 1
     (record,) = caplog.records
@@ -50,14 +50,14 @@ def test_it_is_told_with_its_place(payload, where, caplog):
     "payload", [{"a": None}, {"a": "null"}, {"a": [None, 1.5]}, Pose(1.0), [2**53 + 0.0, 1e308]]
 )
 def test_what_is_nothing_on_purpose_is_not(payload, caplog):
-    teller = NullTeller("/odom")
+    teller = JsonEncoder("/odom")
     teller.encode(payload)
     assert (teller.count, caplog.records) == (0, [])
 
 
 def test_a_flood_is_counted_whole_and_told_seldom(caplog):
     now = [0.0]
-    teller = NullTeller("/odom", lambda: now[0])
+    teller = JsonEncoder("/odom", lambda: now[0])
     for _ in range(1000):
         teller.encode({"x": math.nan})
     now[0] = AGAIN_S
@@ -75,7 +75,7 @@ VALUES = st.recursive(
 
 @given(VALUES)
 def test_none_is_missed_and_none_is_made_up(payload):
-    teller = NullTeller("t")
+    teller = JsonEncoder("t")
     teller.encode(payload)
     assert (teller.count == 1) == (nan_in(payload) is not None)
 

@@ -9,7 +9,7 @@ import pytest
 import nep
 from nep.messages.codecs import CODECS
 from nep.nodes.publisher import Unsendable, place_of
-from nep.system.log_rarely import is_told
+from nep.system.log_rarely import is_logged
 
 
 class Told:
@@ -64,7 +64,7 @@ def test_good_and_bad_in_turn_are_logged_rarely(caplog: pytest.LogCaptureFixture
     unsendable = told.new()
     for _ in range(500):
         unsendable.add([object()], nep.EncodeError("json", "list", "because"))
-        unsendable.cure()
+        unsendable.resolve()
     assert unsendable.count == 500
     assert len(caplog.records) == 3
     assert caplog.records[-1].getMessage().startswith("a message on 't' cannot be sent (100 so far): ")
@@ -105,4 +105,4 @@ def test_a_payload_that_holds_itself_has_an_end() -> None:
 
 
 def test_the_rule_of_rare_logging() -> None:
-    assert [count for count in range(1001) if is_told(count)] == [1, 10, 100, 1000]
+    assert [count for count in range(1001) if is_logged(count)] == [1, 10, 100, 1000]

@@ -209,7 +209,7 @@ def test_alerts_about_originals_are_cleaned_and_bounded() -> None:
     assert max(told) == 200
     assert not any(map(control_in, shown))
     for n in range(1000):
-        native.cure(f"topic:{n}")
+        native.resolve(f"topic:{n}")
     assert told[-1] == 0
 
 

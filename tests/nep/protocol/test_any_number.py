@@ -20,7 +20,7 @@ from nep.errors import WireError
 from nep.masters.graph import Graph, with_hosts
 from nep.masters.leases import read_renewal, renewed_body
 from nep.masters.master import Master
-from nep.messages.packing import pack_surely
+from nep.messages.packing import pack_saturated
 from nep.protocol import encoding, requests, wire
 from nep.protocol.encoding import AnswerEncoder
 from nep.protocol.requests import (
@@ -115,11 +115,11 @@ def test_every_quick_answer_to_a_renewal_can_be_read(
 @MANY
 @given(st.sampled_from(sorted(encoding._REQUESTS)), PLAIN, PLAIN)
 def test_nothing_that_comes_in_raises_anything_unexpected(name: str, what: object, call: object) -> None:
-    encoding.decode_request(pack_surely({"do": name, "call": call, "what": what}))
-    read_renewal(pack_surely({"do": "renew", "call": call, "what": what}))
+    encoding.decode_request(pack_saturated({"do": name, "call": call, "what": what}))
+    read_renewal(pack_saturated({"do": "renew", "call": call, "what": what}))
     for answer in encoding._ANSWERS:
         with contextlib.suppress(WireError):
-            encoding.decode_answer(pack_surely({"is": answer, "re": call, "what": what}))
+            encoding.decode_answer(pack_saturated({"is": answer, "re": call, "what": what}))
 
 
 @settings(MANY, max_examples=150)

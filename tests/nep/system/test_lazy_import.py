@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 
 def in_a_new_process(program: str) -> str:
@@ -21,23 +21,23 @@ def in_a_new_process(program: str) -> str:
 def test_it_is_imported_when_something_of_it_is_used() -> None:
     program = (
         "import sys\n"
-        "from nep.system.lazy_import import later\n"
-        "colorsys = later('colorsys')\n"
+        "from nep.system.lazy_import import lazy_module\n"
+        "colorsys = lazy_module('colorsys')\n"
         "print('colorsys' in sys.modules, colorsys.rgb_to_hsv(0, 0, 0), 'colorsys' in sys.modules)\n"
     )
     assert in_a_new_process(program) == "False (0.0, 0.0, 0) True"
 
 
 def test_what_it_gives_is_that_of_the_module() -> None:
-    assert later("colorsys").__getattr__("rgb_to_hls") is sys.modules["colorsys"].rgb_to_hls
+    assert lazy_module("colorsys").__getattr__("rgb_to_hls") is sys.modules["colorsys"].rgb_to_hls
 
 
 def test_what_is_not_there_is_said_at_its_first_use() -> None:
-    absent = later("nep.no_such_module")
+    absent = lazy_module("nep.no_such_module")
     with pytest.raises(ModuleNotFoundError, match="no_such_module"):
         absent.__getattr__("something")
     with pytest.raises(AttributeError, match="nothing_of_this_name"):
-        later("colorsys").__getattr__("nothing_of_this_name")
+        lazy_module("colorsys").__getattr__("nothing_of_this_name")
 
 
 def test_nep_loads_without_what_it_seldom_needs() -> None:

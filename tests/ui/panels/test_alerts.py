@@ -35,10 +35,10 @@ def test_alerts_come_the_worst_first_and_go_when_they_are_cured(panel, window) -
     panel.refresh()
     assert [alert.severity for alert in panel.shown] == ["error", "warn"]
     assert not panel.rows[1].button.isVisibleTo(panel)
-    alerts.cure("message:/faces")
+    alerts.resolve("message:/faces")
     panel.refresh()
     assert panel.chip.status == "warn"
-    alerts.cure("silent:/cam")
+    alerts.resolve("silent:/cam")
     panel.refresh()
     assert panel.rows == []
     assert panel.empty.isVisible()

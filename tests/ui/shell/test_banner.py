@@ -76,7 +76,7 @@ def test_pages_stay_while_the_mouse_is_over_them_and_make_room_when_it_has_left(
     after = places(window)
     assert after["topics"].y() - before["topics"].y() == window.room.height() > 50, "the mouse was away"
     assert window.banner.geometry().bottom() < window.pages.geometry().top()
-    window.session.alerts.cure("one")
+    window.session.alerts.resolve("one")
     window.tick()
     QApplication.processEvents()
     assert not window.banner.isVisible()

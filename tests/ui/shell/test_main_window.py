@@ -364,7 +364,7 @@ def test_an_alert_is_a_banner_until_it_is_cured(qtbot, window: MainWindow, comma
     assert banner.more.text() == "and 1 more"
     QTest.mouseClick(banner.button, Qt.MouseButton.LeftButton)
     assert panel(window, "developer", "inspector").topics == ["/camera"]
-    alerts.cure("two")
+    alerts.resolve("two")
     window.tick()
     assert "A topic is slow." in banner.accessibleName()
     QTest.mouseClick(banner.close_button, Qt.MouseButton.LeftButton)

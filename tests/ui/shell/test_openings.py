@@ -203,7 +203,7 @@ def test_toasts_and_banners(window: MainWindow) -> None:
             "x", "error", "This is wrong.", "Mend it.", button="Stop", action="run.stop"
         )
         window.tick()
-        window.session.alerts.cure("x")
+        window.session.alerts.resolve("x")
         window.tick()
 
     leaves_nothing(window, say)

@@ -29,13 +29,13 @@ def test_health_names_the_alerts_before_the_robots(session: fakes.Session) -> No
     assert facts(session).health() == ("circle-x", "1 alert", "error")
     session.alerts.put("slow", "warn", "Slow.")
     assert facts(session).health()[1] == "2 alerts"
-    session.alerts.cure("slow")
-    session.alerts.cure("message:/faces")
+    session.alerts.resolve("slow")
+    session.alerts.resolve("message:/faces")
     assert facts(session).health() == ("circle-check", "Pepper is well", "ok")
 
 
 def test_health_agrees_with_the_health_panel(session: fakes.Session) -> None:
-    session.alerts.cure("message:/faces")
+    session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.values["battery"] = 7
     assert facts(session).health() == ("triangle-alert", "Pepper: 1 to look at", "warn")
@@ -44,7 +44,7 @@ def test_health_agrees_with_the_health_panel(session: fakes.Session) -> None:
 
 
 def test_a_robot_that_has_told_nothing_is_connected_and_not_well(session: fakes.Session) -> None:
-    session.alerts.cure("message:/faces")
+    session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.answered_s, link.values = None, {}
     for topic in session.topics:
@@ -53,7 +53,7 @@ def test_a_robot_that_has_told_nothing_is_connected_and_not_well(session: fakes.
 
 
 def test_a_robot_that_has_gone_is_to_be_looked_at(session: fakes.Session) -> None:
-    session.alerts.cure("message:/faces")
+    session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.connected = False
     assert facts(session).health() == ("triangle-alert", "Pepper: 1 to look at", "warn")

@@ -314,7 +314,7 @@ def test_the_facts_of_the_status_bar(pseudo, session) -> None:
     told = [facts.health(), facts.saved(), facts.topics(), facts.master(), facts.traffic()]
     told += [facts.lost(), facts.shown(), facts.window()]
     for alert in list(facts._session.alerts.active):
-        facts._session.alerts.cure(alert.id)
+        facts._session.alerts.resolve(alert.id)
     told.append(facts.health())
     assert [words for _icon, words, _status in told if untranslated(words, "Pepper", "Master")] == []
 

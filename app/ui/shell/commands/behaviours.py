@@ -14,12 +14,12 @@ from app.errors import SettingsError
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
 from nep.i18n import _, ngettext
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from app.ui.shell.dialogs import version_history
 else:
-    version_history = later("app.ui.shell.dialogs.version_history")
+    version_history = lazy_module("app.ui.shell.dialogs.version_history")
 
 Answer = tuple[str, Callable[[], object]]
 

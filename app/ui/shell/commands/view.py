@@ -24,7 +24,7 @@ from app.ui.theme.system import Wish
 from app.ui.theme.theme import Mode
 from app.ui.widgets.lists.fuzzy import Entry
 from nep.i18n import _
-from nep.system.lazy_import import later
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from app.ui.shell.dialogs import command_palette, shortcuts
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
     from app.ui.shell.dialogs import settings as settings_sheet
 else:
     command_palette, name_sheet = (
-        later("app.ui.shell.dialogs.command_palette"),
-        later("app.ui.shell.dialogs.name"),
+        lazy_module("app.ui.shell.dialogs.command_palette"),
+        lazy_module("app.ui.shell.dialogs.name"),
     )
     settings_sheet, shortcuts = (
-        later("app.ui.shell.dialogs.settings"),
-        later("app.ui.shell.dialogs.shortcuts"),
+        lazy_module("app.ui.shell.dialogs.settings"),
+        lazy_module("app.ui.shell.dialogs.shortcuts"),
     )
 
 TEXT_STEP = 25

@@ -23,7 +23,7 @@ class Layout:
 
     ``title`` is marked with `lazy`. ``homes`` tells beside which panel another one opens, as a tab; the rest
     open beside the last panel. ``brings`` tells which panel comes with another one when that is opened; it is
-    ``later``: at first its row is not there.
+    ``lazy_module``: at first its row is not there.
     """
 
     name: str
