@@ -91,7 +91,7 @@ class GatewayAttachment:
 
 
 class NativeNetwork:
-    """The native network as the gateway uses it (see `NativeSideOfGateway`).
+    """The native network as the gateway uses it (see `GatewayNetwork`).
 
     `make_node` joins the network; it is called when the first topic is carried over, so that a master without
     original programs has no node of a gateway.
@@ -118,7 +118,7 @@ class NativeNetwork:
     # ---- the network
 
     def start(self, inbox: NativeInbox) -> None:
-        """See `NativeSideOfGateway`."""
+        """See `GatewayNetwork`."""
         self._inbox = inbox
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
@@ -154,7 +154,7 @@ class NativeNetwork:
             subscriber.close()
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
-        """See `NativeSideOfGateway`."""
+        """See `GatewayNetwork`."""
         if message.codec != "image":
             return message.data
         try:
@@ -210,11 +210,11 @@ class NativeNetwork:
     # ---- the graph and the alerts
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """See `NativeSideOfGateway`."""
+        """See `GatewayNetwork`."""
         self._listing.show(programs)
 
     def look(self) -> None:
-        """See `NativeSideOfGateway`."""
+        """See `GatewayNetwork`."""
         self._listing.renew()
         if self._inbox is not None and self._inbox.dropped != self._dropped:
             lost = self._inbox.dropped - self._dropped
@@ -243,7 +243,7 @@ class NativeNetwork:
             self._report(tuple(self._alerts.values()))
 
     def close(self) -> None:
-        """See `NativeSideOfGateway`."""
+        """See `GatewayNetwork`."""
         self._listing.close()
         if self._node is not None:
             self._node.close()

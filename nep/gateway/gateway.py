@@ -33,7 +33,7 @@ _PROGRAMS_MAX = 2000
 _logger = logging.getLogger("nep.gateway")
 
 
-class NativeSideOfGateway(NativeSide, AlertSink, Protocol):
+class GatewayNetwork(NativeSide, AlertSink, Protocol):
     """All that the gateway needs of the native network; it is called in the gateway's thread."""
 
     def start(self, inbox: NativeInbox) -> None:
@@ -61,7 +61,7 @@ class Gateway:
 
     def __init__(
         self,
-        outside: NativeSideOfGateway,
+        outside: GatewayNetwork,
         processes: Processes,
         file: Path | None = None,
         *,

@@ -73,7 +73,7 @@ def test_let_it_move_goes_on(window) -> None:
     assert window.done == ["moved"]
     assert not window.question.isVisible()
     assert window.focusWidget() is window.field
-    assert window.motion_permission.allowed(ROVER)
+    assert window.permission.allowed(ROVER)
 
 
 @pytest.mark.parametrize("how", ["button", "escape", "enter"])
@@ -87,7 +87,7 @@ def test_not_now_moves_nothing(window, how) -> None:
         QTest.keyClick(window.question.not_now, Qt.Key.Key_Space)
     assert window.done == []
     assert not window.question.isVisible()
-    assert not window.motion_permission.allowed(ROVER)
+    assert not window.permission.allowed(ROVER)
 
 
 def test_always_is_kept(window, tmp_path) -> None:
@@ -111,7 +111,7 @@ def test_an_always_that_can_not_be_kept_is_told_and_it_moves_all_the_same(window
 
 def test_a_stop_takes_the_question_away(window) -> None:
     window.ask("move")
-    window.motion_permission.withdraw()
+    window.permission.withdraw()
     window.question.refresh()
     assert not window.question.isVisible()
     assert window.done == []
@@ -153,7 +153,7 @@ def test_the_whole_name_is_to_be_read_however_long(qtbot, tmp_path, name, size, 
     window.resize(*size)
     window.show()
     rover = replace(ROVER, name=name)
-    window.motion_permission.permits([(rover, ("move",))], lambda: None)
+    window.permission.permits([(rover, ("move",))], lambda: None)
     window.question.refresh()
     assert clipped(window.question) == []
     for words in (window.question.title, window.question.sentence):

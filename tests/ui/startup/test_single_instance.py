@@ -72,10 +72,10 @@ def test_another_process_hands_over_whole_paths(qtbot, name: str, tmp_path: Path
 STARTING = """
 import sys
 from pathlib import Path
-from app.core.storage.file_lock import Turn
+from app.core.storage.file_lock import FileLock
 from app.ui.startup.single_instance import StartRequest, found
 print("begun", flush=True)
-turn = Turn(Path(sys.argv[2]))
+turn = FileLock(Path(sys.argv[2]))
 there = found(sys.argv[1], StartRequest((Path("a.nepb"),)), turn, 60.0)
 print("found" if there else "first", flush=True)
 sys.stdin.read()
