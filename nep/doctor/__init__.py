@@ -1,7 +1,7 @@
 """The connection doctor: why programs do not find each other, and what to do about it.
 
-`collect_facts` looks at processes, ports, the master's graph and this Python; `findings` judges these facts and
-is a function of them alone.
+`collect_facts` looks at processes, ports, the master's graph and this Python; `findings` judges these facts,
+and is a function of them alone.
 """
 
 from nep.doctor.collect import collect_facts, start_obstacle
