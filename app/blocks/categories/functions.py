@@ -7,7 +7,7 @@ from functools import partial
 from app.blocks.model.block import Block
 from app.blocks.model.category import Category
 from app.blocks.model.fields import StatementInput, TextField, ValueInput
-from app.blocks.model.growing import InputField, Inputs
+from app.blocks.model.mutators import InputField, Inputs
 
 _definition = partial(Block, shape="definition", style="functions")
 _statement = partial(Block, shape="statement", style="functions")

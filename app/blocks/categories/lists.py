@@ -7,7 +7,7 @@ from functools import partial
 from app.blocks.model.block import Block
 from app.blocks.model.category import Category
 from app.blocks.model.fields import ChoiceField, StatementInput, ValueInput, VariableField
-from app.blocks.model.growing import Items
+from app.blocks.model.mutators import Items
 
 _value = partial(Block, shape="value", style="variables")
 _boolean = partial(Block, shape="boolean", style="variables")

@@ -7,9 +7,9 @@ import keyword
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from app.blocks.compiler.problems import Notes
+from app.blocks.compiler.lowering import END, Function, Lowering
+from app.blocks.compiler.problems import ProblemCollector
 from app.blocks.compiler.render import instrumented, readable
-from app.blocks.compiler.shaping import END, Function, Shaping
 from app.blocks.model.block import Block
 from app.blocks.model.block_text import reading
 from app.blocks.model.fields import (
@@ -21,7 +21,7 @@ from app.blocks.model.fields import (
     ValueInput,
     VariableField,
 )
-from app.blocks.model.growing import InputField
+from app.blocks.model.mutators import InputField
 from app.blocks.model.names import Names
 from app.blocks.model.program import Program
 from app.blocks.model.template import expression, literal, statements
@@ -111,13 +111,13 @@ class _Compiler:
         self._catalogue = catalogue
         self._name = name
         self._names = Names(RESERVED)
-        self._shaping = Shaping(workspace, catalogue, self._names)
+        self._shaping = Lowering(workspace, catalogue, self._names)
         self._workspace = workspace = self._shaping.workspace
         self._function: Function | None = None  # the one that is being compiled
         self._calls: set[str] = set()  # the blocks that run a function
         self._variables: dict[str, str] = {}  # Blockly's id -> Python's name
         self._marks: dict[ast.AST, str] = {}
-        self._notes = Notes(catalogue, workspace)
+        self._notes = ProblemCollector(catalogue, workspace)
         self._readings: dict[str, str] = {}
         self._labels: dict[str, str] = {}
         self._uses = _Uses()

@@ -25,7 +25,7 @@ _LITERALS = {"values_number": "NUMBER", "values_text": "TEXT"}
 _STARTER = "events_started"
 
 
-class Notes:
+class ProblemCollector:
     """Collects problems while a program is compiled; each block is told of once."""
 
     def __init__(self, catalogue: Catalogue, workspace: Workspace) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 
-from app.blocks.compiler.shaping import CALL, CALL_RESULT, PLAIN, RESULT
-from app.blocks.model.growing import inputs_of, name_of
+from app.blocks.compiler.lowering import CALL, CALL_RESULT, PLAIN, RESULT
+from app.blocks.model.mutators import inputs_of, name_of
 from app.blocks.model.workspace import Placed, saved_blocks
 from app.blocks.toolbox.catalogue import categories
 

@@ -20,7 +20,7 @@ from app.blocks.model.fields import (
     ValueInput,
     VariableField,
 )
-from app.blocks.model.growing import Inputs, Items
+from app.blocks.model.mutators import Inputs, Items
 from app.blocks.model.workspace import parse_workspace
 from nep.i18n import _, lazy, listed, translate
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from app.blocks.model.block import Block
 from app.blocks.model.fields import Argument, ValueInput
-from app.blocks.model.growing import FunctionInput, Inputs, Items, inputs_of, name_of
+from app.blocks.model.mutators import FunctionInput, Inputs, Items, inputs_of, name_of
 from app.blocks.model.names import Names
 from app.blocks.model.workspace import Placed, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
@@ -36,7 +36,7 @@ class Function:
     gives: bool
 
 
-class Shaping:
+class Lowering:
     """What people made: functions, and the ``workspace`` with plain blocks only."""
 
     def __init__(self, workspace: Workspace, catalogue: Catalogue, names: Names) -> None:
