@@ -17,7 +17,7 @@ from app.robots.driver.call import Clock, Link, MonotonicClock
 from app.robots.driver.process import main as drive
 from app.robots.virtual.camera import Camera
 from app.robots.virtual.lens import Lens
-from app.robots.virtual.life import Beat, surroundings
+from app.robots.virtual.simulation import Beat, surroundings
 from app.robots.virtual.vision import colours_in
 from app.robots.virtual.wheels import RADIUS, WheelBody
 

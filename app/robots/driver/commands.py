@@ -25,7 +25,7 @@ _LONGEST_ID = 200
 _ENDED_KEPT = 100
 
 
-class Desk:
+class CommandHandler:
     """Takes the commands for one robot; all methods are for the deciding thread of its tasks."""
 
     def __init__(

@@ -19,9 +19,9 @@ from app.errors import DescriptionError, RobotValueError
 from app.robots.description.description import LARGEST_BYTES, parse, td_for, topic_of
 from app.robots.description.json_access import as_part
 from app.robots.driver.call import Call, Canceled, Clock, MonotonicClock
-from app.robots.driver.commands import Desk
+from app.robots.driver.commands import CommandHandler
 from app.robots.driver.declare import Kind
-from app.robots.driver.rize_dialect import Dialect
+from app.robots.driver.rize_dialect import RizeDialect
 from app.robots.driver.schema_values import told_fields
 from app.robots.driver.tasks import Tasks
 from nep.i18n import _, lazy, number
@@ -117,8 +117,10 @@ class Driver:
             watchdog_s=timing.watchdog_s,
             beat=beat,
         )
-        desk = Desk(self.robot, body, self.kind.actions, tasks, answer, self._done)
-        dialect = Dialect(self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS))
+        desk = CommandHandler(self.robot, body, self.kind.actions, tasks, answer, self._done)
+        dialect = RizeDialect(
+            self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS)
+        )
         tasks.start()
         self._listen(self.robot.topics.command, "robot/command", desk.receive)
         self._listen(RIZE_COMMANDS, "json", lambda message, _publisher: dialect.receive(message))

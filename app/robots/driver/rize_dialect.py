@@ -15,7 +15,7 @@ from app.robots.description.inputs import Parameter
 from app.robots.description.json_access import as_part, names, number_of
 from app.robots.description.model import Action, Robot
 from app.robots.driver.call import Call
-from app.robots.driver.commands import Desk
+from app.robots.driver.commands import CommandHandler
 from app.robots.driver.declare import ActionSpec
 from app.robots.driver.task import Answer, Task
 from app.robots.driver.tasks import Tasks
@@ -33,11 +33,16 @@ class _Group:
     states: list[str] = field(default_factory=list)
 
 
-class Dialect:
+class RizeDialect:
     """Speaks RIZE for one robot; all methods are for the deciding thread of its tasks."""
 
     def __init__(
-        self, robot: Robot, specs: Mapping[str, ActionSpec], desk: Desk, tasks: Tasks, publish: Publish
+        self,
+        robot: Robot,
+        specs: Mapping[str, ActionSpec],
+        desk: CommandHandler,
+        tasks: Tasks,
+        publish: Publish,
     ) -> None:
         self._robot, self._desk, self._tasks, self._publish = robot, desk, tasks, publish
         self._specs = {spec.primitive: (name, spec) for name, spec in specs.items() if spec.primitive}

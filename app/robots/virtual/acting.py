@@ -11,9 +11,9 @@ from app.robots.driver.declare import EventSpec, detections, event, picture, sen
 from app.robots.driver.schema import Suggested
 from app.robots.virtual.body import START_PITCH, Body
 from app.robots.virtual.camera import lens_of
-from app.robots.virtual.life import Life
 from app.robots.virtual.motion import Motion
 from app.robots.virtual.room import Room
+from app.robots.virtual.simulation import Simulation
 from app.robots.virtual.vision import angles_to
 from nep.i18n import _
 
@@ -49,7 +49,7 @@ def _face(text: str, title: str, rize_word: str) -> EventSpec:
 
 
 class Senses:
-    """Its sensors and events; what fills them is :class:`~app.robots.virtual.life.Life`."""
+    """Its sensors and events; what fills them is :class:`~app.robots.virtual.simulation.Life`."""
 
     battery = battery_sensor()
     distance = distance_sensor(most_m=5)
@@ -91,7 +91,7 @@ class Acting(Senses):
     start_room: ClassVar[Room] = Room()
 
     def __init__(self, link: Link) -> None:
-        self._life = Life(Body(room=self.start_room), link, MonotonicClock())
+        self._life = Simulation(Body(room=self.start_room), link, MonotonicClock())
         self.voice: tuple[int, str] = (60, "en")
         link.on_world(self._life.act)
         self._life.start()

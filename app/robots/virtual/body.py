@@ -24,7 +24,7 @@ _DRAIN_MOVING_PER_S = 1 / 60
 
 
 @dataclass(frozen=True)
-class Happening:
+class BodyEvent:
     """Something that the body noticed: an event of the robot's description and its data."""
 
     event: str
@@ -75,7 +75,7 @@ class Body:
     battery: float = 84.4
     touched: set[str] = field(default_factory=set)
     heard: str = ""
-    happenings: deque[Happening] = field(default_factory=lambda: deque(maxlen=200))
+    happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _base: Motion | None = field(default=None, repr=False)
     _turning: bool = field(default=False, repr=False)
     _speech: Speech | None = field(default=None, repr=False)
@@ -181,15 +181,15 @@ class Body:
         """A hand on the head or on a hand, or away again."""
         if down and place not in self.touched:
             self.touched.add(place)
-            self.happenings.append(Happening("touched", {"place": place}))
+            self.happenings.append(BodyEvent("touched", {"place": place}))
         elif not down and place in self.touched:
             self.touched.discard(place)
-            self.happenings.append(Happening("released", {"place": place}))
+            self.happenings.append(BodyEvent("released", {"place": place}))
 
     def hear(self, word: str) -> None:
         """Somebody said something."""
         self.heard = word
-        self.happenings.append(Happening("heard", {"word": word}))
+        self.happenings.append(BodyEvent("heard", {"word": word}))
 
     # ---- time -------------------------------------------------------------------------------------
 
@@ -227,7 +227,7 @@ class Body:
             else:
                 motion.moved -= way
                 motion.block()
-                self.happenings.append(Happening("bumped", {"side": "front" if way > 0 else "back"}))
+                self.happenings.append(BodyEvent("bumped", {"side": "front" if way > 0 else "back"}))
         if motion.done:
             self._base = None
 

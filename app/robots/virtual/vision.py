@@ -60,7 +60,7 @@ def message(found: Iterable[Detection], lens: Lens) -> dict[str, object]:
     }
 
 
-class Eyes:
+class ObjectDetector:
     """Looks at pictures; keeps only what OpenCV needs."""
 
     def __init__(self) -> None:

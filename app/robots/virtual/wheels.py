@@ -6,7 +6,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, field
 
-from app.robots.virtual.body import Happening
+from app.robots.virtual.body import BodyEvent
 from app.robots.virtual.room import Room
 
 RADIUS = 0.17
@@ -33,7 +33,7 @@ class WheelBody:
     light: str = LIGHT
     battery: float = 91.3
     bumped: str = ""
-    happenings: deque[Happening] = field(default_factory=lambda: deque(maxlen=200))
+    happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _wanted: tuple[float, float] = (0.0, 0.0)
 
     def drive(self, speed: float, turn_speed: float) -> None:
@@ -84,7 +84,7 @@ class WheelBody:
         side = self._side(way)
         if side != self.bumped:
             self.bumped = side
-            self.happenings.append(Happening("bump", {"side": side}))
+            self.happenings.append(BodyEvent("bump", {"side": side}))
 
     def _side(self, way: float) -> str:
         """Where it touches: at the left, at the right, in front or at the back."""

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.robots.virtual.body import RADIUS, Body
-from app.robots.virtual.life import drawable
 from app.robots.virtual.motion import Joint, Motion
 from app.robots.virtual.room import Room
+from app.robots.virtual.simulation import drawable
 
 STEP = 1 / 30
 

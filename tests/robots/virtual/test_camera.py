@@ -11,7 +11,7 @@ from app.robots.virtual.body import Body
 from app.robots.virtual.camera import Camera, lens_of
 from app.robots.virtual.lens import Lens
 from app.robots.virtual.room import Room
-from app.robots.virtual.vision import Eyes, angles_to, message
+from app.robots.virtual.vision import ObjectDetector, angles_to, message
 
 
 @pytest.fixture(scope="module")
@@ -20,8 +20,8 @@ def camera() -> Camera:
 
 
 @pytest.fixture(scope="module")
-def eyes() -> Eyes:
-    return Eyes()
+def eyes() -> ObjectDetector:
+    return ObjectDetector()
 
 
 def test_a_point_ahead_is_in_the_middle_and_left_is_left():

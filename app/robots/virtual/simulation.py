@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping
 import cv2
 
 from app.robots.driver.call import Clock, Link
-from app.robots.virtual.body import Body, Happening
+from app.robots.virtual.body import Body, BodyEvent
 from app.robots.virtual.camera import Camera, lens_of
 from app.robots.virtual.room import Room
-from app.robots.virtual.vision import Detection, Eyes, message
+from app.robots.virtual.vision import Detection, ObjectDetector, message
 
 BODY_HZ = 30.0
 CAMERA_HZ = 15.0
@@ -24,7 +24,7 @@ _LOST_AFTER_S = 0.5
 _STOP_S = 2.0
 
 
-class Life:
+class Simulation:
     """Owns the body, its lock and the two threads; `link` hears of everything."""
 
     def __init__(self, body: Body, link: Link, clock: Clock) -> None:
@@ -33,7 +33,7 @@ class Life:
         self.seen: Mapping[str, list[Detection]] = {}
         self._link, self._clock = link, clock
         self._start_room = body.room
-        self._camera, self._eyes = Camera(body.room), Eyes()
+        self._camera, self._eyes = Camera(body.room), ObjectDetector()
         self._ended = threading.Event()
         self._stepped_s = clock.now()
         self._face: str | None = None
@@ -85,7 +85,7 @@ class Life:
                 self.changed.notify_all()
             self.tell(happenings, step)
 
-    def tell(self, happenings: list[Happening], step: int) -> None:
+    def tell(self, happenings: list[BodyEvent], step: int) -> None:
         """Publish what happened, the drawing, and the sensors whose turn it is."""
         for happening in happenings:
             self._link.happen(happening.event, **happening.data)
