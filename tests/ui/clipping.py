@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.ui.widgets import Chip, Elided, StatusItem
+from app.ui.widgets import Chip, ElidedLabel, StatusItem
 from app.ui.widgets.table.cells import PADDING, Head, head_font
 
 SLACK = 1.5
@@ -75,7 +75,7 @@ def sideways(root: QWidget) -> list[str]:
 
 def _faults(widget: QWidget, root: QWidget) -> Iterator[str]:
     said = _name(widget)
-    if isinstance(widget, Elided) or not said:
+    if isinstance(widget, ElidedLabel) or not said:
         return
     if isinstance(widget, QLabel):
         yield from _label(widget, said)

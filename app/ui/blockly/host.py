@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app import resources
 from app.ui.blockly.bridge import BlocklyBridge, Json
-from app.ui.blockly.scheme import PAGE, SCHEME, Fence, SchemeHandler, register_scheme
+from app.ui.blockly.scheme import PAGE, SCHEME, RequestBlocker, SchemeHandler, register_scheme
 from app.ui.widgets.keyboard import proxy_of
 from nep import i18n
 
@@ -66,7 +66,7 @@ class BlocklyWeb:
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)
         profile = QWebEngineProfile(None)
         self._profile = profile
-        self.fence = Fence(profile)
+        self.fence = RequestBlocker(profile)
         self._handler = SchemeHandler(profile)
         profile.setUrlRequestInterceptor(self.fence)
         profile.installUrlSchemeHandler(SCHEME, self._handler)

@@ -105,7 +105,7 @@ class SchemeHandler(QWebEngineUrlSchemeHandler):
         job.reply(QByteArray(kind.encode()), buffer)
 
 
-class Fence(QWebEngineUrlRequestInterceptor):
+class RequestBlocker(QWebEngineUrlRequestInterceptor):
     """Blocks every request that is not for our own files. What was blocked is kept for tests."""
 
     def __init__(self, parent: QObject | None = None) -> None:

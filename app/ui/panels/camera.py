@@ -10,7 +10,7 @@ from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.pictures.boxes import boxes_on, camera_of
 from app.ui.pictures.view import SILENT_AFTER_S, PictureView, rate_sentence
 from app.ui.text.numbers import age_words
-from app.ui.widgets import Chip, Elided, EmptyAction, EmptyState
+from app.ui.widgets import Chip, ElidedLabel, EmptyAction, EmptyState
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class CameraPanel(OneRobotPanel):
         super().__init__(context, _("Camera"))
         self._topic = ""
         self._stream: ImageStream | None = None
-        self.rate = Elided("body", "textSecondary", least=60)
+        self.rate = ElidedLabel("body", "textSecondary", least=60)
         self.header = [self.rate]
         self.chip = Chip(self.theme)
         self.chips = [self.chip]

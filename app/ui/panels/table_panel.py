@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLay
 
 from app.ui.panels.base import Density, PanelContext, PanelWidget
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Elided, EmptyAction, EmptyState, Line, label
+from app.ui.widgets import ElidedLabel, EmptyAction, EmptyState, Separator, label
 from app.ui.widgets.buttons import LinkButton
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.menus import Menu
@@ -58,7 +58,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         self.foot = label("", "small", role="textTertiary", wrap=True)
         self.foot.setContentsMargins(12, 5, 12, 6)
         self.foot.setMinimumWidth(0)
-        self.line = Line(theme)
+        self.line = Separator(theme)
         self.empty = EmptyState(theme, icon, "", "")
         self.doctor = DoctorLine(theme, context.run)
         self.pages = QStackedWidget()
@@ -142,7 +142,7 @@ class DoctorLine(QWidget):
     def __init__(self, theme: Theme, run: Callable[[str], None]) -> None:
         """``run`` does a command of the window by its name."""
         super().__init__()
-        words = Elided("small", "textSecondary")
+        words = ElidedLabel("small", "textSecondary")
         words.setText(_("Expected to see something?"))
         self.button = LinkButton(theme, _("Open the connection doctor"))
         self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
@@ -157,5 +157,5 @@ class DoctorLine(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.addWidget(Line(theme))
+        column.addWidget(Separator(theme))
         column.addLayout(row)

@@ -18,14 +18,14 @@ from app.core.session import Session
 from app.core.storage import deep_json
 from app.core.storage.settings import home
 from app.errors import AppError, DocumentError, SettingsError
-from app.ui.widgets.file_dialogs import Asks
+from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
 
 LONGEST_FLUSH_MS = 500
 
 
 @runtime_checkable
-class Flushes(Protocol):
+class SupportsFlush(Protocol):
     """A panel that may hold an edit which the document has not seen yet."""
 
     def flush(self, done: Callable[[], None]) -> None:
@@ -47,7 +47,7 @@ class DocumentController:
     def __init__(
         self,
         session: Session,
-        asks: Asks,
+        asks: FileDialogs,
         say: Callable[..., object],
         shown: Callable[[], object],
         editor: Callable[[], object],
@@ -182,7 +182,7 @@ class DocumentController:
     def with_newest(self, then: Callable[[], None]) -> None:
         """Do something once the editor's newest edit is in the document."""
         editor = self._editor()
-        if isinstance(editor, Flushes):
+        if isinstance(editor, SupportsFlush):
             editor.flush(then)
         else:
             then()
@@ -350,7 +350,7 @@ class FlushBeforeClose(QObject):
         if not self._asked:
             self._asked, self._ready = True, False
             editor = self._editor()
-            if isinstance(editor, Flushes):
+            if isinstance(editor, SupportsFlush):
                 editor.flush(self._go_on)
             else:
                 self._ready = True

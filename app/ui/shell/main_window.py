@@ -34,7 +34,7 @@ from app.ui.shell.window_state import WindowState
 from app.ui.startup.interpreter import GcFreezeTimer
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
-from app.ui.widgets.file_dialogs import Asks, SystemDialogs
+from app.ui.widgets.file_dialogs import FileDialogs, SystemDialogs
 from nep.i18n import _, lazy
 
 TICK_MS = 33
@@ -57,7 +57,7 @@ class MainWindow(QMainWindow):
         panels: Mapping[str, Panel],
         examples: Sequence[Example] = (),
         *,
-        asks: Asks | None = None,
+        asks: FileDialogs | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """``asks`` asks for files, by dialogs if it is None.

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QMainWindow
 
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
-from app.ui.theme.system import wish_of
+from app.ui.theme.system import preference_of
 from app.ui.theme.theme import MODES, Mode, Theme
 
 Saved = dict[str, object]
@@ -37,8 +37,8 @@ class WindowState:
         """Give the theme what was chosen before; it is applied once."""
         chosen = self._settings.get("theme", "system")
         mode: Mode = next((mode for mode in MODES if mode == chosen), "system")
-        motion = wish_of(self._settings.get("less_motion", None))
-        contrast = wish_of(self._settings.get("high_contrast", None))
+        motion = preference_of(self._settings.get("less_motion", None))
+        contrast = preference_of(self._settings.get("high_contrast", None))
         theme.begin(mode, self._settings.get("text_percent", 100), motion, contrast)
 
     def keep_theme(self, theme: Theme) -> None:

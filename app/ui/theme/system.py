@@ -10,16 +10,16 @@ from typing import Literal
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QStyleHints
 
-Wish = Literal["system", "on", "off"]
-WISHES: tuple[Wish, ...] = ("system", "on", "off")
+Preference = Literal["system", "on", "off"]
+PREFERENCES: tuple[Preference, ...] = ("system", "on", "off")
 CLIENT_AREA_ANIMATION = 0x1042  # SPI_GETCLIENTAREAANIMATION of Windows
 
 
-def wish_of(kept: object) -> Wish:
+def preference_of(kept: object) -> Preference:
     """A wish from the settings; those of older versions were only on or off."""
     if isinstance(kept, bool):
         return "on" if kept else "system"
-    return next((wish for wish in WISHES if wish == kept), "system")
+    return next((wish for wish in PREFERENCES if wish == kept), "system")
 
 
 def wants_contrast(hints: QStyleHints) -> bool:

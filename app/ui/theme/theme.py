@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QApplication, QStyleFactory
 from app.ui.theme import fonts, style_sheet, system
 from app.ui.theme import tokens as theme_tokens
 from app.ui.theme.icons import IconEngine
-from app.ui.theme.system import Wish
+from app.ui.theme.system import Preference
 from app.ui.theme.tokens import Status, Tokens
 
 Mode = Literal["light", "dark", "system"]
@@ -65,8 +65,8 @@ class Theme(QObject):
         self._hints = hints if hints is not None else QGuiApplication.styleHints()
         self._mode: Mode = mode
         self._text_percent = TEXT_PERCENT[0]
-        self.motion: Wish = "off"  # less of it
-        self.contrast: Wish = "off"  # more of it
+        self.motion: Preference = "off"  # less of it
+        self.contrast: Preference = "off"  # more of it
         self.reduced_motion = self.high_contrast = False
         self._dark = self._wanted_dark()
         self._icons: dict[tuple[str, str, str], QIcon] = {}
@@ -96,7 +96,7 @@ class Theme(QObject):
         self._mode = mode
         self._refresh()
 
-    def begin(self, mode: Mode, text_percent: int, motion: Wish, contrast: Wish) -> None:
+    def begin(self, mode: Mode, text_percent: int, motion: Preference, contrast: Preference) -> None:
         """Take over everything that was chosen before, and apply it once."""
         self._mode, self.contrast = mode, contrast
         self.high_contrast = self._wanted_contrast()
@@ -111,13 +111,13 @@ class Theme(QObject):
         self._fonts.clear()
         self.apply()
 
-    def set_motion(self, wish: Wish) -> None:
+    def set_motion(self, wish: Preference) -> None:
         """Whether nothing fades, glides or breathes: "on" is less motion, "system" as the system says."""
         self.motion = wish
         self.reduced_motion = wish == "on" or (wish == "system" and system.wants_less_motion())
         self.changed.emit()
 
-    def set_contrast(self, wish: Wish) -> None:
+    def set_contrast(self, wish: Preference) -> None:
         """Whether edges are strong and tints are off: "on", "off", or as the system says."""
         self.contrast = wish
         if self._wanted_contrast() != self.high_contrast:

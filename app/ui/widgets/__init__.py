@@ -24,9 +24,9 @@ from app.ui.widgets.inputs.fields import SearchField as SearchField
 from app.ui.widgets.inputs.segments import Segments as Segments
 from app.ui.widgets.inputs.slider import SliderWithUnit as SliderWithUnit
 from app.ui.widgets.inputs.switch import Switch as Switch
-from app.ui.widgets.labels import Changing as Changing
-from app.ui.widgets.labels import Elided as Elided
-from app.ui.widgets.labels import Line as Line
+from app.ui.widgets.labels import ElidedLabel as ElidedLabel
+from app.ui.widgets.labels import FixedWidthLabel as FixedWidthLabel
+from app.ui.widgets.labels import Separator as Separator
 from app.ui.widgets.labels import label as label
 from app.ui.widgets.labels import set_role as set_role
 from app.ui.widgets.lists.scroll_areas import Scrolled as Scrolled

@@ -13,7 +13,7 @@ from app.core.documents.file_format import SUFFIX
 from nep.i18n import _
 
 
-class Asks(Protocol):
+class FileDialogs(Protocol):
     """Asks a person for a file; ``take`` is called with the answer, never when the person gives up."""
 
     def open(self, folder: str, take: Callable[[Path], None]) -> None:

@@ -29,7 +29,7 @@ def set_role(shown: QLabel, role: str) -> None:
         shown.style().polish(shown)
 
 
-class Elided(QLabel):
+class ElidedLabel(QLabel):
     """A line that is shortened in its middle where there is too little room; the tooltip has the whole."""
 
     def __init__(self, kind: str, role: str, least: int = 0) -> None:
@@ -55,7 +55,7 @@ class Elided(QLabel):
         painter.end()
 
 
-class Changing(Elided):
+class FixedWidthLabel(ElidedLabel):
     """Words that change many times a second, in room that does not depend on them.
 
     A label asks for its room anew with every word, and the whole window is then laid out again.
@@ -104,7 +104,7 @@ class BoldInLine(QWidget):
         painter.end()
 
 
-class Line(QWidget):
+class Separator(QWidget):
     """A line of 1 px: between groups of buttons (upright) or between parts of a panel."""
 
     def __init__(self, theme: Theme, *, upright: bool = False, length: int = 0) -> None:

@@ -83,7 +83,7 @@ def _level_words(record: ConsoleRecord) -> str:
     return _("critical") if record.level == "critical" else _(WORDS.get(record.level, record.level))
 
 
-class Wanted:
+class RecordFilter:
     """Whether a record is shown: by its level, its node ("" for all), and words that it must hold."""
 
     def __init__(self, levels: frozenset[str], node: str, words: str) -> None:

@@ -18,7 +18,7 @@ from app.ui.panels.console.list import (
     FindWords,
     LineDelegate,
     LineList,
-    Wanted,
+    RecordFilter,
     line_of,
 )
 from app.ui.text import plain
@@ -133,8 +133,8 @@ class ConsolePanel(PanelWidget):
         elif came:
             self.list.scrollToTop()
 
-    def _wanted(self) -> Wanted:
-        return Wanted(SHOWN[self.level], self.node, self.words.text())
+    def _wanted(self) -> RecordFilter:
+        return RecordFilter(SHOWN[self.level], self.node, self.words.text())
 
     def _scrolled(self, value: int) -> None:
         if value == 0:

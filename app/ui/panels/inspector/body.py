@@ -10,13 +10,13 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.panels.inspector.diff import Counts, changes_words
 from app.ui.panels.inspector.find import FindBar
-from app.ui.panels.inspector.footer import Foot
+from app.ui.panels.inspector.footer import Footer
 from app.ui.panels.inspector.hex_view import HexView
 from app.ui.panels.inspector.tree_model import TreeModel
 from app.ui.panels.inspector.tree_view import TreeView
 from app.ui.text.numbers import size_words
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Elided, EmptyAction, EmptyState, IconButton, Line, Segments, label
+from app.ui.widgets import ElidedLabel, EmptyAction, EmptyState, IconButton, Segments, Separator, label
 from nep.i18n import _
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class CompareStrip(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._with = ""
-        self.words = Elided("small", "textSecondary")
+        self.words = ElidedLabel("small", "textSecondary")
         self.only = IconButton(theme, "filter", _("Show changes only"), checkable=True, size=24)
         self.only.toggled.connect(self.only_changed)
         row = QHBoxLayout(self)
@@ -75,7 +75,7 @@ class InspectorBody(QWidget):
         self.bytes = HexView(theme)
         self.empty = EmptyState(theme, "list-tree", "", "")
         self.large = EmptyState(theme, "database", "", "")
-        self.foot = Foot(theme)
+        self.foot = Footer(theme)
         self.foot.show_path("")
         self._arrange(theme)
 
@@ -87,7 +87,7 @@ class InspectorBody(QWidget):
         bar.addWidget(self.finder, 1)
         bar.addWidget(self.compare)
         bar.addWidget(self.mode)
-        self.line = Line(theme)
+        self.line = Separator(theme)
         self.pages = QStackedWidget()
         for page in (self.empty, self.large, self.tree, self.bytes):
             self.pages.addWidget(page)

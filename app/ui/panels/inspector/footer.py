@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 from app.ui.text import plain
 from app.ui.text.numbers import age_words, grouped, latency_words, size_words
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Changing, IconButton, Line, label, paint
+from app.ui.widgets import FixedWidthLabel, IconButton, Separator, label, paint
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Legend(QWidget):
         painter.end()
 
 
-class Foot(QWidget):
+class Footer(QWidget):
     """The path of the chosen value with its copy buttons; below, the message's facts."""
 
     def __init__(self, theme: Theme) -> None:
@@ -74,14 +74,14 @@ class Foot(QWidget):
         self.path.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.copy_value = IconButton(theme, "copy", _("Copy value"), "Ctrl+C", size=26)
         self.copy_path = IconButton(theme, "link", _("Copy path"), "Ctrl+Shift+C", size=26)
-        self.facts = Changing("small", "textTertiary")
+        self.facts = FixedWidthLabel("small", "textTertiary")
         self._facts_next, self._facts_due = "", -FACTS_S
         self.legend = Legend(theme)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
         rows.setSpacing(0)
         for parts in ((self.path, self.copy_value, self.copy_path), (self.facts, self.legend)):
-            rows.addWidget(Line(theme))
+            rows.addWidget(Separator(theme))
             row = QHBoxLayout()
             row.setContentsMargins(10, 3, 8, 3)
             row.setSpacing(2)

@@ -15,7 +15,7 @@ from app.ui.panels.robots.controls.chooser import Pictures
 from app.ui.panels.robots.form import ActionForm
 from app.ui.panels.robots.tries import TryList, end_words, left_words, now_words, output_words, progress_of
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Card, Chip, Elided, IconButton, ValueBar, label, set_role
+from app.ui.widgets import Button, Card, Chip, ElidedLabel, IconButton, ValueBar, label, set_role
 from app.ui.widgets.cards import Tile
 from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, lazy
@@ -53,9 +53,9 @@ class ActionCard(Card):
         self.form = ActionForm(theme, action, options, pictures)
         self.form.changed.connect(self._say_summary)
         self.title = label(action.title[:1].upper() + action.title[1:], "card", wrap=True)
-        self.summary = Elided("bodyLarge", "textSecondary")
+        self.summary = ElidedLabel("bodyLarge", "textSecondary")
         self.risk = Chip(theme, _(RISKS.get(action.risk or "", "")), "warn")
-        self.words = Elided("body", "textSecondary", 60)
+        self.words = ElidedLabel("body", "textSecondary", 60)
         self.left = label("", "body", role="textTertiary")
         self.result = Chip(theme)
         self.try_button = Button(theme, _("Try"), "play")

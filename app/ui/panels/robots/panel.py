@@ -24,7 +24,7 @@ from app.ui.panels.robots.action_card import ActionCard
 from app.ui.panels.robots.list import LIST_WIDTH, RobotList
 from app.ui.text.numbers import grouped
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Chip, Elided, EmptyAction, EmptyState, Line, SearchField, label
+from app.ui.widgets import Button, Chip, ElidedLabel, EmptyAction, EmptyState, SearchField, Separator, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.indicators import ROBOT_STATUS
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
@@ -50,7 +50,7 @@ class RobotHead(QWidget):
         super().__init__()
         self.name = label("", "heading")
         self.chip = Chip(theme)
-        self.about = Elided("body", "textSecondary")
+        self.about = ElidedLabel("body", "textSecondary")
         self.finder = SearchField(theme, _("Find an action"))
         self.finder.setFixedWidth(FINDER_WIDTH)
         self.finder.setMinimumHeight(theme.size("control", "form"))
@@ -128,7 +128,7 @@ class RobotsPanel(OneRobotPanel):
         self.list.chosen.connect(self.choose)
         self.list.forgotten.connect(self.forget)
         self.items = self.list.items
-        self._list_line = Line(theme, upright=True)
+        self._list_line = Separator(theme, upright=True)
         right = QVBoxLayout()
         right.setSpacing(0)
         self.head = head = RobotHead(theme)
@@ -137,7 +137,7 @@ class RobotsPanel(OneRobotPanel):
         self.finder.textChanged.connect(self._filter)
         self.stop.clicked.connect(lambda: self.session.runs.stop_robot(self._robot))
         right.addWidget(head)
-        right.addWidget(Line(theme))
+        right.addWidget(Separator(theme))
         right.addWidget(self._make_cards(), 1)
         robot = QWidget()
         robot.setLayout(right)

@@ -12,7 +12,7 @@ from app.ui.shell.commands.shell import Shell
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Line, paint
+from app.ui.widgets import Button, Separator, paint
 from nep.i18n import _
 
 FREEZE = "view.freeze"
@@ -70,7 +70,7 @@ class DeveloperTools(QObject):
         self._actions[FREEZE].triggered.connect(self.refresh)
         self.layout.clicked.connect(lambda: menus.drop_layouts(self.layout))
         self.panels.clicked.connect(lambda: menus.drop_panels(self.panels))
-        self._wide_only = (Line(theme, upright=True, length=24), self.layout, self.panels)
+        self._wide_only = (Separator(theme, upright=True, length=24), self.layout, self.panels)
         tools = (self.freeze, *self._wide_only)
         for place, tool in enumerate(tools):
             bar.add_tool(tool, place)

@@ -11,7 +11,7 @@ from app.ui.shell.actions.actions import Actions
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, label, paint
+from app.ui.widgets import Button, IconButton, RunButton, Separator, StopButton, label, paint
 from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
@@ -269,7 +269,7 @@ class RunBar(Bar):
         row.addSpacing(-4)
         row.addWidget(self.pace)
         row.addSpacing(-4)
-        row.addWidget(Line(theme, upright=True, length=28))
+        row.addWidget(Separator(theme, upright=True, length=28))
         row.addSpacing(8)
         row.addWidget(self.mark)
         row.addWidget(self.sentence, 1)

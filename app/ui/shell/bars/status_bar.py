@@ -15,7 +15,7 @@ from app.core.robots.robot_link import STOPPING
 from app.core.session import Session
 from app.ui.text.numbers import age_words, grouped
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Line, StatusItem, paint
+from app.ui.widgets import Separator, StatusItem, paint
 from nep.i18n import _, ngettext
 
 Fact = tuple[str, str, str | None]  # icon, words, status
@@ -160,13 +160,13 @@ class StatusBar(QWidget):
         self._row = QHBoxLayout(self)
         self._row.setContentsMargins(16, 0, 16, 0)
         self._row.setSpacing(0)
-        self._left: list[tuple[StatusItem, Line]] = []
-        self._right: list[tuple[StatusItem, Line]] = []
+        self._left: list[tuple[StatusItem, Separator]] = []
+        self._right: list[tuple[StatusItem, Separator]] = []
         self._row.addStretch(1)
 
-    def _grow(self, items: list[tuple[StatusItem, Line]], count: int, *, right: bool) -> None:
+    def _grow(self, items: list[tuple[StatusItem, Separator]], count: int, *, right: bool) -> None:
         while len(items) < count:
-            item, line = StatusItem(self._theme), Line(self._theme, upright=True)
+            item, line = StatusItem(self._theme), Separator(self._theme, upright=True)
             holder = QWidget()
             row = QHBoxLayout(holder)
             row.setContentsMargins(0, 0, 0, 0)

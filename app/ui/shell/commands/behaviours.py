@@ -24,14 +24,14 @@ else:
 Answer = tuple[str, Callable[[], object]]
 
 
-class Offers(Protocol):
+class OfferChoice(Protocol):
     """Offers something once, with two answers: their words, and what they do."""
 
     def __call__(self, title: str, detail: str, yes: Answer, no: Answer) -> None: ...
 
 
 @runtime_checkable
-class Undoes(Protocol):
+class SupportsUndo(Protocol):
     """A panel whose edits can be undone."""
 
     def undo(self) -> None:
@@ -42,7 +42,7 @@ class Undoes(Protocol):
 
 
 @runtime_checkable
-class ShowsBlocks(Protocol):
+class SupportsShowBlock(Protocol):
     """A panel that can bring a block into view."""
 
     def show_block(self, block: str) -> None:
@@ -50,7 +50,7 @@ class ShowsBlocks(Protocol):
 
 
 @runtime_checkable
-class FindsBlocks(Protocol):
+class SupportsFindBlocks(Protocol):
     """A panel that finds blocks by words."""
 
     def find_blocks(self, *, to_add: bool) -> None:
@@ -155,27 +155,27 @@ class BehaviourCommands:
     def undo(self) -> None:
         """Take back the last edit of the blocks."""
         editor = self._shell.editor()
-        if isinstance(editor, Undoes):
+        if isinstance(editor, SupportsUndo):
             editor.undo()
 
     def redo(self) -> None:
         """Do it again."""
         editor = self._shell.editor()
-        if isinstance(editor, Undoes):
+        if isinstance(editor, SupportsUndo):
             editor.redo()
 
     def show_block(self, block: str) -> None:
         """Scroll to a block by its id."""
         self._shell.show_layout("behaviour")
         editor = self._shell.editor()
-        if isinstance(editor, ShowsBlocks):
+        if isinstance(editor, SupportsShowBlock):
             editor.show_block(block)
 
     def find_blocks(self, *, to_add: bool) -> None:
         """Ask for the words of blocks in the behaviour, or of blocks to add."""
         self._shell.show_layout("behaviour")
         editor = self._shell.editor()
-        if isinstance(editor, FindsBlocks):
+        if isinstance(editor, SupportsFindBlocks):
             editor.find_blocks(to_add=to_add)
 
     # -- files of before --------------------------------------------------------------------------
@@ -210,7 +210,7 @@ class BehaviourCommands:
         self._shell.show_recent()
         return kept
 
-    def come_back(self, left: Sequence[Unsaved], offer: Offers) -> None:
+    def come_back(self, left: Sequence[Unsaved], offer: OfferChoice) -> None:
         """Open the tabs of the last start; offer what a Studio that died left behind."""
         rest = self._session.tabs.come_back(left)
         if not rest:

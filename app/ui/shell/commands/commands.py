@@ -17,7 +17,7 @@ from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS, Hand
 from app.ui.shell.commands.view import ViewCommands
 from app.ui.shell.documents import DocumentController
 from app.ui.shell.stop_keys import StopKeys
-from app.ui.widgets.file_dialogs import Asks
+from app.ui.widgets.file_dialogs import FileDialogs
 
 _ABOUT = {command.id: command for command in ARGUMENT_COMMANDS}
 
@@ -25,7 +25,7 @@ _ABOUT = {command.id: command for command in ARGUMENT_COMMANDS}
 class Commands:
     """Gives a window its menus and keys, and whoever names a command what that does."""
 
-    def __init__(self, shell: Shell, session: Session, asks: Asks) -> None:
+    def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         keys = Shortcuts(session.settings, shell.complain, COMMANDS)
         self.files = DocumentController(
             session, asks, shell.say, partial(bring_into_view, shell), shell.editor

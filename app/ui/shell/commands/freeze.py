@@ -10,7 +10,7 @@ from app.ui.shell.docking.workbench import Workbench
 
 
 @runtime_checkable
-class Freezes(Protocol):
+class SupportsFreeze(Protocol):
     """A panel whose button ``freeze`` holds what it shows; the button hides when there is nothing."""
 
     freeze: QAbstractButton
@@ -19,7 +19,7 @@ class Freezes(Protocol):
 def freezable(bench: Workbench | None) -> list[QAbstractButton]:
     """The buttons of the open panels that show something live now."""
     panels = [bench.docks[name].panel for name in bench.open_names()] if bench is not None else []
-    buttons = [panel.freeze for panel in panels if isinstance(panel, Freezes)]
+    buttons = [panel.freeze for panel in panels if isinstance(panel, SupportsFreeze)]
     return [button for button in buttons if not button.isHidden()]
 
 

@@ -20,7 +20,7 @@ from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.shell import START, Shell
 from app.ui.shell.dialogs.about import AboutSheet
 from app.ui.shell.documents import DocumentController
-from app.ui.theme.system import Wish
+from app.ui.theme.system import Preference
 from app.ui.theme.theme import Mode
 from app.ui.widgets.lists.fuzzy import Entry
 from nep.i18n import _
@@ -44,7 +44,7 @@ TEXT_STEP = 25
 
 
 @runtime_checkable
-class ChoosesRobot(Protocol):
+class SupportsRobotChoice(Protocol):
     """A panel that can show one robot of many."""
 
     def choose(self, name: str) -> None:
@@ -111,7 +111,7 @@ class ViewCommands:
             self._mark_topic(name)
         elif kind == "robot":
             dock = shell.open_panel("robots")
-            if dock is not None and isinstance(dock.panel, ChoosesRobot):
+            if dock is not None and isinstance(dock.panel, SupportsRobotChoice):
                 dock.panel.choose(name)
         elif kind == "layout":
             self.show_own_layout(name)
@@ -285,5 +285,5 @@ class ViewCommands:
         AboutSheet(self._shell.theme, self._shell.surface).open()
 
 
-def _wish(action: QAction) -> Wish:
+def _wish(action: QAction) -> Preference:
     return "on" if action.isChecked() else "off"

@@ -11,7 +11,7 @@ from app.core.messages import snapshots
 from app.core.storage.settings import Settings
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.window_state import WindowState
-from app.ui.theme.system import WISHES
+from app.ui.theme.system import PREFERENCES
 from app.ui.theme.theme import MODES, Theme
 from app.ui.widgets import Button, ComboBox, Elided, IconButton, Segments, label
 from app.ui.widgets.file_dialogs import show_free
@@ -24,7 +24,7 @@ MODE_WORDS = {
     "dark": (lazy("Dark"), "moon"),
     "system": (lazy("As the system"), "monitor"),
 }
-WISH_WORDS = {"system": lazy("As the system"), "on": lazy("On"), "off": lazy("Off")}
+PREFERENCE_WORDS = {"system": lazy("As the system"), "on": lazy("On"), "off": lazy("Off")}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
 SIDE_BY_SIDE = 3
 """So many languages stand side by side; more are a list to open."""
@@ -46,11 +46,11 @@ class SettingsSheet(Overlay):
         self.text = Segments(
             theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name=_("Text size")
         )
-        wishes = [(wish, _(WISH_WORDS[wish]), None) for wish in WISHES]
+        wishes = [(wish, _(PREFERENCE_WORDS[wish]), None) for wish in PREFERENCES]
         self.contrast = Segments(theme, wishes, check=True, size="form", name=_("High contrast"))
         self.motion = Segments(theme, wishes, check=True, size="form", name=_("Less motion"))
         self.shortcuts = Button(theme, _("Change the shortcuts"), "keyboard", size="form")
-        self.folder = Elided("bodyLarge", "textSecondary")
+        self.folder = ElidedLabel("bodyLarge", "textSecondary")
         self.choose = Button(theme, _("Choose a folder"), "folder-open", size="form")
         self.mode.changed.connect(self._mode)
         self.text.changed.connect(lambda percent: self._changed(lambda: theme.set_text_percent(int(percent))))
@@ -172,11 +172,11 @@ class SettingsSheet(Overlay):
         self._changed(lambda: self.theme.set_mode(mode))
 
     def _contrast(self, chosen: str) -> None:
-        wish = next(wish for wish in WISHES if wish == chosen)
+        wish = next(wish for wish in PREFERENCES if wish == chosen)
         self._changed(lambda: self.theme.set_contrast(wish))
 
     def _motion(self, chosen: str) -> None:
-        wish = next(wish for wish in WISHES if wish == chosen)
+        wish = next(wish for wish in PREFERENCES if wish == chosen)
         self._changed(lambda: self.theme.set_motion(wish))
 
     def _choose(self) -> None:

@@ -112,7 +112,7 @@ class DockBody(QWidget):
         painter.end()
 
 
-class Unmade(PanelWidget):
+class FailedPanel(PanelWidget):
     """Has the place of a panel that could not be made, and keeps what that is to be given back.
 
     Its first refresh raises what the making raised; each one after that makes the panel.
@@ -311,13 +311,13 @@ class Dock(QDockWidget):
             menu.popup(QCursor.pos())
 
 
-def made(description: Panel, context: PanelContext, density: Density) -> Dock:
+def make_dock(description: Panel, context: PanelContext, density: Density) -> Dock:
     """A dock with a new panel; when that can't be made, what stands in its place says so when it is seen."""
     try:
         return Dock(context.theme, description, description.make(context), density)
     except FAULTS as error:
         traceback.clear_frames(error.__traceback__)
-        unmade = Unmade(context, description, error)
+        unmade = FailedPanel(context, description, error)
     dock = Dock(context.theme, description, unmade, density)
     unmade.take = dock.replace
     return dock

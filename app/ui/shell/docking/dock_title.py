@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.ui.panels.base import Density, PanelWidget
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Elided, IconButton, paint, set_role
+from app.ui.widgets import ElidedLabel, IconButton, paint, set_role
 from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _
 
@@ -51,8 +51,8 @@ class DockTitle(QWidget):
         self._least = theme.size("panelTitle", density)  # asked thousands of times while panels are arranged
         self._whole = panel.replaces_title()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.name = Elided("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
-        self._subtitle = Elided("code", "textTertiary")
+        self.name = ElidedLabel("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
+        self._subtitle = ElidedLabel("code", "textTertiary")
         self._tabs: list[TitleTab] = []
         self.more = IconButton(theme, "ellipsis", _("More about {panel}").format(panel=panel.title()))
         self.more.clicked.connect(lambda: self.menu_wanted.emit(self.more))

@@ -11,7 +11,7 @@ from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.shell.docking.dock import Dock, made
+from app.ui.shell.docking.dock import Dock, make_dock
 from app.ui.shell.docking.layouts import Layout
 from app.ui.shell.docking.sizes import fit
 from app.ui.theme.theme import Theme
@@ -125,7 +125,7 @@ class Workbench(QMainWindow):
         description = self._panels.get(name)
         if description is None:
             return None
-        dock = made(description, self._context, self._layout.density)
+        dock = make_dock(description, self._context, self._layout.density)
         dock.dockLocationChanged.connect(self._tabs_soon)
         dock.topLevelChanged.connect(self._tabs_soon)
         dock.visibilityChanged.connect(self._tabs_soon)

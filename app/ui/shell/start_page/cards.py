@@ -16,7 +16,7 @@ from app.ui.text import plain
 from app.ui.text.dates import day_words
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Card, Chip, Elided, label, paint
+from app.ui.widgets import Button, Card, Chip, ElidedLabel, label, paint
 from app.ui.widgets.buttons import LinkButton, PaintedButton
 from nep.i18n import _
 
@@ -180,7 +180,7 @@ class DevelopersLine(QWidget):
         icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14))
         theme.changed.connect(lambda: icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14)))
         row.addWidget(icon)
-        question = Elided("body", "textSecondary")
+        question = ElidedLabel("body", "textSecondary")
         question.setText(_("Do you write programs?"))
         row.addWidget(question)
         row.addWidget(link)

@@ -22,7 +22,7 @@ REMEMBERED = 4000  # cells: some screens full, so that scrolling does not gather
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
-class Shown(Protocol):
+class TableAppearance(Protocol):
     """What painting asks of the table's view; the rows may be of any type."""
 
     row_height: int
@@ -66,7 +66,7 @@ def head_width(theme: Theme, column: Column[Any]) -> int:
 class CellDelegate(QStyledItemDelegate):
     """Paints a `Cell`, and knows what each place showed when it was painted last."""
 
-    def __init__(self, theme: Theme, view: Shown, parent: QWidget) -> None:
+    def __init__(self, theme: Theme, view: TableAppearance, parent: QWidget) -> None:
         super().__init__(parent)
         self._theme = theme
         self._view = view
@@ -149,10 +149,10 @@ class CellDelegate(QStyledItemDelegate):
         painter.drawText(box, Qt.AlignmentFlag.AlignCenter, words)
 
 
-class Head(QHeaderView):
+class TableHeader(QHeaderView):
     """The head: small words, the sorted one in the text's colour with its arrow."""
 
-    def __init__(self, theme: Theme, view: Shown, parent: QWidget) -> None:
+    def __init__(self, theme: Theme, view: TableAppearance, parent: QWidget) -> None:
         super().__init__(Qt.Orientation.Horizontal, parent)
         self._theme = theme
         self._view = view

@@ -35,7 +35,7 @@ from PySide6.QtWidgets import (
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
-from app.ui.widgets.table.cells import CellDelegate, Head, head_width
+from app.ui.widgets.table.cells import CellDelegate, TableHeader, head_width
 from app.ui.widgets.table.columns import ColumnChoice
 from app.ui.widgets.table.model import Cell, Column, Order, TableModel
 
@@ -77,7 +77,7 @@ class TableView(QTableView, Generic[Row]):
         self._model = model
         self._cells = CellDelegate(theme, self, self)
         self.setItemDelegate(self._cells)
-        self.setHorizontalHeader(Head(theme, self, self))
+        self.setHorizontalHeader(TableHeader(theme, self, self))
         head = self.horizontalHeader()
         head.sectionClicked.connect(self._sort)
         head.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
