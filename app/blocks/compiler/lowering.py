@@ -1,4 +1,4 @@
-"""Blocks whose gaps people made themselves, as plain blocks: lists of n items, calls of functions.
+"""Lowering: lists of n items and calls of functions, whose gaps people made, become plain blocks.
 
 A workspace is rewritten once before it is compiled: each such block gets a type of its own, which the
 catalogue then describes like any other block.
