@@ -1,6 +1,6 @@
 // Where Blockly does work again and again that a page with a thousand blocks feels, done once or later.
 import * as Blockly from 'blockly/core';
-import {bringNear} from './culling';
+import {drawNow} from './culling';
 
 const SVG = 'http://www.w3.org/2000/svg';
 
@@ -48,7 +48,7 @@ for (const name of ['setNodeToVisualActiveFocus', 'setNodeToVisualPassiveFocus']
 const focusNode = manager.focusNode;
 manager.focusNode = function (node) {
   const element = node.canBeFocused() ? node.getFocusableElement() : null;
-  bringNear(element);  // what is not drawn cannot have the keys
+  drawNow(element);  // what is not drawn cannot have the keys
   if (node instanceof Blockly.Field && later.delete(node as Told)) node.recomputeAriaContext();
   focusNode.call(this, node);
 };
@@ -95,7 +95,7 @@ const later = new Set<Told>();
 let holding = 0;
 
 /** While `load` makes blocks, their words for screen readers wait; a block's were made four times before. */
-export function wordsLater<T>(load: () => T): T {
+export function withDeferredWords<T>(load: () => T): T {
   holding += 1;
   try {
     return load();

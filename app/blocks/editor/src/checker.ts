@@ -12,7 +12,7 @@ class Checker extends Blockly.ConnectionChecker {
 Blockly.registry.register(Blockly.registry.Type.CONNECTION_CHECKER, 'nep', Checker);
 export const CHECKER = 'nep';
 
-export function leniently<T>(make: () => T): T {
+export function withoutTypeChecks<T>(make: () => T): T {
   const before = lenient;
   lenient = true;
   try {

@@ -7,7 +7,7 @@ const FAR = 'nepFar';
 /** How far outside the view scripts are drawn, in pixels: more than one turn of a wheel. */
 const MARGIN = 240;
 
-export class Far {
+export class Culling {
   /** Each hidden script's wrapping: a <g> that is not displayed is laid out all the same, what is in an <svg> is not. */
   private readonly hidden = new Map<Blockly.BlockSvg, Element>();
   private waiting = 0;
@@ -73,7 +73,7 @@ export class Far {
 }
 
 /** Draws the script that holds this element, at once. */
-export function bringNear(element: Element | null | undefined): void {
+export function drawNow(element: Element | null | undefined): void {
   const wrapping = element?.closest(`.${FAR}`);
   wrapping?.replaceWith(...wrapping.childNodes);
 }

@@ -1,7 +1,7 @@
 // The functions of a behaviour: uses follow their function, and the toolbox offers them.
 import * as Blockly from 'blockly/core';
-import {CALLS, type CallBlock, type DefinitionBlock, FieldFunctionInput, definitionsOf, follow, freshName,
-  functionName} from './mutators';
+import {CALLS, type CallBlock, type DefinitionBlock, FieldFunctionInput, definitionsOf, freshName,
+  functionName, updateCall} from './mutators';
 import {Toolbox} from './toolbox';
 
 export const FUNCTIONS = 'functions';
@@ -68,7 +68,7 @@ export class Functions {
     const byId = new Map(definitions.map((each) => [each.id, each]));
     for (const call of this.calls()) {
       const definition = byId.get(call.target) ?? byName.get(call.called);
-      if (definition) follow(call, definition);
+      if (definition) updateCall(call, definition);
     }
   }
 

@@ -1,7 +1,7 @@
 // Help for one block: a card in the page, made of what the window tells about each block.
 import * as Blockly from 'blockly/core';
 import {iconElement, iconName} from './icons';
-import {isKept} from './unknown_blocks';
+import {isUnknown} from './unknown_blocks';
 import {definitionOf} from './definitions';
 import {t} from './words';
 
@@ -41,7 +41,7 @@ export class HelpCard {
 
   /** Shows the help of this block; false when there is none. */
   show(block: Blockly.BlockSvg | null): boolean {
-    const help = block ? isKept(block) ? keptHelp(block) : helpFor(block.type) : null;
+    const help = block ? isUnknown(block) ? keptHelp(block) : helpFor(block.type) : null;
     if (!block || !help) return false;
     this.close();
     this.back = Blockly.getFocusManager().getFocusedNode();
@@ -107,13 +107,13 @@ function element(tag: string, name: string, words = ''): HTMLElement {
 }
 
 /** “Help” in the context menu of every block that has some. */
-export function offerHelp(show: (block: Blockly.BlockSvg) => void): void {
+export function registerHelpMenu(show: (block: Blockly.BlockSvg) => void): void {
   Blockly.ContextMenuRegistry.registry.register({
     id: 'nepHelp',
     weight: 7,
     scopeType: Blockly.ContextMenuRegistry.ScopeType.BLOCK,
     displayText: () => t('Help'),
-    preconditionFn: ({block}) => block && (isKept(block) || helpFor(block.type)) ? 'enabled' : 'hidden',
+    preconditionFn: ({block}) => block && (isUnknown(block) || helpFor(block.type)) ? 'enabled' : 'hidden',
     callback: ({block}) => block && show(block),
   });
 }

@@ -3,13 +3,13 @@ import * as Blockly from 'blockly/core';
 import './blockly_patches';
 import './fields';
 import './mutators';
-import {HelpCard, focusedBlock, offerHelp} from './help';
+import {HelpCard, focusedBlock, registerHelpMenu} from './help';
 import {iconElement} from './icons';
 import {trimMenu} from './menu';
 import {FindBar} from './search';
 import {type Tab} from './tab';
-import {type Definitions, type Shown, Tabs} from './tabs';
-import {putVariables} from './theme';
+import {type Definitions, type ShownTab, Tabs} from './tabs';
+import {setCssVariables} from './theme';
 import {type Tokens, useTokens} from './tokens';
 import {type Alarm, showAlarms} from './toolbox';
 import {t, useWords} from './words';
@@ -53,7 +53,7 @@ class Editor {
     // A hidden page draws no frames, and Blockly tells of edits only after a frame.
     document.addEventListener('visibilitychange', () => document.hidden && this.shown.program.flush());
     this.makeZoomButtons();
-    offerHelp((block) => this.help.show(block));
+    registerHelpMenu((block) => this.help.show(block));
     let told = false;
     const tellBlock = () => queueMicrotask(() => {
       const has = focusedBlock() !== null;
@@ -83,14 +83,14 @@ class Editor {
     theme: (it: {tokens: Tokens; dark: boolean}) => this.setTheme(it.tokens, it.dark),
     motion: (it: {reduced: boolean}) => document.documentElement.classList.toggle('reduced', it.reduced),
     definitions: (it: Definitions) => this.tabs.define(it),
-    tab: (it: Shown) => this.showTab(it),
+    tab: (it: ShownTab) => this.showTab(it),
     close: (key: string) => this.tabs.close(key),
-    highlight: (ids: string[]) => this.shown.states.highlight(ids),
-    stopped: (ids: string[]) => this.shown.states.markStopped(ids),
-    errors: (errors: Record<string, string>) => this.shown.states.setErrors(errors),
-    absent: (ids: string[]) => this.shown.states.setAbsent(ids),
+    highlight: (ids: string[]) => this.shown.overlays.highlight(ids),
+    stopped: (ids: string[]) => this.shown.overlays.markStopped(ids),
+    errors: (errors: Record<string, string>) => this.shown.overlays.setErrors(errors),
+    absent: (ids: string[]) => this.shown.overlays.setAbsent(ids),
     alarms: (alarms: Record<string, Alarm>) => showAlarms(alarms),
-    live: (it: {values: Record<string, string>; old: string[]}) => this.shown.states.setLive(it.values, it.old),
+    live: (it: {values: Record<string, string>; old: string[]}) => this.shown.overlays.setLive(it.values, it.old),
     flush: (token: number) => this.bridge.flushed(token, this.shown.program.flush()),
     change: (state: Record<string, unknown>) => this.shown.change(state),
     undo: () => this.shown.program.undo(false),
@@ -103,7 +103,7 @@ class Editor {
     search: () => this.shown.search(),
   };
 
-  private showTab(it: Shown): void {
+  private showTab(it: ShownTab): void {
     this.help.close();
     this.tabs.show(it);
     this.find.again();
@@ -118,7 +118,7 @@ class Editor {
 
   private setTheme(tokens: Tokens, dark: boolean): void {
     useTokens(tokens, dark);
-    putVariables(dark);
+    setCssVariables(dark);
     this.tabs.themeChanged();
   }
 
@@ -165,7 +165,7 @@ async function useLanguage(wanted: string): Promise<string> {
 async function start(bridge: Bridge): Promise<void> {
   const beginning = JSON.parse(await bridge.beginning()) as Beginning;
   useTokens(beginning.theme.tokens, beginning.theme.dark);
-  putVariables(beginning.theme.dark);
+  setCssVariables(beginning.theme.dark);
   document.documentElement.classList.toggle('reduced', beginning.reduced);
   useWords(beginning.words ?? {});
   const language = await useLanguage(beginning.language);

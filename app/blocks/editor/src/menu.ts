@@ -1,6 +1,6 @@
 // Fewer entries, plain words.
 import * as Blockly from 'blockly/core';
-import {offerRemoving} from './remove_menu';
+import {registerRemoveMenu} from './remove_menu';
 import {lazy, t} from './words';
 
 const REMOVED = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockCollapseExpand', 'blockDisable',
@@ -21,7 +21,7 @@ const WORDS: Readonly<Record<string, string>> = {
 };
 
 export function trimMenu(language: string): void {
-  offerRemoving();
+  registerRemoveMenu();
   for (const id of REMOVED) {
     if (Blockly.ContextMenuRegistry.registry.getItem(id)) Blockly.ContextMenuRegistry.registry.unregister(id);
   }

@@ -213,7 +213,7 @@ function startCall(this: CallBlock): void {
 }
 
 /** Lets a call follow its function: name, and which inputs there are. */
-export function follow(call: CallBlock, definition: DefinitionBlock): void {
+export function updateCall(call: CallBlock, definition: DefinitionBlock): void {
   const name = functionName(definition);
   const same = call.target === definition.id && call.called === name && JSON.stringify(call.own) === JSON.stringify(definition.own);
   if (!same) reshape(call, () => call.showCall(definition.id, name, definition.own));

@@ -3,7 +3,7 @@ import * as Blockly from 'blockly/core';
 import {definitionOf, sensorTypes} from './definitions';
 import {FieldLive} from './fields';
 import {drawIcon} from './icons';
-import {isKept} from './unknown_blocks';
+import {isUnknown} from './unknown_blocks';
 import {type BlockState, pathOf} from './renderer';
 import {t} from './words';
 
@@ -12,7 +12,7 @@ const BUBBLE_WIDTH = 300;
 const GAP = 14;
 const PICTURE_MS = 66;
 
-export class States {
+export class Overlays {
   private running = new Set<string>();
   private next: string[] = [];
   private resting = 0;
@@ -117,11 +117,11 @@ export class States {
   private dress(): void {
     for (const block of this.workspace.getAllBlocks(false)) {
       const parent = block.isShadow() ? block.getParent() : null;
-      const grey = isKept(block) || this.absent.has(block.id) || (parent !== null && this.absent.has(parent.id));
+      const grey = isUnknown(block) || this.absent.has(block.id) || (parent !== null && this.absent.has(parent.id));
       const root = block.getSvgRoot();
       if (root.classList.contains('nepAbsent') === grey) continue;
       root.classList.toggle('nepAbsent', grey);
-      if (isKept(block)) continue;
+      if (isUnknown(block)) continue;
       block.setTooltip(grey ? absentSentence(block) : String(definitionOf(block.type)?.['tooltip'] ?? ''));
     }
   }

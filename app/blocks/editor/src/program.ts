@@ -1,9 +1,9 @@
 // The workspace as JSON: loading, saving, telling the window about real edits.
 import * as Blockly from 'blockly/core';
-import {leniently} from './checker';
-import type {Far} from './culling';
-import {type BlockState, KEPT, keep, keepWhole, unkeep} from './unknown_blocks';
-import {wordsLater} from './blockly_patches';
+import {withoutTypeChecks} from './checker';
+import type {Culling} from './culling';
+import {type BlockState, UNKNOWN_BLOCK, wrapUnknown, wrapWholeStack, unwrapUnknown} from './unknown_blocks';
+import {withDeferredWords} from './blockly_patches';
 
 type Json = Record<string, unknown>;
 
@@ -23,7 +23,7 @@ export class Program {
   private historyTold = 'false false';
   private loading = false;
 
-  constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly far: Far,
+  constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly culling: Culling,
     private readonly listener: Listener) {
     workspace.addChangeListener((event) => this.onEvent(event));
   }
@@ -37,7 +37,7 @@ export class Program {
     this.told = JSON.stringify(this.save());
     this.tellHistory();
     this.goHome();
-    this.far.look();
+    this.culling.look();
   }
 
   /** Another program in the place of this one, as one edit that undo takes back; the view stays. */
@@ -83,7 +83,7 @@ export class Program {
   save(): Json {
     const state = Blockly.serialization.workspaces.save(this.workspace) as Json;
     const blocks = state['blocks'] as {blocks: BlockState[]} | undefined;
-    if (blocks) state['blocks'] = {...blocks, blocks: blocks.blocks.map(unkeep)};
+    if (blocks) state['blocks'] = {...blocks, blocks: blocks.blocks.map(unwrapUnknown)};
     return {...this.rest, ...state};
   }
 
@@ -134,13 +134,13 @@ export class Program {
     try {
       this.loadOthers(others, how);
       this.workspace.setResizesEnabled(false);
-      leniently(() => wordsLater(() => {
+      withoutTypeChecks(() => withDeferredWords(() => {
         for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, how);
       }));
     } finally {
       Blockly.utils.dom.stopTextWidthCache();
       this.workspace.setResizesEnabled(true);
-      this.far.lookSoon();
+      this.culling.lookSoon();
     }
   }
 
@@ -158,13 +158,13 @@ export class Program {
   private append(state: BlockState, how: {recordUndo?: boolean}): void {
     const before = this.workspace.getTopBlocks(false).length;
     try {
-      Blockly.serialization.blocks.append(keep(state) as Blockly.serialization.blocks.State, this.workspace, how);
+      Blockly.serialization.blocks.append(wrapUnknown(state) as Blockly.serialization.blocks.State, this.workspace, how);
     } catch (error) {
       console.warn(`kept whole: ${String(error)}`);
       for (const block of this.workspace.getTopBlocks(false).slice(before)) block.dispose(false);
-      Blockly.serialization.blocks.append(keepWhole(state) as Blockly.serialization.blocks.State, this.workspace, how);
+      Blockly.serialization.blocks.append(wrapWholeStack(state) as Blockly.serialization.blocks.State, this.workspace, how);
     }
-    this.far.hide(this.workspace.getTopBlocks(false).slice(before));
+    this.culling.hide(this.workspace.getTopBlocks(false).slice(before));
   }
 
   private onEvent(event: Blockly.Events.Abstract): void {
@@ -194,7 +194,7 @@ export class Program {
 /** Whether the workspace holds a block of one of the types, or a kept block whose own type is among them. */
 export function holdsAny(workspace: Blockly.Workspace, types: ReadonlySet<string>): boolean {
   return workspace.getAllBlocks(false).some((block) => types.has(block.type) ||
-    (block.type === KEPT && keptMatches(block, types)));
+    (block.type === UNKNOWN_BLOCK && keptMatches(block, types)));
 }
 
 function keptMatches(block: Blockly.Block, types: ReadonlySet<string>): boolean {

@@ -1,6 +1,6 @@
 // Taking any item out of a list, any input off a function: entries of the menu, for mouse and keys.
 import * as Blockly from 'blockly/core';
-import {leniently} from './checker';
+import {withoutTypeChecks} from './checker';
 import {definitionOf} from './definitions';
 import {DEFINITIONS, type DefinitionBlock, MOST_INPUTS, changeInputs} from './mutators';
 import {t} from './words';
@@ -33,7 +33,7 @@ function removeItem({list, number}: Item): void {
   const saved = Blockly.serialization.blocks.save(list, {addCoordinates: true}) as State;
   const {workspace} = list;
   list.dispose(false);
-  const made = leniently(() => {
+  const made = withoutTypeChecks(() => {
     const block = Blockly.serialization.blocks.append(without(saved, number), workspace, {recordUndo: true});
     const own = block.outputConnection ?? block.previousConnection;
     if (holder && own) holder.connect(own);
@@ -79,7 +79,7 @@ function wanted(block: Blockly.BlockSvg, event: Event): Item | null {
   return itemOf((id ? block.workspace.getBlockById(id) : null) ?? asked ?? block);
 }
 
-export function offerRemoving(): void {
+export function registerRemoveMenu(): void {
   const scopeType = Blockly.ContextMenuRegistry.ScopeType.BLOCK;
   Blockly.ContextMenuRegistry.registry.register({
     id: 'nepRemoveItem', weight: 5, scopeType,

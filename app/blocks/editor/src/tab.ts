@@ -2,12 +2,12 @@
 import * as Blockly from 'blockly/core';
 import {CHECKER} from './checker';
 import {FieldChoice} from './choices';
-import {Far} from './culling';
+import {Culling} from './culling';
 import {Functions} from './functions';
-import {offeredSensors, onFlyout} from './visible_sensors';
+import {visibleSensors, observeFlyout} from './visible_sensors';
 import {Program, holdsAny} from './program';
 import {RENDERER} from './renderer';
-import {States} from './overlays';
+import {Overlays} from './overlays';
 import {makeTheme} from './theme';
 import {Toolbox} from './toolbox';
 
@@ -24,9 +24,9 @@ export interface TabListener {
 export class Tab {
   readonly workspace: Blockly.WorkspaceSvg;
   readonly program: Program;
-  readonly states: States;
+  readonly overlays: Overlays;
   private readonly functions: Functions;
-  private readonly far: Far;
+  private readonly culling: Culling;
   key = '';
   generation = 0;
   private readonly frame = document.createElement('div');
@@ -47,18 +47,18 @@ export class Tab {
       move: {scrollbars: true, drag: true, wheel: true},
       zoom: {controls: false, wheel: true, pinch: true, startScale: SCALE, minScale: 0.3, maxScale: 2},
     });
-    this.far = new Far(this.workspace);
-    this.program = new Program(this.workspace, this.far, {
+    this.culling = new Culling(this.workspace);
+    this.program = new Program(this.workspace, this.culling, {
       changed: (json) => listener.changed(this, json),
       history: (canUndo, canRedo) => listener.history(this, canUndo, canRedo),
       selected: (id) => listener.selected(this, id),
     });
-    this.states = new States(this.workspace);
+    this.overlays = new Overlays(this.workspace);
     this.functions = new Functions(this.workspace);
     const toolbox = this.workspace.getToolbox();
-    if (toolbox instanceof Toolbox) toolbox.onFound = () => this.states.showLive();
+    if (toolbox instanceof Toolbox) toolbox.onFound = () => this.overlays.showLive();
     const flyout = this.workspace.getFlyout();
-    if (flyout) onFlyout(flyout, () => listener.offered(this));
+    if (flyout) observeFlyout(flyout, () => listener.offered(this));
     this.workspace.registerButtonCallback('CREATE_VARIABLE', (button) =>
       Blockly.Variables.createVariableButtonHandler(button.getTargetWorkspace()));
   }
@@ -69,7 +69,7 @@ export class Tab {
     this.program.load(state);
     this.functions.refresh();
     this.generation = generation;
-    this.states.forget();
+    this.overlays.forget();
   }
 
   /** Another program in the place of this one, as an edit that can be undone. */
@@ -77,7 +77,7 @@ export class Tab {
     this.letGo();
     this.program.change(state);
     this.functions.refresh();
-    this.states.restore();
+    this.overlays.restore();
   }
 
   show(): void {
@@ -93,7 +93,7 @@ export class Tab {
   /** The page has another size. */
   resize(): void {
     Blockly.svgResize(this.workspace);
-    this.far.lookSoon();
+    this.culling.lookSoon();
   }
 
   /** Tells the newest edits and takes it off the screen; what is told to it meanwhile waits until `show`. */
@@ -146,7 +146,7 @@ export class Tab {
       this.program.rebuild();
       this.functions.refresh();
     }
-    if (this.themeOutdated || rebuilt) this.states.restore();
+    if (this.themeOutdated || rebuilt) this.overlays.restore();
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox && this.toolboxDefinition) {
       toolbox.update(this.toolboxDefinition, this.outdated.size > 0);
@@ -174,7 +174,7 @@ export class Tab {
 
   /** The sensors that the open toolbox shows. */
   get offered(): [robot: string, sensor: string][] {
-    return offeredSensors(this.workspace.getFlyout());
+    return visibleSensors(this.workspace.getFlyout());
   }
 
   /** Whether a block is in the hand here. */

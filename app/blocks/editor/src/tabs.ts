@@ -15,7 +15,7 @@ export interface Definitions {
   sources?: Record<string, Option[]>;
 }
 
-export interface Shown {
+export interface ShownTab {
   key: string;
   /** With a program: load it here. Without: show what is here already. */
   generation?: number;
@@ -33,7 +33,7 @@ export class Tabs {
     this.shown = this.make();
   }
 
-  show({key, generation, workspace}: Shown): void {
+  show({key, generation, workspace}: ShownTab): void {
     this.applyWaiting();
     const tab = this.tabs.get(key) ?? this.free() ?? this.make();
     tab.key = key;

@@ -48,7 +48,7 @@ export function makeTheme(): Blockly.Theme {
 }
 
 /** Puts every colour role on the page as `--nep-<role>`. */
-export function putVariables(dark: boolean): void {
+export function setCssVariables(dark: boolean): void {
   const style = document.documentElement.style;
   for (const [role, value] of roles()) style.setProperty(`--nep-${role}`, value);
   style.setProperty('color-scheme', dark ? 'dark' : 'light');

@@ -5,9 +5,9 @@ import {type BlockDefinition, definitionOf, fieldNames, inputKinds} from './defi
 import {readInputs} from './mutators';
 import {t} from './words';
 
-export const KEPT = 'nep_kept';
+export const UNKNOWN_BLOCK = 'nep_kept';
 
-export interface Connected {
+export interface ConnectionState {
   block?: BlockState;
   shadow?: BlockState;
 }
@@ -18,8 +18,8 @@ export interface BlockState {
   x?: number;
   y?: number;
   fields?: Record<string, unknown>;
-  inputs?: Record<string, Connected>;
-  next?: Connected;
+  inputs?: Record<string, ConnectionState>;
+  next?: ConnectionState;
   extraState?: unknown;
   [other: string]: unknown;
 }
@@ -36,21 +36,21 @@ interface KeptState {
   whole?: boolean;
 }
 
-function mapInputs(inputs: Record<string, Connected>, change: (each: Connected, name: string) => Connected) {
+function mapInputs(inputs: Record<string, ConnectionState>, change: (each: ConnectionState, name: string) => ConnectionState) {
   return Object.fromEntries(Object.entries(inputs).map(([name, each]) => [name, change(each, name)]));
 }
 
 /** `state` with every block that cannot be made here replaced by a kept one. */
-export function keep(state: BlockState, shape: Shape | null = null): BlockState {
+export function wrapUnknown(state: BlockState, shape: Shape | null = null): BlockState {
   const definition = definitionOf(state.type);
   const known = definition !== null && fits(state, definition, shape);
   const own = known ? inputKinds(definition) : new Map<string, InputKind>();
-  const kindOf = (name: string, each: Connected): InputKind => own.get(name) ?? guessInput(name, each);
+  const kindOf = (name: string, each: ConnectionState): InputKind => own.get(name) ?? guessInput(name, each);
   const result: BlockState = {...state};
   if (state.inputs) {
-    result.inputs = mapInputs(state.inputs, (each, name) => keepConnected(each, kindOf(name, each)));
+    result.inputs = mapInputs(state.inputs, (each, name) => wrapConnected(each, kindOf(name, each)));
   }
-  if (state.next) result.next = keepConnected(state.next, 'statement');
+  if (state.next) result.next = wrapConnected(state.next, 'statement');
   if (known) return result;
   const {id, x, y, inputs, next, ...original} = state;
   const form = shape ?? guessTop(state);
@@ -61,27 +61,27 @@ export function keep(state: BlockState, shape: Shape | null = null): BlockState 
     inputs: Object.entries(inputs ?? {}).map(([name, each]) => [name, kindOf(name, each)]),
     label: labelOf(state),
   };
-  return {...position(id, x, y), type: KEPT, extraState: kept,
+  return {...position(id, x, y), type: UNKNOWN_BLOCK, extraState: kept,
     ...(result.inputs && {inputs: result.inputs}), ...(form !== 'value' && result.next && {next: result.next})};
 }
 
-/** One kept block that holds a whole stack: the last resort when even `keep` cannot be made. */
-export function keepWhole(state: BlockState): BlockState {
+/** One kept block that holds a whole stack: the last resort when even `wrapUnknown` cannot be made. */
+export function wrapWholeStack(state: BlockState): BlockState {
   const {id, x, y, ...original} = state;
   const kept: KeptState = {original, shape: 'statement', inputs: [], label: labelOf(state), whole: true};
-  return {...position(id, x, y), type: KEPT, extraState: kept};
+  return {...position(id, x, y), type: UNKNOWN_BLOCK, extraState: kept};
 }
 
-/** The opposite of `keep` and `keepWhole`. */
-export function unkeep(state: BlockState): BlockState {
+/** The opposite of `wrapUnknown` and `wrapWholeStack`. */
+export function unwrapUnknown(state: BlockState): BlockState {
   const {inputs, next, ...result} = state as BlockState;
   if (inputs) {
-    const filled = Object.entries(inputs).map(([name, each]) => [name, unkeepConnected(each)] as const)
+    const filled = Object.entries(inputs).map(([name, each]) => [name, unwrapConnected(each)] as const)
       .filter(([, each]) => each.block || each.shadow);
     if (filled.length) result['inputs'] = Object.fromEntries(filled);
   }
-  if (next?.block || next?.shadow) result['next'] = unkeepConnected(next);
-  if (state.type !== KEPT) return result as BlockState;
+  if (next?.block || next?.shadow) result['next'] = unwrapConnected(next);
+  if (state.type !== UNKNOWN_BLOCK) return result as BlockState;
   const kept = state.extraState as KeptState;
   const {type, extraState, ...rest} = result;
   void type;
@@ -93,14 +93,14 @@ function position(id?: string, x?: number, y?: number): Record<string, unknown> 
   return {...(id !== undefined && {id}), ...(x !== undefined && {x}), ...(y !== undefined && {y})};
 }
 
-function keepConnected(each: Connected, kind: InputKind): Connected {
-  return {...each, ...(each.block && {block: keep(each.block, kind)}),
-    ...(each.shadow && {shadow: keep(each.shadow, kind)})};
+function wrapConnected(each: ConnectionState, kind: InputKind): ConnectionState {
+  return {...each, ...(each.block && {block: wrapUnknown(each.block, kind)}),
+    ...(each.shadow && {shadow: wrapUnknown(each.shadow, kind)})};
 }
 
 /** Without the `null` that Blockly writes for the grey preview of a block that is still being dragged. */
-function unkeepConnected(each: Connected): Connected {
-  return {...(each.shadow && {shadow: unkeep(each.shadow)}), ...(each.block && {block: unkeep(each.block)})};
+function unwrapConnected(each: ConnectionState): ConnectionState {
+  return {...(each.shadow && {shadow: unwrapUnknown(each.shadow)}), ...(each.block && {block: unwrapUnknown(each.block)})};
 }
 
 /** Whether the definition has a place for everything that the state holds. */
@@ -125,9 +125,9 @@ function hasInput(state: BlockState, definition: BlockDefinition, name: string):
     Number(number) < Math.min(50, typeof extra.items === 'number' ? extra.items : 3);
 }
 
-function guessInput(name: string, each: Connected): InputKind {
+function guessInput(name: string, each: ConnectionState): InputKind {
   const child = each.block ?? each.shadow;
-  if (child?.type === KEPT) return (child.extraState as KeptState).shape === 'value' ? 'value' : 'statement';
+  if (child?.type === UNKNOWN_BLOCK) return (child.extraState as KeptState).shape === 'value' ? 'value' : 'statement';
   const definition = child ? definitionOf(child.type) : null;
   if (definition) return 'output' in definition ? 'value' : 'statement';
   return child?.next || /^(do|else|then|body|stack|substack)/i.test(name) ? 'statement' : 'value';
@@ -149,11 +149,11 @@ interface KeptBlock extends Blockly.Block {
 }
 
 /** Whether this block stands for one that is not known here. */
-export function isKept(block: Blockly.Block): boolean {
-  return block.type === KEPT;
+export function isUnknown(block: Blockly.Block): boolean {
+  return block.type === UNKNOWN_BLOCK;
 }
 
-Blockly.Blocks[KEPT] = {
+Blockly.Blocks[UNKNOWN_BLOCK] = {
   init(this: KeptBlock) {
     this.setStyle('kept');
     this.setInputsInline(true);

@@ -4,7 +4,7 @@ import {sensorTypes} from './definitions';
 import {sensorOf} from './overlays';
 
 /** Calls `look` after whatever opens, fills or closes it. */
-export function onFlyout(flyout: Blockly.IFlyout, look: () => void): void {
+export function observeFlyout(flyout: Blockly.IFlyout, look: () => void): void {
   const {show, setVisible} = flyout;
   flyout.show = (contents) => {
     show.call(flyout, contents);
@@ -17,7 +17,7 @@ export function onFlyout(flyout: Blockly.IFlyout, look: () => void): void {
 }
 
 /** Robot and sensor of each block in it; none while it is closed. */
-export function offeredSensors(flyout: Blockly.IFlyout | null): [robot: string, sensor: string][] {
+export function visibleSensors(flyout: Blockly.IFlyout | null): [robot: string, sensor: string][] {
   if (!flyout?.isVisible()) return [];
   const blocks = [...sensorTypes()].flatMap((type) => flyout.getWorkspace().getBlocksByType(type, true));
   const found = new Map(blocks.map((block) => [sensorOf(block).join('/'), sensorOf(block)]));
