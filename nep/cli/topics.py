@@ -10,7 +10,6 @@ from nep.cli.echo import echo
 from nep.cli.hz_bw import bw, hz
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
-from nep.cli.rates import bw, hz
 from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_alerts, show_json, show_table, size
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import ids_as_text

@@ -13,7 +13,7 @@ from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.system import PREFERENCES
 from app.ui.theme.theme import MODES, Theme
-from app.ui.widgets import Button, ComboBox, Elided, IconButton, Segments, label
+from app.ui.widgets import Button, ComboBox, ElidedLabel, IconButton, Segments, label
 from app.ui.widgets.file_dialogs import show_free
 from nep import i18n
 from nep.i18n import _, lazy, pgettext
