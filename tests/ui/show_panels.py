@@ -35,7 +35,7 @@ SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "nodes": (nodes.PANEL, 446, 260, "compact"),
     "alerts": (alerts.PANEL, 446, 222, "compact"),
     "doctor": (doctor.PANEL, 446, 400, "compact"),
-    "robot": (robot_view.PANEL, 384, 327, "comfortable"),
+    "robot": (robot.PANEL, 384, 327, "comfortable"),
     "camera": (camera.PANEL, 384, 275, "comfortable"),
     "sensors": (sensors.PANEL, 384, 250, "comfortable"),
     "health": (health.PANEL, 384, 240, "comfortable"),
