@@ -49,7 +49,7 @@ class World:
 def world() -> Iterator[World]:
     made = World()
     yield made
-    made.companions.close()
+    made.launcher.close()
 
 
 def test_one_that_is_not_there_is_started_at_once(world: World) -> None:

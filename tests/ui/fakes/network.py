@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 
 import nep
-from app.core.faults import words_of
+from app.core.faults import error_words
 from app.core.network.source import GraphSeen, Job, JobFailed, MasterFound, Sink
 from nep.errors import NepError
 from nep.messages.message import Message
@@ -74,7 +74,7 @@ class Network:
         except NepError as error:
             self._post_event(JobFailed(what, str(error)))
         except Exception as error:  # noqa: BLE001  as the network does: one job that fails must not end all others
-            self._post_event(JobFailed(what, words_of(error)))
+            self._post_event(JobFailed(what, error_words(error)))
 
     def missed(self) -> Mapping[str, int]:
         return dict.fromkeys(self.wanted, 0)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import IO
 
 from app.blocks import Program
-from app.core.robots import virtual_processes as processes_module
+from app.core.robots import launcher as processes_module
 from app.core.run.runner import Kind, RunnerEvent
 from app.errors import RunnerError
 
@@ -119,7 +119,7 @@ class Runner:
         self._on_event(RunnerEvent(kind, self.run, **more))  # type: ignore[arg-type]
 
 
-class Companions(processes_module.Companions):
+class Launcher(processes_module.Launcher):
     """The real ones, with processes of a test, and no master of the computer."""
 
     def __init__(

@@ -31,7 +31,7 @@ from nep.nodes.subscriber import Subscriber
 from tests.ui import sample_data
 from tests.ui.fakes.images import Images
 from tests.ui.fakes.network import Network
-from tests.ui.fakes.processes import Companions, Runner
+from tests.ui.fakes.processes import Launcher, Runner
 from tests.ui.fakes.storage import Document, Settings
 
 ADDRESS = "127.0.0.1:7780"
@@ -82,7 +82,7 @@ class Session(session_module.Session):
     source: Network
     documents: Documents
     images: Images
-    companions: Companions
+    launcher: Launcher
     doctor: Doctor
 
     def __init__(self, clock: Clock | None = None) -> None:
@@ -106,7 +106,7 @@ class Session(session_module.Session):
             make_runner=self._make_runner,  # type: ignore[arg-type]
         )  # fmt: skip
         self.doctor = Doctor()
-        self.companions = Companions(ADDRESS, post, self.fleet.is_there, self.clock)
+        self.launcher = Launcher(ADDRESS, post, self.fleet.is_there, self.clock)
         self.images = Images(self.watch, self.clock)
         self.master = MasterState("none", ADDRESS)
         self.ticks = 0

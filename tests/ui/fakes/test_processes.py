@@ -11,7 +11,7 @@ from typing import IO
 
 import pytest
 
-from app.core.robots.virtual_processes import CompanionFailed, Companions, Process, start_process
+from app.core.robots.launcher import Launcher, LaunchFailed, Process, start_process
 from tests.ui.fakes.processes import Process as MadeUpProcess
 
 WAITS = """
@@ -70,51 +70,51 @@ def told() -> list[object]:
 
 
 @pytest.fixture
-def companions(started_here: RealProcesses | MadeUpProcesses, told: list[object]) -> Iterator[Companions]:
-    made = Companions("127.0.0.1:1", told.append, start=started_here.start)
+def launcher(started_here: RealProcesses | MadeUpProcesses, told: list[object]) -> Iterator[Launcher]:
+    made = Launcher("127.0.0.1:1", told.append, start=started_here.start)
     yield made
     made.close()
 
 
-def test_robots_come_and_go_with_their_processes(companions: Companions, started_here, told) -> None:
-    assert (companions.virtual_robots, companions.process_ids) == ((), ())
-    companions.start_virtual_robot("Pepper")
-    companions.start_virtual_robot("Turtle", "diffdrive")
-    companions.start_virtual_robot("Pepper")  # it is there
-    assert companions.virtual_robots == ("Pepper", "Turtle")
+def test_robots_come_and_go_with_their_processes(launcher: Launcher, started_here, told) -> None:
+    assert (launcher.virtual_robots, launcher.process_ids) == ((), ())
+    launcher.start_virtual_robot("Pepper")
+    launcher.start_virtual_robot("Turtle", "diffdrive")
+    launcher.start_virtual_robot("Pepper")  # it is there
+    assert launcher.virtual_robots == ("Pepper", "Turtle")
     pepper, turtle = started_here.made
-    assert companions.process_ids == (pepper.pid, turtle.pid)
+    assert launcher.process_ids == (pepper.pid, turtle.pid)
     assert pepper.pid != turtle.pid
     assert (pepper.poll(), turtle.poll()) == (None, None)
-    companions.stop_virtual_robot("Pepper")
-    assert (companions.virtual_robots, pepper.poll()) == (("Turtle",), -15 if os.name == "posix" else 1)
-    companions.check()
+    launcher.stop_virtual_robot("Pepper")
+    assert (launcher.virtual_robots, pepper.poll()) == (("Turtle",), -15 if os.name == "posix" else 1)
+    launcher.check()
     assert told == [], "it was told to go"
-    companions.close()
-    assert (companions.virtual_robots, turtle.poll() is None) == ((), False)
+    launcher.close()
+    assert (launcher.virtual_robots, turtle.poll() is None) == ((), False)
 
 
-def test_one_that_ends_by_itself_says_its_last_words_once(companions: Companions, started_here, told) -> None:
-    companions.start_virtual_robot("Pepper")
-    companions.check()
+def test_one_that_ends_by_itself_says_its_last_words_once(launcher: Launcher, started_here, told) -> None:
+    launcher.start_virtual_robot("Pepper")
+    launcher.check()
     assert told == []
     started_here.die(0)
-    assert (companions.virtual_robots, companions.process_ids) == ((), ())
+    assert (launcher.virtual_robots, launcher.process_ids) == ((), ())
     assert started_here.made[0].poll() == 3
     for _ in range(2):
-        companions.check()
-    assert told == [CompanionFailed("Pepper", "The virtual robot Pepper has ended.", "no room left")]
-    assert companions.ended == {"Pepper"}
-    companions.start_virtual_robot("Pepper")
-    assert (companions.virtual_robots, companions.ended) == (("Pepper",), frozenset())
+        launcher.check()
+    assert told == [LaunchFailed("Pepper", "The virtual robot Pepper has ended.", "no room left")]
+    assert launcher.ended == {"Pepper"}
+    launcher.start_virtual_robot("Pepper")
+    assert (launcher.virtual_robots, launcher.ended) == (("Pepper",), frozenset())
 
 
-def test_one_that_is_started_anew_is_another_process(companions: Companions, started_here, told) -> None:
-    companions.start_virtual_robot("Pepper")
-    companions.restart_virtual_robot("Pepper")
+def test_one_that_is_started_anew_is_another_process(launcher: Launcher, started_here, told) -> None:
+    launcher.start_virtual_robot("Pepper")
+    launcher.restart_virtual_robot("Pepper")
     before, now = started_here.made
     assert (before.poll(), now.poll()) == (-9 if os.name == "posix" else 1, None)
-    assert companions.process_ids == (now.pid,)
+    assert launcher.process_ids == (now.pid,)
     for process in (before, now):
         process.terminate()
         process.wait(60)
@@ -123,7 +123,7 @@ def test_one_that_is_started_anew_is_another_process(companions: Companions, sta
     assert told == []
 
 
-def test_waiting_for_one_that_lives_takes_no_longer_than_it_may(companions: Companions, started_here) -> None:
-    companions.start_virtual_robot("Pepper")
+def test_waiting_for_one_that_lives_takes_no_longer_than_it_may(launcher: Launcher, started_here) -> None:
+    launcher.start_virtual_robot("Pepper")
     with pytest.raises(subprocess.TimeoutExpired):
         started_here.made[0].wait(0.01)

@@ -54,7 +54,7 @@ def test_studio_starts_the_master_and_looks_again_when_it_is_there(qtbot, panel,
     (row,) = panel.rows
     assert row.button.accessibleName() == "Start the master"
     qtbot.mouseClick(row.button, Qt.MouseButton.LeftButton)
-    assert window.session.companions.masters_asked_for == 1
+    assert window.session.launcher.masters_asked_for == 1
     window.session.doctor.found = (Finding("master", "ok", "A master runs."),)
     window.session.master = MasterState("searching", "127.0.0.1:7780")
     panel.refresh()

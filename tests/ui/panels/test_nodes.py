@@ -211,7 +211,7 @@ def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed)
     assert panel.empty._title.text() == words
     if pressed is not None:
         press(button(panel.empty, pressed))
-        assert window.session.companions.masters_asked_for == 1
+        assert window.session.launcher.masters_asked_for == 1
 
 
 def test_order_and_columns_come_back_with_the_layout(qtbot, panel, window) -> None:
