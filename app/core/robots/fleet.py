@@ -172,7 +172,9 @@ class Fleet:
         wrong = described.check(input)
         if wrong:
             raise RobotInputError(wrong, described.problems(input))
-        if not self.moving.permits([(link.robot, [action])], lambda: self._try_again(name, action, input)):
+        if not self.permission.permits(
+            [(link.robot, [action])], lambda: self._try_again(name, action, input)
+        ):
             raise MayNotMoveError([name])
         invocation = self._tries.begin(link, described, input)
         if invocation.running and link.publisher is not None and link.robot.dialect == "native":
