@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.ui.widgets import Chip, ElidedLabel, StatusItem
-from app.ui.widgets.table.cells import PADDING, Head, head_font
+from app.ui.widgets.table.cells import PADDING, TableHeader, head_font
 
 SLACK = 1.5
 LONGER = 0.35
@@ -55,7 +55,7 @@ def longer(text: str) -> str:
 
 def clipped(root: QWidget) -> list[str]:
     """What does not fit, one sentence each."""
-    heads = [widget for widget in shown(root) if isinstance(widget, Head)]
+    heads = [widget for widget in shown(root) if isinstance(widget, TableHeader)]
     return [
         *(fault for widget in shown(root) for fault in _faults(widget, root)),
         *(fault for head in heads for fault in _heads(head)),
@@ -95,7 +95,7 @@ def _faults(widget: QWidget, root: QWidget) -> Iterator[str]:
             yield f"{said} is cut by {cut}"
 
 
-def _heads(head: Head) -> Iterator[str]:
+def _heads(head: TableHeader) -> Iterator[str]:
     """The heads of a table that have too little room, and no tip that says the whole."""
     model, across = head.model(), Qt.Orientation.Horizontal
     for place in range(head.count()):
@@ -106,7 +106,7 @@ def _heads(head: Head) -> Iterator[str]:
             yield f"the head “{words}” is {wide} wide and needs {needed:.0f}"
 
 
-def head_needs(head: Head, words: str) -> float:
+def head_needs(head: TableHeader, words: str) -> float:
     """How wide a column is whose head is not shortened."""
     return QFontMetricsF(head_font(head._theme)).horizontalAdvance(words) + 2 * PADDING
 
