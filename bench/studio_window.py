@@ -85,7 +85,7 @@ def studio(address: str, layout: str = "developer") -> Iterator[Studio]:
     with tempfile.TemporaryDirectory(prefix="nep-bench-") as home:
         os.environ["NEP_STUDIO_HOME"] = home
         session = Session(
-            Settings(Path(home)), address=address, journal_folder=Path(home), start_companions=False
+            Settings(Path(home)), address=address, journal_folder=Path(home), start_processes=False
         )
         window = make_window(session, Options(theme="light", new_window=True))
         window.show()

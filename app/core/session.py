@@ -72,7 +72,7 @@ class Session:
         journal_folder: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
         clock_ns: Callable[[], int] = time.time_ns,
-        start_companions: bool = True,
+        start_processes: bool = True,
     ) -> None:
         """Join the master at ``address`` (default: `nep.masters.master.master_address`).
 
@@ -80,7 +80,7 @@ class Session:
         """
         self.address = address if address is not None else master_address()
         self._clock, self._clock_ns = clock, clock_ns
-        self._start_companions = start_companions
+        self._start_processes = start_processes
         self.settings = settings if settings is not None else Settings()
         self.alerts, self.console, self.topics = Alerts(), Console(), Topics()
         self._faults = FaultAlerts(self.alerts, clock)
@@ -135,7 +135,7 @@ class Session:
         """Start the threads; a master is started when none answers."""
         self.source.start()
         self.source.submit(_("watch over the robots"), self._make_stopper)
-        if self._start_companions:
+        if self._start_processes:
             self.launcher.ensure_master()
 
     def watch(self, topic: str) -> Watch:
@@ -186,7 +186,7 @@ class Session:
         self._faults.check()
         with self.guarded(lazy("check what was started here")):
             self.launcher.check()
-            if self.master.kind == "none" and self._start_companions:
+            if self.master.kind == "none" and self._start_processes:
                 self.launcher.keep_master()
         with self.guarded(lazy("count what was missed")):
             missed = self.source.missed()

@@ -22,7 +22,7 @@ from app.core.documents.versions import bring_here
 from app.core.session import Session
 from app.core.storage.file_lock import FileLock
 from app.core.storage.settings import home
-from app.ui.panels.registry import PanelShelf
+from app.ui.panels.registry import PanelRegistry
 from app.ui.self_drive import SelfDrive
 from app.ui.shell.bars.logo import LogoEngine
 from app.ui.shell.main_window import MainWindow
@@ -98,7 +98,7 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
 
 def steps_after(window: MainWindow) -> list[Callable[[], object]]:
     """What a person needs a moment later: the panels, and the editor, which has then only to be started."""
-    panels = window.panels.steps() if isinstance(window.panels, PanelShelf) else ()
+    panels = window.panels.steps() if isinstance(window.panels, PanelRegistry) else ()
     return [*panels, *(partial(importlib.import_module, name) for name in SOON)]
 
 
@@ -110,7 +110,7 @@ def make_window(session: Session, options: Options) -> MainWindow:
     chosen = next((mode for mode in MODES if mode == options.theme), None)
     if chosen is not None:
         theme.set_mode(chosen)
-    window = MainWindow(session, theme, PanelShelf(), read_examples(resources.folder() / "examples"))
+    window = MainWindow(session, theme, PanelRegistry(), read_examples(resources.folder() / "examples"))
     window.setWindowIcon(QIcon(LogoEngine(theme)))
     if not window.state.place(window):
         window.resize(fitting(window.size(), window.screen().availableSize()))

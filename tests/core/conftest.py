@@ -24,7 +24,7 @@ def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         Settings(tmp_path),
         address=master.address,
         journal_folder=tmp_path / "journal",
-        start_companions=False,
+        start_processes=False,
     )
     made.start()
     yield made

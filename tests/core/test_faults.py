@@ -150,7 +150,7 @@ def test_an_exception_is_one_line() -> None:
 @pytest.fixture
 def session(tmp_path: Path) -> Session:
     """Never started: it has no threads and no sockets."""
-    return Session(Settings(tmp_path), address=ADDRESS, journal_folder=tmp_path / "j", start_companions=False)
+    return Session(Settings(tmp_path), address=ADDRESS, journal_folder=tmp_path / "j", start_processes=False)
 
 
 def raising(*_given: object) -> object:
@@ -227,7 +227,7 @@ def test_the_alert_of_a_fault_is_cured_when_what_failed_goes_well(
         Settings(tmp_path),
         address=ADDRESS,
         journal_folder=tmp_path / "j",
-        start_companions=False,
+        start_processes=False,
         clock=lambda: now[0],
     )
 

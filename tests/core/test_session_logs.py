@@ -52,7 +52,7 @@ def test_a_studio_that_starts_late_shows_the_last_errors_once(
         node.log.error("the brake is hot")
         eventually(lambda: LAST_ERRORS_TOPIC in node.graph().topics)
         late = Session(
-            Settings(tmp_path), address=master.address, journal_folder=tmp_path, start_companions=False
+            Settings(tmp_path), address=master.address, journal_folder=tmp_path, start_processes=False
         )
         late.start()
         try:

@@ -34,7 +34,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def session(home: Path) -> Session:
     """Never started: it has no threads and no sockets."""
     return Session(
-        Settings(home), address=free_address(), journal_folder=home / "journal", start_companions=False
+        Settings(home), address=free_address(), journal_folder=home / "journal", start_processes=False
     )
 
 

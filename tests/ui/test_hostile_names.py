@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QAbstractItemView, QLabel, QMenu, QWidget
 
 import app.ui
 from app.ui.panels.base import PanelWidget
-from app.ui.panels.registry import PanelShelf
+from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.bars.banner import AlertBanner
 from app.ui.shell.docking.dock import Dock
 from app.ui.text import plain
@@ -92,12 +92,12 @@ def shown(view: QAbstractItemView) -> Iterator[str]:
         yield from below(QModelIndex())
 
 
-@pytest.mark.parametrize("name", [name for name in PanelShelf() if name != "behaviour"])
+@pytest.mark.parametrize("name", [name for name in PanelRegistry() if name != "behaviour"])
 def test_no_panel_takes_a_name_for_markup(qtbot, name: str) -> None:
     window = hostile()
-    panel = PanelShelf()[name].make(window.context())
+    panel = PanelRegistry()[name].make(window.context())
     assert isinstance(panel, PanelWidget)
-    dock = Dock(window.theme, PanelShelf()[name], panel, "comfortable")
+    dock = Dock(window.theme, PanelRegistry()[name], panel, "comfortable")
     qtbot.addWidget(dock)
     dock.resize(900, 600)
     dock.show()

@@ -12,7 +12,7 @@ from app.ui.panels.base import Panel
 from nep.system.plugins import discover
 
 
-class PanelShelf(Mapping[str, Panel]):
+class PanelRegistry(Mapping[str, Panel]):
     """The panels by name. The start page needs none of them, and they are many modules."""
 
     @cached_property

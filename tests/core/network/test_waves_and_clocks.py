@@ -39,7 +39,7 @@ def quiet(tmp_path: Path, clocks: Clocks) -> Iterator[Session]:
         journal_folder=tmp_path,
         clock=lambda: clocks.now,
         clock_ns=lambda: clocks.wall_ns,
-        start_companions=False,
+        start_processes=False,
     )
     yield session
     session.close()

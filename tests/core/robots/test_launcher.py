@@ -132,7 +132,7 @@ def test_starting_it_anew_is_no_second_wish(world: World) -> None:
 def test_a_second_studio_uses_the_pepper_that_is_there(master: Master, tmp_path: Path) -> None:
     with nep.node("first", master=master.address) as node, Driver(simulated.ROBOT, "Pepper", node):
         second = Session(
-            Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_companions=False
+            Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_processes=False
         )
         second.start()
         try:

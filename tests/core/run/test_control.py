@@ -42,7 +42,7 @@ def failing(*_given: object, **_named: object) -> object:
 @pytest.fixture
 def session(tmp_path) -> Iterator[Session]:
     """Never started: it has no sockets."""
-    made = Session(Settings(tmp_path), address="127.0.0.1:9", journal_folder=tmp_path, start_companions=False)
+    made = Session(Settings(tmp_path), address="127.0.0.1:9", journal_folder=tmp_path, start_processes=False)
     yield made
     made.close()
 

@@ -93,7 +93,7 @@ class Session(session_module.Session):
             source=Network,
             clock=self.clock,
             clock_ns=self.clock.ns,
-            start_companions=False,
+            start_processes=False,
         )
         post = self._mailbox.post_event
         self.console = Console(self.clock.epoch_s)

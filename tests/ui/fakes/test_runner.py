@@ -48,7 +48,7 @@ class RealRun:
 
     def __init__(self, master: Master, folder: Path) -> None:
         self.session = Session(
-            Settings(folder), address=master.address, journal_folder=folder, start_companions=False
+            Settings(folder), address=master.address, journal_folder=folder, start_processes=False
         )
 
     def make_runner(self, on_event: Callable[[RunnerEvent], object]) -> Runner:

@@ -138,7 +138,7 @@ def bad(monkeypatch: pytest.MonkeyPatch) -> dict[str, BaseException]:
 def with_bad(qtbot, theme: Theme, home: Path) -> MainWindow:
     """A window with the panel "bad" beside the plain ones, as Studio starts it."""
     session = Session(
-        Settings(home), address=free_address(), journal_folder=home / "journal", start_companions=False
+        Settings(home), address=free_address(), journal_folder=home / "journal", start_processes=False
     )
     panels = {**PANELS, "bad": Panel("bad", "Bad", "bot", (), Bad)}
     window = MainWindow(session, theme, panels, [])

@@ -30,7 +30,7 @@ SENT, EACH_S = 1500, 0.001
 @pytest.fixture
 def session(master: Master, home: Path) -> Iterator[Session]:
     made = Session(
-        Settings(home), address=master.address, journal_folder=home / "journal", start_companions=False
+        Settings(home), address=master.address, journal_folder=home / "journal", start_processes=False
     )
     made.start()
     yield made

@@ -16,7 +16,7 @@ from app.robots.description.description import parse, td_for
 from app.ui.panels.camera import CameraPanel
 from app.ui.panels.image.panel import ImagePanel
 from app.ui.panels.inspector.panel import InspectorPanel
-from app.ui.panels.registry import PanelShelf
+from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.robot import RobotPanel
 from app.ui.shell.docking.dock import RESTS_AFTER_S, Dock, on_screen
 from app.ui.shell.main_window import TICK_MS, MainWindow
@@ -48,13 +48,13 @@ class Case:
             address="127.0.0.1:1",
             source=Network,
             journal_folder=home / "journal",
-            start_companions=False,
+            start_processes=False,
         )
         assert isinstance(self.session.source, Network)
         self.source = self.session.source
         self.session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
         self.source.tell(graph())
-        panels = {**PanelShelf(), "behaviour": PANELS["behaviour"]}
+        panels = {**PanelRegistry(), "behaviour": PANELS["behaviour"]}
         clock = {"clock": lambda: self.now} if own_clock else {}
         self.window = MainWindow(self.session, theme, panels, **clock)
 

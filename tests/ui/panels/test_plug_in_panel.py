@@ -12,7 +12,7 @@ import pytest
 from PySide6.QtWidgets import QMenu, QMenuBar
 
 from app.core.session import Session
-from app.ui.panels.registry import PanelShelf
+from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from tests.ui.shell_parts import PANELS
@@ -67,7 +67,7 @@ def menu_named(where: QMenuBar | QMenu, name: str) -> QMenu:
 
 
 def test_a_panel(qtbot, plug_in: None, theme: Theme, session: Session) -> None:
-    window = MainWindow(session, theme, {**PANELS, "counter": PanelShelf()["counter"]}, [])
+    window = MainWindow(session, theme, {**PANELS, "counter": PanelRegistry()["counter"]}, [])
     qtbot.addWidget(window)
     window.show_layout("developer")
     window.show()

@@ -9,7 +9,7 @@ from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import QStackedWidget
 
 from app.ui.panels.base import Panel, PanelWidget
-from app.ui.panels.registry import PanelShelf
+from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.shell.docking.workbench import Workbench
@@ -29,7 +29,7 @@ class Layouts(QStackedWidget):
         super().__init__()
         shell = Window(Session.full())
         self.session = shell.session
-        self.panels = {**PanelShelf(), "behaviour": BLOCKS}
+        self.panels = {**PanelRegistry(), "behaviour": BLOCKS}
         self.benches = {
             layout.name: Workbench(shell.theme, layout, self.panels, shell.context()) for layout in LAYOUTS
         }

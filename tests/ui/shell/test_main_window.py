@@ -305,7 +305,7 @@ def test_everything_comes_back_at_the_next_start(qtbot, theme: Theme, session: S
     commands.run("text.larger")
     first.close()
     again = Session(
-        Settings(home), address=free_address(), journal_folder=home / "journal", start_companions=False
+        Settings(home), address=free_address(), journal_folder=home / "journal", start_processes=False
     )
     second = MainWindow(again, theme, PANELS, [])
     qtbot.addWidget(second)
@@ -406,7 +406,7 @@ def test_a_studio_that_closed_in_order_has_its_tabs_again_and_asks_nothing(
         entry = json.loads(file.read_text("utf-8"))
         file.write_text(json.dumps({**entry, "pid": 2**22 + 1}), "utf-8")
     again = Session(
-        Settings(home), address="127.0.0.1:9", journal_folder=home / "journal", start_companions=False
+        Settings(home), address="127.0.0.1:9", journal_folder=home / "journal", start_processes=False
     )
     rest = again.tabs.come_back(left_behind(home / "journal"))
     assert rest == []

@@ -17,7 +17,7 @@ from app.robots import simulated
 from app.robots.description.description import parse, td_for
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.panel import BehaviourPanel
-from app.ui.panels.registry import PanelShelf
+from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.main_window import MainWindow
@@ -43,13 +43,13 @@ COMMANDS = [
 @pytest.fixture
 def window(qtbot, theme: Theme, home: Path) -> Iterator[MainWindow]:
     session = Session(
-        Settings(home), address=free_address(), journal_folder=home / "journal", start_companions=False
+        Settings(home), address=free_address(), journal_folder=home / "journal", start_processes=False
     )
     session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
     session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Anna")), "/Anna/description")
-    shelf = PanelShelf()
+    panels = PanelRegistry()
     behaviour = Panel("behaviour", "Behaviour", "blocks", (), lambda ctx: BehaviourPanel(ctx, Editor))
-    made = MainWindow(session, theme, {**shelf, "behaviour": behaviour}, asks=Answers())
+    made = MainWindow(session, theme, {**panels, "behaviour": behaviour}, asks=Answers())
     qtbot.addWidget(made)
     theme.apply()
     theme.set_motion(True)

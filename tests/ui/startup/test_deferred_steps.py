@@ -19,7 +19,7 @@ from app.core.documents.journal import Journal
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.ui.application import Options, make_application, make_window
-from app.ui.panels.registry import PanelShelf
+from app.ui.panels.registry import PanelRegistry
 from app.ui.startup.deferred import DeferredSteps
 from app.ui.theme import fonts
 from tests.ui.shell_parts import free_address
@@ -94,12 +94,12 @@ def test_a_step_that_fails_stops_none_of_the_others(qtbot: QtBot, caplog: pytest
 
 
 def test_the_steps_find_every_panel() -> None:
-    shelf = PanelShelf()
-    for step in shelf.steps():
+    panels = PanelRegistry()
+    for step in panels.steps():
         step()
-    assert {"behaviour", "console", "topics"} <= set(shelf)
-    assert len(shelf) == len(list(shelf)) >= 10
-    assert shelf["console"].name == "console"
+    assert {"behaviour", "console", "topics"} <= set(panels)
+    assert len(panels) == len(list(panels)) >= 10
+    assert panels["console"].name == "console"
 
 
 def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: Path) -> None:
@@ -111,7 +111,7 @@ def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: 
         "from app.ui import application\n"
         "from app.core.session import Session\n"
         "application.make_application()\n"
-        "application.make_window(Session(start_companions=False), application.Options(new_window=True))\n"
+        "application.make_window(Session(start_processes=False), application.Options(new_window=True))\n"
         f"print([name for name in {late} if name in sys.modules])\n"
     )
     environ = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "NEP_STUDIO_HOME": str(tmp_path)}
@@ -141,7 +141,7 @@ def test_everything_that_shows_first_has_our_fonts(
     journal.write("Walk", None, '{"blocks": {"blocks": [{"type": "x", "id": "a"}]}}', {})
     monkeypatch.setattr("app.core.documents.journal._alive", lambda _pid, _born_s: False)
     (tmp_path / "settings.json").write_text(json.dumps({"theme": mode}), "utf-8")
-    window = make_window(Session(Settings(tmp_path), start_companions=False), Options())
+    window = make_window(Session(Settings(tmp_path), start_processes=False), Options())
     qtbot.addWidget(window)
     window.show()
     assert window.banner.isVisible(), "unsaved work is offered"
