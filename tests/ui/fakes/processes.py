@@ -21,7 +21,8 @@ class Process:
 
     def __init__(self, log: IO[bytes]) -> None:
         self.pid = next(self._ids)
-        self._log, self._code = log, None
+        self._log = log
+        self._code: int | None = None
 
     def die(self, said: bytes, code: int) -> None:
         """It says something and ends by itself."""
@@ -129,15 +130,8 @@ class Launcher(processes_module.Launcher):
         is_there: Callable[[str], bool | None],
         clock: Callable[[], float],
     ) -> None:
-        super().__init__(address, post_event, is_there, clock, self._begin)
-        self.processes: list[Process] = []
-        self.commands: list[Sequence[str]] = []
+        super().__init__(address, post_event, is_there, clock, lambda _command, _more, log: Process(log))
         self.masters_asked_for = 0
-
-    def _begin(self, command: Sequence[str], _environment: Mapping[str, str], log: IO[bytes]) -> Process:
-        self.commands.append(command)
-        self.processes.append(Process(log))
-        return self.processes[-1]
 
     def ensure_master(self) -> None:
         self.masters_asked_for += 1
