@@ -56,6 +56,7 @@ from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 
 CHECK_S = 1.0
+NO_WATCH = lazy("can't watch over the robots: {error}")
 LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """What the Console shows."""
 
@@ -134,7 +135,7 @@ class Session:
     def start(self) -> None:
         """Start the threads; a master is started when none answers."""
         self.source.start()
-        self.source.submit(_("watch over the robots"), self._make_stopper)
+        self.source.submit(NO_WATCH, self._make_stopper)
         if self._start_processes:
             self.launcher.ensure_master()
 
@@ -204,16 +205,16 @@ class Session:
     def close(self) -> None:
         """End the program, the threads and the processes that were started here, whatever one does."""
         ends: list[tuple[str, Callable[[], object]]] = [
-            (lazy("end the program"), self.runs.close),
-            (lazy("keep the tabs"), lambda: self.tabs.keep(ended_well=True)),
-            (lazy("end the behaviours"), self.documents.end),
-            (lazy("end the robots"), self.fleet.close),
-            (lazy("end the stopper"), self.stopper.close if self.stopper is not None else _nothing),
-            (lazy("end the pictures"), self.images.close),
-            (lazy("end the doctor"), self.doctor.close),
-            (lazy("leave the network"), self.source.close),
-            (lazy("end what was started here"), self.launcher.close),
-            (lazy("end the reach"), self.remote_access.close),
+            ("end the program", self.runs.close),
+            ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
+            ("end the behaviours", self.documents.end),
+            ("end the robots", self.fleet.close),
+            ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),
+            ("end the pictures", self.images.close),
+            ("end the doctor", self.doctor.close),
+            ("leave the network", self.source.close),
+            ("end what was started here", self.launcher.close),
+            ("end the reach", self.remote_access.close),
         ]
         for what, end in ends:
             with log_errors(what):
@@ -304,11 +305,7 @@ class Session:
             case RemoteAccessChanged():
                 self.remote_access.changed(event)
             case JobFailed() if event.what:
-                self.console.add(
-                    "error",
-                    "studio",
-                    _("can't {what}: {error}").format(what=event.what, error=event.sentence),
-                )
+                self.console.add("error", "studio", _(event.what).format(error=event.sentence))
             case _:
                 pass
 
@@ -379,7 +376,7 @@ class Session:
         if stopper is not None and (targets != self._reachable or self._tries_to_reach):
             self._reachable, self._tries_to_reach = targets, False
             stopper.expect(targets)
-            self.source.submit(_("watch over the robots"), lambda _node: stopper.set_robots(targets))
+            self.source.submit(NO_WATCH, lambda _node: stopper.set_robots(targets))
 
 
 def _nothing() -> None:

@@ -13,7 +13,8 @@ import psutil
 import pytest
 
 import nep
-from app.core.session import Session
+from app.core.network.source import JobFailed
+from app.core.session import NO_WATCH, Session
 from app.errors import RobotInputError, RobotUnknownError
 from app.robots.description.description import td_for
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
@@ -302,3 +303,11 @@ def _forever() -> dict[str, object]:
 
 def _number(value: float) -> dict[str, object]:
     return {"type": "values_number", "id": f"n{value}", "fields": {"NUMBER": value}}
+
+
+def test_a_job_on_the_network_that_failed_is_told_in_one_sentence(session: Session) -> None:
+    session._on_event(JobFailed(NO_WATCH, "the master has gone"), 0.0)
+    session._on_event(JobFailed("", "nobody asked"), 0.0)
+    texts = [record.text for record in session.console.records]
+    assert "can't watch over the robots: the master has gone" in texts
+    assert not [text for text in texts if "nobody asked" in text]

@@ -69,7 +69,7 @@ class WatchFailed:
 
 @dataclass(frozen=True, slots=True)
 class JobFailed:
-    """Something that was to be done on the network failed."""
+    """Something that was to be done on the network failed: ``what`` (see `Source.submit`), and why."""
 
     what: str
     sentence: str
@@ -90,7 +90,10 @@ class Source(Protocol):
         """Messages of ``topic`` are not wanted any more."""
 
     def submit(self, what: str, job: Job) -> None:
-        """Do something with the node, in the source's thread; a failure is told as `JobFailed`."""
+        """Do something with the node, in the source's thread; a failure is told as `JobFailed`.
+
+        ``what`` is the `lazy` sentence for that, with the hole ``error``; "" when nobody is to be told.
+        """
 
     def missed(self) -> Mapping[str, int]:
         """By watched topic, the messages that were sent since it is watched and did not arrive here."""
@@ -248,7 +251,7 @@ class LiveSource:
             except NepError as error:
                 self._post_event(JobFailed(what, str(error)))
             except Exception as error:  # noqa: BLE001  one job that fails must not end all others
-                _log.exception("can't %s", what or "meet a wish")
+                _log.exception("a job on the network failed")
                 self._post_event(JobFailed(what, error_words(error)))
             self._reconcile()
 
