@@ -9,6 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.theme import fonts
 from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session
 
@@ -39,7 +40,8 @@ class Window:
         self.toast_buttons.append((button, run))
 
     def make(self, panel: Panel, size: tuple[int, int] = (640, 480)) -> PanelWidget:
-        """The panel, shown, with the widgets of its title beside it."""
+        """The panel, shown in our fonts also when no test has loaded them before."""
+        fonts.load()
         made = panel.make(self.context())
         made.resize(*size)
         made.show()
