@@ -25,6 +25,7 @@ from app.robots.identity import Identity
 from app.robots.turtle import ROBOT
 from nep.masters.master import Master
 from nep.nodes.publisher import Publisher
+from tests.blocks.fakes import until
 from tests.core.waiting import tick_until
 
 HERE = platform.node()
@@ -77,6 +78,7 @@ def test_a_virtual_robot_of_another_studio_of_this_person_is_ours(master: Master
     command = [sys.executable, "-m", "app.robots.turtle", "--name", "Turtle", "--owner-pid", str(os.getpid())]
     made = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
     try:
+        until(lambda: bool(psutil.Process(made.pid).cmdline()))  # the system knows it a moment after it began
         assert VirtualProcesses(MODULES).is_ours(Identity("n", "Turtle", HERE, made.pid))
         assert not VirtualProcesses(("app.robots.simulated",)).is_ours(
             Identity("n", "Turtle", HERE, made.pid)
