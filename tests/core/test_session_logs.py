@@ -14,7 +14,7 @@ from app.core.robots.launcher import LaunchFailed
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC
-from tests.blocks.samples import number, stack, started, text, workspace, write
+from tests.blocks.samples import block, number, stack, started, text, workspace, write
 from tests.core.waiting import tick_until
 from tests.nep.programs import eventually
 
@@ -86,16 +86,19 @@ def test_a_storm_of_records_is_bounded_and_counted_exactly(session: Session) -> 
 
 def test_what_a_program_prints_stands_there_once_though_it_is_on_the_bus(session: Session) -> None:
     heard: list[object] = []
+    waits = block("control_wait", SECONDS=number(600))  # who ends at once has a second for its records
     with nep.node("page") as page, page.new_sub("/nep/log", "nep/log") as records:
         tick_until(session, lambda: session.master.kind == "connected")
-        session.document.edited(workspace(stack(started(), write(text("hello")), write(number(7)))))
+        session.document.edited(workspace(stack(started(), write(text("hello")), write(number(7)), waits)))
         session.runs.run()
 
         def both() -> bool:
             heard.extend(payload for ok, payload in [records.listen()] if ok)
-            return len(heard) >= 2 and not session.runs.active
+            return len(heard) >= 2
 
         tick_until(session, both)
+        session.runs.stop()
+        tick_until(session, lambda: not session.runs.active)
         name = session.document.name
         assert [record["text"] for record in heard] == ["hello", "7"]  # type: ignore[index]
         assert {record["node"] for record in heard} == {f"program {name}"}  # type: ignore[index]
