@@ -87,24 +87,27 @@ def test_a_storm_of_records_is_bounded_and_counted_exactly(session: Session) -> 
 def test_what_a_program_prints_stands_there_once_though_it_is_on_the_bus(session: Session) -> None:
     heard: list[object] = []
     waits = block("control_wait", SECONDS=number(600))  # who ends at once has a second for its records
+
+    def printed() -> list[tuple[str, str]]:
+        return [(line.origin, line.text) for line in session.console.records if line.text in {"hello", "7"}]
+
     with nep.node("page") as page, page.new_sub("/nep/log", "nep/log") as records:
         tick_until(session, lambda: session.master.kind == "connected")
         session.document.edited(workspace(stack(started(), write(text("hello")), write(number(7)), waits)))
         session.runs.run()
 
-        def both() -> bool:
+        def by_both_ways() -> bool:
             heard.extend(payload for ok, payload in [records.listen()] if ok)
-            return len(heard) >= 2
+            return len(heard) >= 2 and len(printed()) >= 2
 
-        tick_until(session, both)
-        session.runs.stop()
-        tick_until(session, lambda: not session.runs.active)
+        tick_until(session, by_both_ways)
         name = session.document.name
         assert [record["text"] for record in heard] == ["hello", "7"]  # type: ignore[index]
         assert {record["node"] for record in heard} == {f"program {name}"}  # type: ignore[index]
+        session.runs.stop()
+        tick_until(session, lambda: not session.runs.active)
     session.tick()
-    printed = [line for line in session.console.records if line.text in {"hello", "7"}]
-    assert [(line.origin, line.text) for line in printed] == [(name, "hello"), (name, "7")]
+    assert printed() == [(name, "hello"), (name, "7")]
 
 
 def test_alerts_of_the_connection_lead_to_the_doctor(session: Session) -> None:
