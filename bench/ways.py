@@ -57,7 +57,7 @@ except SystemExit:
     pass
 sys.setprofile(None)
 names = sorted(f"{c.co_filename.removeprefix(ours)} {getattr(c, 'co_qualname', c.co_name)}"
-               for c in seen if not c.co_name.startswith("<"))
+               for c in seen if not c.co_name.startswith("<") and c.co_flags & 1)  # not the bodies of classes
 print("WAY", *names, sep="\\n")
 """
 
