@@ -94,10 +94,13 @@ def test_nobody_waits_for_a_slow_disk_and_the_newest_edit_is_kept(
 def test_what_is_discarded_while_it_is_written_does_not_come_back(
     on_a_slow_disk: Document,
     slow: SlowJournal,
+    journal_writer: BackgroundWorker[bool],
     tmp_path: Path,
     journals: Path,
     end: Callable[[Document], object],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("app.core.documents.background_worker.END_S", 60.0)
     document = on_a_slow_disk
     document.path = tmp_path / "mine.nepb"
     document.edited(STARTED)
@@ -105,6 +108,7 @@ def test_what_is_discarded_while_it_is_written_does_not_come_back(
     document.dirty = False
     threading.Timer(0.05, slow.goes.set).start()
     end(document)
+    assert journal_writer.finish(slow.name), "what was under way has ended, too"
     assert list(journals.glob("*")) == []
 
 
