@@ -6,10 +6,13 @@ python -m tests.ui.show_panels DIR [panel ...]
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, QEventLoop, Qt, QTimer
 from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
 
 from app.ui.blockly.scheme import register_scheme
 from app.ui.panels import alerts, camera, doctor, health, problems, robot, sensors
@@ -71,6 +74,30 @@ def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -
     widget.shut()
     dock.close()
     dock.deleteLater()
+
+
+@contextmanager
+def shown_panel(
+    qtbot: QtBot, theme: Theme, name: str, session: Session
+) -> Iterator[tuple[Dock, PanelWidget]]:
+    """A panel alone in its dock, at its size in the design, after three ticks of what the session has."""
+    panel, width, height, density = SIZES[name]
+    widget = panel.make(PanelContext(session, theme, str, str, str))  # type: ignore[arg-type]
+    dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
+    qtbot.addWidget(dock)
+    dock.resize(width, height)
+    with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
+        dock.show()
+    dock.front = True
+    qtbot.waitUntil(dock.shown)
+    if session.fleet.links:
+        prepare(name, widget)
+    for _ in range(3):
+        session.tick()
+        dock.refresh()
+    yield dock, widget
+    widget.shut()
+    dock.close()
 
 
 def prepare(name: str, widget: PanelWidget) -> None:

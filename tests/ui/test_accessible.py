@@ -11,15 +11,13 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.run.view import RunView
-from app.ui.panels.base import PanelContext
 from app.ui.shell.bars.run_bar import RunBar
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.overlay import Overlay
-from app.ui.shell.docking.dock import Dock
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session as FakeSession
-from tests.ui.show_panels import SIZES, prepare
+from tests.ui.show_panels import SIZES, shown_panel
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 MEANINGLESS = {QAccessible.Role.NoRole, QAccessible.Role.Whitespace}  # Client is a painted widget of ours
@@ -56,24 +54,10 @@ def _above(widget: QWidget) -> str:
 @pytest.mark.parametrize("name", [name for name in SIZES if name != "behaviour"])
 @pytest.mark.parametrize("full", [True, False], ids=["full", "empty"])
 def test_everything_in_a_panel_has_a_name(qtbot, theme: Theme, name: str, full: bool) -> None:
-    panel, width, height, density = SIZES[name]
     session = FakeSession.full() if full else FakeSession()
-    widget = panel.make(PanelContext(session, theme, str, str, str))  # type: ignore[arg-type]
-    dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
-    qtbot.addWidget(dock)
-    dock.resize(width, height)
-    with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
-        dock.show()
-    dock.front = True
-    qtbot.waitUntil(dock.shown)
-    if full:
-        prepare(name, widget)
-    for _ in range(3):
-        session.tick()
-        dock.refresh()
-    assert list(stops(dock))
-    assert unsaid(dock) == []
-    widget.shut()
+    with shown_panel(qtbot, theme, name, session) as (dock, _widget):
+        assert list(stops(dock))
+        assert unsaid(dock) == []
 
 
 def test_everything_in_the_window_has_a_name(qtbot, window: MainWindow, commands: Commands) -> None:

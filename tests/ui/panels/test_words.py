@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
 
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Robot
-from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Panel, PanelWidget
 from app.ui.panels.behaviour import panel as behaviour
 from app.ui.panels.inspector.tree_view import TreeView
 from app.ui.panels.nodes import rows as nodes
@@ -26,7 +26,7 @@ from tests.pseudo import ROOT, texts_of, untranslated
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
 from tests.ui.panels.test_behaviour import Editor
-from tests.ui.show_panels import SIZES, prepare
+from tests.ui.show_panels import SIZES, shown_panel
 from tools import words
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -152,26 +152,10 @@ def shown(qtbot, theme: Theme) -> Show:
 
     @contextmanager
     def show(name: str, session: Session) -> Iterator[tuple[Dock, PanelWidget]]:
-        _panel, width, height, density = SIZES[name]
-        panel = panel_of(name)
-        context = PanelContext(session, theme, str, str, str)  # type: ignore[arg-type]
-        widget = panel.make(context)
-        dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
-        qtbot.addWidget(dock)
-        dock.resize(width, height)
-        with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
-            dock.show()
-        dock.front = True
-        qtbot.waitUntil(dock.shown)
-        if session.fleet.links:
-            prepare(name, widget)
-        for _each in range(3):
-            session.tick()
-            dock.refresh()
-        for _each in range(2):  # layouts come to rest
-            qtbot.wait(20)
-        yield dock, widget
-        widget.shut()
+        with shown_panel(qtbot, theme, name, session) as (dock, widget):
+            for _each in range(2):  # layouts come to rest
+                qtbot.wait(20)
+            yield dock, widget
 
     return show
 

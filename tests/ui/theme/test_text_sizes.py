@@ -24,7 +24,7 @@ from app.ui.widgets import StatusItem, StopButton
 from tests.ui.clipping import clipped, lengthen, sideways
 from tests.ui.fakes import Session as FakeSession
 from tests.ui.shell_parts import PANELS, Answers
-from tests.ui.show_panels import SIZES, prepare
+from tests.ui.show_panels import SIZES, shown_panel
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 SETTLE_MS = 20
@@ -91,28 +91,13 @@ def settle(qtbot, root, *, longer: bool) -> None:
 def test_no_panel_cuts_its_words(qtbot, theme: Theme, full: bool, percent: int, longer: bool) -> None:
     theme.set_text_percent(percent)
     faults = []
-    for name, (panel, width, height, density) in SIZES.items():
+    for name in SIZES:
         if name == "behaviour":
             continue  # its page is of the web; its bar is in test_behaviour_tabs
         session = FakeSession.full() if full else FakeSession()
-        context = PanelContext(session, theme, str, str, str)  # type: ignore[arg-type]
-        widget = panel.make(context)
-        dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
-        qtbot.addWidget(dock)
-        dock.resize(width, height)
-        with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
-            dock.show()
-        dock.front = True
-        qtbot.waitUntil(dock.shown)
-        if full:
-            prepare(name, widget)
-        for _ in range(3):
-            session.tick()
-            dock.refresh()
-        settle(qtbot, dock, longer=longer)
-        faults += [f"{name}: {fault}" for fault in clipped(dock)]
-        widget.shut()
-        dock.close()
+        with shown_panel(qtbot, theme, name, session) as (dock, _widget):
+            settle(qtbot, dock, longer=longer)
+            faults += [f"{name}: {fault}" for fault in clipped(dock)]
     assert faults == []
 
 
