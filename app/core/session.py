@@ -42,6 +42,7 @@ from app.core.network.traffic import Traffic
 from app.core.network.watches import Watch, Watches
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
+from app.core.robots.last_robots import LastRobots
 from app.core.robots.launcher import VIRTUAL_ROBOTS, Launcher, LaunchFailed, VirtualProcesses
 from app.core.robots.stop import RobotStopper, StopTarget
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
@@ -100,6 +101,7 @@ class Session:
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
         self.launcher = Launcher(self.address, self._mailbox.post_event, self.fleet.is_there)
+        self.last_robots = LastRobots(self.settings)
         self.doctor = doctor_of(self.address, self.settings.path.parent)
         self.runs = Runs(
             self.documents,
@@ -187,6 +189,7 @@ class Session:
         self._faults.check()
         with self.guarded(lazy("check what was started here")):
             self.launcher.check()
+            self.last_robots.keep(self.launcher)
             if self.master.kind == "none" and self._start_processes:
                 self.launcher.keep_master()
         with self.guarded(lazy("count what was missed")):
@@ -207,6 +210,7 @@ class Session:
         ends: list[tuple[str, Callable[[], object]]] = [
             ("end the program", self.runs.close),
             ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
+            ("keep which robots were here", partial(self.last_robots.keep, self.launcher)),
             ("end the behaviours", self.documents.end),
             ("end the robots", self.fleet.close),
             ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),

@@ -215,6 +215,7 @@ def run(options: Options) -> int:
             lambda: single_instance.SingleInstanceServer(meeting_place, partial(open_asked, window), window)
         )
         first.append(turn.release)
+        first.append(partial(session.last_robots.start, session.launcher))
     soon.put_first(first)
     IncomingFiles(window, window.commands.files.open_all)
     if isinstance(application, Application):

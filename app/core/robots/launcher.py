@@ -116,6 +116,8 @@ class Launcher:
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[Process, IO[bytes]]] = {}
+        self.wanted: dict[str, str] = {}
+        """The virtual robots that a person started here and did not end, each with its model."""
         self.ended: frozenset[str] = frozenset()
         """The virtual robots started here whose processes have ended by themselves."""
         self._master = MasterStart(
@@ -156,6 +158,7 @@ class Launcher:
         Where the master is started here, nobody can be there yet.
         """
         now = self._clock()
+        self.wanted[name] = model
         self._wishes[name] = _Wish(model, now + KNOWN_WITHIN_S, now + WISH_KEPT_S)
         self.follow()
 
@@ -203,6 +206,7 @@ class Launcher:
 
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
         """Start it anew; a process of it that still lives but hangs is killed."""
+        self.wanted[name] = model
         self._wishes.pop(name, None)
         with self._lock:
             held = self._robots.pop(name, None)
@@ -214,6 +218,10 @@ class Launcher:
 
     def stop_virtual_robot(self, name: str) -> None:
         """End a virtual robot that was started here; it is not wished any more."""
+        self.wanted.pop(name, None)
+        self._end_robot(name)
+
+    def _end_robot(self, name: str) -> None:
         self._wishes.pop(name, None)
         with self._lock:
             held = self._robots.pop(name, None)
@@ -239,7 +247,7 @@ class Launcher:
         """End the virtual robots. The master lives on while programs that are not ours are registered."""
         self._wishes.clear()
         for name in list(self._robots):
-            self.stop_virtual_robot(name)
+            self._end_robot(name)
         self._master.close()
 
 

@@ -158,7 +158,7 @@ class RobotPanel(OneRobotPanel):
         self._say_nothing(None)
 
     def fleet_changed(self) -> None:
-        self.choose.setVisible(len(self.session.fleet.links) > 1)
+        self.choose.setVisible(bool(self.session.fleet.links))
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
@@ -179,6 +179,12 @@ class RobotPanel(OneRobotPanel):
             action.setCheckable(True)
             action.setChecked(link.name == self._robot)
             action.triggered.connect(lambda _on=False, name=link.name: self.session.fleet.choose(name))
+        if self._robot in self.session.launcher.wanted:
+            menu.addSeparator()
+            away = menu.addAction(plain.entry(_("Put {robot} away").format(robot=self._robot)))
+            away.triggered.connect(
+                lambda _on=False, name=self._robot: self.context.run(f"robot.end_virtual:{name}")
+            )
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.choose)
 

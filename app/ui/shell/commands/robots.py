@@ -56,6 +56,14 @@ class RobotCommands:
             self._shell.show_layout("behaviour")
         self._shell.say(_("The virtual Turtle is coming"))
 
+    def end_virtual(self, name: str = "") -> bool:
+        """End this virtual robot, or all that were started here; they do not come back at the next start."""
+        launcher = self._session.launcher
+        names = [each for each in launcher.wanted if name in {"", each}]
+        for each in names:
+            launcher.stop_virtual_robot(each)
+        return bool(names)
+
     # -- robots that are missing ------------------------------------------------------------------
 
     def connect(self, name: str) -> None:

@@ -85,6 +85,10 @@ def _no_recent(do: Handlers) -> str:
     return "" if do.session.settings.recent_known else _("The list is empty")
 
 
+def _no_virtual_robot(do: Handlers) -> str:
+    return "" if do.session.launcher.wanted else _("No virtual robot was started here")
+
+
 def _largest_text(do: Handlers) -> str:
     return _("Text is as large as it gets") if do.shell.theme.text_percent >= TEXT_PERCENT[1] else ""
 
@@ -195,6 +199,8 @@ COMMANDS: tuple[C, ...] = (
       icon="bot"),
     C("robots.turtle", lazy("Use the virtual Turtle"), lambda do: do.robots.virtual_turtle(), "Robots",
       icon="bot"),
+    C("robots.end_virtual", lazy("Put the virtual robots away"), lambda do: do.robots.end_virtual(), "Robots",
+      why_not=_no_virtual_robot),
     # unlike "robots.virtual" it stays in the layout that shows
     C("robots.start", lazy("Start the virtual Pepper"), lambda do: do.robots.start_pepper(), in_palette=False,
       in_shortcuts=False),
@@ -235,6 +241,7 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("tab.move", TabPlace.parse, lambda do, place: do.behaviours.move_tab(place)),
     _about("connect", str, lambda do, robot: do.robots.connect(robot)),
     _about("robot.use", RobotSwap.parse, lambda do, swap: do.robots.use(swap)),
+    _about("robot.end_virtual", str, lambda do, robot: do.robots.end_virtual(robot)),
     _about("robot.virtual", str, lambda do, missing: do.robots.start_for(missing)),
     *map(_fix_blocks, ("limit", "define", "add")),  # what a problem's button does (`app.blocks.fixes.fixes`)
 )

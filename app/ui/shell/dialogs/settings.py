@@ -1,4 +1,4 @@
-"""The settings: language, look, size of text, contrast, motion, shortcuts, and where pictures are kept."""
+"""The settings: language, look, text, contrast, motion, virtual robots, shortcuts, and where pictures go."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from app.core.messages import snapshots
+from app.core.robots.last_robots import COME_BACK
 from app.core.storage.settings import Settings
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.system import PREFERENCES
 from app.ui.theme.theme import MODES, Theme
-from app.ui.widgets import Button, ComboBox, ElidedLabel, IconButton, Segments, label
+from app.ui.widgets import Button, ComboBox, ElidedLabel, IconButton, Segments, Switch, label
 from app.ui.widgets.file_dialogs import show_free
 from nep import i18n
 from nep.i18n import _, lazy, pgettext
@@ -49,6 +50,7 @@ class SettingsSheet(Overlay):
         wishes = [(wish, _(PREFERENCE_WORDS[wish]), None) for wish in PREFERENCES]
         self.contrast = Segments(theme, wishes, check=True, size="form", name=_("High contrast"))
         self.motion = Segments(theme, wishes, check=True, size="form", name=_("Less motion"))
+        self.robots = Switch(theme, _("Come back at the next start"))
         self.shortcuts = Button(theme, _("Change the shortcuts"), "keyboard", size="form")
         self.folder = ElidedLabel("bodyLarge", "textSecondary")
         self.choose = Button(theme, _("Choose a folder"), "folder-open", size="form")
@@ -56,6 +58,7 @@ class SettingsSheet(Overlay):
         self.text.changed.connect(lambda percent: self._changed(lambda: theme.set_text_percent(int(percent))))
         self.contrast.changed.connect(self._contrast)
         self.motion.changed.connect(self._motion)
+        self.robots.clicked.connect(lambda on: state.keep(COME_BACK, on))
         self.choose.clicked.connect(self._choose)
         self._lay_out()
         theme.changed.connect(self._show)
@@ -114,6 +117,7 @@ class SettingsSheet(Overlay):
             (_("Text size"), self.text),
             (_("High contrast"), self.contrast),
             (_("Less motion"), self.motion),
+            (_("Virtual robots"), self.robots),
             (_("Keyboard"), self.shortcuts),
             (_("Pictures"), pictures),
         )
@@ -150,6 +154,7 @@ class SettingsSheet(Overlay):
         self.text.set_value(str(theme.text_percent))
         self.contrast.set_value(theme.contrast)
         self.motion.set_value(theme.motion)
+        self.robots.setChecked(self._settings.get(COME_BACK, True))
         self.folder.setText(str(snapshots.folder(self._settings)))
         if self.isVisible():
             self.place()

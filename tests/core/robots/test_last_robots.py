@@ -1,0 +1,71 @@
+"""The virtual robots that a person worked with come back at the next start."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.core.robots.last_robots import KEPT, MOST, LastRobots
+from app.core.storage.settings import Settings
+
+
+class Launcher:
+    """Starts nobody; knows who was wanted."""
+
+    def __init__(self) -> None:
+        self.wanted: dict[str, str] = {}
+
+    def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
+        self.wanted[name] = model
+
+
+def next_start(folder: Path) -> dict[str, str]:
+    """Who is wanted after a start of Studio."""
+    launcher = Launcher()
+    LastRobots(Settings(folder)).start(launcher)
+    return launcher.wanted
+
+
+def test_who_was_here_comes_back_and_who_was_put_away_does_not(tmp_path: Path) -> None:
+    robots, launcher = LastRobots(Settings(tmp_path)), Launcher()
+    assert next_start(tmp_path) == {}
+    launcher.start_virtual_robot()
+    launcher.start_virtual_robot("Turtle", "diffdrive")
+    robots.keep(launcher)
+    assert next_start(tmp_path) == {"Pepper": "pepper", "Turtle": "diffdrive"}
+    del launcher.wanted["Pepper"]
+    robots.keep(launcher)
+    assert next_start(tmp_path) == {"Turtle": "diffdrive"}
+    launcher.wanted.clear()
+    robots.keep(launcher)
+    assert next_start(tmp_path) == {}
+
+
+def test_a_start_in_which_nobody_was_brought_back_forgets_nobody(tmp_path: Path) -> None:
+    Settings(tmp_path).set(KEPT, {"Pepper": "pepper"})
+    LastRobots(Settings(tmp_path)).keep(Launcher())
+    assert next_start(tmp_path) == {"Pepper": "pepper"}
+
+
+def test_nobody_comes_back_where_a_person_does_not_want_it(tmp_path: Path) -> None:
+    Settings(tmp_path).set(KEPT, {"Pepper": "pepper"})
+    robots = LastRobots(Settings(tmp_path))
+    assert robots.come_back
+    robots.set_come_back(False)
+    assert next_start(tmp_path) == {}
+    robots.set_come_back(True)
+    assert next_start(tmp_path) == {"Pepper": "pepper"}
+
+
+@pytest.mark.parametrize(
+    "kept", [None, [], {"": "pepper"}, {"Pepper": "toaster"}, {"Pepper": 3}, {"Pepper": ["pepper"]}]
+)
+def test_damaged_settings_start_nobody(tmp_path: Path, kept: object) -> None:
+    Settings(tmp_path).set(KEPT, kept)
+    assert next_start(tmp_path) == {}
+
+
+def test_settings_full_of_robots_start_only_a_few(tmp_path: Path) -> None:
+    Settings(tmp_path).set(KEPT, {f"Pepper {number}": "pepper" for number in range(500)})
+    assert len(next_start(tmp_path)) == MOST
