@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -21,15 +22,74 @@ def read(path):
 def test_these_are_the_examples_of_the_start_page():
     named = [(read(path)[0]["name"], read(path)[0]["description"]) for path in EXAMPLES]
     assert named == [
-        ("Greeting", "Says hello when it sees a face"),
+        ("Greeting", "Waves when it sees a face"),
         ("Reaction to touch", "Laughs when its head is touched"),
-        ("Tour guide", "Walks, stops and explains"),
-        ("A quiz", "Asks, listens and answers"),
-        ("A dance", "Moves that are put together of functions"),
-        ("A careful walk", "Looks ahead and decides"),
-        ("The finder", "Finds the ball and a face in its picture"),
-        ("Weather station", "Sends and receives messages on a topic"),
+        ("Tour guide", "Walks to three stations and speaks"),
+        ("A quiz", "Asks; a touch on its head is “yes”"),
+        ("A dance", "Sways, blinks and waves, by functions"),
+        ("A careful walk", "Walks while nothing is in its way"),
+        ("The finder", "Looks for the ball and for a face"),
+        ("Weather station", "Sends messages and reacts to them"),
     ]
+
+
+# what the words of a card or note claim, and the blocks of which the example must then have one
+CLAIMS = {
+    r"\bwav(e|es|ing)\b": {"robot_pepper_do_wave"},
+    r"\bface\b": {"robot_pepper_get_sees_face"},
+    r"\bball\b": {"robot_pepper_get_sees_ball"},
+    r"\btouch": {"robot_pepper_when_touched", "robot_pepper_get_head_touched"},
+    r"\bwalk": {"robot_pepper_do_walk"},
+    r"\b(turns?|sways?)\b": {"robot_pepper_do_turn"},
+    r"\b(says?|speaks?|asks?|laughs?|tell)\b": {"robot_pepper_do_say"},
+    r"\b(eyes|blinks?|colour|light)\b": {"robot_pepper_do_light"},
+    r"\bfunctions?\b": {"functions_call"},
+    r"\bmessages?\b": {"messages_publish_field"},
+    r"\bin its way\b|\broom\b.*\bwalk|\bthere is room\b": {"robot_pepper_get_distance"},
+    r"\b(listens?|hears?|microphone)\b": {"robot_pepper_when_hears"},
+    r"\bbattery\b": {"robot_pepper_get_battery"},
+    r"\bConsole\b": {"messages_write"},
+}
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_what_a_card_and_a_note_claim_is_in_the_blocks(path):
+    saved, _pepper = read(path)
+    used = set(types(saved["workspace"]["blocks"]["blocks"]))
+    (note,) = saved["workspace"]["workspaceComments"]
+    for claim, needed in CLAIMS.items():
+        if re.search(claim, f"{saved['description']}\n{note['text']}"):
+            assert used & needed, (claim, saved["description"], note["text"])
+    for robot in saved["robots"]:
+        assert robot in note["text"]
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_a_note_says_what_the_example_does_and_two_things_to_try_with_values_that_are_there(path):
+    saved, _pepper = read(path)
+    (note,) = saved["workspace"]["workspaceComments"]
+    about, tries = note["text"].split("\n\nTry this:\n")
+    assert about
+    first, second = tries.split("\n")
+    assert first.startswith("1. ")
+    assert second.startswith("2. ")
+    values = re.findall(r"instead of ([\d.]+)", tries)
+    there = [
+        block["fields"]["NUMBER"] for block in blocks(saved["workspace"]) if block["type"] == "values_number"
+    ]
+    for value in values:
+        assert there.count(float(value)) == 1, f"{value} is there {there.count(float(value))} times"
+
+
+def blocks(saved):
+    if isinstance(saved, dict):
+        if "type" in saved:
+            yield saved
+        for inner in saved.values():
+            yield from blocks(inner)
+    elif isinstance(saved, list):
+        for inner in saved:
+            yield from blocks(inner)
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)

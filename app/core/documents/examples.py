@@ -12,13 +12,15 @@ from dataclasses import replace
 from app.core.documents.file_format import BehaviourFile
 from nep.i18n import translate
 
-NAME, ABOUT, TEXT, LABEL = (
+NAME, ABOUT, TEXT, LABEL, NOTE = (
     "name of an example",
     "about an example",
     "text in an example",
     "name in an example",
+    "note of an example",
 )
-"""Contexts of the catalogue: the example's name, what it does, a block of text, a variable or function."""
+"""Contexts of the catalogue: the example's name, what it does in a line, a block of text, a variable or
+function, and the note beside its blocks: what it does, and what to try."""
 
 Say = Callable[[str, str], str]
 """What a (context, English) is in another language."""
@@ -63,6 +65,8 @@ def _translated(value: object, say: Say, label: Callable[[str], str]) -> object:
         fields["TEXT"] = say(TEXT, str(fields["TEXT"]))
     if str(kind).startswith("functions_define") and isinstance(fields, dict):
         fields["NAME"] = label(str(fields["NAME"]))
+    for note in _dicts(made.get("workspaceComments")):
+        note["text"] = say(NOTE, str(note.get("text", "")))
     for variable in _dicts(made.get("variables")):
         variable["name"] = label(str(variable["name"]))
     state = made.get("extraState")

@@ -29,6 +29,7 @@ from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.documents import FlushBeforeClose
 from app.ui.shell.focus_ring import FocusRing
 from app.ui.shell.keyboard import PanelFocus
+from app.ui.shell.start_page.open_work import open_work
 from app.ui.shell.start_page.page import Example, StartPage
 from app.ui.shell.window_state import WindowState
 from app.ui.startup.interpreter import GcFreezeTimer
@@ -70,7 +71,7 @@ class MainWindow(QMainWindow):
         self.state = WindowState(session.settings, self.complain)
         self.saved_layouts = SavedLayouts(self.state, self.complain)
         self.on_shut: Callable[[], object] = lambda: None
-        self._showing = ""
+        self._showing = self._left = ""
         self.benches: dict[str, Workbench] = {}
         self._facts = StatusFacts(session)
         self._alerts_seen = -1
@@ -135,6 +136,8 @@ class MainWindow(QMainWindow):
         start.developer_pressed.connect(actions["layout.developer"].trigger)
         start.example_chosen.connect(files.example)
         start.file_chosen.connect(files.open)
+        start.work_chosen.connect(self._go_on_with)
+        start.left.connect(actions["start_page.leave"].trigger)
         self.banner.on_action = run
         self.banner.on_dismiss = self.session.alerts.dismiss
         self.banner.on_more = self._show_all_alerts
@@ -187,11 +190,24 @@ class MainWindow(QMainWindow):
 
     def show_start(self) -> None:
         """Show the start page."""
+        if self.bench is not None:
+            self._left = self._showing
         self._showing = START
         self.pages.setCurrentWidget(self.start)
         self.show_recent()
         self._show_bars(None)
         self.start.focus_first()
+
+    @property
+    def left(self) -> str:
+        """The layout that leads back from the start page to the work; "" when there is none."""
+        if self._left:
+            return self._left
+        return "behaviour" if any(not each.blank for each in self.session.documents) else ""
+
+    def _go_on_with(self, key: str) -> None:
+        self._run(f"tab:{key}")
+        self._run("layout.behaviour")
 
     def show_recent(self) -> None:
         """Show on the start page which files were opened lately."""
@@ -234,7 +250,7 @@ class MainWindow(QMainWindow):
         self.bench_made.connect(placeholder.deleteLater)
 
     def _show_bars(self, layout: str | None) -> None:
-        self.bar.show_layout(layout)
+        self.bar.show_layout(layout, back=bool(self.left))
         self.run_bar.setVisible(layout == "behaviour")
         self.tool_bar.setVisible(layout == "developer")
         self.status.setVisible(layout is not None)
@@ -329,6 +345,7 @@ class MainWindow(QMainWindow):
             )
             there = any(link.state in {"ready", "busy", STOPPING} for link in self.session.fleet.links)
             self.start.show_robot(words if there else "", status)
+            self.start.show_open(open_work(self.session))
         elif self.showing == "behaviour":
             self.run_bar.show_view(view)
         else:

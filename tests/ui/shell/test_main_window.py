@@ -53,6 +53,39 @@ def test_it_begins_with_the_start_page(qtbot, window: MainWindow, commands: Comm
     assert not window.bar.stop.filled
 
 
+def test_there_is_one_way_to_the_start_page_and_one_back(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    show(qtbot, window)
+    assert not window.bar.home.isVisible()
+    assert not window.bar.back.isVisible(), "a first start leads back to nothing"
+    assert commands.actions.why_not("start_page.leave") == "Nothing is open"
+    commands.run("layout.developer")
+    QTest.mouseClick(window.bar.home, Qt.MouseButton.LeftButton)
+    assert window.start.isVisible()
+    QTest.mouseClick(window.bar.back, Qt.MouseButton.LeftButton)
+    assert window.showing == "developer"
+    QTest.keyClick(window, Qt.Key.Key_Home, Qt.KeyboardModifier.AltModifier)
+    assert window.start.isVisible()
+    qtbot.waitUntil(lambda: window.start.isAncestorOf(QApplication.focusWidget()))
+    QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape)
+    assert window.showing == "developer"
+
+
+def test_open_work_on_the_start_page_leads_to_its_tab(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    documents = window.session.documents
+    first = documents.current
+    first.edited({"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "a"}]}})
+    documents.new().edited({"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "b"}]}})
+    commands.run("file.start_page")
+    rows = window.start.open_work.rows
+    assert [row.work.name for row in rows] == [documents.current.name, first.name], "the current one first"
+    QTest.mouseClick(rows[1], Qt.MouseButton.LeftButton)
+    assert documents.current is first
+    assert window.showing == "behaviour"
+
+
 def test_stop_is_filled_on_the_start_page_while_a_robot_has_not_stopped(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QLabel
 from app import resources
 from app.core.storage.settings import RecentFile
 from app.ui.shell.start_page.cards import CardTitle
+from app.ui.shell.start_page.open_work import OpenWork
 from app.ui.shell.start_page.page import StartPage, read_examples
 from app.ui.shell.start_page.preview import Row, category_of, rows
 from app.ui.text.dates import day_words
@@ -73,6 +74,33 @@ def test_what_is_pressed_is_told(qtbot, page: StartPage, tmp_path: Path) -> None
     (developers,) = [each for each in page.findChildren(LinkButton) if "Developer" in each.text()]
     QTest.mouseClick(developers, Qt.MouseButton.LeftButton)
     assert told == ["robot", "new", tmp_path / "Quiz.nepb", "developer"]
+
+
+def test_open_work_stands_first_and_leads_back(page: StartPage) -> None:
+    assert "Open now" not in words(page)
+    page.show_open(
+        [OpenWork("a", "Greeting", unsaved=True), OpenWork("b", "Quiz", path="/q.nepb", runs=True)]
+    )
+    assert "Open now" in words(page)
+    assert [row.accessibleName() for row in page.open_work.rows] == [
+        "Go on with Greeting, not saved yet",
+        "Go on with Quiz, runs now",
+    ]
+    told: list[str] = []
+    page.work_chosen.connect(told.append)
+    QTest.mouseClick(page.open_work.rows[1], Qt.MouseButton.LeftButton)
+    QTest.keyClick(page.open_work.rows[0], Qt.Key.Key_Space)
+    assert told == ["b", "a"]
+    page.show_open([])
+    assert "Open now" not in words(page)
+
+
+def test_open_rows_stay_while_nothing_changed(page: StartPage) -> None:
+    work = [OpenWork("a", "Greeting")]
+    page.show_open(work)
+    row = page.open_work.rows[0]
+    page.show_open(list(work))
+    assert page.open_work.rows == [row]
 
 
 def test_recent_files_stand_there_with_their_day(page: StartPage, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from app.ui.shell.docking.layouts import Layout
 from app.ui.text.numbers import spoken_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Chip, Segments, StopButton, paint
+from app.ui.widgets import Chip, IconButton, Segments, StopButton, paint
 from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _, lazy, ngettext
 
@@ -53,6 +53,8 @@ class AppBar(QWidget):
             theme, [(layout.name, _(layout.title), layout.icon) for layout in layouts], name=_("Layout")
         )
         self.switch.changed.connect(self.layout_chosen)
+        self.home = IconButton(theme, "house", _("Start page"))
+        self.back = IconButton(theme, "arrow-left", _("Back to your work"), "Esc")
         self.search = PaletteField(theme)
         self.chip = Chip(theme, "", "off", large=True)
         self.stop = StopButton(theme, "appBar")
@@ -66,6 +68,8 @@ class AppBar(QWidget):
         menus.setContentsMargins(0, 0, 0, 0)
         menus.setSpacing(10)
         menus.addWidget(Logo(self._theme))
+        menus.addWidget(self.home)
+        menus.addWidget(self.back)
         menus.addWidget(self.menus, 0, Qt.AlignmentFlag.AlignVCenter)
         menus.addStretch(1)
         robots = QHBoxLayout(right)
@@ -92,11 +96,18 @@ class AppBar(QWidget):
 
     def use(self, actions: Actions) -> None:
         """Let its buttons trigger these."""
+        actions.bind(self.home, "file.start_page")
+        self.back.clicked.connect(actions["start_page.leave"].trigger)
         actions.bind(self.search, "palette.open")
         actions.bind(self.stop, "run.stop")
 
-    def show_layout(self, name: str | None) -> None:
-        """Mark the layout that shows; None is the start page, which has no switch but a Stop."""
+    def show_layout(self, name: str | None, *, back: bool = False) -> None:
+        """Mark the layout that shows; None is the start page, which has no switch but a Stop.
+
+        The way to the start page is where the way ``back`` from it is, when there is one.
+        """
+        self.home.setVisible(name is not None)
+        self.back.setVisible(name is None and back)
         if name is not None:
             self.switch.set_value(name)
         self.switch.setVisible(name is not None)

@@ -58,6 +58,10 @@ class Shell(Protocol):
     def editor(self) -> object:
         """The panel of behaviours; None until it was first shown."""
 
+    @property
+    def left(self) -> str:
+        """The layout that leads back from the start page to the work; "" when there is none."""
+
     def show_start(self) -> None:
         """Show the start page."""
 

@@ -15,7 +15,7 @@ from app.ui.shell.actions.command import ArgumentCommand, Command
 from app.ui.shell.commands.behaviours import BehaviourCommands, TabPlace
 from app.ui.shell.commands.freeze import freezable
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
-from app.ui.shell.commands.shell import Shell
+from app.ui.shell.commands.shell import START, Shell
 from app.ui.shell.commands.view import TEXT_STEP, ViewCommands
 from app.ui.shell.documents import DocumentController
 from app.ui.theme.theme import TEXT_PERCENT
@@ -77,6 +77,12 @@ def _no_own_layout(do: Handlers) -> str:
     return _no_panels(do) or _("This layout came with Studio")
 
 
+def _no_way_back(do: Handlers) -> str:
+    if do.shell.showing != START:
+        return _("Only on the start page")
+    return "" if do.shell.left else _("Nothing is open")
+
+
 def _nothing_to_freeze(do: Handlers) -> str:
     return "" if freezable(do.shell.bench) else _("Nothing here can be frozen")
 
@@ -124,8 +130,10 @@ COMMANDS: tuple[C, ...] = (
       ("Ctrl+Shift+T",), "history"),
     C("file.forget_recent", lazy("Clear the list of recent files"), lambda do: do.behaviours.forget_recent(),
       why_not=_no_recent),
-    C("file.start_page", lazy("Start page"), lambda do: do.view.start_page(), "File", icon="house",
-      above=True),
+    C("file.start_page", lazy("Start page"), lambda do: do.view.start_page(), "File", ("Alt+Home",),
+      "house", above=True, mac=("Ctrl+Shift+H",)),
+    C("start_page.leave", lazy("Back to your work"), lambda do: do.view.leave_start_page(), icon="arrow-left",
+      in_shortcuts=False, why_not=_no_way_back),
     C("settings.open", lazy("Settings"), lambda do: do.view.open_settings(), "File", ("Ctrl+,",), "settings"),
     C("file.quit", lazy("Quit"), lambda do: do.shell.close(), "File", ("Ctrl+Q",), above=True),
     C("edit.undo", lazy("Undo"), lambda do: do.behaviours.undo(), "Edit", ("Ctrl+Z",), "rotate-ccw",

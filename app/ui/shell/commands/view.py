@@ -162,6 +162,11 @@ class ViewCommands:
         self._shell.show_start()
         self._shell.state.keep_layout(START)
 
+    def leave_start_page(self) -> None:
+        """From the start page back to the work."""
+        if self._shell.showing == START and self._shell.left:
+            self.show_layout(self._shell.left)
+
     def show_layout(self, layout: str) -> None:
         """Show Behaviour or Developer as it was left."""
         self._shell.show_layout(layout)

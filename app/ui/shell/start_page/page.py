@@ -1,4 +1,4 @@
-"""The start page: use a robot, make a behaviour, open an example or a recent file."""
+"""The start page: go on with open work, use a robot, make a behaviour, open an example or a recent file."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
@@ -25,6 +26,7 @@ from app.core.storage.atomic_file import read_whole
 from app.core.storage.settings import RecentFile
 from app.ui.shell.start_page.art import EmptyPageArt, RobotArt
 from app.ui.shell.start_page.cards import BigCard, DevelopersLine, ExampleCard, RecentRow
+from app.ui.shell.start_page.open_work import OpenWork, OpenWorkList
 from app.ui.shell.start_page.preview import Row, rows
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
@@ -90,11 +92,18 @@ class StartPage(QWidget):
     file_chosen = Signal(object)
     open_pressed = Signal()
     developer_pressed = Signal()
+    work_chosen = Signal(str)
+    left = Signal()  # Esc
 
     def __init__(self, theme: Theme, examples: Sequence[Example]) -> None:
         super().__init__()
         self._theme, self.examples = theme, tuple(examples)
         self.setAccessibleName(_("Start"))
+        self.open_work = OpenWorkList(theme)
+        self.open_work.chosen.connect(self.work_chosen)
+        leave = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
+        leave.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        leave.activated.connect(self.left)
         self._use = Button(theme, _("Use the virtual robot"), "bot", kind="primary", size="large")
         self._use.clicked.connect(self.virtual_robot)
         self._new = Button(theme, _("New behaviour"), size="large")
@@ -141,6 +150,7 @@ class StartPage(QWidget):
         lead = _("Build what a robot says and does, by putting blocks together. No programming needed.")
         column.addWidget(label(lead, "lead", role="textSecondary", wrap=True))
         column.addSpacing(24)
+        column.addWidget(self.open_work)
         cards = QHBoxLayout()
         cards.setSpacing(16)
         cards.addWidget(self.robot_card, 408)
@@ -253,6 +263,11 @@ class StartPage(QWidget):
         """The connected robot's chip beside "Connect a robot"; nothing when there is none."""
         self.robot_card.chip.set(chip, status)
 
+    def show_open(self, work: Sequence[OpenWork]) -> None:
+        """The behaviours that are open; without any the section is not there."""
+        self.open_work.show_work(work)
+
     def focus_first(self) -> None:
         """Give the keyboard to the button that most people want."""
-        self._use.setFocus(Qt.FocusReason.OtherFocusReason)
+        rows = self.open_work.rows
+        (rows[0] if rows else self._use).setFocus(Qt.FocusReason.OtherFocusReason)

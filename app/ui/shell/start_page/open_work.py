@@ -1,0 +1,157 @@
+"""The open behaviours on the start page: each a row that leads back to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QPainter
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from app.core.session import Session
+from app.ui.text import plain
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import label, paint
+from app.ui.widgets.buttons import PaintedButton
+from nep.i18n import _
+
+HEIGHT, TILE, LEFT = 56, 30, 54
+IN_A_ROW = 3
+DOT = 7.0
+
+
+@dataclass(frozen=True)
+class OpenWork:
+    """One open behaviour: ``key`` of its tab, whether it is unsaved, whether it runs, its file or ""."""
+
+    key: str
+    name: str
+    unsaved: bool = False
+    runs: bool = False
+    path: str = ""
+
+
+def open_work(session: Session) -> tuple[OpenWork, ...]:
+    """What is open and has something in it, what was worked on last first."""
+    current, runs = session.document, session.runs
+    documents = sorted(session.documents, key=lambda each: each is not current)
+    return tuple(
+        OpenWork(
+            each.key,
+            each.name,
+            each.dirty,
+            runs.active and runs.document is each,
+            str(each.path) if each.path is not None else "",
+        )
+        for each in documents
+        if not each.blank
+    )
+
+
+class OpenRow(PaintedButton):
+    """An open behaviour: its tile, its name with a dot while it is unsaved, and "Go on"."""
+
+    def __init__(self, theme: Theme, work: OpenWork) -> None:
+        super().__init__(theme, radius="panel")
+        self.work = work
+        self._state = state_words(work)
+        self.say(work.name, _("Go on with {name}, {state}").format(name=work.name, state=self._state))
+        self.setToolTip(plain.tip(work.path or self._state))
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:
+        theme = self._theme
+        words = paint.height_of(theme.font("label")) + paint.height_of(theme.font("body"))
+        return QSize(240, max(HEIGHT, round(words) + 18))
+
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme = self._theme
+        edge = theme.colour("borderStrong" if self.is_highlighted else "border")
+        fill = theme.colour("hover" if self.is_highlighted else "panel")
+        paint.box(painter, rect, theme.radius("panel"), fill, edge)
+        tile = QRectF(12, rect.center().y() - TILE / 2, TILE, TILE)
+        paint.box(painter, tile, theme.radius("control"), theme.block_colour("robot"))
+        icon = tile.adjusted(7, 7, -7, -7)
+        paint_icon(painter, icon, theme.icon_name("behaviour"), theme.block_text("robot"))
+        link, words = theme.font("button"), _("Go on")
+        side = theme.scaled(14)
+        wide = paint.width_of(link, words) + 6 + side
+        room = QRectF(LEFT, rect.top(), rect.width() - LEFT - wide - 26, rect.height())
+        self._paint_words(painter, room)
+        accent = theme.colour("accentText")
+        area = QRectF(rect.right() - 14 - wide, rect.top(), wide - side - 6, rect.height())
+        paint.words(painter, area, words, link, accent)
+        arrow = QRectF(rect.right() - 14 - side, rect.center().y() - side / 2, side, side)
+        paint_icon(painter, arrow, "arrow-right", accent)
+
+    def _paint_words(self, painter: QPainter, room: QRectF) -> None:
+        theme, work = self._theme, self.work
+        name, state = theme.font("label"), theme.font("body")
+        high = paint.height_of(name)
+        top = room.center().y() - (high + paint.height_of(state)) / 2
+        line = QRectF(room.left(), top, room.width() - (DOT + 8 if work.unsaved else 0), high)
+        paint.words(painter, line, work.name, name, theme.colour("text"))
+        if work.unsaved:
+            left = room.left() + min(paint.width_of(name, work.name), line.width()) + 8
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(theme.colour("textSecondary"))
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.drawEllipse(QRectF(left, line.center().y() - DOT / 2, DOT, DOT))
+        line = QRectF(room.left(), top + high, room.width(), paint.height_of(state))
+        paint.words(painter, line, self._state, state, theme.colour("textTertiary"))
+
+
+def state_words(work: OpenWork) -> str:
+    """Whether it runs, and whether it is saved; an example that nobody changed needs no saving."""
+    if work.runs:
+        return _("runs now")
+    if work.unsaved:
+        return _("not saved yet")
+    return _("saved") if work.path else _("not changed yet")
+
+
+class OpenWorkList(QWidget):
+    """The heading and the rows; not there without open work."""
+
+    chosen = Signal(str)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._shown: tuple[OpenWork, ...] = ()
+        self.rows: list[OpenRow] = []
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 24)
+        column.setSpacing(10)
+        column.addWidget(label(_("Open now"), "heading"))
+        self._grid = QGridLayout()
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setSpacing(8)
+        for place in range(IN_A_ROW):
+            self._grid.setColumnStretch(place, 1)
+        column.addLayout(self._grid)
+        self.hide()
+
+    def show_work(self, work: Sequence[OpenWork]) -> None:
+        """Show these; the same again costs nothing."""
+        if tuple(work) == self._shown:
+            return
+        self._shown = tuple(work)
+        had = self._with_focus(self.rows)
+        for row in self.rows:
+            self._grid.removeWidget(row)
+            row.hide()
+            row.deleteLater()
+        self.rows = [OpenRow(self._theme, each) for each in work]
+        for place, row in enumerate(self.rows):
+            row.clicked.connect(lambda _on=False, key=row.work.key: self.chosen.emit(key))
+            self._grid.addWidget(row, place // IN_A_ROW, place % IN_A_ROW)
+        paint.show_when(self, bool(self.rows))
+        for row in self.rows:
+            if row.work.key == had:
+                row.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _with_focus(self, rows: Iterable[OpenRow]) -> str:
+        return next((row.work.key for row in rows if row.hasFocus()), "")
