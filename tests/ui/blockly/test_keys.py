@@ -66,6 +66,17 @@ def press(them: Person, *keys: Qt.Key) -> None:
         QTest.qWait(PACE_MS)
 
 
+def hold(them: Person, key: Qt.Key, held=Qt.ControlModifier) -> None:
+    """A key with Ctrl."""
+    them.press(key, held)
+    QTest.qWait(PACE_MS)
+
+
+def to_the_canvas(them: Person) -> None:
+    """From wherever the keys are."""
+    hold(them, Qt.Key_B, Qt.ControlModifier | Qt.ShiftModifier)
+
+
 def test_a_behaviour_is_built_with_keys_alone(qtbot, view, person):
     them = person(state=workspace())
     take_the_keys(them)
@@ -77,7 +88,7 @@ def test_a_behaviour_is_built_with_keys_alone(qtbot, view, person):
     them.wait_for("!!document.querySelector('.blocklyDragging')")
     press(them, Qt.Key_Return)  # puts it down
     qtbot.waitUntil(lambda: [top["type"] for top in them.tops()] == ["events_started"], timeout=WAIT_MS)
-    press(them, Qt.Key_T)
+    hold(them, Qt.Key_B)
     goes_to(them, "events")
     press(them, Qt.Key_Down)
     goes_to(them, "control")
@@ -103,7 +114,7 @@ def test_a_behaviour_is_built_with_keys_alone(qtbot, view, person):
 
 def test_a_robots_block_is_found_by_its_words_and_put_in_its_place(qtbot, view, them):
     press(them, Qt.Key_Tab)
-    press(them, Qt.Key_W)
+    to_the_canvas(them)
     press(them, Qt.Key_Down)
     goes_to(them, "when started")
     view.open_search()
@@ -189,7 +200,8 @@ def test_f1_explains_the_block_that_the_keys_are_on_and_else_is_the_windows(qtbo
     goes_to(them, "events")
     press(them, Qt.Key_F1)
     qtbot.waitUntil(lambda: pressed == ["window"], timeout=WAIT_MS)
-    press(them, Qt.Key_W, Qt.Key_Down, Qt.Key_Down)
+    to_the_canvas(them)
+    press(them, Qt.Key_Down, Qt.Key_Down)
     goes_to(them, "wait")
     qtbot.waitUntil(lambda: view._on_block, timeout=WAIT_MS)
     press(them, Qt.Key_F1)
@@ -219,7 +231,9 @@ def test_a_colour_is_chosen_with_keys(qtbot, view, person):
     light = block("robot_pepper_do_light", "l", ROBOT="Pepper", WHERE="eyes", COLOUR="#ffffff")
     them = person(state=workspace(light | {"x": 60, "y": 60}))
     take_the_keys(them)
-    press(them, Qt.Key_Tab, Qt.Key_W, Qt.Key_Down, Qt.Key_Right, Qt.Key_Right, Qt.Key_Right)
+    press(them, Qt.Key_Tab)
+    to_the_canvas(them)
+    press(them, Qt.Key_Down, Qt.Key_Right, Qt.Key_Right, Qt.Key_Right)
     goes_to(them, "colour: white")
     press(them, Qt.Key_Return)
     them.wait_for("document.activeElement.title", "white")
@@ -231,7 +245,9 @@ def test_a_colour_is_chosen_with_keys(qtbot, view, person):
 
 
 def test_what_blocks_are_called_is_words_without_pictures(them):
-    press(them, Qt.Key_Tab, Qt.Key_W, Qt.Key_Down)
+    press(them, Qt.Key_Tab)
+    to_the_canvas(them)
+    press(them, Qt.Key_Down)
     goes_to(them, "Begin stack, when started")
     press(them, Qt.Key_Down)
     goes_to(them, "wait, 5, s")
@@ -241,7 +257,9 @@ def test_what_blocks_are_called_is_words_without_pictures(them):
 def test_a_button_on_a_block_has_its_words_and_obeys_enter(qtbot, view, person):
     them = person(state=workspace(list_of() | {"id": "l", "x": 60, "y": 60}))
     take_the_keys(them)
-    press(them, Qt.Key_Tab, Qt.Key_W, Qt.Key_Down, Qt.Key_Right)
+    press(them, Qt.Key_Tab)
+    to_the_canvas(them)
+    press(them, Qt.Key_Down, Qt.Key_Right)
     goes_to(them, "take the last gap away")
     press(them, Qt.Key_Right)
     goes_to(them, "add one gap")
@@ -254,7 +272,9 @@ def test_enter_on_a_text_opens_it(qtbot, view, person):
     say["inputs"] = {"TEXT": {"shadow": {"type": "values_text", "id": "t", "fields": {"TEXT": "Hello"}}}}
     them = person(state=workspace(say | {"x": 60, "y": 60}))
     take_the_keys(them)
-    press(them, Qt.Key_Tab, Qt.Key_W, Qt.Key_Down, Qt.Key_Right, Qt.Key_Right)
+    press(them, Qt.Key_Tab)
+    to_the_canvas(them)
+    press(them, Qt.Key_Down, Qt.Key_Right, Qt.Key_Right)
     goes_to(them, "Hello")
     press(them, Qt.Key_Return)
     them.wait_for("!!document.querySelector('.blocklyHtmlInput')")

@@ -225,7 +225,7 @@ def test_the_sheet_lists_every_command_and_every_fixed_key(sheet: ShortcutSheet)
     }
     headings = [line.words for line in sheet.rows.lines.lines if isinstance(line, Heading)]
     assert len(headings) == len(set(headings))
-    assert {"File", "View", "Run", "Block editor"} <= set(headings)
+    assert {"File", "View", "Run", "Blocks"} <= set(headings)
 
 
 def test_a_new_key_works_at_once_everywhere(

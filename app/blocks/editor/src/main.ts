@@ -2,9 +2,11 @@
 import * as Blockly from 'blockly/core';
 import './blockly_patches';
 import './fields';
+import './focus_after_delete';
 import './mutators';
 import {HelpCard, focusedBlock, registerHelpMenu} from './help';
 import {iconElement} from './icons';
+import {useOwnKeys} from './keys';
 import {trimMenu} from './menu';
 import {FindBar} from './search';
 import {type Tab} from './tab';
@@ -170,6 +172,7 @@ async function start(bridge: Bridge): Promise<void> {
   useWords(beginning.words ?? {});
   const language = await useLanguage(beginning.language);
   trimMenu(language);
+  useOwnKeys();
   // Blockly measures text once; the font has to be there before.
   await Promise.allSettled([document.fonts.load('600 15px Inter'), document.fonts.load('500 14px Inter')]);
   const editor = new Editor(bridge);

@@ -1,0 +1,75 @@
+// The keys of the page. Blockly gives bare letters to many of its commands (D duplicates, C tidies): whoever types
+// into nothing would change the program, so that each has Ctrl, Shift or Alt beside it here, or no key.
+// `app/ui/shell/actions/shortcuts.py` lists them for people.
+import * as Blockly from 'blockly/core';
+
+const {names} = Blockly.ShortcutItems;
+const {KeyCodes} = Blockly.utils;
+type Shortcut = Blockly.ShortcutRegistry.KeyboardShortcut;
+type Keys = NonNullable<Shortcut['keyCodes']>;
+
+const registry = Blockly.ShortcutRegistry.registry;
+
+/** Ctrl, on a Mac Cmd, with a key. */
+export function ctrl(key: number, ...more: number[]): string {
+  return registry.createSerializedKey(key, [KeyCodes.CTRL_CMD, ...more]);
+}
+
+function alt(key: number, ...more: number[]): string {
+  return registry.createSerializedKey(key, [KeyCodes.ALT, ...more]);
+}
+
+const KEYS: Readonly<Record<string, Keys>> = {
+  [names.START_MOVE]: [ctrl(KeyCodes.M)],
+  [names.START_MOVE_STACK]: [ctrl(KeyCodes.M, KeyCodes.SHIFT)],
+  [names.DISCONNECT]: [ctrl(KeyCodes.X, KeyCodes.SHIFT)],
+  [names.DUPLICATE]: [ctrl(KeyCodes.D)],
+  [names.CLEANUP]: [ctrl(KeyCodes.L)],
+  [names.FOCUS_TOOLBOX]: [ctrl(KeyCodes.B)],
+  [names.FOCUS_WORKSPACE]: [ctrl(KeyCodes.B, KeyCodes.SHIFT)],
+  [names.NEXT_STACK]: [alt(KeyCodes.DOWN)],
+  [names.PREVIOUS_STACK]: [alt(KeyCodes.UP)],
+  // In the toolbox, where these are asked before the two above.
+  [names.NEXT_HEADING]: [alt(KeyCodes.DOWN)],
+  [names.PREVIOUS_HEADING]: [alt(KeyCodes.UP)],
+  [names.INFORMATION]: [alt(KeyCodes.I)],
+  [names.EXTENDED_INFORMATION]: [alt(KeyCodes.I, KeyCodes.SHIFT)],
+};
+
+/** Whether a person presses it while typing: a letter or a digit, alone or with Shift. */
+function isTyped(key: string): boolean {
+  const code = Number(key.replace(/^Shift\+/, ''));
+  return (code >= KeyCodes.ZERO && code <= KeyCodes.NINE) || (code >= KeyCodes.A && code <= KeyCodes.Z);
+}
+
+function give(name: string, keyCodes: Keys, changes: Partial<Shortcut> = {}): void {
+  const shortcut = registry.getRegistry()[name];
+  if (!shortcut) throw new Error(`Blockly has no shortcut ${name}`);
+  registry.unregister(name);
+  registry.register({...shortcut, ...changes, keyCodes, allowCollision: true}, true);
+}
+
+/** Takes the one block out of its stack, which closes behind it; Blockly takes all below along when Shift is held. */
+function takeOut(): boolean {
+  const block = Blockly.getFocusManager().getFocusedNode();
+  if (!(block instanceof Blockly.BlockSvg)) return false;
+  Blockly.keyboardNavigationController.setIsActive(true);
+  Blockly.Events.setGroup(true);
+  block.unplug(true);
+  Blockly.Events.setGroup(false);
+  return true;
+}
+
+/** Call it once, after everybody has registered their shortcuts. */
+export function useOwnKeys(): void {
+  for (const [name, keys] of Object.entries(KEYS)) {
+    give(name, keys, name === names.DISCONNECT ? {callback: takeOut} : {});
+  }
+  for (const [key, commands] of Object.entries(registry.getKeyMap())) {
+    if (!isTyped(key)) continue;
+    for (const name of commands) {
+      console.warn(`${name} would be done by typing: it has no key`);
+      registry.removeKeyMapping(key, name);
+    }
+  }
+}
