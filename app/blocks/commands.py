@@ -8,20 +8,112 @@ from __future__ import annotations
 
 import sys
 
-from app.blocks.runtime import lists, values
+from app.blocks.runtime.calculation import (
+    absolute,
+    arc_cosine,
+    arc_sine,
+    arc_tangent,
+    cosine,
+    counting,
+    e_to_the,
+    is_divisible,
+    is_even,
+    is_negative,
+    is_odd,
+    is_positive,
+    is_whole,
+    larger,
+    limited,
+    logarithm,
+    mapped,
+    natural_logarithm,
+    rounded_to,
+    sign,
+    sine,
+    smaller,
+    square_root,
+    tangent,
+    ten_to_the,
+)  # fmt: skip
+from app.blocks.runtime.clock import (
+    now,
+    seconds_since,
+)  # fmt: skip
 from app.blocks.runtime.find_robots import find_robots
 from app.blocks.runtime.interrupts import without_interrupts
+from app.blocks.runtime.lists import (
+    add_item,
+    average_of,
+    clear_list,
+    contains,
+    copy_of,
+    each,
+    insert_item,
+    is_empty_list,
+    item,
+    join_items,
+    largest_of,
+    middle_of,
+    new_list,
+    part_of_list,
+    position,
+    remove_item,
+    set_item,
+    shuffled,
+    smallest_of,
+    sorted_down,
+    sorted_up,
+    split_text,
+    sum_of,
+    turned_round,
+)  # fmt: skip
 from app.blocks.runtime.network import Network
 from app.blocks.runtime.runtime import Runtime, stop_script
+from app.blocks.runtime.texts import (
+    backwards,
+    ends_with,
+    has_in_it,
+    has_number,
+    in_capitals,
+    in_small_letters,
+    is_empty,
+    letter,
+    number_in,
+    part_of_text,
+    position_in_text,
+    replaced,
+    same_words,
+    starts_with,
+    without_spaces_around,
+)  # fmt: skip
+from app.blocks.runtime.values import (
+    is_known,
+    join,
+    length,
+    part,
+    random_number,
+    repeat,
+    rounded,
+    rounded_down,
+    rounded_up,
+)  # fmt: skip
 from nep import node as new_node
 from nep.i18n import _
 from nep.system.streams import prepare_streams
 
 __all__ = [
-    "add_item", "contains", "each", "fail", "insert_item", "is_known", "item", "join", "join_items", "length",
-    "new_list", "newest", "on_message", "on_start", "on_true", "part", "position", "publish",
-    "random_number", "remove_item", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run",
-    "set_item", "split_text", "stop_program", "stop_script", "wait", "wait_until", "write",
+    "absolute", "add_item", "arc_cosine", "arc_sine", "arc_tangent", "average_of", "backwards",
+    "clear_list", "contains", "copy_of", "cosine", "counting", "e_to_the", "each", "ends_with", "fail",
+    "has_in_it", "has_number", "in_capitals", "in_small_letters", "insert_item", "is_divisible",
+    "is_empty", "is_empty_list", "is_even", "is_known", "is_negative", "is_odd", "is_positive",
+    "is_whole", "item", "join", "join_items", "larger", "largest_of", "length", "letter", "limited",
+    "logarithm", "mapped", "middle_of", "natural_logarithm", "new_list", "newest", "now", "number_in",
+    "on_message", "on_start", "on_true", "part", "part_of_list", "part_of_text", "position",
+    "position_in_text", "publish", "random_number", "remove_item", "repeat", "replaced", "reset_timer",
+    "robot", "rounded", "rounded_down", "rounded_to", "rounded_up", "run", "same_words", "seconds_since",
+    "set_item", "shuffled", "sign", "sine", "smaller", "smallest_of", "sorted_down", "sorted_up",
+    "split_text", "square_root", "starts_with", "stop_program", "stop_script", "sum_of", "tangent",
+    "ten_to_the", "timer", "turned_round", "wait", "wait_until", "without_spaces_around", "write",
 ]  # fmt: skip
 
 
@@ -37,33 +129,13 @@ on_message = _runtime.on_message
 on_start = _runtime.on_start
 on_true = _runtime.on_true
 publish = _runtime.publish
+reset_timer = _runtime.reset_timer
 robot = _runtime.robot
 stop_program = _runtime.stop_program
+timer = _runtime.timer
 wait = _runtime.wait
 wait_until = _runtime.wait_until
 write = _runtime.write
-
-is_known = values.is_known
-join = values.join
-length = values.length
-part = values.part
-random_number = values.random_number
-repeat = values.repeat
-rounded = values.rounded
-rounded_down = values.rounded_down
-rounded_up = values.rounded_up
-
-add_item = lists.add_item
-contains = lists.contains
-each = lists.each
-insert_item = lists.insert_item
-item = lists.item
-join_items = lists.join_items
-new_list = lists.new_list
-position = lists.position
-remove_item = lists.remove_item
-set_item = lists.set_item
-split_text = lists.split_text
 
 LOOK_S = 3.0
 STOP_ANSWER_S = 1.0

@@ -72,7 +72,9 @@ def filled(described) -> dict[str, object]:
     for argument in described.arguments:
         if isinstance(argument, ValueInput):
             default = argument.default
-            if argument.check == "List" or argument.variable:
+            if described.type == "lists_total":
+                parts[argument.name] = list_of(number(1), number(4))
+            elif argument.check == "List" or argument.variable:
                 parts[argument.name] = list_of(text("a"), text("b"))
             elif argument.check == "Boolean":
                 parts[argument.name] = boolean(False)
@@ -153,15 +155,20 @@ def test_descriptions_are_sound():
     assert {category.name for category in categories()} >= {
         "events",
         "control",
-        "values",
+        "logic",
+        "numbers",
+        "texts",
+        "sensing",
         "variables",
         "lists",
         "functions",
         "messages",
         "robot",
     }
+    names = (*(category.name for category in categories()), "values")
     for category in categories():
-        assert all(described.type.startswith(f"{category.name}_") for described in category.blocks)
+        assert all(described.type.partition("_")[0] in names for described in category.blocks)
+        assert {described.type for described in category.blocks} >= set(category.headings)
         assert all(described.tooltip.endswith(".") for described in category.blocks)
 
 

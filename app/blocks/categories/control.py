@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.blocks.model.block import Block
 from app.blocks.model.category import Category
-from app.blocks.model.fields import ChoiceField, StatementInput, ValueInput
+from app.blocks.model.fields import ChoiceField, StatementInput, ValueInput, VariableField
 
 _CONDITION = ValueInput("CONDITION", "Boolean")
 _BODY = StatementInput("BODY")
@@ -79,6 +79,24 @@ CATEGORY = Category(
             },
             arguments=(ChoiceField("MODE", (("while", "while"), ("until", "until"))), _CONDITION, _BODY),
             variant="MODE",
+        ),
+        Block(
+            type="control_count",
+            text="count %VAR from %FIRST to %LAST by %STEP %BODY",
+            shape="statement",
+            style="control",
+            icon="list-ordered",
+            tooltip="Runs the blocks inside once for each number; the variable holds the number.",
+            help="From 1 to 10 by 2 are 1, 3, 5, 7 and 9. It counts down when the second number is smaller.",
+            python="for %VAR in counting(%FIRST, %LAST, %STEP):\n    %BODY",
+            arguments=(
+                VariableField("VAR", "number"),
+                ValueInput("FIRST", "Number", 1),
+                ValueInput("LAST", "Number", 10),
+                ValueInput("STEP", "Number", 1),
+                _BODY,
+            ),
+            words=("for", "loop", "index", "range", "counter", "repeat", "i"),
         ),
         Block(
             type="control_if",

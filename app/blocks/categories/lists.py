@@ -117,6 +117,91 @@ _READING = (
         check="String",
         words=("join", "text", "say"),
     ),
+    _value(
+        "lists_part",
+        "items %FIRST to %LAST of %LIST",
+        icon="scissors",
+        tooltip="A list of the items from one number to another.",
+        help="What is beyond the end is left out. The list itself stays as it is.",
+        python="part_of_list(%LIST, %FIRST, %LAST)",
+        arguments=(ValueInput("FIRST", "Number", 1), ValueInput("LAST", "Number", 3), _LIST),
+        check="List",
+        words=("slice", "sublist", "piece", "some"),
+    ),
+    _boolean(
+        "lists_is_empty",
+        "%LIST is empty",
+        icon="circle-dashed",
+        tooltip="Whether nothing is in the list.",
+        python="is_empty_list(%LIST)",
+        arguments=(_LIST,),
+        check="Boolean",
+        words=("nothing", "none", "length"),
+    ),
+)
+
+_WORKING_OUT = (
+    _value(
+        "lists_total",
+        "%WHAT of %LIST",
+        icon="sigma",
+        tooltip="One number from all numbers of a list.",
+        help="The middle number is the one in the middle when they stand in a row from small to large.",
+        python={
+            "sum": "sum_of(%LIST)",
+            "average": "average_of(%LIST)",
+            "smallest": "smallest_of(%LIST)",
+            "largest": "largest_of(%LIST)",
+            "middle": "middle_of(%LIST)",
+        },
+        arguments=(
+            ChoiceField(
+                "WHAT",
+                (
+                    ("sum", "sum"),
+                    ("average", "average"),
+                    ("smallest number", "smallest"),
+                    ("largest number", "largest"),
+                    ("middle number", "middle"),
+                ),
+            ),
+            _LIST,
+        ),
+        variant="WHAT",
+        check="Number",
+        words=("total", "add", "mean", "min", "max", "minimum", "maximum", "median", "statistics"),
+    ),
+    _value(
+        "lists_copy",
+        "copy of %LIST %ORDER",
+        icon="copy",
+        tooltip="A new list with the same items, in this order.",
+        help="The list itself stays as it is: to sort it, set it to its sorted copy. Numbers come before "
+        "texts; capital and small letters are sorted alike.",
+        python={
+            "same": "copy_of(%LIST)",
+            "up": "sorted_up(%LIST)",
+            "down": "sorted_down(%LIST)",
+            "backwards": "turned_round(%LIST)",
+            "random": "shuffled(%LIST)",
+        },
+        arguments=(
+            _LIST,
+            ChoiceField(
+                "ORDER",
+                (
+                    ("from small to large", "up"),
+                    ("from large to small", "down"),
+                    ("backwards", "backwards"),
+                    ("in a random order", "random"),
+                    ("as it is", "same"),
+                ),
+            ),
+        ),
+        variant="ORDER",
+        check="List",
+        words=("sort", "order", "reverse", "shuffle", "mix", "duplicate", "ascending", "descending"),
+    ),
 )
 
 _removing = partial(
@@ -175,6 +260,15 @@ _CHANGING = (
         words=("pop", "draw", "remove"),
     ),
     _statement(
+        "lists_clear",
+        "remove all items of %LIST",
+        icon="list-x",
+        tooltip="Makes a list empty.",
+        python="clear_list(%LIST)",
+        arguments=(_LIST,),
+        words=("delete", "empty", "reset", "clear"),
+    ),
+    _statement(
         "lists_each",
         "for each item %VAR in %LIST %BODY",
         icon="repeat",
@@ -192,5 +286,11 @@ CATEGORY = Category(
     style="variables",
     icon="list",
     order=45,
-    blocks=(*_MAKING, *_READING, *_CHANGING),
+    blocks=(*_MAKING, *_READING, *_WORKING_OUT, *_CHANGING),
+    headings={
+        "lists_empty": "Make a list",
+        "lists_get": "Read a list",
+        "lists_total": "Work something out",
+        "lists_add": "Change a list",
+    },
 )

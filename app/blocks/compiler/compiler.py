@@ -26,16 +26,17 @@ from app.blocks.model.names import Names
 from app.blocks.model.program import Program
 from app.blocks.model.template import expression, literal, statements
 from app.blocks.model.workspace import Placed, Workspace, parse_workspace
+from app.blocks.runtime import calculation, clock, lists, texts
 from app.blocks.runtime.publishing import moved_by
 from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Robot
 
 COMMANDS = frozenset(
     {
-        "add_item", "contains", "each", "fail", "insert_item", "is_known", "item", "join", "join_items",
-        "length", "new_list", "newest", "on_message", "on_start", "on_true", "part", "position", "publish",
-        "random_number", "remove_item", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run",
-        "set_item", "split_text", "stop_program", "stop_script", "wait", "wait_until", "write",
+        "fail", "is_known", "join", "length", "newest", "on_message", "on_start", "on_true", "part",
+        "publish", "random_number", "repeat", "reset_timer", "robot", "rounded", "rounded_down",
+        "rounded_up", "run", "stop_program", "stop_script", "timer", "wait", "wait_until", "write",
+        *calculation.__all__, *clock.__all__, *lists.__all__, *texts.__all__,
     }
 )  # fmt: skip
 """What a program may call (`app.blocks.commands`); no variable gets one of these names."""

@@ -46,6 +46,7 @@ class Category:
     button: tuple[str, str] | None = None
     make: Callable[[Robot, Sequence[Robot]], tuple[Block, ...]] | None = None
     dynamic: str = ""  # the editor adds what people made themselves: "functions"
+    headings: Mapping[str, str] = field(default_factory=dict)  # type of a block -> what stands above it
     groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
 
     def translated(self, say: Say) -> Category:
@@ -55,5 +56,6 @@ class Category:
             self,
             title=say("category", self.title),
             button=button,
+            headings={block: say("heading", words) for block, words in self.headings.items()},
             blocks=tuple(block.translated(say) for block in self.blocks),
         )

@@ -6,12 +6,20 @@ too; what is put in is copied, so no list is inside itself.
 
 from __future__ import annotations
 
+import math
 import random
+import statistics
 from collections.abc import Sequence
 
 from app.blocks.runtime.errors import BehaviourError, kind
-from app.blocks.runtime.values import LONGEST_TEXT, number, text
+from app.blocks.runtime.values import LONGEST_TEXT, letters, number, text
 from nep.i18n import _, lazy, ngettext
+
+__all__ = [
+    "add_item", "average_of", "clear_list", "contains", "copy_of", "each", "insert_item", "is_empty_list",
+    "item", "join_items", "largest_of", "middle_of", "new_list", "part_of_list", "position", "remove_item",
+    "set_item", "shuffled", "smallest_of", "sorted_down", "sorted_up", "split_text", "sum_of", "turned_round",
+]  # fmt: skip
 
 MOST_ITEMS = 10_000
 FIRST, LAST, RANDOM = "first", "last", "random"
@@ -92,10 +100,96 @@ def join_items(of: object, between: object) -> str:
 def split_text(words: object, at: object) -> list[object]:
     """The pieces of a text between these characters; its single characters when there are none."""
     whole, joint = text(words), text(at)
-    pieces = whole.split(joint) if joint else list(whole)
+    pieces = whole.split(joint) if joint else letters(whole)
     if len(pieces) > MOST_ITEMS:
         raise _full()
     return [*pieces]
+
+
+def part_of_list(of: object, first: object, last: object) -> list[object]:
+    """The items from one number to another, both included; what is beyond the ends is left out."""
+    begin, end = (math.floor(number(each, lazy("“items”"))) for each in (first, last))
+    return _own_list(_read(of)[max(begin, 1) - 1 : max(end, 0)])
+
+
+def is_empty_list(of: object) -> bool:
+    """Whether nothing is in the list."""
+    return not _read(of)
+
+
+def clear_list(of: object) -> None:
+    """Take all items out."""
+    _changed(of).clear()
+
+
+def copy_of(of: object) -> list[object]:
+    """A list with the same items."""
+    return _own_list(_read(of))
+
+
+def sorted_up(of: object) -> list[object]:
+    """The items from small to large: numbers, then texts, capital and small letters alike, then the rest."""
+    return sorted(_own_list(_read(of)), key=_rank)
+
+
+def sorted_down(of: object) -> list[object]:
+    """The items from large to small."""
+    return sorted_up(of)[::-1]
+
+
+def turned_round(of: object) -> list[object]:
+    """The last item first."""
+    return _own_list(_read(of))[::-1]
+
+
+def shuffled(of: object) -> list[object]:
+    """The items in a random order."""
+    items = _own_list(_read(of))
+    random.shuffle(items)
+    return items
+
+
+def sum_of(of: object) -> int | float:
+    """All numbers of the list together; 0 for an empty one."""
+    return sum(_numbers(of, lazy("“sum”")))
+
+
+def average_of(of: object) -> float:
+    """The sum divided by how many there are."""
+    items = _some(_numbers(of, lazy("“average”")))
+    return sum(items) / len(items)
+
+
+def smallest_of(of: object) -> int | float:
+    """The smallest number."""
+    return min(_some(_numbers(of, lazy("“smallest number”"))))
+
+
+def largest_of(of: object) -> int | float:
+    """The largest number."""
+    return max(_some(_numbers(of, lazy("“largest number”"))))
+
+
+def middle_of(of: object) -> int | float:
+    """The number in the middle when they are sorted; between the two in the middle of an even count."""
+    return statistics.median(_some(_numbers(of, lazy("“middle number”"))))
+
+
+def _numbers(of: object, what: str) -> list[int | float]:
+    return [number(each, what) for each in _read(of)]
+
+
+def _some(items: list[int | float]) -> list[int | float]:
+    if not items:
+        raise BehaviourError(_("The list is empty."))
+    return items
+
+
+def _rank(value: object) -> tuple[int, float, str]:
+    """Where a value stands among others of any kind."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return (0, math.inf if math.isnan(value) else value, "")
+    return (1 if isinstance(value, str) else 2, 0, text(value).casefold())
 
 
 def _read(of: object) -> Sequence[object]:

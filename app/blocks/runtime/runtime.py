@@ -11,8 +11,9 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
+from types import ModuleType
 
-from app.blocks.runtime import lists, values
+from app.blocks.runtime import calculation, clock, lists, texts, values
 from app.blocks.runtime.errors import BehaviourError, explain
 from app.blocks.runtime.link import ProgramLink
 from app.blocks.runtime.robot_handle import RobotHandle, StatusText
@@ -22,16 +23,14 @@ from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
 
 _OWN = (
-    "called", "fail", "newest", "number", "on_message", "on_start", "on_true", "publish", "robot", "step",
-    "stop_program", "value", "wait", "wait_until", "write",
+    "called", "fail", "newest", "number", "on_message", "on_start", "on_true", "publish", "reset_timer",
+    "robot", "step", "stop_program", "timer", "value", "wait", "wait_until", "write",
 )  # fmt: skip
 _PURE = (
     "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
 )  # fmt: skip
-_LISTS = (
-    "add_item", "contains", "each", "insert_item", "item", "join_items", "new_list", "position",
-    "remove_item", "set_item", "split_text",
-)  # fmt: skip
+_PARTS: tuple[ModuleType, ...] = (calculation, clock, lists, texts)
+"""Modules whose ``__all__`` are names of programs."""
 
 Script = Callable[..., None]
 Decorator = Callable[[Script], Script]
@@ -106,6 +105,7 @@ class Runtime:
         self._subscriptions: list[Callable[[ProgramLink], None]] = []
         self._count_lock = threading.Lock()
         self._running = 0
+        self._timer_from_s = 0.0
         self.scheduler = Scheduler()
         self.saying = StatusText(self.scheduler.block, readings or {})
         self._calls = Calls(self.scheduler)
@@ -117,7 +117,7 @@ class Runtime:
         return (
             {name: getattr(self, name) for name in _OWN}
             | {name: getattr(values, name) for name in _PURE}
-            | {name: getattr(lists, name) for name in _LISTS}
+            | {name: getattr(part, name) for part in _PARTS for name in part.__all__}
             | {"stop_script": stop_script}
         )
 
@@ -126,6 +126,7 @@ class Runtime:
     def start(self, link: ProgramLink, robots: Sequence[Robot]) -> None:
         """Begin all scripts; the program's text has run, so its hats are known."""
         self._link = link
+        self.reset_timer()
         self._robots = {robot.name: robot for robot in robots}
         self._calls.begin()
         link.listen(self.scheduler.poke, self._stopped_outside)
@@ -239,6 +240,16 @@ class Runtime:
     def write(self, value: object) -> None:
         """Write a line to the console."""
         self._printed(values.text(value))
+
+    # ---- time
+
+    def timer(self) -> float:
+        """Seconds since the beginning, or since the timer was reset; pauses do not count."""
+        return round(self.scheduler.running_s() - self._timer_from_s, 3)
+
+    def reset_timer(self) -> None:
+        """Let the timer count from 0."""
+        self._timer_from_s = self.scheduler.running_s()
 
     # ---- topics
 

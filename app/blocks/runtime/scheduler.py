@@ -55,6 +55,8 @@ class Scheduler:
         self._parked: deque[Script] = deque()  # before a block
         self._resuming: deque[Script] = deque()  # inside a block, after a wait
         self._paused = False
+        self._paused_since_s = 0.0
+        self._stood_s = 0.0  # how long all pauses before took
         self.pace_s = 0.0  # slow motion: see `set_pace`
         self._stepping: Script | None = None
         self._stopping = False
@@ -194,15 +196,24 @@ class Scheduler:
     def pause(self) -> None:
         """Hold every script at its next block."""
         with self._lock:
+            if not self._paused:
+                self._paused_since_s = self._clock()
             self._paused = True
             self._wake_all()
 
     def go_on(self) -> None:
         """End the pause."""
         with self._lock:
+            if self._paused:
+                self._stood_s += self._clock() - self._paused_since_s
             self._paused, self._stepping = False, None
             self._grant()
             self._wake_all()
+
+    def running_s(self) -> float:
+        """A clock in seconds that stands while paused."""
+        with self._lock:
+            return (self._paused_since_s if self._paused else self._clock()) - self._stood_s
 
     def set_pace(self, seconds: float) -> None:
         """Slow motion: so long each script stays at a block before it is done; 0 for none."""

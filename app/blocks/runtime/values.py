@@ -1,10 +1,11 @@
-"""What programs do with values: pure functions, called by the blocks of the category "Values"."""
+"""What programs do with values: pure functions, called by blocks of several categories."""
 
 from __future__ import annotations
 
 import json
 import math
 import random
+import unicodedata
 from collections.abc import Mapping, Sequence
 
 from app.blocks.runtime.errors import BehaviourError, kind
@@ -12,6 +13,7 @@ from nep.i18n import _, lazy
 
 LONGEST_TEXT = 1_000_000
 _MOST_ROUNDS = 10**9
+_JOINER = "\u200d"
 
 
 def text(value: object) -> str:
@@ -43,10 +45,34 @@ def join(first: object, second: object) -> str:
 
 
 def length(value: object) -> int:
-    """How many characters a text has, how many things a list or message."""
-    if isinstance(value, (str, list, tuple, Mapping)):
+    """How many letters a text has, how many things a list or message."""
+    if isinstance(value, (list, tuple, Mapping)):
         return len(value)
-    return len(text(value))
+    return len(letters(text(value)))
+
+
+def letters(words: str) -> Sequence[str]:
+    """The letters of a text as people see them: an accent or the colour of a skin is none of its own."""
+    if words.isascii():
+        return words
+    found: list[str] = []
+    for character in words:
+        if found and _belongs(found[-1], character):
+            found[-1] += character
+        else:
+            found.append(character)
+    return found
+
+
+def _belongs(before: str, character: str) -> bool:
+    """Whether a character is a part of the letter before it."""
+    if before[-1] == _JOINER or character in (_JOINER, "\ufe0f"):
+        return True
+    if "\U0001f3fb" <= character <= "\U0001f3ff" or "\U000e0020" <= character <= "\U000e007f":
+        return True  # a colour of skin, the letters of a region's flag
+    if "\U0001f1e6" <= character <= "\U0001f1ff":  # half a flag
+        return len(before) == 1 and "\U0001f1e6" <= before <= "\U0001f1ff"
+    return unicodedata.category(character) in ("Mn", "Me", "Mc")
 
 
 def number(value: object, what: str) -> int | float:

@@ -59,7 +59,11 @@ def _category(category: Category) -> dict[str, object]:
     if category.button is not None:
         words, key = category.button
         contents.append({"kind": "button", "text": words, "callbackkey": key})
-    contents += [block.to_toolbox() for block in category.blocks if block.in_toolbox]
+    for block in category.blocks:
+        if block.type in category.headings:
+            contents.append({"kind": "label", "text": category.headings[block.type]})
+        if block.in_toolbox:
+            contents.append(block.to_toolbox())
     made = _entry(category.name, category.title, category.style, category.icon, contents)
     return made | {"dynamic": category.dynamic} if category.dynamic else made
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -183,3 +185,60 @@ def test_a_list_that_was_put_in_is_a_copy_however_deep() -> None:
     lists.add_item(outer, [[inner]])
     inner.append(2)
     assert outer == [[[1]], [[[1]]]]
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "expected"),
+    [
+        ("sum_of", ([],), 0),
+        ("sum_of", ([1, 2.5, -3],), 0.5),
+        ("sum_of", ([2**64 - 1, 1],), 2**64),
+        ("sum_of", (["a"],), "“sum” needs a number, not a text."),
+        ("sum_of", ([math.nan],), "“sum” needs a number that is not endless."),
+        ("sum_of", ([[1]],), "“sum” needs a number, not a list."),
+        ("sum_of", (0,), "This needs a list, not a number. Set the variable to an empty list first."),
+        ("average_of", ([1, 2],), 1.5),
+        ("average_of", ([],), "The list is empty."),
+        ("smallest_of", ([3, -1, 2],), -1),
+        ("largest_of", ([3, -1, 2],), 3),
+        ("largest_of", ([],), "The list is empty."),
+        ("middle_of", ([9, 1, 5],), 5),
+        ("middle_of", ([1, 2],), 1.5),
+        ("sorted_up", (["b", 10, "A", 2, True],), [2, 10, "A", "b", True]),
+        ("sorted_down", ([1, 3, 2],), [3, 2, 1]),
+        ("sorted_up", ([math.inf, 1, -math.inf],), [-math.inf, 1, math.inf]),
+        ("sorted_up", ([],), []),
+        ("turned_round", (["a", "👍"],), ["👍", "a"]),
+        ("copy_of", ([[1], 2],), [[1], 2]),
+        ("copy_of", (None,), "This list is not known yet."),
+        ("part_of_list", ([1, 2, 3], 2, 99), [2, 3]),
+        ("part_of_list", ([1, 2, 3], -1, 2), [1, 2]),
+        ("part_of_list", ([1, 2, 3], 3, 1), []),
+        ("part_of_list", ([1, 2, 3], "a", 1), "“items” needs a number, not a text."),
+        ("is_empty_list", ([],), True),
+        ("is_empty_list", ([0],), False),
+        ("is_empty_list", ("",), "This needs a list, not a text."),
+    ],
+)
+def test_what_is_worked_out_from_a_list(name, given, expected):
+    try:
+        result = getattr(lists, name)(*given)
+    except BehaviourError as error:
+        result = error.sentence
+    assert (type(result), result) == (type(expected), expected)
+
+
+def test_a_copy_is_another_list():
+    inner: list[object] = [1]
+    items: list[object] = [inner]
+    copied = lists.copy_of(items)
+    lists.clear_list(items)
+    inner.append(2)
+    assert (items, copied) == ([], [[1]])
+
+
+def test_a_shuffled_list_has_the_same_items_in_another_order():
+    items: list[object] = [*range(100)]
+    mixed = lists.shuffled(items)
+    assert mixed != items
+    assert sorted(mixed, key=str) == sorted(items, key=str)

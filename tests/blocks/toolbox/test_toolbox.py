@@ -93,18 +93,19 @@ def test_the_toolbox():
     shape = [(item["kind"], item["name"]) for item in contents]
     assert shape == [
         ("blocksHeading", "Blocks"),
-        ("category", "Events"), ("category", "Control"), ("category", "Values"), ("category", "Variables"),
+        ("category", "Events"), ("category", "Control"), ("category", "Logic"), ("category", "Numbers"),
+        ("category", "Text"), ("category", "Ask and time"), ("category", "Variables"),
         ("category", "Lists"), ("category", "Functions"), ("category", "Messages"),
         ("robotHeading", "Pepper"),
         ("category", "Speech"), ("category", "Movement"), ("category", "Face and lights"),
         ("category", "Sensors"),
         ("robotHeading", "NAO"),
     ]  # fmt: skip
-    pepper, away = contents[8], contents[-1]
+    pepper, away = contents[11], contents[-1]
     assert (pepper["virtual"], pepper["connected"], away["connected"]) == (True, True, False)
-    assert len({item["toolboxitemid"] for item in contents if item["kind"] == "category"}) == 11
-    speech = contents[9]
-    assert (speech["icon"], speech["categorystyle"], contents[12]["categorystyle"]) == (
+    assert len({item["toolboxitemid"] for item in contents if item["kind"] == "category"}) == 14
+    speech = contents[12]
+    assert (speech["icon"], speech["categorystyle"], contents[15]["categorystyle"]) == (
         "message-circle", "robot", "sensors",
     )  # fmt: skip
     say = speech["contents"][0]
@@ -114,10 +115,17 @@ def test_the_toolbox():
         "fields": {"ROBOT": "Pepper"},
         "inputs": {"TEXT": {"shadow": {"type": "values_text", "fields": {"TEXT": "Hello"}}}},
     }
-    assert contents[6]["dynamic"] == "functions"
-    assert contents[4]["contents"][0] == {
+    assert contents[9]["dynamic"] == "functions"
+    assert contents[7]["contents"][0] == {
         "kind": "button", "text": "New variable", "callbackkey": "CREATE_VARIABLE",
     }  # fmt: skip
+
+
+def test_a_long_category_has_headings_between_its_blocks():
+    (lists,) = [item for item in DEFINITIONS["toolbox"]["contents"] if item["name"] == "Lists"]  # type: ignore[index]
+    shown = [entry.get("text") or entry["type"] for entry in lists["contents"]]
+    assert shown[:2] == ["Make a list", "lists_empty"]
+    assert shown[shown.index("Change a list") + 1] == "lists_add"
 
 
 def test_every_entry_of_the_toolbox_is_defined_and_every_style_is_known():

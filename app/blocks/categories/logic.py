@@ -1,0 +1,103 @@
+"""Logic: true and false, comparing, and, or, not."""
+
+from __future__ import annotations
+
+from app.blocks.model.block import Block
+from app.blocks.model.category import Category
+from app.blocks.model.fields import ChoiceField, ValueInput
+
+_COMPARE = {
+    "==": "%A == %B",
+    "!=": "%A != %B",
+    "<": "%A < %B",
+    "<=": "%A <= %B",
+    ">": "%A > %B",
+    ">=": "%A >= %B",
+}
+_RELATIONS = (
+    ("is below", "<"),
+    ("is above", ">"),
+    ("is", "=="),
+    ("is not", "!="),
+    ("is at most", "<="),
+    ("is at least", ">="),
+)
+
+CATEGORY = Category(
+    name="logic",
+    title="Logic",
+    style="values",
+    icon="equal",
+    order=25,
+    blocks=(
+        Block(
+            type="values_compare",
+            text="%A %RELATION %B",
+            shape="boolean",
+            style="values",
+            icon="",
+            tooltip="Compares two values.",
+            python=_COMPARE,
+            arguments=(
+                ValueInput("A", None, 10),
+                ValueInput("B", None, 20),
+                ChoiceField("RELATION", _RELATIONS),
+            ),
+            variant="RELATION",
+            check="Boolean",
+        ),
+        Block(
+            type="values_logic",
+            text="%A %LOGIC %B",
+            shape="boolean",
+            style="values",
+            icon="",
+            tooltip="“and”: both must be so. “or”: one of them is enough.",
+            python={"and": "%A and %B", "or": "%A or %B"},
+            arguments=(
+                ValueInput("A", "Boolean"),
+                ValueInput("B", "Boolean"),
+                ChoiceField("LOGIC", (("and", "and"), ("or", "or"))),
+            ),
+            variant="LOGIC",
+            check="Boolean",
+            fails=False,
+        ),
+        Block(
+            type="values_not",
+            text="not %A",
+            shape="boolean",
+            style="values",
+            icon="",
+            tooltip="So when the other is not.",
+            python="not %A",
+            arguments=(ValueInput("A", "Boolean"),),
+            check="Boolean",
+            fails=False,
+        ),
+        Block(
+            type="values_boolean",
+            text="%VALUE",
+            shape="boolean",
+            style="values",
+            icon="",
+            tooltip="True or false.",
+            python="%VALUE",
+            arguments=(ChoiceField("VALUE", (("true", True), ("false", False))),),
+            check="Boolean",
+            fails=False,
+        ),
+        Block(
+            type="values_known",
+            text="%A is known",
+            shape="boolean",
+            style="values",
+            icon="",
+            tooltip="Whether a sensor or a topic has told this value yet.",
+            python="is_known(%A)",
+            arguments=(ValueInput("A"),),
+            check="Boolean",
+            fails=False,
+        ),
+    ),
+)

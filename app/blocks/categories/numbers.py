@@ -1,0 +1,239 @@
+"""Numbers: what can be worked out from them."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from app.blocks.model.block import Block
+from app.blocks.model.category import Category
+from app.blocks.model.fields import ChoiceField, NumberField, ValueInput
+
+_number = partial(Block, shape="value", style="values", check="Number")
+_boolean = partial(Block, shape="boolean", style="values", check="Boolean")
+
+_TWO = (ValueInput("A", "Number", 1), ValueInput("B", "Number", 1))
+
+_ARITHMETIC = {
+    "+": "%A + %B",
+    "-": "%A - %B",
+    "*": "%A * %B",
+    "/": "%A / %B",
+    "%": "%A % %B",
+    "**": "%A ** %B",
+}
+_SIGNS = (
+    ("+", "+"),
+    ("−", "-"),  # noqa: RUF001 (the sign that people read)
+    ("×", "*"),  # noqa: RUF001 (the sign that people read)
+    ("÷", "/"),
+    ("remainder of ÷", "%"),
+    ("to the power of", "**"),
+)
+
+_FUNCTIONS = (
+    ("square root", "sqrt", "square_root(%NUMBER)"),
+    ("absolute value", "abs", "absolute(%NUMBER)"),
+    ("sign", "sign", "sign(%NUMBER)"),
+    ("sin", "sin", "sine(%NUMBER)"),
+    ("cos", "cos", "cosine(%NUMBER)"),
+    ("tan", "tan", "tangent(%NUMBER)"),
+    ("asin", "asin", "arc_sine(%NUMBER)"),
+    ("acos", "acos", "arc_cosine(%NUMBER)"),
+    ("atan", "atan", "arc_tangent(%NUMBER)"),
+    ("ln", "ln", "natural_logarithm(%NUMBER)"),
+    ("log", "log", "logarithm(%NUMBER)"),
+    ("e to the power", "e^", "e_to_the(%NUMBER)"),
+    ("10 to the power", "10^", "ten_to_the(%NUMBER)"),
+)
+
+_BASIC = (
+    Block(
+        type="values_number",
+        text="%NUMBER",
+        shape="value",
+        style="values",
+        icon="",
+        tooltip="A number.",
+        python="%NUMBER",
+        arguments=(NumberField("NUMBER", 0),),
+        check="Number",
+        fails=False,
+    ),
+    Block(
+        type="values_arithmetic",
+        text="%A %SIGN %B",
+        shape="value",
+        style="values",
+        icon="",
+        tooltip="Works out a number from two numbers.",
+        python=_ARITHMETIC,
+        arguments=(*_TWO, ChoiceField("SIGN", _SIGNS)),
+        variant="SIGN",
+        check="Number",
+    ),
+    Block(
+        type="values_random",
+        text="random number from %LOW to %HIGH",
+        shape="value",
+        style="values",
+        icon="dices",
+        tooltip="A number by chance; a whole one when both limits are whole.",
+        python="random_number(%LOW, %HIGH)",
+        arguments=(ValueInput("LOW", "Number", 1), ValueInput("HIGH", "Number", 6)),
+        check="Number",
+    ),
+    Block(
+        type="values_round",
+        text="%HOW %NUMBER",
+        shape="value",
+        style="values",
+        icon="",
+        tooltip="Makes a whole number; halves go up.",
+        python={
+            "round": "rounded(%NUMBER)",
+            "up": "rounded_up(%NUMBER)",
+            "down": "rounded_down(%NUMBER)",
+        },
+        arguments=(
+            ChoiceField("HOW", (("round", "round"), ("round up", "up"), ("round down", "down"))),
+            ValueInput("NUMBER", "Number", 3.1),
+        ),
+        variant="HOW",
+        check="Number",
+    ),
+)
+
+_MORE = (
+    _number(
+        "numbers_function",
+        "%FUNCTION of %NUMBER",
+        icon="square-radical",
+        tooltip="Works out one number from another.",
+        help="sin, cos and tan take an angle in degrees; asin, acos and atan give one. “log” is the "
+        "logarithm to the base 10, “ln” the one to the base e. The absolute value of −5 is 5; "  # noqa: RUF001
+        "the sign is 1, 0 or −1.",  # noqa: RUF001
+        python={value: python for _words, value, python in _FUNCTIONS},
+        arguments=(
+            ChoiceField("FUNCTION", tuple((words, value) for words, value, _python in _FUNCTIONS)),
+            ValueInput("NUMBER", "Number", 9),
+        ),
+        variant="FUNCTION",
+        words=("sqrt", "root", "abs", "sine", "cosine", "tangent", "logarithm", "exponent", "angle", "math"),
+    ),
+    _number(
+        "numbers_round_to",
+        "round %NUMBER to %PLACES decimal places",
+        icon="decimals-arrow-left",
+        tooltip="Rounds to so many digits behind the decimal point; halves go up.",
+        help="With 0 places it is a whole number. With −1 places it is rounded to tens.",  # noqa: RUF001
+        python="rounded_to(%NUMBER, %PLACES)",
+        arguments=(ValueInput("NUMBER", "Number", 3.14159), ValueInput("PLACES", "Number", 2)),
+        words=("digits", "decimals", "precision"),
+    ),
+    _number(
+        "numbers_of_two",
+        "%WHICH of %A and %B",
+        icon="scale",
+        tooltip="The smaller or the larger of two numbers.",
+        python={"smaller": "smaller(%A, %B)", "larger": "larger(%A, %B)"},
+        arguments=(
+            ChoiceField("WHICH", (("smaller", "smaller"), ("larger", "larger"))),
+            ValueInput("A", "Number", 1),
+            ValueInput("B", "Number", 2),
+        ),
+        variant="WHICH",
+        words=("min", "max", "minimum", "maximum", "least", "most"),
+    ),
+    _number(
+        "numbers_limit",
+        "limit %NUMBER to between %LOW and %HIGH",
+        icon="between-vertical-start",
+        tooltip="The number, but never below the first limit and never above the second.",
+        help="Useful for a speed or an angle: whatever comes in, the robot gets a number that it can do.",
+        python="limited(%NUMBER, %LOW, %HIGH)",
+        arguments=(
+            ValueInput("NUMBER", "Number", 120),
+            ValueInput("LOW", "Number", 0),
+            ValueInput("HIGH", "Number", 100),
+        ),
+        words=("constrain", "clamp", "range", "minimum", "maximum"),
+    ),
+    _number(
+        "numbers_map",
+        "map %NUMBER from %LOW – %HIGH to %NEW_LOW – %NEW_HIGH",  # noqa: RUF001 (from … to …)
+        icon="scaling",
+        tooltip="Turns a number of one range into the number at the same place of another range.",
+        help="A number outside the first range comes out outside the second; put “limit” around it if that "
+        "must not be.",
+        python="mapped(%NUMBER, %LOW, %HIGH, %NEW_LOW, %NEW_HIGH)",
+        arguments=(
+            ValueInput("NUMBER", "Number", 50),
+            ValueInput("LOW", "Number", 0),
+            ValueInput("HIGH", "Number", 100),
+            ValueInput("NEW_LOW", "Number", 0),
+            ValueInput("NEW_HIGH", "Number", 1),
+        ),
+        words=("scale", "convert", "range", "proportion"),
+    ),
+    _number(
+        "numbers_constant",
+        "%CONSTANT",
+        icon="pi",
+        tooltip="A number that mathematics has a name for.",
+        help="π is the distance around a circle divided by the distance across it.",
+        python={"pi": "3.141592653589793", "e": "2.718281828459045", "golden": "1.618033988749895"},
+        arguments=(
+            ChoiceField("CONSTANT", (("π (3.1416)", "pi"), ("e (2.7183)", "e"), ("φ (1.618)", "golden"))),
+        ),
+        variant="CONSTANT",
+        fails=False,
+        words=("pi", "circle", "constant", "golden", "ratio"),
+    ),
+    _boolean(
+        "numbers_is",
+        "%NUMBER is %KIND",
+        icon="binary",
+        tooltip="Whether a number is even, odd, whole, positive or negative.",
+        help="0 is even, and neither positive nor negative.",
+        python={
+            "even": "is_even(%NUMBER)",
+            "odd": "is_odd(%NUMBER)",
+            "whole": "is_whole(%NUMBER)",
+            "positive": "is_positive(%NUMBER)",
+            "negative": "is_negative(%NUMBER)",
+        },
+        arguments=(
+            ValueInput("NUMBER", "Number", 4),
+            ChoiceField(
+                "KIND",
+                (
+                    ("even", "even"),
+                    ("odd", "odd"),
+                    ("whole", "whole"),
+                    ("positive", "positive"),
+                    ("negative", "negative"),
+                ),
+            ),
+        ),
+        variant="KIND",
+        words=("integer", "sign", "question"),
+    ),
+    _boolean(
+        "numbers_divisible",
+        "%NUMBER is divisible by %BY",
+        icon="divide",
+        tooltip="Whether nothing is left over when the first number is divided by the second.",
+        python="is_divisible(%NUMBER, %BY)",
+        arguments=(ValueInput("NUMBER", "Number", 12), ValueInput("BY", "Number", 3)),
+        words=("multiple", "remainder", "modulo"),
+    ),
+)
+
+CATEGORY = Category(
+    name="numbers",
+    title="Numbers",
+    style="values",
+    icon="hash",
+    order=30,
+    blocks=(*_BASIC, *_MORE),
+)

@@ -1,0 +1,215 @@
+"""Text: putting it together, taking it apart, comparing it."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from app.blocks.model.block import Block
+from app.blocks.model.category import Category
+from app.blocks.model.fields import ChoiceField, TextField, ValueInput
+
+_text = partial(Block, shape="value", style="values", check="String")
+_number = partial(Block, shape="value", style="values", check="Number")
+_boolean = partial(Block, shape="boolean", style="values", check="Boolean")
+
+_BASIC = (
+    Block(
+        type="values_text",
+        text="%TEXT",  # the editor puts quotation marks around it
+        shape="value",
+        style="values",
+        icon="",
+        tooltip="A text.",
+        python="%TEXT",
+        arguments=(TextField("TEXT", "Hello"),),
+        check="String",
+        fails=False,
+    ),
+    Block(
+        type="values_join",
+        text="join %A %B",
+        shape="value",
+        style="values",
+        icon="link",
+        tooltip="Puts two texts together; numbers become text.",
+        python="join(%A, %B)",
+        arguments=(ValueInput("A", None, "Hello "), ValueInput("B", None, "Pepper")),
+        check="String",
+    ),
+    Block(
+        type="values_length",
+        text="length of %TEXT",
+        shape="value",
+        style="values",
+        icon="ruler",
+        tooltip="How many characters a text has, or how many things a list.",
+        python="length(%TEXT)",
+        arguments=(ValueInput("TEXT", None, "Hello"),),
+        check="Number",
+    ),
+)
+
+_TAKING_APART = (
+    _text(
+        "texts_letter",
+        "%WHERE %NUMBER of %TEXT",
+        icon="a-large-small",
+        tooltip="One letter of a text; the first is number 1.",
+        help="When there is no such letter, the behaviour stops here and says how many there are. A picture "
+        "such as 👍 is one letter.",
+        python={
+            "number": "letter(%TEXT, %NUMBER)",
+            "first": "letter(%TEXT, 'first')",
+            "last": "letter(%TEXT, 'last')",
+            "random": "letter(%TEXT, 'random')",
+        },
+        arguments=(
+            ChoiceField(
+                "WHERE",
+                (
+                    ("letter number", "number"),
+                    ("first letter", "first"),
+                    ("last letter", "last"),
+                    ("a random letter", "random"),
+                ),
+            ),
+            ValueInput("NUMBER", "Number", 1, only=("WHERE", "number")),
+            ValueInput("TEXT", None, "Hello"),
+        ),
+        variant="WHERE",
+        words=("character", "char", "get", "index"),
+    ),
+    _text(
+        "texts_part",
+        "letters %FIRST to %LAST of %TEXT",
+        icon="scissors",
+        tooltip="A piece of a text, from one letter to another.",
+        help="What is beyond the end is left out: letters 4 to 99 of “Hello” are “lo”.",
+        python="part_of_text(%TEXT, %FIRST, %LAST)",
+        arguments=(
+            ValueInput("FIRST", "Number", 1),
+            ValueInput("LAST", "Number", 3),
+            ValueInput("TEXT", None, "Hello"),
+        ),
+        words=("substring", "slice", "piece", "characters", "cut"),
+    ),
+    _number(
+        "texts_position",
+        "position of %PIECE in %TEXT",
+        icon="text-search",
+        tooltip="At which letter these characters begin; 0 when they are not in the text.",
+        python="position_in_text(%TEXT, %PIECE)",
+        arguments=(ValueInput("PIECE", None, "l"), ValueInput("TEXT", None, "Hello")),
+        words=("index", "find", "where", "search"),
+    ),
+    _text(
+        "texts_change",
+        "%TEXT %CHANGE",
+        icon="case-upper",
+        tooltip="The text in capital letters, in small ones, without spaces around it, or backwards.",
+        python={
+            "capitals": "in_capitals(%TEXT)",
+            "small": "in_small_letters(%TEXT)",
+            "trimmed": "without_spaces_around(%TEXT)",
+            "backwards": "backwards(%TEXT)",
+        },
+        arguments=(
+            ValueInput("TEXT", None, "Hello"),
+            ChoiceField(
+                "CHANGE",
+                (
+                    ("in capital letters", "capitals"),
+                    ("in small letters", "small"),
+                    ("without spaces around it", "trimmed"),
+                    ("backwards", "backwards"),
+                ),
+            ),
+        ),
+        variant="CHANGE",
+        words=("upper", "lower", "case", "uppercase", "lowercase", "trim", "strip", "reverse"),
+    ),
+    _text(
+        "texts_replace",
+        "replace %OLD with %NEW in %TEXT",
+        icon="replace",
+        tooltip="The text with other characters in the place of these, wherever they are.",
+        help="With nothing in the second gap they are taken out.",
+        python="replaced(%TEXT, %OLD, %NEW)",
+        arguments=(
+            ValueInput("OLD", None, "Ada"),
+            ValueInput("NEW", None, "Leo"),
+            ValueInput("TEXT", None, "Hello Ada"),
+        ),
+        words=("substitute", "exchange", "remove", "change"),
+    ),
+    _number(
+        "texts_number",
+        "number in %TEXT",
+        icon="calculator",
+        tooltip="The first number that is written in a text.",
+        help="“I am 12 years old” gives 12. When there is none, the behaviour stops here and says so: ask "
+        "“has a number” first.",
+        python="number_in(%TEXT)",
+        arguments=(ValueInput("TEXT", None, "12 apples"),),
+        words=("convert", "parse", "to", "int", "value"),
+    ),
+)
+
+_QUESTIONS = (
+    _boolean(
+        "texts_contains",
+        "%TEXT %HOW %PIECE",
+        icon="text-search",
+        tooltip="Whether these characters are in the text, or at its beginning or end.",
+        help="Capital and small letters are different here.",
+        python={
+            "contains": "has_in_it(%TEXT, %PIECE)",
+            "starts": "starts_with(%TEXT, %PIECE)",
+            "ends": "ends_with(%TEXT, %PIECE)",
+        },
+        arguments=(
+            ValueInput("TEXT", None, "Hello Ada"),
+            ChoiceField("HOW", (("contains", "contains"), ("starts with", "starts"), ("ends with", "ends"))),
+            ValueInput("PIECE", None, "Ada"),
+        ),
+        variant="HOW",
+        words=("in", "includes", "has", "begins", "find"),
+    ),
+    _boolean(
+        "texts_same",
+        "%A is %B ignoring capitals",
+        icon="equal",
+        tooltip="Whether two texts are the same; capital letters and spaces around do not matter.",
+        help="For what people type or say: “Yes”, “yes” and “YES ” are the same.",
+        python="same_words(%A, %B)",
+        arguments=(ValueInput("A", None, "Yes"), ValueInput("B", None, "yes")),
+        words=("equals", "same", "compare", "case", "insensitive"),
+    ),
+    _boolean(
+        "texts_empty",
+        "%TEXT is empty",
+        icon="circle-dashed",
+        tooltip="Whether there is nothing in a text, or only spaces.",
+        python="is_empty(%TEXT)",
+        arguments=(ValueInput("TEXT", None, ""),),
+        words=("nothing", "blank", "none"),
+    ),
+    _boolean(
+        "texts_has_number",
+        "%TEXT has a number",
+        icon="binary",
+        tooltip="Whether a number is written in a text.",
+        python="has_number(%TEXT)",
+        arguments=(ValueInput("TEXT", None, "12 apples"),),
+        words=("is", "numeric", "digit"),
+    ),
+)
+
+CATEGORY = Category(
+    name="texts",
+    title="Text",
+    style="values",
+    icon="type",
+    order=35,
+    blocks=(*_BASIC, *_TAKING_APART, *_QUESTIONS),
+)

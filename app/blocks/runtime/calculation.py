@@ -1,0 +1,201 @@
+"""What programs work out from numbers: pure functions, called by the blocks of the category "Numbers".
+
+Angles are in degrees. What is no finite number is refused with a sentence (`values.number`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from decimal import ROUND_HALF_DOWN, ROUND_HALF_UP, Decimal
+from fractions import Fraction
+
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.values import number, text
+from nep.i18n import _, lazy
+
+__all__ = [
+    "absolute", "arc_cosine", "arc_sine", "arc_tangent", "cosine", "counting", "e_to_the", "is_divisible",
+    "is_even", "is_negative", "is_odd", "is_positive", "is_whole", "larger", "limited", "logarithm",
+    "mapped", "natural_logarithm", "rounded_to", "sign", "sine", "smaller", "square_root", "tangent",
+    "ten_to_the",
+]  # fmt: skip
+
+_MOST_ROUNDS = 10**9
+_MOST_PLACES = 15
+_EXACT = 2**53
+
+
+def square_root(value: object) -> int | float:
+    """The number that gives this one when multiplied by itself."""
+    return _only(math.sqrt, value, lazy("“square root”"))
+
+
+def absolute(value: object) -> int | float:
+    """The number without its sign."""
+    return abs(number(value, lazy("“absolute value”")))
+
+
+def sign(value: object) -> int:
+    """1, 0 or -1."""
+    found = number(value, lazy("“sign”"))
+    return (found > 0) - (found < 0)
+
+
+def sine(degrees: object) -> int | float:
+    """The sine of an angle."""
+    return _neat(math.sin(_angle(degrees, lazy("“sin”"))))
+
+
+def cosine(degrees: object) -> int | float:
+    """The cosine of an angle."""
+    return _neat(math.cos(_angle(degrees, lazy("“cos”"))))
+
+
+def tangent(degrees: object) -> int | float:
+    """The tangent of an angle; there is none at 90 degrees."""
+    what = lazy("“tan”")
+    if abs(number(degrees, what)) % 180 == 90:
+        raise _no_result(what, degrees)
+    return _neat(math.tan(_angle(degrees, what)))
+
+
+def arc_sine(value: object) -> int | float:
+    """The angle with this sine."""
+    return _neat(math.degrees(_only(math.asin, value, lazy("“asin”"))))
+
+
+def arc_cosine(value: object) -> int | float:
+    """The angle with this cosine."""
+    return _neat(math.degrees(_only(math.acos, value, lazy("“acos”"))))
+
+
+def arc_tangent(value: object) -> int | float:
+    """The angle with this tangent."""
+    return _neat(math.degrees(math.atan(number(value, lazy("“atan”")))))
+
+
+def natural_logarithm(value: object) -> int | float:
+    """The logarithm to the base e."""
+    return _only(math.log, value, lazy("“ln”"))
+
+
+def logarithm(value: object) -> int | float:
+    """The logarithm to the base 10."""
+    return _only(math.log10, value, lazy("“log”"))
+
+
+def e_to_the(power: object) -> float:
+    """E to this power."""
+    return math.exp(number(power, lazy("“e to the power”")))
+
+
+def ten_to_the(power: object) -> int | float:
+    """10 to this power."""
+    return _neat(math.pow(10, number(power, lazy("“10 to the power”"))), places=None)
+
+
+def rounded_to(value: object, places: object) -> int | float:
+    """The number with so many digits behind the point, halves up; below 0 it is rounded to tens and more."""
+    found = number(value, lazy("“round”"))
+    wanted = number(places, lazy("“decimal places”"))
+    digits = max(-_MOST_PLACES, min(_MOST_PLACES, round(wanted)))
+    if abs(found) >= _EXACT:  # it has no digits behind the point that a computer keeps
+        return found
+    halves = ROUND_HALF_UP if found > 0 else ROUND_HALF_DOWN
+    exact = Decimal(repr(found)).scaleb(digits).to_integral_value(halves).scaleb(-digits)
+    return int(exact) if exact == int(exact) else float(exact)
+
+
+def smaller(one: object, other: object) -> int | float:
+    """The smaller of both."""
+    return min(number(one, lazy("“smaller”")), number(other, lazy("“smaller”")))
+
+
+def larger(one: object, other: object) -> int | float:
+    """The larger of both."""
+    return max(number(one, lazy("“larger”")), number(other, lazy("“larger”")))
+
+
+def limited(value: object, low: object, high: object) -> int | float:
+    """The number, at least the one limit and at most the other, in whichever order they come."""
+    found, first, last = (number(each, lazy("“limit”")) for each in (value, low, high))
+    return max(min(first, last), min(max(first, last), found))
+
+
+def mapped(value: object, low: object, high: object, new_low: object, new_high: object) -> int | float:
+    """The number at the same place of another range; the first range is wider than nothing."""
+    what = lazy("“map”")
+    found, first, last, to_first, to_last = (
+        number(each, what) for each in (value, low, high, new_low, new_high)
+    )
+    if first == last:
+        raise BehaviourError(_("{name} needs a first range of two different numbers.").format(name=_(what)))
+    return to_first + (found - first) * (to_last - to_first) / (last - first)
+
+
+def is_even(value: object) -> bool:
+    """Whether it is a whole number that two divides."""
+    return is_whole(value) and int(number(value, lazy("“even”"))) % 2 == 0
+
+
+def is_odd(value: object) -> bool:
+    """Whether it is a whole number that two does not divide."""
+    return is_whole(value) and int(number(value, lazy("“odd”"))) % 2 == 1
+
+
+def is_whole(value: object) -> bool:
+    """Whether nothing is behind its point."""
+    found = number(value, lazy("“is”"))
+    return isinstance(found, int) or found.is_integer()
+
+
+def is_positive(value: object) -> bool:
+    """Whether it is above 0."""
+    return number(value, lazy("“positive”")) > 0
+
+
+def is_negative(value: object) -> bool:
+    """Whether it is below 0."""
+    return number(value, lazy("“negative”")) < 0
+
+
+def is_divisible(value: object, by: object) -> bool:
+    """Whether nothing is left over; as the numbers are written, so 0.3 is divisible by 0.1."""
+    found, divisor = (number(each, lazy("“is divisible by”")) for each in (value, by))
+    return Fraction(str(found)) % Fraction(str(divisor)) == 0
+
+
+def counting(first: object, last: object, step: object) -> Iterator[int | float]:
+    """From one number to another, up or down as they stand; the sign of the step does not matter."""
+    what = lazy("“count”")
+    begin, end, wide = (number(each, what) for each in (first, last, step))
+    if wide == 0:
+        raise BehaviourError(_("{name} needs a step other than 0.").format(name=_(what)))
+    wide = abs(wide) if end >= begin else -abs(wide)
+    # A hair more: 0.1 three times is 0.30000000000000004, and 0 to 0.3 by 0.1 has four numbers.
+    rounds = min(math.floor((end - begin) / wide + 1e-9), _MOST_ROUNDS)
+    whole = isinstance(begin, int) and isinstance(wide, int)
+    return (begin + at * wide if whole else _neat(begin + at * wide, places=12) for at in range(rounds + 1))
+
+
+def _angle(degrees: object, what: str) -> float:
+    return math.radians(math.fmod(number(degrees, what), 360))
+
+
+def _only(work_out: Callable[[float], float], value: object, what: str) -> int | float:
+    found = number(value, what)
+    try:
+        return _neat(work_out(found), places=None)
+    except ValueError:
+        raise _no_result(what, found) from None
+
+
+def _no_result(what: str, value: object) -> BehaviourError:
+    return BehaviourError(_("{name} has no result for {number}.").format(name=_(what), number=text(value)))
+
+
+def _neat(value: float, places: int | None = 10) -> int | float:
+    """Without what a computer adds at the end: sin 30 is 0.5; a whole number is one."""
+    found = value if places is None else round(value, places)
+    return int(found) if found.is_integer() and abs(found) < _EXACT else found

@@ -1,0 +1,62 @@
+"""The date and time of this computer: called by the blocks of the category "Ask and time"."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.values import text
+from nep.i18n import _, lazy
+
+__all__ = ["now", "seconds_since"]
+
+_DAYS = (
+    lazy("Monday"),
+    lazy("Tuesday"),
+    lazy("Wednesday"),
+    lazy("Thursday"),
+    lazy("Friday"),
+    lazy("Saturday"),
+    lazy("Sunday"),
+)
+
+
+def now(part: str) -> object:
+    """One part of the date and time of now; Monday is day 1 of the week."""
+    return part_of_moment(_now(), part)
+
+
+def part_of_moment(moment: datetime, part: str) -> object:
+    """One part of a date and time."""
+    if part in ("year", "month", "day", "hour", "minute", "second"):
+        return getattr(moment, part)
+    if part == "weekday":
+        return moment.isoweekday()
+    if part == "day name":
+        return _(_DAYS[moment.weekday()])
+    return moment.strftime(_SHAPES[part])
+
+
+def seconds_since(moment: object) -> float:
+    """Seconds since a time of today, a date, or both; below 0 for what is still to come."""
+    return round((_now() - read_moment(text(moment), _now())).total_seconds(), 3)
+
+
+def read_moment(written: str, today: datetime) -> datetime:
+    """“14:30”, “2026-11-23”, “2026-11-23 14:30:05”; BehaviourError for anything else."""
+    words = written.strip()
+    if ":" in words and "-" not in words:
+        words = f"{today:%Y-%m-%d} {words.zfill(5) if words.count(':') == 1 else words.zfill(8)}"
+    try:
+        return datetime.fromisoformat(words).replace(tzinfo=None)
+    except ValueError:
+        said = _("“seconds since” needs a time such as 14:30 or a date such as 2026-11-23, not “{text}”.")
+        raise BehaviourError(said.format(text=written[:60])) from None
+
+
+_SHAPES = {"date": "%Y-%m-%d", "time": "%H:%M", "date and time": "%Y-%m-%d %H:%M:%S"}
+
+
+def _now() -> datetime:
+    """By the clock on the wall, as people write it."""
+    return datetime.now().astimezone().replace(tzinfo=None)

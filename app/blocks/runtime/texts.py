@@ -1,0 +1,151 @@
+"""What programs do with text: pure functions, called by the blocks of the category "Text".
+
+Letters are counted from 1, as people see them (`values.letters`). Every value is taken as people write it.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import re
+import unicodedata
+
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.values import LONGEST_TEXT, letters, number, text
+from nep.i18n import _, lazy, ngettext
+
+__all__ = [
+    "backwards", "ends_with", "has_in_it", "has_number", "in_capitals", "in_small_letters", "is_empty",
+    "letter", "number_in", "part_of_text", "position_in_text", "replaced", "same_words", "starts_with",
+    "without_spaces_around",
+]  # fmt: skip
+
+_NUMBER = re.compile(r"(?<![\d.,])[-−]?\d+(?:[.,]\d+)*")  # noqa: RUF001 (the sign that people read)
+_THOUSANDS = re.compile(r"[1-9]\d{0,2}(?:,\d{3})+(?:\.\d+)?")
+_MOST_DIGITS = 300
+
+
+def letter(of: object, where: object) -> str:
+    """The letter at a place: its number, "first", "last" or "random"."""
+    all_of_it = letters(text(of))
+    if not all_of_it:
+        raise BehaviourError(_("The text is empty."))
+    if where == "random":
+        return random.choice(all_of_it)  # noqa: S311 (a game, no secret)
+    named = {"first": 1, "last": len(all_of_it)}
+    place = named.get(where) if isinstance(where, str) else None
+    wanted = number(where, lazy("“letter number”")) if place is None else place
+    if wanted != int(wanted):
+        raise BehaviourError(
+            _("“letter number” needs a whole number, not {place}.").format(place=text(wanted))
+        )
+    if not 1 <= wanted <= len(all_of_it):
+        said = ngettext(
+            "The text has {count} letter; there is no letter {number}.",
+            "The text has {count} letters; there is no letter {number}.",
+            len(all_of_it),
+        )
+        raise BehaviourError(said.format(count=len(all_of_it), number=text(wanted)))
+    return all_of_it[int(wanted) - 1]
+
+
+def part_of_text(of: object, first: object, last: object) -> str:
+    """The letters from one number to another, both included; what is beyond the ends is left out."""
+    begin, end = (math.floor(number(each, lazy("“letters”"))) for each in (first, last))
+    return "".join(letters(text(of))[max(begin, 1) - 1 : max(end, 0)])
+
+
+def position_in_text(of: object, piece: object) -> int:
+    """The number of the letter at which these characters begin; 0 when they are not there."""
+    whole, wanted = text(of), text(piece)
+    found = whole.find(wanted) if wanted else -1
+    return 0 if found < 0 else len(letters(whole[:found])) + 1
+
+
+def has_in_it(of: object, piece: object) -> bool:
+    """Whether these characters are in the text."""
+    return text(piece) in text(of)
+
+
+def starts_with(of: object, piece: object) -> bool:
+    """Whether the text begins with these characters."""
+    return text(of).startswith(text(piece))
+
+
+def ends_with(of: object, piece: object) -> bool:
+    """Whether the text ends with these characters."""
+    return text(of).endswith(text(piece))
+
+
+def same_words(one: object, other: object) -> bool:
+    """Whether both are the same but for capital letters and spaces around."""
+    return _plain(one) == _plain(other)
+
+
+def is_empty(value: object) -> bool:
+    """Whether nothing is in the text, or only spaces."""
+    return not text(value).strip()
+
+
+def in_capitals(value: object) -> str:
+    """In capital letters."""
+    return text(value).upper()
+
+
+def in_small_letters(value: object) -> str:
+    """In small letters."""
+    return text(value).lower()
+
+
+def without_spaces_around(value: object) -> str:
+    """Without spaces and line ends at its beginning and end."""
+    return text(value).strip()
+
+
+def backwards(value: object) -> str:
+    """The last letter first."""
+    return "".join(reversed(letters(text(value))))
+
+
+def replaced(of: object, old: object, new: object) -> str:
+    """The text with other characters in the place of these, wherever they are."""
+    whole, before, after = text(of), text(old), text(new)
+    if not before:
+        return whole
+    if len(whole) + whole.count(before) * (len(after) - len(before)) > LONGEST_TEXT:
+        raise BehaviourError(
+            _("This text is too long: more than {most} characters.").format(most=LONGEST_TEXT)
+        )
+    return whole.replace(before, after)
+
+
+def has_number(value: object) -> bool:
+    """Whether a number is written in it."""
+    return _written(value) is not None
+
+
+def number_in(value: object) -> int | float:
+    """The first number that is written in a text; a number is itself."""
+    if isinstance(value, (int, float)) or value is None:
+        return number(value, lazy("“number in”"))
+    found = _written(value)
+    if found is None:
+        raise BehaviourError(_("There is no number in “{text}”.").format(text=text(value)[:60]))
+    return found
+
+
+def _written(value: object) -> int | float | None:
+    """“12”, “−3.5”, “2,5” and “1,000” are numbers; a comma before three digits is none of a fraction."""  # noqa: RUF002
+    match = _NUMBER.search(text(value))
+    if match is None or len(match[0]) > _MOST_DIGITS:
+        return None
+    minus, digits = match[0][0] in "-−", match[0].lstrip("-−")  # noqa: RUF001 (the sign that people read)
+    if _THOUSANDS.fullmatch(digits):
+        digits = digits.replace(",", "")
+    pieces = re.split(r"[.,]", digits)
+    found = int(pieces[0]) if len(pieces) == 1 else float(f"{pieces[0]}.{pieces[1]}")
+    return -found if minus else found
+
+
+def _plain(value: object) -> str:
+    return unicodedata.normalize("NFKC", text(value)).casefold().strip()

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+import pytest
+
+from app.blocks.runtime import clock
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.scheduler import Scheduler
+from tests.blocks.fakes import play
+from tests.blocks.samples import block, started, text, workspace, write
+
+MOMENT = datetime.fromisoformat("2026-11-23 07:05:09")
+
+
+def test_parts_of_a_moment():
+    told = {part: clock.part_of_moment(MOMENT, part) for _words, part in PARTS}
+    assert told == {
+        "year": 2026, "month": 11, "day": 23, "weekday": 1, "day name": "Monday", "hour": 7, "minute": 5,
+        "second": 9, "date": "2026-11-23", "time": "07:05", "date and time": "2026-11-23 07:05:09",
+    }  # fmt: skip
+
+
+def options():
+    from app.blocks.categories.sensing import CATEGORY
+
+    (block_of_now,) = [each for each in CATEGORY.blocks if each.type == "sensing_now"]
+    return block_of_now.argument("PART").options
+
+
+PARTS = options()
+
+
+@pytest.mark.parametrize(
+    ("written", "expected"),
+    [
+        ("14:30", "2026-11-23 14:30:00"),
+        ("7:30", "2026-11-23 07:30:00"),
+        ("7:30:05", "2026-11-23 07:30:05"),
+        (" 2026-11-22 ", "2026-11-22 00:00:00"),
+        ("2026-11-22 14:30:05", "2026-11-22 14:30:05"),
+    ],
+)
+def test_moments_are_read_as_people_write_them(written, expected):
+    assert str(clock.read_moment(written, MOMENT)) == expected
+
+
+@pytest.mark.parametrize(
+    "wrong", ["", "soon", "25:00", "2026-13-01", "-1", "0", "18446744073709551615", "nan", "👍"]
+)
+def test_what_is_no_moment_is_told(wrong):
+    with pytest.raises(BehaviourError, match="needs a time such as 14:30"):
+        clock.read_moment(wrong, MOMENT)
+
+
+def test_seconds_since_now_and_since_what_is_to_come():
+    moment = str(clock.now("date and time"))
+    assert 0 <= clock.seconds_since(moment) < 60
+    later = datetime.fromisoformat(moment) + timedelta(days=1)
+    assert clock.seconds_since(f"{later:%Y-%m-%d %H:%M:%S}") < 0
+
+
+def test_the_timer_counts_and_is_reset():
+    run = play(
+        workspace(
+            started(
+                block("control_wait", SECONDS=block("values_number", NUMBER=0.2)),
+                write(block("sensing_timer")),
+                block("sensing_reset"),
+                write(block("sensing_timer")),
+                write(block("sensing_seconds_since", "since", MOMENT=text("soon"))),
+            )
+        )
+    )
+    before, after = map(float, run.lines)
+    assert before >= 0.2 > after >= 0
+    assert run.runtime.error is not None
+    assert run.runtime.error.block == "since"
+
+
+def test_the_clock_of_scripts_stands_while_paused():
+    time_s = [10.0]
+    scheduler = Scheduler(lambda: time_s[0])
+    began = scheduler.running_s()
+    time_s[0] += 2
+    scheduler.pause()
+    scheduler.pause()
+    time_s[0] += 100
+    assert scheduler.running_s() - began == 2
+    scheduler.go_on()
+    time_s[0] += 1
+    assert scheduler.running_s() - began == 3
