@@ -121,7 +121,7 @@ class ProblemCollector:
             sentence = _("{robot} is not connected, so {block} will be skipped.")
             self._note(
                 "warning", placed, block, name, sentence.format(robot=robot, block=skipped),
-                mend=_("Connect {robot}").format(robot=robot), mend_action=f"connect:{robot}", style="robot",
+                mend=_("Show the robots"), mend_action=f"connect:{robot}", style="robot",
             )  # fmt: skip
             return True
         if block is None:

@@ -26,6 +26,17 @@ def asked_of(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
     return {robot: frozenset(types) for robot, types in found.items()}
 
 
+def count_of(workspace: Mapping[str, object], ids: Collection[str]) -> Mapping[str, int]:
+    """How many of these blocks name each robot."""
+    wanted = frozenset(ids)
+    found: dict[str, int] = {}
+    for block in saved_blocks(workspace) if wanted else ():
+        robot = _robot_of(block)
+        if isinstance(robot, str) and block.get("id") in wanted:
+            found[robot] = found.get(robot, 0) + 1
+    return found
+
+
 def types_of(robot: Robot) -> frozenset[str]:
     """The types of all blocks of a robot."""
     return frozenset(block.type for block in robot_blocks(robot, [robot]))

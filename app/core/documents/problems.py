@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from app.blocks import Problem
-from app.blocks.fixes.replace_robot import asked_of, can_do, types_of
+from app.blocks.fixes.replace_robot import asked_of, can_do, count_of, types_of
 from app.robots.description.description import Robot
 from nep.i18n import _, ngettext
 
@@ -42,14 +42,16 @@ def listed(
     missing: Sequence[Robot],
     connected: Sequence[Robot],
     virtual_models: Collection[str],
+    absent: Collection[str] = (),
 ) -> tuple[Listed, ...]:
     """The lines for these problems.
 
-    All blocks of one missing robot are one line. It offers each connected robot that can do the same, and the
-    virtual robot of its model.
+    All blocks of one missing robot are one line: as many as are grey, which are those in `absent`
+    (`Program.absent`). It offers each connected robot that can do the same, and a virtual robot of its model.
     """
     found: list[Listed] = []
     place: dict[str, int] = {}
+    grey = count_of(workspace, absent)
     known = {robot.name: robot for robot in missing}
     asked = asked_of(workspace)
     types = {robot.name: types_of(robot) for robot in connected} if known else {}
@@ -58,10 +60,7 @@ def listed(
         if name is None:
             own = (Mend(problem.mend, problem.mend_action),) if problem.mend and problem.mend_action else ()
             found.append(Listed(problem, own))
-        elif name in place:
-            at = place[name]
-            found[at] = replace(found[at], blocks=found[at].blocks + 1)
-        else:
+        elif name not in place:
             place[name] = len(found)
             robot = known.get(name)
             able: list[Robot] = []
@@ -69,7 +68,7 @@ def listed(
                 blocks = asked.get(name, frozenset())
                 able = [each for each in connected if can_do(blocks, robot.model, each, types[each.name])]
             mends = robot_mends(name, robot, able, virtual_models)
-            found.append(Listed(problem, mends))
+            found.append(Listed(problem, mends, max(1, grey.get(name, 0))))
     return tuple(_counted(each) for each in found)
 
 
@@ -81,15 +80,20 @@ def robot_mends(
 ) -> tuple[Mend, ...]:
     """What can be done about a missing robot, the best first; `able` can do what is asked of it."""
     if robot is None:
-        return (Mend(_("Connect {robot}").format(robot=name), f"{CONNECT}{name}"),)
+        return (_show_robots(name),)
     alike = [other for other in able if other.model == robot.model] or able
     mends = [
         Mend(_("Use {robot}").format(robot=other.name), f"robot.use:{name}:{other.name}")
         for other in alike[:MOST_MENDS]
     ]
     if robot.model in virtual_models and len(mends) < MOST_MENDS:
-        mends.append(Mend(_("Use the virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
-    return tuple(mends) or (Mend(_("Connect {robot}").format(robot=name), f"{CONNECT}{name}"),)
+        mends.append(Mend(_("Start a virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
+    return tuple(mends) or (_show_robots(name),)
+
+
+def _show_robots(name: str) -> Mend:
+    """Studio can't switch a real robot on: it shows which are there, and why others are not."""
+    return Mend(_("Show the robots"), f"{CONNECT}{name}")
 
 
 def _missing(problem: Problem) -> str | None:

@@ -27,6 +27,8 @@ from nep.i18n import _, lazy, ngettext, pgettext
 
 if TYPE_CHECKING:
     from app.blocks import Program
+    from app.core.documents.document import Document
+    from app.robots.description.description import Robot
 
 STATUS = {"error": "error", "warning": "warn", "info": "info"}
 SEVERITIES = {"error": lazy("error"), "warning": lazy("warning"), "info": lazy("info")}
@@ -142,14 +144,20 @@ class ProblemsPanel(PanelWidget):
         self.checked.setText(_("Checked while you build"))
         found = listed(
             program.problems,
-            document.workspace if document.absent else {},  # parsed only when somebody is missing
-            document.absent,
+            document.workspace if program.absent else {},  # parsed only when somebody is missing
+            self._missing(document),
             [link.robot for link in self.session.fleet.connected],
             VIRTUAL_ROBOTS,
+            program.absent,
         )
         if found != self._found:
             self._found = found
             self._show(found)
+
+    def _missing(self, document: Document) -> list[Robot]:
+        """The robots that are not there, as the behaviour knows them, or else as they were seen last."""
+        seen = {link.name: link.robot for link in self.session.fleet.links if not link.connected}
+        return list({**seen, **{robot.name: robot for robot in document.absent}}.values())
 
     def _show(self, found: tuple[Listed, ...]) -> None:
         """The rows of these problems; one that is there already stays, with its focus."""

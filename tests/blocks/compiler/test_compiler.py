@@ -115,7 +115,7 @@ def test_the_problems_of_the_picture():
     first, second = program.problems
     assert (first.severity, first.block_id, first.category, first.icon) == ("warning", "n", "robot", "hand")
     assert (first.subject, first.sentence) == ("wave", "NAO is not connected, so wave will be skipped.")
-    assert (first.mend, first.mend_action) == ("Connect NAO", "connect:NAO")
+    assert (first.mend, first.mend_action) == ("Show the robots", "connect:NAO")
     assert (second.severity, second.block_id, second.category) == ("info", "w", "control")
     assert second.sentence == "wait until may wait for ever if nobody comes."
     assert (second.subject, second.mend, second.mend_action) == ("wait until", "Add a time limit", "limit:w")

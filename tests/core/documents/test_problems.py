@@ -26,7 +26,7 @@ def speaks(robot: str, count: int = 3) -> dict[str, object]:
 
 def lines(saved, missing: list[Robot], connected: list[Robot]):
     program = compile_behaviour(saved, connected, absent=missing, name="Test")
-    return listed(program.problems, saved, missing, connected, MODELS)
+    return listed(program.problems, saved, missing, connected, MODELS, program.absent)
 
 
 def test_all_blocks_of_a_missing_robot_are_one_line() -> None:
@@ -34,7 +34,28 @@ def test_all_blocks_of_a_missing_robot_are_one_line() -> None:
     assert line.problem.sentence == "Pepper is not connected, so 3 blocks will be skipped."
     assert line.problem.subject == "3 blocks"
     assert line.problem.block_id, "a press leads to the first"
-    assert line.mends == (Mend("Use the virtual Pepper", "robot.virtual:Pepper"),)
+    assert line.mends == (Mend("Start a virtual Pepper", "robot.virtual:Pepper"),)
+
+
+def test_what_is_counted_is_what_is_grey_also_values_inside_and_scripts_that_nothing_starts() -> None:
+    asks = block("robot_pepper_get_heard_word", ROBOT="Nao 3")
+    says = block("robot_pepper_do_say", ROBOT="Nao 3", TEXT=asks)
+    alone = block("robot_pepper_do_wave", ROBOT="Nao 3")
+    saved = workspace(started(says), alone)
+    missing = [pepper("Nao 3")]
+    program = compile_behaviour(saved, [], absent=missing, name="Test")
+    (line,) = lines(saved, missing, [])
+    assert len(program.absent) == 3
+    assert line.blocks == 3
+    assert line.problem.sentence == "Nao 3 is not connected, so 3 blocks will be skipped."
+
+
+def test_a_button_says_what_it_does() -> None:
+    """Nobody is told that a real robot is connected when a virtual one starts."""
+    (line,) = lines(speaks("Nao 3"), [pepper("Nao 3")], [])
+    assert line.mends == (Mend("Start a virtual Nao 3", "robot.virtual:Nao 3"),)
+    (line,) = lines(speaks("Nao 3"), [], [])
+    assert line.mends == (Mend("Show the robots", "connect:Nao 3"),)
 
 
 def test_one_block_is_named() -> None:
@@ -44,13 +65,13 @@ def test_one_block_is_named() -> None:
 
 def test_a_connected_robot_that_can_do_the_same_comes_first() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2")])
-    assert [mend.words for mend in line.mends] == ["Use Pepper 2", "Use the virtual Pepper"]
+    assert [mend.words for mend in line.mends] == ["Use Pepper 2", "Start a virtual Pepper"]
     assert line.mends[0].action == "robot.use:Pepper:Pepper 2"
 
 
 def test_a_robot_of_an_unknown_model_can_only_be_connected() -> None:
     (line,) = lines(workspace(started(say("Hi"))), [sample("Pepper")], [])
-    assert [mend.words for mend in line.mends] in (["Connect Pepper"], ["Use the virtual Pepper"])
+    assert [mend.words for mend in line.mends] in (["Show the robots"], ["Start a virtual Pepper"])
 
 
 def test_the_blocks_of_two_missing_robots_are_two_lines() -> None:

@@ -77,13 +77,13 @@ def test_a_missing_robot_is_one_line_with_the_robots_that_can_do_it(panel, windo
     document = window.session.document
     absent = [
         Problem("warning", f"b{n}", "robot", "say", "Pepper 2 is not connected, so say will be skipped.",
-                "Connect Pepper 2", "connect:Pepper 2", icon="message-circle")
+                "Show the robots", "connect:Pepper 2", icon="message-circle")
         for n in range(3)
     ]  # fmt: skip
-    document.found, document.edits = tuple(absent), 7
+    document.found, document.edits, document.absent_blocks = tuple(absent), 7, ("b0", "b1", "b2")
     monkeypatch.setattr(type(document), "absent", (pepper("Pepper 2"),))
     say = {"type": "robot_virtual_pepper_do_say", "fields": {"ROBOT": "Pepper 2"}}
-    document.workspace = {"blocks": {"blocks": [say]}}
+    document.workspace = {"blocks": {"blocks": [{**say, "id": f"b{n}"} for n in range(3)]}}
     panel.refresh()
     (row,) = panel.rows
     assert row.accessibleName() == "warning: Pepper 2 is not connected, so 3 blocks will be skipped."

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtGui import QRegion
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -14,8 +15,10 @@ from app.core.network.topics import Topic
 from app.core.storage.settings import RecentFile
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.command_palette import Palette
+from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import Example
+from app.ui.widgets import StopButton
 from app.ui.widgets.lists import fuzzy
 from app.ui.widgets.lists.entry_list import Heading
 from app.ui.widgets.lists.fuzzy import Entry, Finder, Match, match
@@ -62,6 +65,24 @@ def test_scattered_letters_do_not_fit() -> None:
     assert found("Close the behaviour", query="tour") == []  # it would close a tab on Enter
 
 
+@pytest.mark.parametrize(
+    ("query", "words"),
+    [("pb", "Put the panels back"), ("ptpb", "Put the panels back"), ("vl", "Volver a poner los paneles")],
+)
+def test_the_initials_of_a_command_mean_it(query: str, words: str) -> None:
+    topics = [Entry(f"topic:/{query}", f"/{query}"), Entry(f"topic:/a{query}", f"/a{query}")]
+    other = Entry("command:x", f"Take the {query}x away")
+    rows, _count = Finder([*topics, Entry("command:layout.reset", words)]).find(query, 20)
+    assert [each.entry.words for each in rows] == [words, f"/{query}", f"/a{query}"]
+    rows, _count = Finder([other, Entry("command:layout.reset", words)]).find(query, 20)
+    assert rows[0].entry is other, "whole letters of a command are still better than initials"
+
+
+@pytest.mark.parametrize("query", ["p", "pt b", "bp", "pbx", "tb"])
+def test_what_are_no_initials_stands_as_ever(query: str) -> None:
+    assert not fuzzy.is_initials(query, "Put the panels back")
+
+
 def test_of_very_many_whole_pieces_are_found_and_all_are_counted() -> None:
     many = [Entry(f"topic:/robot{n}/joint/{n % 97}", f"/robot{n}/joint/{n % 97}") for n in range(10_000)]
     finder = Finder([*many, Entry("command:x", "Joists and beams")])
@@ -88,6 +109,15 @@ def test_of_ten_thousand_topics_few_are_looked_at_closely(monkeypatch: pytest.Mo
         assert finder.find(query, 40)[0]
         assert 0 < len(compared) <= fuzzy.MANY
         assert fuzzy.MANY * 10 <= 10_000
+
+
+class Steady(Overlay):
+    """As large and where it was, whatever the size of text."""
+
+    top = 300
+
+    def wanted_size(self, room: QSize) -> QSize:
+        return QSize(300, 200)
 
 
 # -- in the window --------------------------------------------------------------------------------
@@ -142,6 +172,32 @@ def test_stop_stays_bright_and_can_be_pressed(palette: Palette, window: MainWind
     window.commands.actions["run.stop"].triggered.connect(lambda: pressed.append("stop"))
     QTest.mouseClick(stop, Qt.MouseButton.LeftButton)
     assert pressed == ["stop"]
+
+
+@pytest.mark.parametrize("percent", [200, 125, 100])
+@pytest.mark.parametrize("layout", ["behaviour", "developer"])
+def test_the_hole_over_stop_follows_it_when_the_size_of_text_changes(
+    qtbot, palette: Palette, window: MainWindow, layout: str, percent: int
+) -> None:
+    """Whatever opens over the window: one that keeps its place is not laid out again by itself."""
+    palette.shut()
+    window.commands.run(f"layout.{layout}")
+    window.theme.set_text_percent(150)
+    stop = next(each for each in window.findChildren(StopButton) if each.isVisible())
+    qtbot.waitUntil(lambda: stop.size() == stop.sizeHint())
+    sheet = Steady(window.theme, window, "Steady")
+    sheet.open()
+    qtbot.waitUntil(lambda: sheet.graphicsEffect() is None)
+    window.theme.set_text_percent(percent)
+    qtbot.waitUntil(lambda: stop.size() == stop.sizeHint())
+
+    def follows() -> None:
+        body = QRect(stop.mapTo(window, QPoint()), stop.size()).adjusted(4, 4, -4, -4)
+        hole = QRegion(sheet._scrim.rect()) - sheet._scrim.mask()
+        assert hole.boundingRect() == body
+        assert not sheet.geometry().intersects(body)
+
+    qtbot.waitUntil(follows)
 
 
 def test_f12_stops_while_it_is_open(palette: Palette, commands: Commands) -> None:

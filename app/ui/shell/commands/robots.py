@@ -67,10 +67,8 @@ class RobotCommands:
     # -- robots that are missing ------------------------------------------------------------------
 
     def connect(self, name: str) -> None:
-        """A virtual robot starts; for a real one the list of robots shows."""
-        link = self._session.fleet.link(name)
-        described = link.robot.source if link is not None else self._session.document.robots.get(name, {})
-        kind = described.get("rb:robot")
+        """A virtual robot starts again; for a real one the list of robots shows."""
+        kind = self._described(name).get("rb:robot")
         model = _model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
         if model is not None:
             self._session.launcher.restart_virtual_robot(name, model)
@@ -79,7 +77,7 @@ class RobotCommands:
 
     def start_for(self, missing: str) -> bool:
         """Start the virtual robot of a missing one's model; False when there is none. It can be undone."""
-        model = _model(self._session.document.robots.get(missing, {}).get("rb:robot"))
+        model = _model(self._described(missing).get("rb:robot"))
         if model is None:
             return False
         launcher = self._session.launcher
@@ -90,6 +88,11 @@ class RobotCommands:
             lambda: launcher.stop_virtual_robot(missing),
         )
         return True
+
+    def _described(self, name: str) -> Mapping[str, object]:
+        """A robot's description, as it was seen last or as the behaviour keeps it."""
+        link = self._session.fleet.link(name)
+        return link.robot.source if link is not None else self._session.document.robots.get(name, {})
 
     def use(self, swap: RobotSwap) -> bool:
         """Let another robot do what a missing one was asked to do; False when it is away.

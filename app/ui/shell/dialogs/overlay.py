@@ -35,6 +35,43 @@ def stops_in(window: QWidget) -> list[StopButton]:
     return [stop for stop in window.findChildren(StopButton) if stop.isVisible() and stop.window() is window]
 
 
+class StopPlaces(QObject):
+    """Tells when a Stop of a window comes, goes, or gets another place or size: by itself or with what holds it.
+
+    A change of the size of text lays bars out after all widgets have heard of it, and more than once.
+    """
+
+    changed = Signal()
+    GEOMETRY = frozenset({QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide})
+
+    def __init__(self, window: QWidget, parent: QObject) -> None:
+        super().__init__(parent)
+        self._window = window
+        self._watched: list[QWidget] = []
+
+    def watch(self) -> None:
+        """Watch from now on until `rest`; all Stops, also those that can't be seen yet."""
+        self.rest()
+        for stop in self._window.findChildren(StopButton):
+            widget: QWidget | None = stop
+            while widget is not None and widget is not self._window and widget not in self._watched:
+                self._watched.append(widget)
+                widget.installEventFilter(self)
+                widget = widget.parentWidget()
+
+    def rest(self) -> None:
+        """Watch nothing."""
+        watched, self._watched = self._watched, []
+        for widget in watched:
+            if isValid(widget):
+                widget.removeEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() in self.GEOMETRY:
+            self.changed.emit()
+        return super().eventFilter(watched, event)
+
+
 class Scrim(QWidget):
     """Darkens a window except its Stop buttons, which can be pressed as ever; a press elsewhere closes."""
 
@@ -108,6 +145,8 @@ class Overlay(QWidget):
         self._scrim = Scrim(theme, window)
         self._scrim.surface = self
         self._scrim.pressed.connect(self.shut)
+        self._stops = StopPlaces(window, self)
+        self._stops.changed.connect(self._stop_moved)
         self._before: QWidget | None = None
         self._opening = QVariantAnimation(self)
         self._opening.setStartValue(0.0)
@@ -133,6 +172,7 @@ class Overlay(QWidget):
         self._before = QApplication.focusWidget()
         window = self.window_below()
         window.installEventFilter(self)
+        self._stops.watch()
         self.place()
         self._scrim.show()
         self._scrim.raise_()
@@ -160,6 +200,7 @@ class Overlay(QWidget):
         if isinstance(application, QApplication):
             application.focusChanged.disconnect(self._focus_changed)
         self.window_below().removeEventFilter(self)
+        self._stops.rest()
         self._opening.stop()
         self._arrived()
         before = self._before
@@ -185,6 +226,10 @@ class Overlay(QWidget):
         if place != self.geometry() or self._scrim.size() != window.size() or not self.isVisible():
             self.setGeometry(place)
             self._scrim.cover()
+
+    def _stop_moved(self) -> None:
+        self.place()
+        self._scrim.cover()
 
     def _placed(self, top: int) -> QRect:
         window = self.window_below()

@@ -1,7 +1,8 @@
 """Fuzzy search for the command palette: which words fit what was typed, how well, and by which letters.
 
 A whole piece of a word fits better than letters that are spread over it; the beginning of a word fits better
-than its middle. Letters that are only somewhere do not fit at all: a person would not know why.
+than its middle. Letters that are only somewhere do not fit at all: a person would not know why. Who types the
+initials of a command means that command, whatever else has those letters.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 
-WHOLE, WORD, INSIDE, SPREAD = 100.0, 80.0, 55.0, 40.0
+WHOLE, WORD, INITIALS, INSIDE, SPREAD = 100.0, 80.0, 70.0, 55.0, 40.0
 LEAST_SPREAD = 0.8  # share of the letters that begin a word or follow the letter before
 PER_LETTER = 0.05
 MANY = 400  # entries of a kind that are all looked at letter by letter
@@ -150,13 +151,32 @@ class Finder:
             count += len(found)
             if found:
                 best.append(heapq.nlargest(most, found, key=attrgetter("score")))
-        best.sort(key=lambda found: -found[0].score)
+        best.sort(key=lambda found: (not _says_initials(query, found), -found[0].score))
         return [each for found in best for each in found], count
 
 
 def _fitting(query: str, entry: Entry) -> Match | None:
     fits = match(query, entry.words)
-    return None if fits is None else Match(entry, fits[0] - (LATER if entry.reason else 0.0), fits[1])
+    if fits is None:
+        return None
+    score, spans = fits
+    if is_initials(query, entry.words):
+        score = max(score, INITIALS - PER_LETTER * len(entry.words))
+    return Match(entry, score - (LATER if entry.reason else 0.0), spans)
+
+
+def _says_initials(query: str, found: Sequence[Match]) -> bool:
+    return found[0].entry.kind == "command" and is_initials(query, found[0].entry.words)
+
+
+def is_initials(query: str, words: str) -> bool:
+    """Whether these are the first letters of words, the first word's and others' in their order."""
+    wanted = query.lower().strip()
+    firsts = [word[0] for word in "".join(c if c.isalnum() else " " for c in words.lower()).split()]
+    if len(wanted) < 2 or not firsts or wanted[0] != firsts[0]:
+        return False
+    left = iter(firsts)
+    return all(letter in left for letter in wanted)
 
 
 def _soonest(pieces: Sequence[str]) -> Callable[[tuple[str, Entry]], tuple[int, int]]:
