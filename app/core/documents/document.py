@@ -25,6 +25,7 @@ from app.core.documents.file_format import (
     write_file,
 )
 from app.core.documents.journal import Journal, Unsaved
+from app.core.documents.titles import name_of
 from app.core.documents.versions import Stamp, stamp_of
 from app.core.documents.workspace_json import LONG_CHARACTERS, WorkspaceJson
 from app.core.storage import deep_json
@@ -149,11 +150,14 @@ class Document:
             unsaved.journal.unlink(missing_ok=True)
 
     def save(self, path: Path | None = None) -> None:
-        """Write the file, atomically; with ``path`` it becomes the behaviour's file. Raises DocumentError."""
+        """Write the file, atomically; with ``path`` it becomes the behaviour's file. Raises DocumentError.
+
+        The file holds its name too: programs that read files go by that one.
+        """
         target = path if path is not None else self.path
         if target is None:
             raise DocumentError(None, _("this behaviour has no file yet"), _("choose one"))
-        name = target.stem if path is not None else self.name
+        name = name_of(target, self.name)
         write_file(target, BehaviourFile(name, self.workspace, self.robots, self.others))
         self.path, self.name = target, name
         self.dirty = False
@@ -311,7 +315,8 @@ class Document:
     def _replace(self, found: BehaviourFile, path: Path | None) -> None:
         self._discard_journal()
         self._journal = self._make_journal()
-        self.name, self.path, self.workspace = found.name, path, found.workspace
+        self.name = name_of(path, found.name) if path is not None else found.name
+        self.path, self.workspace = path, found.workspace
         self.robots, self.others = dict(found.robots), found.others
         self._compile_s = self._asked = None
         self.dirty = False

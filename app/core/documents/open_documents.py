@@ -12,6 +12,7 @@ from app.blocks import editor_definitions
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.documents.document import UNNAMED, Compiled, Document
 from app.core.documents.journal import Unsaved
+from app.core.documents.titles import told_apart
 from app.errors import DocumentError
 from app.robots.description.description import Robot
 from nep.i18n import _
@@ -54,7 +55,7 @@ class Documents:
         if self.current.blank:
             return self.current
         made = self._made()
-        made.new(self._free_name())
+        made.new(self._free_name(_(UNNAMED)))
         return self._put(made)
 
     def open(self, path: Path) -> Document:
@@ -66,11 +67,11 @@ class Documents:
 
     def example(self, path: Path) -> Document:
         """Open an example as a new behaviour in a tab. Raises DocumentError."""
-        return self._filled(lambda document: document.example(path))
+        return self._named_apart(self._filled(lambda document: document.example(path)))
 
     def copy(self, path: Path, name: str) -> Document:
         """Open a file as a new behaviour of another name in a tab. Raises DocumentError."""
-        return self._filled(lambda document: document.copy(path, name))
+        return self._named_apart(self._filled(lambda document: document.copy(path, name)))
 
     def recover(self, unsaved: Unsaved) -> Document:
         """Put back unsaved work: into the tab that has its file, else into a tab of its own."""
@@ -88,6 +89,11 @@ class Documents:
     def with_key(self, key: str) -> Document | None:
         """The open behaviour of that key."""
         return next((each for each in self._open if each.key == key), None)
+
+    def title(self, document: Document) -> str:
+        """What an open behaviour is called: no two of them are called the same."""
+        opened = [*self._open, *([document] if document not in self._open else [])]
+        return told_apart([(each.name, each.path) for each in opened])[opened.index(document)]
 
     # -- tabs --------------------------------------------------------------------------------------------
 
@@ -252,11 +258,15 @@ class Documents:
         self.revision += 1
         return document
 
-    def _free_name(self) -> str:
-        names = {each.name for each in self._open}
-        number = 2
-        name = _(UNNAMED)
-        while name in names:
-            name = f"{_(UNNAMED)} {number}"
+    def _named_apart(self, document: Document) -> Document:
+        """One without a file gets a name that no other has."""
+        document.name = self._free_name(document.name, besides=document)
+        return document
+
+    def _free_name(self, wanted: str, besides: Document | None = None) -> str:
+        names = {each.name.casefold() for each in self._open if each is not besides}
+        number, name = 2, wanted
+        while name.casefold() in names:
+            name = f"{wanted} {number}"
             number += 1
         return name

@@ -59,6 +59,9 @@ class OpenBehaviours(Protocol):
         """The one that shows; Run runs it."""
         ...
 
+    def title(self, document: Document) -> str:
+        """What people call it."""
+
 
 class Runs:
     """The behaviour's runs. One thread uses it (the window's); the stop itself happens beside it."""
@@ -347,7 +350,9 @@ class Runs:
         self.kept, self._program_key = frozenset(program.robots), runner.program_key
         self._console.leave_out(runner.pid)
         last = self._run.last_words
-        self._run = RunState("running", document.name, started_s=self._clock(), last_words=last)
+        self._run = RunState(
+            "running", self._documents.title(document), started_s=self._clock(), last_words=last
+        )
         self._console.add("info", self._run.name, _("started"))
 
     def _on_error(self, event: RunnerEvent) -> None:

@@ -33,6 +33,11 @@ def data_home() -> Path:
     return Path(chosen) if chosen else Path(platformdirs.user_data_dir("nep-studio", appauthor=False))
 
 
+def kept_folder() -> Path:
+    """Where Studio saves behaviours that were closed and had no file yet."""
+    return home() / "kept"
+
+
 @dataclass(frozen=True, slots=True)
 class RecentFile:
     """A file that was opened or saved, and when (epoch seconds)."""
@@ -103,7 +108,8 @@ class Settings:
             if isinstance(entry, Mapping) and isinstance(entry.get("path"), str):
                 path, when = Path(entry["path"]), entry.get("opened_s", 0)
                 opened_s = float(when) if isinstance(when, int | float) else 0.0
-                found.append(RecentFile(path, str(entry.get("name", path.stem)), opened_s, path.is_file()))
+                name = str(entry.get("name", path.stem)) if path.parent == kept_folder() else path.stem
+                found.append(RecentFile(path, name, opened_s, path.is_file()))
         return found
 
     def add_recent(self, path: Path, name: str | None = None) -> None:

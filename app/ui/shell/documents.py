@@ -16,7 +16,7 @@ from app.core.documents.journal import Unsaved
 from app.core.documents.versions import Earlier, free_path, keep_earlier, stamp_of
 from app.core.session import Session
 from app.core.storage import deep_json
-from app.core.storage.settings import home
+from app.core.storage.settings import kept_folder
 from app.errors import AppError, DocumentError, SettingsError
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
@@ -163,7 +163,8 @@ class DocumentController:
     def save_as(self) -> None:
         """Ask where, then save there."""
         document = self._session.document
-        folder = document.path.parent if document.path is not None else Path.home()
+        own = document.path
+        folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
         suggestion = str(folder / f"{document.name}{SUFFIX}")
         self._asks.save(suggestion, lambda path: self.with_newest(lambda: self._save(path)))
 
@@ -247,7 +248,7 @@ class DocumentController:
         try:
             earlier = keep_earlier(path) if path is not None else None
             if path is None:
-                document.save(free_path(home() / "kept", name, self._clock()))
+                document.save(free_path(kept_folder(), name, self._clock()))
             else:
                 document.save()
         except AppError as error:

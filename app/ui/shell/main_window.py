@@ -9,6 +9,7 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QMenuBar, QStackedWidget, QVBoxLayout, QWidget
 
+from app.core.documents.titles import recent_titles
 from app.core.faults import log_errors
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
@@ -211,7 +212,7 @@ class MainWindow(QMainWindow):
 
     def show_recent(self) -> None:
         """Show on the start page which files were opened lately."""
-        self.start.show_recent(self.session.settings.recent)
+        self.start.show_recent(recent_titles(self.session.settings.recent))
 
     def complain(self, sentence: str) -> None:
         """Say in the Console what went wrong and needs nobody's hand."""
@@ -368,7 +369,11 @@ class MainWindow(QMainWindow):
         elif self.showing == "developer":
             left = (facts.master(), facts.remote_access(), facts.traffic(), facts.lost())
             self.status.show_facts(left, (facts.shown(), facts.window()))
-        title = "NEP Studio" if self.showing == START else f"{document.name} - NEP Studio"
+        title = (
+            "NEP Studio"
+            if self.showing == START
+            else f"{self.session.documents.title(document)} - NEP Studio"
+        )
         if title != self.windowTitle():
             self.setWindowTitle(title)
 

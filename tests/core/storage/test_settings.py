@@ -41,7 +41,7 @@ def test_recent_files_are_newest_first_without_doubles_or_missing_ones(tmp_path:
     files[-1].unlink()
     recent = Settings(tmp_path / "home").recent
     assert recent[0].path == files[5].resolve()
-    assert recent[0].name == "Five"
+    assert recent[0].name == "5", "the file's own name"
     assert files[-1].resolve() not in [item.path for item in recent]
     assert len({item.path for item in recent}) == len(recent) <= RECENT_LIMIT
 

@@ -10,6 +10,7 @@ from PySide6.QtCore import QPoint, Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.core.documents.titles import told_apart
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.behaviour.live_values import live_words
@@ -130,7 +131,7 @@ class BehaviourPanel(PanelWidget):
         self._ticks += 1
         documents, document = self.session.documents, self.session.document
         runs = self.session.runs
-        self._bar.tabs.show_tabs([tab_facts(each, runs) for each in documents], document.key)
+        self._bar.tabs.show_tabs(tab_facts(documents, runs), document.key)
         if self.editor is None:
             self.editor = self._open_editor()
         if self._new("definitions", documents.definitions_revision):
@@ -362,11 +363,15 @@ def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
     return {link.name: (ROBOT_STATUS[link.state], link.state_words) for link in links if link.state in ALARMS}
 
 
-def tab_facts(document: Document, runs: Runs) -> TabFacts:
-    """What the tab of a behaviour shows."""
-    running = runs.active and runs.document is document
-    where = str(document.path) if document.path is not None else _("Not saved in a file yet")
-    return TabFacts(document.key, document.name, document.dirty, running, f"{document.name}\n{where}")
+def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:
+    """What the tabs of behaviours show."""
+    shown = list(documents)
+    found = []
+    for document, title in zip(shown, told_apart([(each.name, each.path) for each in shown]), strict=True):
+        running = runs.active and runs.document is document
+        where = str(document.path) if document.path is not None else _("Not saved in a file yet")
+        found.append(TabFacts(document.key, title, document.dirty, running, f"{title}\n{where}"))
+    return found
 
 
 PANEL = Panel("behaviour", lazy("Behaviour"), "blocks", (), BehaviourPanel)

@@ -190,7 +190,8 @@ class BehaviourCommands:
                 self._shell.theme, self._shell.surface, self._files.copy, self._files.save
             )
         document = self._session.document
-        self._versions.show_for(document.name, document.path, document.workspace)
+        title = self._session.documents.title(document)
+        self._versions.show_for(document.name, document.path, document.workspace, title=title)
 
     def forget_recent(self) -> None:
         """Clear the list of recent files; it can be taken back."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
+from app.core.documents.titles import recent_titles
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.commands.shell import Shell
@@ -71,7 +72,7 @@ class MenuLists:
 
     def _list_recent(self) -> None:
         self._recent.clear()
-        recent = self._session.settings.recent_known
+        recent = recent_titles(self._session.settings.recent_known)
         self._recent.menuAction().setVisible(bool(recent))
         for file in recent:
             words = file.name

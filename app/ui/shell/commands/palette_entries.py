@@ -6,6 +6,7 @@ import datetime as dt
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from app.core.documents.titles import recent_titles
 from app.core.session import Session
 from app.ui.shell.actions.command import Command
 from app.ui.shell.actions.shortcuts import Shortcuts
@@ -80,7 +81,7 @@ class PaletteEntries:
     def _files(self) -> list[Entry]:
         now = dt.datetime.now().astimezone()
         made = []
-        for file in self._session.settings.recent_known:
+        for file in recent_titles(self._session.settings.recent_known):
             when = day_words(dt.datetime.fromtimestamp(file.opened_s).astimezone(), now)
             reason = ""
             if not file.there:

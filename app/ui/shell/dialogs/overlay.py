@@ -36,7 +36,7 @@ def stops_in(window: QWidget) -> list[StopButton]:
 
 
 class StopPlaces(QObject):
-    """Tells when a Stop of a window comes, goes, or gets another place or size: by itself or with what holds it.
+    """Tells when a Stop of a window comes, goes, or gets another place or size, also with what holds it.
 
     A change of the size of text lays bars out after all widgets have heard of it, and more than once.
     """

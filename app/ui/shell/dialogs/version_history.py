@@ -108,9 +108,17 @@ class VersionHistorySheet(Overlay):
     # -- showing ----------------------------------------------------------------------------------
 
     def show_for(
-        self, name: str, path: Path | None, workspace: Mapping[str, object], now: dt.datetime | None = None
+        self,
+        name: str,
+        path: Path | None,
+        workspace: Mapping[str, object],
+        now: dt.datetime | None = None,
+        title: str = "",
     ) -> None:
-        """Show the versions of a behaviour's file, compared with its blocks as they are now."""
+        """Show the versions of a behaviour's file, compared with its blocks as they are now.
+
+        ``title`` is the name with its folder, where another open behaviour has the same name.
+        """
         self._name, self._now = name, workspace
         moment = now if now is not None else dt.datetime.now().astimezone()
         own = versions_of(path) if path is not None else []
@@ -123,7 +131,7 @@ class VersionHistorySheet(Overlay):
                 Heading(_("Of other files called {name}").format(name=name)),
                 *(self._line(each, moment) for each in others),
             ]
-        self.heading.setText(_("Earlier versions of {name}").format(name=name))
+        self.heading.setText(_("Earlier versions of {name}").format(name=title or name))
         self.setAccessibleName(self.heading.text())
         self._say_nothing(name, path)
         for widget, shown in ((self.rows, True), (self._foot, True), (self.empty, False)):

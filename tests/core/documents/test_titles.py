@@ -1,0 +1,97 @@
+"""Behaviours are called as their files are, and no two of them the same."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.core.documents.document import Document
+from app.core.documents.file_format import BehaviourFile, write_file
+from app.core.documents.journal import Journal
+from app.core.documents.open_documents import Documents
+from app.core.documents.titles import recent_titles, told_apart
+from app.core.storage.settings import RecentFile, Settings, kept_folder
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path / "home"))
+    return tmp_path / "home"
+
+
+def file(path: Path, name: str = "Greeting") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, BehaviourFile(name, {"blocks": {"blocks": [{"type": "events_started"}]}}, {}))
+    return path
+
+
+def documents(tmp_path: Path) -> Documents:
+    return Documents(lambda: Document(lambda: Journal(tmp_path / "journal")))
+
+
+def test_a_copy_of_a_file_is_called_as_it_is_called_and_not_as_what_it_was_copied_from(tmp_path) -> None:
+    opened = documents(tmp_path)
+    first = opened.open(file(tmp_path / "Greeting.nepb"))
+    copy = opened.open(file(tmp_path / "Greeting for class 3.nepb"))
+    assert [opened.title(each) for each in opened] == ["Greeting", "Greeting for class 3"]
+    copy.save()
+    assert json.loads((tmp_path / "Greeting for class 3.nepb").read_text("utf-8"))["name"] == copy.name
+    assert first.name == "Greeting"
+    opened.end()
+
+
+def test_files_of_the_same_name_have_their_folder_behind_it(tmp_path) -> None:
+    opened = documents(tmp_path)
+    here = opened.open(file(tmp_path / "class 3" / "Greeting.nepb"))
+    assert opened.title(here) == "Greeting"
+    there = opened.open(file(tmp_path / "class 4" / "Greeting.nepb"))
+    assert [opened.title(each) for each in opened] == ["Greeting — class 3", "Greeting — class 4"]
+    opened.close(there)
+    assert opened.title(here) == "Greeting"
+    opened.end()
+
+
+def test_as_many_folders_as_it_takes() -> None:
+    paths = [Path("/a/2025/tasks/Quiz.nepb"), Path("/a/2026/tasks/Quiz.nepb"), Path("/b/Quiz.nepb")]
+    assert told_apart([("Quiz", each) for each in paths] + [("quiz", None), ("Other", Path("/b/Other"))]) == [
+        "Quiz — 2025/tasks",
+        "Quiz — 2026/tasks",
+        "Quiz — b",
+        "quiz",
+        "Other",
+    ]
+    assert told_apart([("Quiz", Path("/Quiz.nepb")), ("Quiz", Path("/x/Quiz.nepb"))])[1] == "Quiz — x"
+
+
+def test_an_example_that_is_opened_again_gets_a_name_of_its_own(tmp_path) -> None:
+    opened = documents(tmp_path)
+    path = file(tmp_path / "example.nepb", "Tour guide")
+    assert [opened.example(path).name for _ in range(3)] == ["Tour guide", "Tour guide 2", "Tour guide 3"]
+    opened.end()
+
+
+def test_recent_files_are_called_as_their_tabs(tmp_path) -> None:
+    settings = Settings(tmp_path / "home")
+    for folder in ("class 3", "class 4"):
+        settings.add_recent(file(tmp_path / folder / "Greeting.nepb"), "An old name from inside")
+    assert [each.name for each in recent_titles(settings.recent)] == [
+        "Greeting — class 4",
+        "Greeting — class 3",
+    ]
+    assert [each.name for each in settings.recent] == ["Greeting", "Greeting"]
+
+
+def test_work_that_was_closed_without_a_file_keeps_its_name(tmp_path) -> None:
+    document = Document(lambda: Journal(tmp_path / "journal"))
+    document.new("Quiz")
+    document.save(kept_folder() / "Quiz 2026-11-23 08.00.nepb")
+    assert document.name == "Quiz"
+    settings = Settings(tmp_path / "home")
+    settings.add_recent(kept_folder() / "Quiz 2026-11-23 08.00.nepb", "Quiz")
+    assert isinstance(settings.recent[0], RecentFile)
+    assert settings.recent[0].name == "Quiz"
+    again = Document(lambda: Journal(tmp_path / "journal"))
+    again.open(settings.recent[0].path)
+    assert again.name == "Quiz"
