@@ -112,6 +112,7 @@ class Session:
             post_event=self._mailbox.post_event,
             clock=clock,
         )
+        self.runs.coming = lambda: self.coming
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
@@ -133,6 +134,12 @@ class Session:
     def document(self) -> Document:
         """The behaviour whose tab shows."""
         return self.documents.current
+
+    @property
+    def coming(self) -> tuple[str, ...]:
+        """The virtual robots that are being started and are not there yet."""
+        there = {link.name for link in self.fleet.connected}
+        return tuple(name for name in self.launcher.coming if name not in there)
 
     def start(self) -> None:
         """Start the threads; a master is started when none answers."""
@@ -353,6 +360,7 @@ class Session:
             robots = [link.robot for link in self.fleet.connected]
             self.documents.set_connected(robots)
             for robot in robots:
+                self.launcher.came(robot.name)
                 self.alerts.resolve(f"companion:{robot.name}")
         self._keep_within_reach()
         if self.topics.revision != self._topics_seen:

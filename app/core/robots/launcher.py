@@ -25,6 +25,8 @@ VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.tur
 TAIL_BYTES = 2000
 KNOWN_WITHIN_S = 3.0
 """How long a start waits until it is known who is there: a robot of that name may be."""
+COMING_S = 30.0
+"""How long a robot that was started counts as coming: a slow computer takes its time."""
 WISH_KEPT_S = 4.0
 """How long a wish is kept for a robot that is there: it may have died, which is noticed within 3.3 s."""
 
@@ -113,6 +115,7 @@ class Launcher:
         self._clock = clock
         self._start = start
         self._wishes: dict[str, _Wish] = {}
+        self._coming: dict[str, float] = {}  # until when it counts as coming, by the robot's name
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[Process, IO[bytes]]] = {}
@@ -130,6 +133,16 @@ class Launcher:
         """The names of the virtual robots that run because Studio started them."""
         with self._lock:
             return tuple(name for name, (process, _log) in self._robots.items() if process.poll() is None)
+
+    @property
+    def coming(self) -> tuple[str, ...]:
+        """The virtual robots that a person wants and that are not there yet, but those that failed."""
+        now = self._clock()
+        return tuple(name for name, until in self._coming.items() if now < until)
+
+    def came(self, name: str) -> None:
+        """This robot is there."""
+        self._coming.pop(name, None)
 
     @property
     def process_ids(self) -> tuple[int, ...]:
@@ -159,6 +172,7 @@ class Launcher:
         """
         now = self._clock()
         self.wanted[name] = model
+        self._coming[name] = now + COMING_S
         self._wishes[name] = _Wish(model, now + KNOWN_WITHIN_S, now + WISH_KEPT_S)
         self.follow()
 
@@ -195,6 +209,7 @@ class Launcher:
                 process = self._start(command, environment, log)
             except OSError as error:
                 log.close()
+                self._coming.pop(name, None)
                 self._post_event(
                     LaunchFailed(
                         name, _("The virtual robot {robot} can't be started.").format(robot=name), str(error)
@@ -214,6 +229,7 @@ class Launcher:
             held[0].kill()
             held[0].wait()
             held[1].close()
+        self._coming[name] = self._clock() + COMING_S
         self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
@@ -223,6 +239,7 @@ class Launcher:
 
     def _end_robot(self, name: str) -> None:
         self._wishes.pop(name, None)
+        self._coming.pop(name, None)
         with self._lock:
             held = self._robots.pop(name, None)
         if held is not None:
@@ -236,6 +253,7 @@ class Launcher:
             for name in ended:
                 _process, log = self._robots.pop(name)
                 self.ended |= {name}
+                self._coming.pop(name, None)
                 self._post_event(
                     LaunchFailed(
                         name, _("The virtual robot {robot} has ended.").format(robot=name), _tail(log)

@@ -6,7 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
@@ -20,6 +20,7 @@ from app.core.robots.motion_permission import wanted_by
 from app.core.robots.stop import STOP_TIMEOUT_S as STOP_TIMEOUT_S
 from app.core.robots.stop import RobotStopper
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
+from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.runner import Runner, RunnerEvent
 from app.core.run.view import (
     STOP_AGAIN,
@@ -38,6 +39,8 @@ from app.errors import AppError
 from app.robots.description.description import Robot
 from nep.i18n import _, lazy
 
+PRESSED_TWICE_S = 0.5
+"""Two presses of Run within this time are one: a double click."""
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
 NO_NETWORK = lazy("there is no connection to the network yet")
 
@@ -49,6 +52,14 @@ class RunNetwork(Protocol):
 
     address: str
     stopper: RobotStopper | None
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a person wants to be run: a behaviour; ``paused`` before its first block."""
+
+    document: Document
+    paused: bool = False
 
 
 class OpenBehaviours(Protocol):
@@ -82,9 +93,13 @@ class Runs:
         self._documents, self._fleet, self._network = documents, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._make_runner = make_runner
+        self.coming: Callable[[], Sequence[str]] = tuple
+        """Tells which robots are being started."""
         self.document: Document | None = None  # which the run belongs to: its blocks glow, fail and stop
         self.pace_s = 0.0
         self._runner: Runner | None = None
+        self._next: Wanted | None = None  # once what runs has been stopped, proven
+        self._edits = EditsSinceRun()
         self._used: tuple[str, ...] = ()
         self._program_key: str | None = None  # the last one's: robots refuse what still comes from it
         self.kept: frozenset[str] = frozenset()  # robots it used, until proven still; a stop reaches them
@@ -114,6 +129,9 @@ class Runs:
         self._view = None
         if self._run.nothing_in is not None and self._run.nothing_in is not self._documents.current.newest():
             self._run = replace(self._run, nothing_in=None)  # another behaviour shows, or this one was edited
+        edited = self.active and self._edits.seen()
+        if edited != self._run.edited:
+            self._run = replace(self._run, edited=edited)
 
     def view(self) -> RunView:
         """What the run bar says: made once a tick, and again when something was done since then."""
@@ -121,21 +139,49 @@ class Runs:
         if self._view is None or self._view[0] is not run or self._view[1] is not current:
             names = [link.name for link in self._fleet.connected]
             elsewhere = self.document not in {None, current}
-            made = view_of(run, names, self._clock(), elsewhere=elsewhere, slow=self.pace_s > 0)
+            made = view_of(
+                run, names, self._clock(), coming=self.coming(), elsewhere=elsewhere, slow=self.pace_s > 0
+            )
             self._view = (run, current, made)
         return self._view[2]
 
     def run(self) -> None:
-        """Run the behaviour as it is now; while paused, go on. Problems are told on their blocks."""
-        if self._run.state == "paused":
+        """Run the behaviour that shows as it is now; while paused, go on; while one runs, restart.
+
+        Problems are told on their blocks.
+        """
+        run = self._run
+        if run.state == "paused":
             self.go_on()
-        elif self._run.state in {"ready", "proven"}:
-            self._begin(paused=False)
+        elif run.state != "running" or self._clock() - run.started_s >= PRESSED_TWICE_S:
+            self._want(Wanted(self._documents.current))
+
+    def restart(self) -> None:
+        """Run anew, as its blocks are now, the behaviour that runs or is paused."""
+        if self.active and self.document is not None:
+            self._want(Wanted(self.document))
+
+    def concerns(self, document: Document) -> bool:
+        """Whether this behaviour runs, or is to run once what runs has been stopped."""
+        return (self.active and self.document is document) or (
+            self._next is not None and self._next.document is document
+        )
+
+    def _want(self, wanted: Wanted) -> None:
+        """Run this; what runs is stopped first, and its robots must have proven that they stand still."""
+        if self._run.state in {"ready", "proven"}:
+            self._begin(wanted)
+            return
+        if self.active:
+            self._stop(self._used)
+        if self._run.state == "stopping":
+            self._next = wanted
+            self._run = replace(self._run, restarts=True)
 
     def step(self) -> None:
         """Run one block: of a paused program the next, of none the first; a running one is paused."""
         if self._run.state in {"ready", "proven"}:
-            self._begin(paused=True)
+            self._begin(Wanted(self._documents.current, paused=True))
         elif self._run.state == "running":
             self.pause()
         elif self._run.state == "paused" and self._runner is not None:
@@ -164,6 +210,7 @@ class Runs:
     def stop(self) -> None:
         """End the program and stop every robot; what they answer is the run bar's result."""
         self._asked_again.clear()
+        self._next = None
         self._stop(None)
         self._fleet.permission.withdraw()
 
@@ -299,8 +346,11 @@ class Runs:
         self._run = replace(self._run, state="proven" if report.proven else "unanswered", report=report)
         self.kept = frozenset(report.silent)
         self._tell_fleet(report)
-        self._run = replace(self._run, last_words=result_words(report)[0])
+        self._run = replace(self._run, last_words=result_words(report)[0], restarts=False)
         self._tell_person(report, self._run.name or "stop")
+        wanted, self._next = self._next, None
+        if wanted is not None and report.proven:
+            self._begin(wanted)
 
     def _on_late(self, event: LateAnswer) -> None:
         """A robot answered too late: what it says now counts, if nothing else has happened since."""
@@ -312,8 +362,8 @@ class Runs:
 
     # -- inside ------------------------------------------------------------------------------------------
 
-    def _begin(self, *, paused: bool) -> None:
-        document = self.document = self._documents.current
+    def _begin(self, wanted: Wanted) -> None:
+        document = self.document = wanted.document
         self._alerts.resolve("program")
         self._set_errors({})
         self._mark()
@@ -327,8 +377,8 @@ class Runs:
                 self._run = RunState(nothing_in=program, last_words=self._run.last_words)
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
-            wanted = wanted_by(program, used)
-            if not self._fleet.permission.permits(wanted, self.step if paused else self.run):
+            asked = wanted_by(program, used)
+            if not self._fleet.permission.permits(asked, partial(self._begin_now, wanted)):
                 return  # a person is asked first; the question stands in the window
             runner = self._make_runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
@@ -338,7 +388,7 @@ class Runs:
                 robots,
                 self._network.address,
                 name=document.name,
-                paused=paused,
+                paused=wanted.paused,
                 pace_s=self.pace_s,
                 owners=owners,
             )
@@ -346,14 +396,20 @@ class Runs:
             self._alerts.put("program", "error", _("The behaviour can't be started."), str(error))
             return
         self._runner, self._used, self._labels = runner, program.robots, program.labels
-        self._wanted, self._told_owners, self._robots_told = wanted, owners, self._fleet.revision
+        self._wanted, self._told_owners, self._robots_told = asked, owners, self._fleet.revision
         self.kept, self._program_key = frozenset(program.robots), runner.program_key
         self._console.leave_out(runner.pid)
+        self._edits.ran(document, program)
         last = self._run.last_words
         self._run = RunState(
             "running", self._documents.title(document), started_s=self._clock(), last_words=last
         )
         self._console.add("info", self._run.name, _("started"))
+
+    def _begin_now(self, wanted: Wanted) -> None:
+        """A person has answered that the robots may move; nothing else was begun meanwhile."""
+        if self._run.state in {"ready", "proven"}:
+            self._begin(wanted)
 
     def _on_error(self, event: RunnerEvent) -> None:
         self._console.add("error", self._run.name, event.text)
@@ -399,6 +455,8 @@ class Runs:
             report=None,
             answered=(),
             finished=False,
+            edited=False,
+            restarts=False,
             asked=asked,
         )
         self._fleet.told_to_stop(asked)

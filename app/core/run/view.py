@@ -12,8 +12,9 @@ from nep.i18n import _, lazy, listed, ngettext, number
 MOST_NAMED = 4
 WIDEST_NAMES = 24
 """Longer names of robots are not repeated on the button beside the sentence that has them."""
+APPLIES_LATER = lazy("Your changes apply at the next Run")
 NOTHING = lazy("Take “when started” from Events and hang blocks below it")
-RUN, GO_ON = lazy("Run"), lazy("Go on")
+RUN, GO_ON, RESTART = lazy("Run"), lazy("Go on"), lazy("Restart")
 STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 
 
@@ -23,7 +24,8 @@ class RunState:
 
     ``state`` is ready, running, paused, stopping, proven or unanswered. ``warning`` is what a person should
     know before a paused program goes on. Times are monotonic seconds; the program's clock stands while it is
-    paused (``held_s``, ``pause_began_s``). ``again``: the stop before this one is not proven.
+    paused (``held_s``, ``pause_began_s``). ``again``: the stop before this one is not proven. ``restarts``:
+    something is run as soon as this stop is proven. ``edited``: the behaviour is not what runs any more.
     """
 
     state: str = "ready"
@@ -37,6 +39,8 @@ class RunState:
     elapsed_s: float | None = None
     pressed_s: float = 0.0
     again: bool = False
+    restarts: bool = False
+    edited: bool = False
     asked: tuple[str, ...] = ()
     answered: tuple[RobotStop, ...] = ()
     report: StopReport | None = None
@@ -60,7 +64,7 @@ class RunView:
 
     ``result`` stands beside Stop with its colour (``result_ok``); ``last_stop`` is the small reminder while a
     program runs; ``confirm`` are the words of the button with which a person says that a silent robot is
-    still.
+    still. ``edited``: what runs is not what the blocks say now, so Restart is the next thing to do.
     """
 
     state: str
@@ -70,6 +74,8 @@ class RunView:
     can_run: bool = False
     can_pause: bool = False
     can_step: bool = False
+    can_restart: bool = False
+    edited: bool = False
     run_word: str = RUN
     stop_word: str = STOP
     result: str | None = None
@@ -88,18 +94,30 @@ def place_of(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str
 
 
 def view_of(
-    run: RunState, connected: Sequence[str], now: float, *, elsewhere: bool = False, slow: bool = False
+    run: RunState,
+    connected: Sequence[str],
+    now: float,
+    *,
+    coming: Sequence[str] = (),
+    elsewhere: bool = False,
+    slow: bool = False,
 ) -> RunView:
     """The run bar for this state, the names of the connected robots, and the time; ``slow``: slow motion.
 
-    ``elsewhere``: the run belongs to a behaviour whose tab does not show, so the title names it.
+    ``coming``: robots that are being started. ``elsewhere``: the run belongs to a behaviour whose tab does
+    not show, so the title names it, and Run is of the one that shows.
     """
-    view = replace(_view(run, connected, now), slow=slow)
+    view = replace(_view(run, connected, coming, now), slow=slow)
     return _named(view, run, now) if elsewhere and run.name and run.state != "ready" else view
 
 
 def _named(view: RunView, run: RunState, now: float) -> RunView:
     """The same with the behaviour's name, for when another one's blocks are to be seen."""
+    if view.state in {"running", "paused"}:
+        runs = view.state == "running"
+        if view.edited:
+            view = replace(view, edited=False, detail=run.says if runs else _paused_detail(run))
+        view = replace(view, run_word=RUN if runs else view.run_word)
     if view.state == "running":
         # just pressed: the words of before stay, and what ran has its time
         if run.state == "stopping" and run.elapsed_s is None:
@@ -119,7 +137,7 @@ def _named(view: RunView, run: RunState, now: float) -> RunView:
     return view
 
 
-def _view(run: RunState, connected: Sequence[str], now: float) -> RunView:
+def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: float) -> RunView:
     early = run.state == "stopping" and not run.again and now - run.pressed_s < STOPPING_SHOWN_AFTER_S
     views: dict[str, Callable[[RunState, float], RunView]] = {
         "running": _running,
@@ -134,7 +152,7 @@ def _view(run: RunState, connected: Sequence[str], now: float) -> RunView:
     return RunView(
         "ready",
         title,
-        _(NOTHING) if run.nothing_in else connected_words(connected),
+        _(NOTHING) if run.nothing_in else connected_words(connected, coming),
         title,
         can_run=True,
         can_step=True,
@@ -147,10 +165,13 @@ def _running(run: RunState, now: float) -> RunView:
     return RunView(
         "running",
         _("Running, {time}").format(time=time_words),
-        run.says,
+        _(APPLIES_LATER) if run.edited else run.says,
         _("{name} runs, {time}").format(name=run.name, time=time_words),
         can_pause=True,
         can_step=True,
+        can_restart=True,
+        edited=run.edited,
+        run_word=RESTART,
         last_stop=run.last_words or None,
     )
 
@@ -159,13 +180,19 @@ def _paused(run: RunState, _now: float) -> RunView:
     return RunView(
         "paused",
         _("Paused at “{block}”").format(block=run.paused_at) if run.paused_at else _("Paused"),
-        run.warning or _("Robots hold still; the clock stands"),
+        _(APPLIES_LATER) if run.edited and not run.warning else _paused_detail(run),
         _("{name} is paused").format(name=run.name),
         can_run=True,
         can_step=True,
+        can_restart=True,
+        edited=run.edited,
         run_word=GO_ON,
         last_stop=run.last_words or None,
     )
+
+
+def _paused_detail(run: RunState) -> str:
+    return run.warning or _("Robots hold still; the clock stands")
 
 
 def _stopping_early(run: RunState, now: float) -> RunView:
@@ -173,9 +200,12 @@ def _stopping_early(run: RunState, now: float) -> RunView:
     title = _("Ready")
     if run.elapsed_s is not None:
         title = _("Running, {time}").format(time=seconds(run.elapsed_s))
-    return replace(
+    view = replace(
         _stopping(run, now), state="running", title=title, detail=run.says, stop_word=STOP, result=None
     )
+    if run.restarts:  # nothing flashes: the buttons stay as they were
+        view = replace(view, can_pause=True, can_step=True, can_restart=True, run_word=RESTART)
+    return view
 
 
 def _stopping(run: RunState, now: float) -> RunView:
@@ -191,7 +221,7 @@ def _stopping(run: RunState, now: float) -> RunView:
         )
     if run.asked:
         result = _some_stopped(len(done), len(run.asked))
-    title = _(STOPPING)
+    title = _("Restarting") if run.restarts else _(STOPPING)
     return RunView("stopping", title, detail, title, stop_word=STOPPING, result=result or None)
 
 
@@ -254,8 +284,11 @@ def seconds(value: float) -> str:
     return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"
 
 
-def connected_words(names: Sequence[str]) -> str:
-    """The line under Ready."""
+def connected_words(names: Sequence[str], coming: Sequence[str] = ()) -> str:
+    """The line under Ready; of robots that are being started while there is none yet."""
+    if not names and coming:
+        words = ngettext("{robots} is coming", "{robots} are coming", len(coming))
+        return words.format(robots=listed(coming))
     if not names:
         return _("No robot is connected")
     words = ngettext("{robots} is connected", "{robots} are connected", len(names))
@@ -282,6 +315,8 @@ def result_words(report: StopReport) -> tuple[str, bool]:
 
 
 def _some_stopped(stopped: int, count: int) -> str:
+    if count == 1:
+        return _("1 robot stopped") if stopped else _("not stopped yet")
     return _("{stopped} of {count} robots stopped").format(stopped=stopped, count=count)
 
 

@@ -28,8 +28,18 @@ ANY_TYPE = "*"
 class ShowToast(Protocol):
     """Says for some seconds what the person just did."""
 
-    def __call__(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:
-        """Show ``words``, "Copied robots.Pepper.pose.y", and perhaps a ``button`` that does ``run``."""
+    def __call__(
+        self,
+        words: str,
+        button: str = "",
+        run: Callable[[], object] | None = None,
+        *,
+        until: Callable[[], bool] | None = None,
+    ) -> None:
+        """Show ``words``, "Copied robots.Pepper.pose.y", and perhaps a ``button`` that does ``run``.
+
+        They go earlier once ``until`` is so: what they say has happened.
+        """
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QVBoxLayout,
 
 from app.core.robots.health_facts import HealthFact, facts_of
 from app.ui.panels.base import Density, Panel, PanelContext
+from app.ui.panels.no_robot import NoRobot
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.text.numbers import age_words
 from app.ui.theme.theme import Theme
@@ -82,16 +83,13 @@ class HealthPanel(OneRobotPanel):
         self.rows: list[HealthRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        self.empty = EmptyState(
-            self.theme,
-            "bot",
-            _("No robot is connected"),
-            _("How it is stands here as soon as it is there."),
-            [
-                EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot"),
-                EmptyAction(_("Find out why"), lambda: context.run("help.doctor"), "stethoscope"),
-            ],
-        )
+        title, text = _("No robot is connected"), _("How it is stands here as soon as it is there.")
+        steps = [
+            EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot"),
+            EmptyAction(_("Find out why"), lambda: context.run("help.doctor"), "stethoscope"),
+        ]
+        self.empty = EmptyState(self.theme, "bot", title, text, steps)
+        self._no_robot = NoRobot(self.empty, title, text, steps)
         self.step = Button(self.theme, _("Start it again"), "rotate-ccw", size="small")
         self.step.clicked.connect(self._do_next_step)
         inside = QWidget()
@@ -123,6 +121,7 @@ class HealthPanel(OneRobotPanel):
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
             self.chip.set("")
+            self._no_robot.tell(self.session.coming)
             return
         facts = facts_of(link, self.session.topics, time.monotonic(), _whole_age)
         if facts != self._facts:

@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.no_robot import NoRobot
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.robot_drawing.scene import RobotDrawing
 from app.ui.robot_drawing.state import RobotState
@@ -153,15 +154,19 @@ class RobotPanel(OneRobotPanel):
         self.view.moved.connect(
             lambda what, x, y: self._change({"move": what, "x": round(x, 3), "y": round(y, 3)})
         )
-        self.empty = EmptyState(theme=self.theme, icon="bot", title="", text="")
+        title = _("No robot is connected")
+        text = _("With the virtual robot you can try everything at once.")
+        start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
+        self.empty = EmptyState(self.theme, "bot", title, text, [start])
+        self._no_robot = NoRobot(self.empty, title, text, [start])
         self.pages = self.show_one_of(self.empty, self.view)
-        self._say_nothing(None)
 
     def fleet_changed(self) -> None:
         self.choose.setVisible(bool(self.session.fleet.links))
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
+            self._no_robot.tell(self.session.coming)
             return
         self.chip.set(link.chip, ROBOT_STATUS.get(link.state, "ok"))
         if link.drawing is not None:
@@ -193,15 +198,9 @@ class RobotPanel(OneRobotPanel):
         self.reset.setVisible(link.virtual)
         self._say_nothing(link)
 
-    def _say_nothing(self, link: RobotLink | None) -> None:
+    def _say_nothing(self, link: RobotLink) -> None:
         self.pages.setCurrentWidget(self.empty)
-        if link is None:
-            self.empty.say(
-                _("No robot is connected"), _("With the virtual robot you can try everything at once."), "bot"
-            )
-            start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
-            self.empty.set_actions([start])
-        elif link.virtual:
+        if link.virtual:
             title = _("{robot} is coming").format(robot=link.name)
             self.empty.say(title, _("It is drawn as soon as it tells where it is."))
             self.empty.set_actions([])

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.robots.description.description import Sensor
 from app.ui.panels.base import Density, Panel, PanelContext
+from app.ui.panels.no_robot import NoRobot
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.text.numbers import age_words
 from app.ui.text.sensor_values import ReadingWords, reading_of
@@ -93,9 +94,9 @@ class SensorsPanel(OneRobotPanel):
         self.rows: list[SensorRow] = []
         self._scroll = ScrollColumn(_("Sensors"), margins=(0, 6, 0, 6))
         self._column = self._scroll.column
-        self.empty = EmptyState(
-            self.theme, "eye", _("No robot, no sensors"), _("Connect a robot to see what it feels and sees.")
-        )
+        title, text = _("No robot, no sensors"), _("Connect a robot to see what it feels and sees.")
+        self.empty = EmptyState(self.theme, "eye", title, text)
+        self._no_robot = NoRobot(self.empty, title, text)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
         self.pages.addWidget(self._scroll)
@@ -113,6 +114,8 @@ class SensorsPanel(OneRobotPanel):
             there = link.connected  # what it felt before it went is not true now
             for row in self.rows:
                 row.show_value(link.values.get(row.sensor.name) if there else None, now)
+        else:
+            self._no_robot.tell(self.session.coming)
 
     def show_robot(self, link: RobotLink) -> None:
         for row in self.rows:

@@ -122,7 +122,7 @@ class DocumentController:
             runs = self._session.runs
             gone = []
             for document in documents:
-                if runs.active and runs.document is document:
+                if runs.concerns(document):
                     runs.stop()
                 kept = self._keep(document)
                 if kept is None:

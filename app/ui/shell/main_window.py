@@ -340,6 +340,7 @@ class MainWindow(QMainWindow):
         view = self.session.runs.view()
         words, status = robots_chip(self.session)
         self.bar.show_robots(words, status)
+        self.toast.refresh()
         if self.showing == START:
             self.bar.stop.show_state(
                 _(view.stop_word), ring=view.state == "stopping", filled=self._may_move()

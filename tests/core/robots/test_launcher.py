@@ -11,7 +11,7 @@ import pytest
 import nep
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
-from app.core.robots.launcher import KNOWN_WITHIN_S, WISH_KEPT_S, Launcher
+from app.core.robots.launcher import COMING_S, KNOWN_WITHIN_S, WISH_KEPT_S, Launcher
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
@@ -159,3 +159,23 @@ def test_the_fleet_tells_who_is_there_once_it_was_told() -> None:
 def _described() -> TopicInfo:
     publisher = PublisherInfo(1, "n1", ("tcp://127.0.0.1:2",), True, 1, 100, 1, None, None, None)
     return TopicInfo("/Pepper/description", "robot/description", "json", (publisher,))
+
+
+def test_a_robot_is_coming_until_it_is_there_or_has_failed(world: World) -> None:
+    launcher = world.launcher
+    world.there = None
+    launcher.start_virtual_robot("Pepper")
+    assert launcher.coming == ("Pepper",), "also while it is not known whether one is there"
+    world.there = False
+    world.after(0.1)
+    assert launcher.coming == ("Pepper",)
+    launcher.came("Pepper")
+    assert launcher.coming == ()
+    launcher.restart_virtual_robot("Pepper")
+    assert launcher.coming == ("Pepper",)
+    world.processes[-1].die(b"out of order", 1)
+    launcher.check()
+    assert launcher.coming == (), "it ended by itself"
+    launcher.start_virtual_robot("Turtle", "diffdrive")
+    world.after(COMING_S)
+    assert launcher.coming == (), "it never came"

@@ -139,9 +139,9 @@ def test_a_robot_is_not_called_stopped_while_another_of_its_programs_is_waited_f
     run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper",))
     run = replace(run, answered=(replace(PEPPER, waits=True),))
     view = view_of(run, [], 10.2)
-    assert (view.detail, view.result) == ("Waiting for Pepper, 0.2 s", "0 of 1 robots stopped")
+    assert (view.detail, view.result) == ("Waiting for Pepper, 0.2 s", "not stopped yet")
     run = replace(run, answered=(*run.answered, RobotStop("Pepper", True, 90.0, program="pepper 2")))
-    assert view_of(run, [], 10.2).result == "1 of 1 robots stopped"
+    assert view_of(run, [], 10.2).result == "1 robot stopped"
 
 
 def test_a_robot_of_rize_is_never_called_stopped() -> None:

@@ -105,6 +105,7 @@ class Session(session_module.Session):
             alerts=self.alerts, console=self.console, post_event=post, clock=self.clock,
             make_runner=self._make_runner,  # type: ignore[arg-type]
         )  # fmt: skip
+        self.runs.coming = lambda: self.coming
         self.doctor = Doctor()
         self.launcher = Launcher(ADDRESS, post, self.fleet.is_there, self.clock)
         self.images = Images(self.watch, self.clock)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -132,7 +133,7 @@ def shown(run: Run) -> tuple[object, ...]:
 
 
 READY = ("ready", True, False, True, "Run", "Stop")
-RUNNING = ("running", False, True, True, "Run", "Stop")
+RUNNING = ("running", False, True, True, "Restart", "Stop")
 PAUSED = ("paused", True, False, True, "Go on", "Stop")
 PROVEN = ("proven", True, False, True, "Run", "Stop")
 
@@ -165,6 +166,97 @@ def test_run_pause_step_go_on_and_stop(run: Run) -> None:
     assert runs.view().title.startswith("Stopped after ")
     assert runs.view().detail == "The dashed outline shows where"
     assert (runs.running_blocks, runs.stopped_blocks) == ((), ("c",))
+
+
+def pressed_long_ago(run: Run) -> None:
+    """Run was not pressed just now: another press is no double click."""
+    runs = run.session.runs
+    runs._run = replace(runs._run, started_s=runs._run.started_s - 10)
+
+
+def test_run_again_stops_what_runs_and_begins_anew(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(endless())
+    runs.run()
+    run.works("c")
+    first = runs._runner
+    assert first is not None
+    runs.run()
+    assert runs._runner is first, "two presses within half a second are one"
+    assert shown(run) == RUNNING
+    pressed_long_ago(run)
+    runs.run()
+    assert (runs.active, shown(run)) == (False, RUNNING), "nothing flashes while the robots answer"
+    runs.run()  # while it stops: no third program
+    tick_until(run.session, lambda: runs.active)
+    assert runs._runner is not first
+    assert first.state in {"stopping", "ended"}
+    assert shown(run) == RUNNING
+    second = runs._runner
+    run.works("c")
+    assert runs._runner is second
+    runs.stop()
+    tick_until(run.session, lambda: runs.view().state == "proven")
+    assert runs.view().title.startswith("Stopped after ")
+
+
+def test_stop_takes_back_a_restart(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(endless())
+    runs.run()
+    run.works("c")
+    runs.restart()
+    runs.stop()
+    tick_until(run.session, lambda: runs.view().state == "proven")
+    run.session.tick()
+    assert not runs.active
+
+
+def test_a_paused_program_is_restarted_from_its_beginning(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(endless())
+    runs.step()
+    tick_until(run.session, lambda: runs.view().state == "paused")
+    assert runs.view().can_restart
+    runs.restart()
+    tick_until(run.session, lambda: runs.view().state == "running" and runs.active)
+    runs.stop()
+    tick_until(run.session, lambda: runs.view().state == "proven")
+
+
+def test_edits_while_it_runs_say_that_they_apply_later_until_they_are_undone(run: Run) -> None:
+    runs, document = run.session.runs, run.session.document
+
+    def says() -> bool:
+        """Whether the bar says so, once the newest edit is compiled."""
+        tick_until(run.session, lambda: document.newest() is document.program())
+        runs.tick()
+        view = runs.view()
+        assert view.edited == (view.detail == "Your changes apply at the next Run")
+        return view.edited
+
+    document.edited(endless())
+    runs.run()
+    run.works("c")
+    assert not says()
+    more = workspace(started(block("control_forever", "loop", BODY=[]), write(text("Hi"))))
+    document.edited(more)
+    assert says()
+    document.edited(endless())
+    assert not says(), "undone: it is what runs"
+    document.edited(more)
+    assert says()
+    run.session.documents.new()
+    run.session.document.edited(more)
+    runs.tick()
+    assert (runs.view().edited, runs.view().run_word) == (False, "Run"), "another tab shows"
+    run.session.documents.show(document)
+    assert says()
+    runs.restart()
+    tick_until(run.session, lambda: runs.active)
+    assert not says()
+    runs.stop()
+    tick_until(run.session, lambda: runs.view().state == "proven")
 
 
 def test_what_is_told_of_a_program_and_its_state(run: Run) -> None:

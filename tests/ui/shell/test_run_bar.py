@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -21,11 +23,12 @@ VIEWS = {
     ),
     "running": RunView(
         "running", "Running, 14 s", "Pepper says “Touch my head.”", "Greeting runs, 14 s",
-        can_pause=True, can_step=True, last_stop="all 2 robots stopped (41 ms)",
+        can_pause=True, can_step=True, can_restart=True, run_word="Restart",
+        last_stop="all 2 robots stopped (41 ms)",
     ),
     "paused": RunView(
         "paused", "Paused at “wait 2 s”", "Robots hold still; the clock stands", "Greeting is paused",
-        can_run=True, can_step=True, run_word="Go on",
+        can_run=True, can_step=True, can_restart=True, run_word="Go on",
     ),
     "stopping": RunView(
         "stopping", "Stopping", "Waiting for Turtle, 0.2 s", "Stopping",
@@ -74,7 +77,8 @@ def tools(qtbot, theme: Theme) -> ToolBar:
 )
 def test_each_state_is_as_in_the_picture(bar: RunBar, state, run, pause, step, stop, look) -> None:
     bar.show_view(VIEWS[state])
-    assert (bar.run.isEnabled(), bar.pause.isEnabled(), bar.step.isEnabled()) == (run, pause, step)
+    can_press = run or state == "running"  # it is Restart then
+    assert (bar.run.isEnabled(), bar.pause.isEnabled(), bar.step.isEnabled()) == (can_press, pause, step)
     assert bar.run.kind == ("run" if run else "plain")
     assert bar.stop.text() == stop
     assert bar.stop.isEnabled()
@@ -100,9 +104,20 @@ def test_paused_says_go_on(bar: RunBar) -> None:
     assert bar.run.text() == "Run"
 
 
+def test_restart_has_the_place_of_run_and_is_filled_once_the_blocks_differ(bar: RunBar) -> None:
+    bar.show_view(VIEWS["running"])
+    assert (bar.run.text(), bar.run.icon_name, bar.run.kind) == ("Restart", "rotate-ccw", "plain")
+    bar.show_view(replace(VIEWS["running"], edited=True))
+    assert (bar.run.text(), bar.run.kind, bar.restart.isVisible()) == ("Restart", "run", False)
+    bar.show_view(replace(VIEWS["paused"], edited=True))
+    assert (bar.run.text(), bar.restart.isVisible()) == ("Go on", True)
+    bar.show_view(VIEWS["paused"])
+    assert not bar.restart.isVisible()
+
+
 def test_the_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     told: list[str] = []
-    names = ("run.run", "run.pause", "run.step", "run.stop", "run.confirm", *PACES)
+    names = ("run.run", "run.restart", "run.pause", "run.step", "run.stop", "run.confirm", *PACES)
 
     def row(name: str) -> Command[None]:
         return Command(name, name, lambda _do: told.append(name))
@@ -114,7 +129,11 @@ def test_the_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     QTest.mouseClick(bar.run, Qt.MouseButton.LeftButton)
     QTest.mouseClick(bar.confirm, Qt.MouseButton.LeftButton)
     QTest.mouseClick(bar.stop, Qt.MouseButton.LeftButton)
-    assert told == ["run.run", "run.confirm", "run.stop"]
+    bar.show_view(VIEWS["running"])
+    QTest.mouseClick(bar.run, Qt.MouseButton.LeftButton)
+    bar.show_view(replace(VIEWS["paused"], edited=True))
+    QTest.mouseClick(bar.restart, Qt.MouseButton.LeftButton)
+    assert told == ["run.run", "run.confirm", "run.stop", "run.run", "run.restart"]
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from app.ui.panels.behaviour.live_values import live_words
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.panels.behaviour.tab import TabFacts
 from app.ui.panels.behaviour.tabs import BehaviourTitle
+from app.ui.panels.no_robot import NoRobot
 from app.ui.widgets import EmptyAction, EmptyState, label
 from app.ui.widgets.indicators import ROBOT_STATUS
 from nep.i18n import _, lazy
@@ -101,17 +102,13 @@ class BehaviourPanel(PanelWidget):
         self._place_column = QVBoxLayout(self._place)
         self._place_column.setContentsMargins(0, 0, 0, 0)
         self.pages = self.show_one_of(self._place, self.program)
-        self.empty = EmptyState(
-            self.theme,
-            "bot",
-            _("No robot is connected"),
-            _("You can build now and run later. With the virtual robot you can try it at once."),
-            [
-                EmptyAction(
-                    _("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot", primary=True
-                )
-            ],
+        title = _("No robot is connected")
+        text = _("You can build now and run later. With the virtual robot you can try it at once.")
+        start = EmptyAction(
+            _("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot", primary=True
         )
+        self.empty = EmptyState(self.theme, "bot", title, text, [start])
+        self._no_robot = NoRobot(self.empty, title, text, [start])
         self.empty.setParent(self._place)
         self.empty.hide()
         self.waiting = BlocksWait(self._place)
@@ -232,6 +229,7 @@ class BehaviourPanel(PanelWidget):
         if wanted != self.empty.isVisibleTo(self._place):
             self.empty.setVisible(wanted)
         if wanted:
+            self._no_robot.tell(self.session.coming)
             self._place_empty()
 
     def _place_empty(self) -> None:

@@ -19,6 +19,7 @@ from app.core.robots.motion_permission import MayNotMoveError
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import AppError, InputProblem, RobotInputError
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.no_robot import NoRobot
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.action_card import ActionCard
 from app.ui.panels.robots.list import LIST_WIDTH, RobotList
@@ -110,20 +111,13 @@ class RobotsPanel(OneRobotPanel):
 
     def _lay_out(self) -> None:
         theme = self.theme
-        self.empty = EmptyState(
-            theme,
-            "bot",
-            _("No robot is connected"),
-            _("What a robot can do appears here as soon as it is there."),
-            [
-                EmptyAction(
-                    _("Use the virtual robot"),
-                    lambda: self.context.run("robots.virtual"),
-                    "bot",
-                    primary=True,
-                )
-            ],
+        title = _("No robot is connected")
+        text = _("What a robot can do appears here as soon as it is there.")
+        start = EmptyAction(
+            _("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot", primary=True
         )
+        self.empty = EmptyState(theme, "bot", title, text, [start])
+        self._no_robot = NoRobot(self.empty, title, text, [start])
         self.list = RobotList(theme, self.context.run)
         self.list.chosen.connect(self.choose)
         self.list.forgotten.connect(self.forget)
@@ -183,6 +177,8 @@ class RobotsPanel(OneRobotPanel):
                 item.show_link(its, self.list.seen(name))
         if link is not None:
             self._show_link(link)
+        else:
+            self._no_robot.tell(self.session.coming)
 
     def _new(self, what: str, *now: object) -> bool:
         """Whether this differs from what was shown."""

@@ -10,6 +10,7 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
 
 from app.core.robots.robot_link import RobotLink
+from app.core.run.view import connected_words
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.logo import Logo
@@ -179,7 +180,8 @@ def robots_chip(session: Session) -> tuple[str, str]:
     """The chip's words and status: "Pepper ready", "2 robots", "Camera silent", "No robot"."""
     links = [link for link in session.fleet.links if link.state != "away"]
     if not links:
-        return _("No robot"), "off"
+        coming = session.coming
+        return (connected_words((), coming), "running") if coming else (_("No robot"), "off")
     moving = [link for link in links if link.state == "not stopped"]
     if moving:
         first, others = moving[0], len(moving) - 1

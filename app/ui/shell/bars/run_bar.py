@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QFont, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.core.run.view import RunView
+from app.core.run.view import RESTART, RunView
 from app.ui.shell.actions.actions import Actions
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
@@ -244,7 +244,7 @@ class RunBar(Bar):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("runBar"))
         self.setAccessibleName(_("Run and stop"))
-        self.run = RunButton(theme, _("Run"), "play", widest=_("Go on"))
+        self.run = RunButton(theme, _("Run"), "play", widest=max(_("Go on"), _("Restart"), key=len))
         self.pause = RunButton(theme, _("Pause"), "pause")
         self.step = RunButton(theme, _("Step"), "step-forward")
         self.pace = IconButton(theme, "gauge", _("Speed"), checkable=True, size=36)
@@ -255,6 +255,9 @@ class RunBar(Bar):
         self.confirm = Button(theme, "", size="large")
         self.confirm.hide()
         self.confirm.let_shrink(96)
+        self.restart = Button(theme, _("Restart"), "rotate-ccw", size="large")
+        self.restart.hide()
+        self.restart.let_shrink(96)
         self.stop = StopButton(theme)
         self._build(theme)
         self.pace.clicked.connect(lambda: drop_below(self._paces, self.pace))
@@ -273,6 +276,7 @@ class RunBar(Bar):
         row.addSpacing(8)
         row.addWidget(self.mark)
         row.addWidget(self.sentence, 1)
+        row.addWidget(self.restart)
         row.addWidget(self.confirm)
         row.addWidget(self.result)
         row.addSpacing(-4)
@@ -295,10 +299,12 @@ class RunBar(Bar):
         self.step.set_bare(bare)
 
     def show_view(self, view: RunView) -> None:
-        """Show one of the six states."""
-        self.run.set_word(_(view.run_word))
-        self.run.set_filled(view.can_run)
-        self.run.setEnabled(view.can_run)
+        """Show one of the six states. Restart has the place of Run; while paused that is Go on."""
+        restarts = view.can_restart and not view.can_run
+        self.run.set_word(_(view.run_word), "rotate-ccw" if view.run_word == RESTART else "play")
+        self.run.set_filled(view.can_run or (restarts and view.edited))
+        self.run.setEnabled(view.can_run or restarts)
+        paint.show_when(self.restart, view.edited and not restarts)
         self.pause.setEnabled(view.can_pause)
         self.step.setEnabled(view.can_step)
         self.pace.setChecked(view.slow)
@@ -326,6 +332,7 @@ class ToolBar(Bar):
         self.run.fill_icon = True
         self.pause = IconButton(theme, "pause", _("Pause"))
         self.step = IconButton(theme, "step-forward", _("Step"))
+        self.restart = IconButton(theme, "rotate-ccw", _("Restart"))
         self.stop = StopButton(theme, "toolBar")
         self.tools = QHBoxLayout()
         self._build()
@@ -341,7 +348,7 @@ class ToolBar(Bar):
         row.addSpacing(-4)
         row.addWidget(self.words)
         row.addWidget(self.result)
-        for button in (self.pause, self.step, self.confirm, self.run):
+        for button in (self.restart, self.pause, self.step, self.confirm, self.run):
             row.addWidget(button)
         row.addSpacing(-4)
         row.addWidget(self.stop)
@@ -364,6 +371,7 @@ class ToolBar(Bar):
         self.words.setVisible(not spoken)
         self.run.set_word(_(view.run_word))
         self.run.setVisible(view.can_run)
+        self.restart.setVisible(view.can_restart)
         self.pause.setVisible(view.can_pause)
         self.step.setVisible(view.can_step and view.state in {"running", "paused"})
         self.confirm.set_word(view.confirm or "")
@@ -372,8 +380,9 @@ class ToolBar(Bar):
 
 
 def bind(bar: RunBar | ToolBar, actions: Actions) -> None:
-    """Run, Pause, Step, Stop and the button that confirms: in both bars they are the same commands."""
+    """Run, Restart, Pause, Step, Stop and the button that confirms: the same commands in both bars."""
     actions.bind(bar.run, "run.run")
+    actions.bind(bar.restart, "run.restart")
     actions.bind(bar.pause, "run.pause")
     actions.bind(bar.step, "run.step")
     actions.bind(bar.stop, "run.stop")

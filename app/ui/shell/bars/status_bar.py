@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 from app.core.network.remote_access import access_words
 from app.core.robots.health_facts import facts_of, has_told
 from app.core.robots.robot_link import STOPPING
+from app.core.run.view import connected_words
 from app.core.session import Session
 from app.ui.text.numbers import age_words, grouped
 from app.ui.theme.theme import Theme
@@ -51,7 +52,8 @@ class StatusFacts:
             link for link in known if link.state != "away"
         ] or known  # Health shows one that has gone, too
         if not links:
-            return "circle-dashed", _("No robot"), "off"
+            coming = self._session.coming
+            return "circle-dashed", connected_words((), coming) if coming else _("No robot"), "off"
         topics, now = self._session.topics, time.monotonic()
         found = [(link, facts_of(link, topics, now, age_words)) for link in links]
         wrong = [fact.status for _link, facts in found for fact in facts if fact.to_look_at]

@@ -25,6 +25,7 @@ class Toast(QWidget):
         super().__init__(window)
         self._theme = theme
         self._run: Callable[[], object] | None = None
+        self._until: Callable[[], bool] | None = None
         self._words = label("", "bodyLarge", wrap=True)
         self.button = Button(theme, "", kind="ghost", size="small")
         self.button.clicked.connect(self._pressed)
@@ -49,8 +50,16 @@ class Toast(QWidget):
         """The sentence shown last."""
         return self._words.text()
 
-    def say(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:
-        """Show a sentence; ``button`` undoes or follows what it says."""
+    def say(
+        self,
+        words: str,
+        button: str = "",
+        run: Callable[[], object] | None = None,
+        *,
+        until: Callable[[], bool] | None = None,
+    ) -> None:
+        """Show a sentence; ``button`` undoes or follows what it says. It goes once ``until`` is so."""
+        self._until = until
         self._words.setText(words)
         self.setAccessibleName(words)
         paint.announce(self, words)
@@ -61,6 +70,12 @@ class Toast(QWidget):
         self.place()
         self.raise_()
         self._timer.start(self._theme.duration("toastShown"))
+
+    def refresh(self) -> None:
+        """Go when what it says is not so any more; called with every tick."""
+        if self._until is not None and self._until():
+            self._until = None
+            self.hide()
 
     def place(self) -> None:
         """Go to the bottom right of the window."""

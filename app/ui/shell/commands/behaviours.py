@@ -87,12 +87,16 @@ class BehaviourCommands:
     # -- run --------------------------------------------------------------------------------------
 
     def run_or_go_on(self) -> None:
-        """Run with the editor's newest edit, or go on where the program is paused."""
+        """Run with the editor's newest edit, restart, or go on where the program is paused."""
         runs = self._session.runs
         if runs.view().state == "paused":
             runs.go_on()
         else:
             self._files.with_newest(runs.run)
+
+    def restart(self) -> None:
+        """Run anew what runs, with the editor's newest edit."""
+        self._files.with_newest(self._session.runs.restart)
 
     def run_step(self) -> None:
         """Run one block, with the editor's newest edit."""

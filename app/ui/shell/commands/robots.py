@@ -54,7 +54,10 @@ class RobotCommands:
         self._session.launcher.start_virtual_robot("Turtle", "diffdrive")
         if self._shell.bench is None:
             self._shell.show_layout("behaviour")
-        self._shell.say(_("The virtual Turtle is coming"))
+        self._shell.say(_("The virtual Turtle is coming"), until=lambda: not self._is_coming("Turtle"))
+
+    def _is_coming(self, name: str) -> bool:
+        return name in self._session.coming
 
     def end_virtual(self, name: str = "") -> bool:
         """End this virtual robot, or all that were started here; they do not come back at the next start."""
@@ -86,6 +89,7 @@ class RobotCommands:
             _("The virtual {robot} is coming").format(robot=missing),
             _("Undo"),
             lambda: launcher.stop_virtual_robot(missing),
+            until=lambda: not self._is_coming(missing),
         )
         return True
 

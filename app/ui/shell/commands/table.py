@@ -24,7 +24,6 @@ from nep.i18n import _, lazy
 A = TypeVar("A")
 MENUS = (lazy("File"), lazy("Edit"), lazy("View"), lazy("Run"), lazy("Robots"), lazy("Help"))
 WHY_NO_RUN = {
-    "running": lazy("A program runs already"),
     "stopping": lazy("Robots are being stopped"),
     "unanswered": lazy("A robot has not confirmed Stop"),
 }
@@ -48,7 +47,13 @@ class Handlers:
 
 def _no_run(do: Handlers) -> str:
     view = do.session.runs.view()
-    return "" if view.can_run else _(WHY_NO_RUN.get(view.state, NOTHING_TO_RUN))
+    if view.can_run or view.can_restart:
+        return ""
+    return _(WHY_NO_RUN.get(view.state, NOTHING_TO_RUN))
+
+
+def _no_restart(do: Handlers) -> str:
+    return "" if do.session.runs.active else _("Nothing runs")
 
 
 def _no_pause(do: Handlers) -> str:
@@ -187,7 +192,9 @@ COMMANDS: tuple[C, ...] = (
       above=True),
     C("theme.motion", lazy("Less motion"), lambda do: do.view.choose_motion(), "View", check=True),
     C("run.run", lazy("Run"), lambda do: do.behaviours.run_or_go_on(), "Run", ("F5",), "play",
-      lazy("Runs the behaviour"), why_not=_no_run),
+      lazy("Runs the behaviour; while it runs, begins anew"), why_not=_no_run),
+    C("run.restart", lazy("Restart"), lambda do: do.behaviours.restart(), "Run", ("Ctrl+F5",), "rotate-ccw",
+      lazy("Stops the program, and runs the behaviour as it is now"), why_not=_no_restart),
     C("run.pause", lazy("Pause"), lambda do: do.session.runs.pause(), "Run", ("F8",), "pause",
       lazy("Holds the program; robots hold still"), why_not=_no_pause),
     C("run.step", lazy("Step"), lambda do: do.behaviours.run_step(), "Run", ("F10",), "step-forward",

@@ -1,0 +1,70 @@
+"""Run as Scratch has it: Run pressed again begins anew, and edits while it runs say that they apply later."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.behaviours import forever, say, started, turn, write
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(240)
+LATER = "Your changes apply at the next Run"
+CHILD = "app.blocks.runtime.child"
+
+
+def programs(studio: Studio) -> list[int]:
+    """The processes of programs that run."""
+    return [each.pid for each in studio.children(CHILD)]
+
+
+@pytest.fixture
+def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
+    """Studio with the virtual robot and a behaviour that turns for ever; it runs."""
+    speech = {**say("Round and round"), "x": 420, "y": 56}
+    path = write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech)
+    studio = start(str(path))
+    studio.choose("Robots", "Use the virtual Pepper")
+    studio.says("Pepper is coming")
+    studio.says("Pepper ready", 40)
+    studio.spot("[data-id=turn]")
+    studio.click("Run", kind="RunButton")
+    until(lambda: "turn" in studio.outlined("running"), "the block glows")
+    return studio
+
+
+def test_f5_and_the_button_restart(turning: Studio) -> None:
+    (first,) = programs(turning)
+    turning.says("Running, 1 s")  # before that it would be a double click
+    turning.click("Restart", kind="RunButton")
+    until(lambda: programs(turning) not in ([first], []), "another program runs")
+    (second,) = programs(turning)
+    until(lambda: "turn" in turning.outlined("running"), "the block glows again")
+    turning.says("Running, 1 s")
+    turning.screen.key("F5")
+    until(lambda: not {first, second}.issuperset(programs(turning)), "the key restarts, too")
+    assert len(programs(turning)) == 1
+    turning.screen.key("F12")
+    turning.says("Pepper stopped (")
+    assert not programs(turning)
+
+
+def test_an_edit_while_it_runs_says_when_it_applies(turning: Studio) -> None:
+    (first,) = programs(turning)
+    assert not turning.all(kind="Sentence", name=LATER)
+    turning.point("[data-id='text Round and round'] .blocklyInputField", dx=10, dy=10)
+    turning.screen.type("Hello")
+    turning.screen.key("Return")
+    turning.point("[data-id=turn] > .blocklyPath", dx=14, dy=14)
+    turning.screen.key("Delete")
+    turning.says(LATER)
+    turning.click("Undo")
+    until(lambda: not any(LATER in str(each["name"]) for each in turning.look()), "undone: nothing to say")
+    turning.click("Redo")
+    turning.says(LATER)
+    turning.click("Restart", kind="RunButton")
+    until(lambda: programs(turning) not in ([first], []), "the new program runs")
+    until(lambda: not any(LATER in str(each["name"]) for each in turning.look()), "it runs what is seen")

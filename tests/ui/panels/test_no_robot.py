@@ -1,0 +1,64 @@
+"""While a virtual robot is being started, nothing in the window says that there is none."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtWidgets import QLabel
+
+from app.ui.panels import health, robot, robots, sensors
+from app.ui.shell.bars.app_bar import robots_chip
+from app.ui.shell.bars.status_bar import StatusFacts
+from app.ui.shell.bars.toast import Toast
+from app.ui.theme.theme import Theme
+from tests.ui import fakes
+from tests.ui.panel_case import Window
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@pytest.mark.parametrize("panel", [health.PANEL, robot.PANEL, robots.PANEL, sensors.PANEL])
+def test_a_panel_says_that_the_robot_is_coming(qapp, panel) -> None:
+    session = fakes.Session()
+    made = Window(session).make(panel, (384, 300))
+
+    def words() -> str:
+        made.refresh()
+        return "\n".join(each.text() for each in made.empty.findChildren(QLabel))
+
+    before = words()
+    assert "No robot" in before
+    session.launcher.start_virtual_robot()
+    assert "Pepper is coming" in words()
+    assert "No robot" not in words()
+    session.launcher.stop_virtual_robot("Pepper")
+    assert words() == before, "it is not wanted any more"
+    made.shut()
+    made.close()
+
+
+def test_the_bars_say_that_the_robot_is_coming() -> None:
+    session = fakes.Session()
+    facts = StatusFacts(session)
+    said = (robots_chip(session)[0], facts.health()[1], session.runs.view().detail)
+    assert said == ("No robot", "No robot", "No robot is connected")
+    session.launcher.start_virtual_robot()
+    session.tick()
+    said = (robots_chip(session)[0], facts.health()[1], session.runs.view().detail)
+    assert said == ("Pepper is coming",) * 3
+
+
+def test_a_toast_goes_once_what_it_says_has_happened(qtbot, theme: Theme) -> None:
+    window = QLabel()
+    qtbot.addWidget(window)
+    window.resize(600, 300)
+    window.show()
+    toast, came = Toast(theme, window), list[bool]()
+    toast.say("The virtual Turtle is coming", until=lambda: bool(came))
+    toast.refresh()
+    assert toast.isVisible()
+    came.append(True)
+    toast.refresh()
+    assert not toast.isVisible()
+    toast.say("Copied")
+    toast.refresh()
+    assert toast.isVisible()
