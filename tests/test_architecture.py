@@ -38,6 +38,7 @@ QT = {"PySide6", "shiboken6", "PyQt6", "PyQt5"}
 SMALL_LINES = 60
 # Small modules that one other module alone imports, and what each earns its file by (docs/adr/0020-rooms.md).
 EARNED = {
+    "app.core.robots.awaited": "pure, and tested alone",
     "nep.public": "a seam: imported at the first use of a name of `nep`, all of them at once",
     "nep.cli.doctor": "one of a list: the commands of nep",
     "nep.cli.interrupts": "imported before all else of a command, under the guard of its caller",

@@ -17,9 +17,9 @@ from app.robots.driver.call import Clock, Link, MonotonicClock
 from app.robots.driver.process import main as drive
 from app.robots.virtual.camera import Camera
 from app.robots.virtual.lens import Lens
-from app.robots.virtual.simulation import Beat, surroundings
+from app.robots.virtual.simulation import Beat, happen, surroundings, told_event
 from app.robots.virtual.vision import colours_in
-from app.robots.virtual.wheels import RADIUS, WheelBody
+from app.robots.virtual.wheels import RADIUS, SIDES, WheelBody
 
 BODY_HZ, CAMERA_HZ = 60.0, 15.0
 _STATE_EVERY, _SLOW_EVERY, _CALM_EVERY = 2, 6, 60
@@ -153,6 +153,13 @@ class VirtualWheels:
                 self.body.room = self.body.room.moved(moved, float(x), float(y))
             if change.get("reset") is True:
                 self.body.reset(self._start_room)
+        if isinstance(change.get("happen"), str):
+            event, data = told_event(change)
+            if event == "bump" and data.get("side") in SIDES:
+                with self._lock:
+                    self.body.press(str(data["side"]))
+            else:
+                happen(self._link, event, {**({"x": 0.0, "area": 0.1} if event == "colour" else {}), **data})
 
 
 class VirtualTurtle(DiffDrive):

@@ -19,6 +19,8 @@ FULL_RANGE = 5.0
 _SECONDS_PER_LETTER = 0.06
 _SHORTEST_SPEECH_S = 0.6
 _LONGEST_STEP_S = 0.02
+TOUCH_LEAST_S = 0.3
+"""A tap counts as long as this: a program that looks now and then must see it."""
 _DRAIN_PER_S = 1 / 180  # % of the battery, standing
 _DRAIN_MOVING_PER_S = 1 / 60
 
@@ -73,13 +75,15 @@ class Body:
     shoulders: str = SHOULDERS
     emotion: str = "neutral"
     battery: float = 84.4
-    touched: set[str] = field(default_factory=set)
+    touched: dict[str, float] = field(default_factory=dict)
+    """Where hands are now, and for how many seconds they have been there."""
     heard: str = ""
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _base: Motion | None = field(default=None, repr=False)
     _turning: bool = field(default=False, repr=False)
     _speech: Speech | None = field(default=None, repr=False)
     _waves: list[Wave] = field(default_factory=list, repr=False)
+    _leaving: set[str] = field(default_factory=set, repr=False)
 
     # ---- what it is asked to do -------------------------------------------------------------------
 
@@ -145,6 +149,7 @@ class Body:
         self.room = room
         self.x, self.y, self.theta_deg = START
         self.eyes, self.shoulders = EYES, SHOULDERS
+        self.touched = dict.fromkeys(self.touched, TOUCH_LEAST_S)
         for place in sorted(self.touched):
             self.touch(place, down=False)
         self.stand()
@@ -158,6 +163,11 @@ class Body:
     def speech(self) -> str | None:
         """The words in the bubble."""
         return None if self._speech is None else self._speech.text
+
+    @property
+    def spoken(self) -> float:
+        """How much of its words it has said, from 0 to 1."""
+        return 0.0 if self._speech is None else min(1.0, self._speech.spoken_s / self._speech.seconds)
 
     @property
     def rolling(self) -> bool:
@@ -178,13 +188,23 @@ class Body:
     # ---- what people do to it ---------------------------------------------------------------------
 
     def touch(self, place: str, *, down: bool) -> None:
-        """A hand on the head or on a hand, or away again."""
-        if down and place not in self.touched:
-            self.touched.add(place)
-            self.happenings.append(BodyEvent("touched", {"place": place}))
-        elif not down and place in self.touched:
-            self.touched.discard(place)
-            self.happenings.append(BodyEvent("released", {"place": place}))
+        """A hand on the head or on a hand, or away again; a tap lasts at least `TOUCH_LEAST_S`."""
+        if down:
+            self._leaving.discard(place)
+            if place not in self.touched:
+                self.touched[place] = 0.0
+                self.happenings.append(BodyEvent("touched", {"place": place}))
+        elif place in self.touched:
+            self._leaving.add(place)
+            self._let_go()
+
+    def _let_go(self) -> None:
+        """Hands that are leaving are away once their touch has lasted long enough."""
+        for place in sorted(self._leaving):
+            if self.touched[place] >= TOUCH_LEAST_S:
+                self._leaving.discard(place)
+                del self.touched[place]
+                self.happenings.append(BodyEvent("released", {"place": place}))
 
     def hear(self, word: str) -> None:
         """Somebody said something."""
@@ -208,6 +228,8 @@ class Body:
         self._waves = [wave for wave in self._waves if not wave.done]
         for joint in self._joints():
             joint.step(dt)
+        self.touched = {place: for_s + dt for place, for_s in self.touched.items()}
+        self._let_go()
         if self._speech is not None:
             self._speech.spoken_s += dt
             if self._speech.spoken_s >= self._speech.seconds:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable, Mapping
 
 import cv2
 
+from app.errors import RobotValueError
 from app.robots.driver.call import Clock, Link
 from app.robots.virtual.body import Body, BodyEvent
 from app.robots.virtual.camera import Camera, lens_of
@@ -22,6 +24,8 @@ _LONGEST_STEP_S = 0.25  # after a suspended computer the world goes on from wher
 _SMALL_STEP_S = 0.004  # while a stop waits for the body to stand still
 _LOST_AFTER_S = 0.5
 _STOP_S = 2.0
+PLACES = ("head", "left_hand", "right_hand")
+_log = logging.getLogger(__name__)
 
 
 class Simulation:
@@ -157,7 +161,7 @@ class Simulation:
         place, moved, word = change.get("touch"), change.get("move"), change.get("say")
         x, y = change.get("x"), change.get("y")
         with self.changed:
-            if place in {"head", "left_hand", "right_hand"}:
+            if place in PLACES:
                 self.body.touch(str(place), down=change.get("down") is not False)
             if isinstance(moved, str) and isinstance(x, (int, float)) and isinstance(y, (int, float)):
                 self.body.room = self.body.room.moved(moved, float(x), float(y))
@@ -165,6 +169,23 @@ class Simulation:
                 self.body.hear(word.strip())
             if change.get("reset") is True:
                 self.body.reset(self._start_room)
+        if isinstance(change.get("happen"), str):
+            self._let_happen(change)
+
+    def _let_happen(self, change: Mapping[str, object]) -> None:
+        """A person lets an event happen as if the robot had noticed it."""
+        event, data = told_event(change)
+        with self.changed:
+            if event == "heard" and isinstance(data.get("word"), str):
+                self.body.hear(str(data["word"]))
+                return
+            if event == "touched" and data.get("place") in PLACES:
+                for down in (True, False):
+                    self.body.touch(str(data["place"]), down=down)
+                return
+        happen(
+            self._link, event, {**({"name": self.body.room.person.name} if "face" in event else {}), **data}
+        )
 
 
 class Beat:
@@ -185,6 +206,19 @@ class Beat:
         return now
 
 
+def told_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
+    """The event that a person lets happen, ``{"happen": "bumped", "side": "front"}``, and its data."""
+    return str(change["happen"]), {name: value for name, value in change.items() if name != "happen"}
+
+
+def happen(link: Link, event: str, data: Mapping[str, object]) -> None:
+    """Publish an event that a person made up; one that the robot does not have is logged and left out."""
+    try:
+        link.happen(event, **data)
+    except (KeyError, TypeError, RobotValueError) as error:
+        _log.warning("%s: it can't notice '%s': %s", link.name, event, error)
+
+
 def drawable(body: Body) -> dict[str, object]:
     """Metres and degrees; head pitch positive is down, arms 0 hang and 180 point up."""
     return {
@@ -194,6 +228,7 @@ def drawable(body: Body) -> dict[str, object]:
         "head_yaw_deg": round(body.head_yaw.angle, 1),
         "head_pitch_deg": round(body.head_pitch.angle, 1),
         "speech": body.speech,
+        "spoken": round(body.spoken, 2),
         "eyes": body.eyes,
         "shoulders": body.shoulders,
         "emotion": body.emotion,

@@ -18,6 +18,9 @@ TURNING, TURN_BRAKING = 360.0, 4000.0  # °/s²
 _LONGEST_STEP_S = 0.01
 _DRAIN_PER_S, _DRAIN_MOVING_PER_S = 1 / 300, 1 / 90
 _ASIDE_DEG = 50.0
+PRESS_S = 0.3
+"""How long a bumper that a person pressed stays pressed."""
+SIDES = ("front", "left", "right", "back")
 
 
 @dataclass
@@ -35,6 +38,7 @@ class WheelBody:
     bumped: str = ""
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _wanted: tuple[float, float] = (0.0, 0.0)
+    _pressed_s: float = 0.0
 
     def drive(self, speed: float, turn_speed: float) -> None:
         """Ask for a speed (m/s, forwards positive) and a turn (°/s, left positive); 0, 0 brakes."""
@@ -50,6 +54,12 @@ class WheelBody:
         """From its rim to what is ahead, at most 4 m."""
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
         return min(FULL_RANGE, max(0.0, ahead))
+
+    def press(self, side: str) -> None:
+        """A hand presses its bumper: it stops as if it had run into something."""
+        self.speed, self.turn_speed, self._wanted = 0.0, 0.0, (0.0, 0.0)
+        self.bumped, self._pressed_s = side, PRESS_S
+        self.happenings.append(BodyEvent("bump", {"side": side}))
 
     def reset(self, room: Room) -> None:
         """Back to the start, in this room."""
@@ -67,6 +77,9 @@ class WheelBody:
         speed, turn_speed = self._wanted
         self.speed = _towards(self.speed, speed, ACCELERATION * dt, BRAKING * dt)
         self.turn_speed = _towards(self.turn_speed, turn_speed, TURNING * dt, TURN_BRAKING * dt)
+        if self._pressed_s > 0.0:
+            self._pressed_s -= dt
+            self.bumped = self.bumped if self._pressed_s > 0.0 else ""
         self.theta_deg = (self.theta_deg + self.turn_speed * dt + 180.0) % 360.0 - 180.0
         if self.speed:
             self._roll(self.speed * dt)
@@ -77,7 +90,8 @@ class WheelBody:
         x = self.x + way * math.cos(math.radians(self.theta_deg))
         y = self.y + way * math.sin(math.radians(self.theta_deg))
         if self.room.free(x, y, RADIUS):
-            self.x, self.y, self.bumped = x, y, ""
+            self.x, self.y = x, y
+            self.bumped = self.bumped if self._pressed_s > 0.0 else ""
             self.room = self.room.pushed_ball(x, y, RADIUS)
             return
         self.speed, self.turn_speed, self._wanted = 0.0, 0.0, (0.0, 0.0)

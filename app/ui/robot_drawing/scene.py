@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPixmap
+from PySide6.QtGui import QColor, QFont, QPainter, QPen, QPixmap
 
+from app.ui.robot_drawing.bubble import paint_bubble
 from app.ui.robot_drawing.objects import paint_thing, thing_area
 from app.ui.robot_drawing.pepper import HEAD, limbs, paint_figure
 from app.ui.robot_drawing.room import WIDTH, Spot, Stage, paint_room
@@ -14,8 +15,6 @@ from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.robot_drawing.turtle import TOP, paint_turtle
 
 TURTLE = "turtle"
-BUBBLE_WIDTH = 190.0
-BUBBLE_LINES = 4
 
 # What a preview shows while no robot has told its state.
 PREVIEW = RobotState(
@@ -56,7 +55,9 @@ class RobotDrawing:
             (paint_turtle if state.figure == TURTLE else paint_figure)(painter, state)
             painter.restore()
         if state.speech:
-            self._bubble(painter, stage, robot, state.speech)
+            high = TOP.y() if state.figure == TURTLE else HEAD.y()
+            head = replace(robot, v=robot.v + high * robot.scale)
+            paint_bubble(painter, stage.bounds(), head, state, self._font)
         painter.restore()
         if dark:
             painter.fillRect(area, QColor(0, 0, 12, 34))
@@ -112,40 +113,6 @@ class RobotDrawing:
             self._room_key = key
         painter.drawPixmap(area.topLeft(), self._room)
 
-    def _bubble(self, painter: QPainter, stage: Stage, robot: Spot, words: str) -> None:
-        font = QFont(self._font)
-        font.setPixelSize(14)
-        font.setWeight(QFont.Weight.DemiBold)
-        metrics = QFontMetricsF(font)
-        lines = _wrap(words, metrics, BUBBLE_WIDTH - 28)
-        line_height = metrics.height() + 1
-        width = max(metrics.horizontalAdvance(line) for line in lines) + 28
-        height = len(lines) * line_height + 18
-        head = QPointF(robot.u, robot.v + HEAD.y() * robot.scale)
-        bounds = stage.bounds()
-        left_side = robot.u + 30 + width > bounds.right() - 6 and robot.u > bounds.center().x()
-        side = -1.0 if left_side else 1.0
-        near = head.x() + side * 31.0 * robot.scale
-        left = near - width if left_side else near
-        left = min(max(left, bounds.left() + 8), bounds.right() - 8 - width)
-        top = max(bounds.top() + 8, head.y() - 39 * robot.scale - height)
-        box = QRectF(left, top, width, height)
-        foot = min(max(head.x() + side * 58 * robot.scale, box.left() + 18), box.right() - 30)
-        shape = QPainterPath()
-        shape.addRoundedRect(box, min(12.0, height / 2), min(12.0, height / 2))
-        tail = QPainterPath(QPointF(foot, box.bottom() - 1))
-        tail.lineTo(foot + 15 if side > 0 else foot - 15, box.bottom() - 1)
-        tail.lineTo(foot - 2.5 * side, box.bottom() + 11)
-        tail.closeSubpath()
-        painter.setPen(QPen(QColor("#C9C4BA"), 0.8))
-        painter.setBrush(QColor("#FFFFFF"))
-        painter.drawPath(shape.united(tail))
-        painter.setFont(font)
-        painter.setPen(QColor("#1C1B19"))
-        for number, line in enumerate(lines):
-            at = QRectF(box.left(), box.top() + 9 + number * line_height, width, line_height)
-            painter.drawText(at, Qt.AlignmentFlag.AlignCenter, line)
-
 
 def _placed(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
     """All objects with their places, what is far first; people before the robot as marks on the floor."""
@@ -191,20 +158,3 @@ def _part_at(own: QPointF, state: RobotState) -> str | None:
 def _near(point: QPointF, centre: QPointF, radius: float) -> bool:
     away = point - centre
     return QPointF.dotProduct(away, away) <= radius * radius
-
-
-def _wrap(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
-    """At most `BUBBLE_LINES` lines; the last one is elided when there is more."""
-    lines: list[str] = [""]
-    rest = words.split()
-    while rest:
-        tried = f"{lines[-1]} {rest[0]}".strip()
-        if lines[-1] and metrics.horizontalAdvance(tried) > width:
-            if len(lines) == BUBBLE_LINES:
-                lines[-1] = " ".join([lines[-1], *rest])
-                break
-            lines.append("")
-            continue
-        lines[-1] = tried
-        rest.pop(0)
-    return [metrics.elidedText(line, Qt.TextElideMode.ElideRight, width) for line in lines]

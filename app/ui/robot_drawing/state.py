@@ -38,7 +38,8 @@ class RobotState:
 
     ``x``, ``y`` in m, ``theta_deg`` 0 looks along x, at the person, and grows to the robot's left. Head yaw
     grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
-    ``figure`` is how it looks, ``pepper`` or ``turtle``; ``bumped`` is the side that touches something.
+    ``figure`` is how it looks, ``pepper`` or ``turtle``; ``bumped`` is the side that touches something,
+    ``spoken`` how much of its words it has said (0 to 1).
     """
 
     x: float = 0.0
@@ -47,6 +48,7 @@ class RobotState:
     head_yaw_deg: float = 0.0
     head_pitch_deg: float = 0.0
     speech: str | None = None
+    spoken: float = 0.0
     eyes: str = EYES
     shoulders: str = SHOULDERS
     emotion: str = "neutral"
@@ -70,6 +72,7 @@ class RobotState:
             head_yaw_deg=_number(data.get("head_yaw_deg")),
             head_pitch_deg=_number(data.get("head_pitch_deg")),
             speech=speech if isinstance(speech, str) and speech.strip() else None,
+            spoken=min(1.0, max(0.0, _number(data.get("spoken")))),
             eyes=_colour(data.get("eyes"), EYES),
             shoulders=_colour(data.get("shoulders"), SHOULDERS),
             emotion=str(data.get("emotion") or "neutral"),

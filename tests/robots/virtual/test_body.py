@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.robots.virtual.body import RADIUS, Body
+from app.robots.virtual.body import RADIUS, TOUCH_LEAST_S, Body
 from app.robots.virtual.motion import Joint, Motion
 from app.robots.virtual.room import Room
 from app.robots.virtual.simulation import drawable
@@ -118,6 +118,7 @@ def test_a_touch_is_told_once_and_its_end_too():
     body = Body()
     body.touch("head", down=True)
     body.touch("head", down=True)
+    body.step(TOUCH_LEAST_S + 0.1)
     body.touch("head", down=False)
     body.touch("left_hand", down=False)
     body.hear("hello")
@@ -126,6 +127,32 @@ def test_a_touch_is_told_once_and_its_end_too():
         ("released", {"place": "head"}),
         ("heard", {"word": "hello"}),
     ]
+
+
+def test_a_short_tap_lasts_as_long_as_a_program_needs_to_see_it_and_a_hand_that_stays_longer():
+    body = Body()
+    body.touch("head", down=True)
+    body.touch("head", down=False)
+    body.step(TOUCH_LEAST_S - 0.05)
+    assert list(body.touched) == ["head"]
+    body.step(0.1)
+    assert events(body) == [("touched", {"place": "head"}), ("released", {"place": "head"})]
+    assert not body.touched
+    body.touch("head", down=True)
+    body.touch("head", down=False)
+    body.step(0.1)
+    body.touch("head", down=True)  # before the tap has ended: now it is held
+    body.step(5)
+    assert list(body.touched) == ["head"]
+
+
+def test_how_much_of_a_speech_is_spoken_is_told():
+    body = Body()
+    speech = body.say("x" * 100)
+    body.step(speech.seconds / 2)
+    assert drawable(body)["spoken"] == pytest.approx(0.5, abs=0.02)
+    run(body, lambda: speech.done)
+    assert body.spoken == 0.0
 
 
 def test_the_battery_drains_faster_when_it_moves():
@@ -144,7 +171,7 @@ def test_reset_puts_everything_back():
     body.room = body.room.moved("ball", 0.5, 1.0)
     body.reset(Room())
     run(body, lambda: body.still)
-    assert (body.x, body.theta_deg, body.touched, body.room) == (-0.5, 0.0, set(), Room())
+    assert (body.x, body.theta_deg, body.touched, body.room) == (-0.5, 0.0, {}, Room())
 
 
 def test_the_drawing_has_what_studio_draws():

@@ -163,6 +163,32 @@ def test_it_feels_and_hears(pepper):
     assert {"primitive": "word", "input": {"hello": 1}, "robot": "Pepper"} in board
 
 
+def test_a_tap_is_seen_by_who_only_looks_at_the_sensor(pepper):
+    told = pepper.listen("head_touched")
+    pepper.world(touch="head", down=True)
+    pepper.world(touch="head", down=False)
+    eventually(lambda: {"value": True} in told)
+    eventually(lambda: told[-1] == {"value": False})
+
+
+def test_a_person_lets_anything_happen_that_its_description_knows(pepper):
+    for leaf in ("touched", "released", "heard", "bumped", "face_seen"):
+        pepper.listen(leaf)
+    pepper.world(happen="bumped", side="back")
+    pepper.world(happen="heard", word="yes")
+    pepper.world(happen="touched", place="left_hand")
+    pepper.world(happen="face_seen", name="Ben")
+    for wrong in ({"side": "top"}, {"side": 3}):
+        pepper.world(happen="bumped", **wrong)
+    pepper.world(happen="flies")
+    pepper.world(happen="touched", place="nose")
+    eventually(lambda: pepper.heard["released"] == [{"place": "left_hand"}])
+    assert pepper.heard["bumped"] == [{"side": "back"}]
+    assert pepper.heard["heard"] == [{"word": "yes"}]
+    assert {"name": "Ben"} in pepper.heard["face_seen"]
+    assert pepper.heard["touched"] == [{"place": "left_hand"}]
+
+
 def test_it_sees(pepper):
     for leaf in ("faces", "balls", "markers", "sees_face", "sees_ball", "face_seen", "face_lost"):
         pepper.listen(leaf)

@@ -19,7 +19,7 @@ from app.robots.virtual.camera import Camera
 from app.robots.virtual.lens import Lens
 from app.robots.virtual.room import Room
 from app.robots.virtual.vision import colours_in
-from app.robots.virtual.wheels import BRAKING, RADIUS, START, WheelBody
+from app.robots.virtual.wheels import BRAKING, PRESS_S, RADIUS, START, WheelBody
 from tests.robots.conftest import Ears, eventually
 
 
@@ -83,6 +83,18 @@ def test_it_pushes_the_ball_and_measures_what_is_ahead() -> None:
     body.step(1.8)
     assert body.room.ball.x > ball + 0.1
     assert near(body.distance, body.room.x_max - body.x - RADIUS, 0.01)
+
+
+def test_a_hand_on_its_bumper_stops_it_and_is_felt_for_a_moment() -> None:
+    body = WheelBody(x=0.0, y=-1.0, theta_deg=180.0)
+    body.drive(0.5, 0.0)
+    body.step(0.5)
+    body.press("left")
+    body.step(PRESS_S / 2)
+    assert (body.bumped, body.still) == ("left", True)
+    body.step(PRESS_S)
+    assert body.bumped == ""
+    assert [(h.event, h.data) for h in body.happenings] == [("bump", {"side": "left"})]
 
 
 # ---- what it sees ----------------------------------------------------------------------------------

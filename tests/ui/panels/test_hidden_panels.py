@@ -17,7 +17,7 @@ from app.ui.panels.camera import CameraPanel
 from app.ui.panels.image.panel import ImagePanel
 from app.ui.panels.inspector.panel import InspectorPanel
 from app.ui.panels.registry import PanelRegistry
-from app.ui.panels.robot import RobotPanel
+from app.ui.panels.robot.panel import RobotPanel
 from app.ui.shell.docking.dock import RESTS_AFTER_S, Dock, on_screen
 from app.ui.shell.main_window import TICK_MS, MainWindow
 from app.ui.theme.theme import Theme

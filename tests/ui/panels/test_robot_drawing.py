@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import QPointF, QRectF
-from PySide6.QtGui import QColor, QImage, QPainter
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter
 
+from app.ui.robot_drawing.bubble import scrolled, wrapped
 from app.ui.robot_drawing.pepper import EMOTIONS
 from app.ui.robot_drawing.room import Stage
 from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
@@ -132,3 +133,42 @@ def test_a_message_becomes_a_state_and_damaged_parts_keep_their_defaults() -> No
     assert broken == RobotState()
     room = RobotState.parse({"room": {"x_min": -1, "x_max": 3, "y_min": -2, "y_max": 2}}).room
     assert room == RoomBounds(-1, 3, -2, 2)
+
+
+LONG = "Once upon a time there was a small robot. " * 11 + "end"
+
+
+@pytest.mark.parametrize("width", [60.0, 140.0, 300.0])
+@pytest.mark.parametrize("words", ["Hello", LONG, "x" * 300, "a " * 200, f"{'y' * 80} and {'z' * 3}"])
+def test_all_words_of_a_speech_are_in_its_bubble(qapp, words, width) -> None:
+    metrics = QFontMetricsF(QFont())
+    lines = wrapped(words, metrics, width)
+    assert "".join(lines).replace(" ", "") == words.replace(" ", "")
+    assert all(metrics.horizontalAdvance(line) <= width for line in lines)
+
+
+def test_a_long_speech_scrolls_with_what_is_spoken() -> None:
+    lines = [f"line {number:02}" for number in range(20)]
+    seen: dict[str, None] = {}
+    for step in range(101):
+        text = scrolled(lines, 6, step / 100)
+        spoken = lines[min(19, int(step / 100 * 20))]
+        assert spoken in text.visible
+        assert len(text.visible) == 6
+        seen.update(dict.fromkeys(text.visible))
+    assert list(seen) == lines
+    assert scrolled(lines, 6, 0.0).first == 0
+    assert scrolled(["one"], 6, 0.5).visible == ["one"]
+    assert len(scrolled(lines, 0, 0.5).visible) == 1
+
+
+@pytest.mark.parametrize("size", [(382, 286), (900, 300), (200, 150)])
+@pytest.mark.parametrize("place", [(0.0, 0.0), (2.5, 2.4), (2.5, -2.4), (-2.5, 0.0)])
+def test_a_long_bubble_stays_inside_and_moves_on(qapp, size, place) -> None:
+    area = QRectF(0, 0, *size)
+    told = RobotState(x=place[0], y=place[1], speech=LONG)
+    begun, ended = (painted(replace(told, spoken=spoken), area) for spoken in (0.0, 1.0))
+    assert differing(begun, ended) > 0
+    edges = [(x, y) for x in (0, size[0] - 1) for y in range(size[1])]
+    silent = painted(replace(told, speech=None), area)
+    assert all(begun.pixel(*at) == silent.pixel(*at) for at in edges)

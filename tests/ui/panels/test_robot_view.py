@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
-from app.ui.panels.robot import PANEL, STALE_AFTER_S, RobotPanel
+from app.ui.panels.robot.panel import PANEL, STALE_AFTER_S, RobotPanel
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press
 from tests.ui.sample_data import drawing, pepper

@@ -24,6 +24,8 @@ SHEET_PADDING = 9  # what the style sheet gives texts above and below, and a pix
 class SearchField(QLineEdit):
     """A field to filter or find, with its icon inside and the key that leads to it at the right."""
 
+    icon_name = "search"
+
     def __init__(self, theme: Theme, placeholder: str, key: str = "") -> None:
         super().__init__()
         self._theme, self._key = theme, key
@@ -44,7 +46,7 @@ class SearchField(QLineEdit):
         super().paintEvent(event)
         painter = QPainter(self)
         middle = self.height() / 2
-        paint_icon(painter, QRectF(9, middle - 7, 14, 14), "search", self._theme.colour("textTertiary"))
+        paint_icon(painter, QRectF(9, middle - 7, 14, 14), self.icon_name, self._theme.colour("textTertiary"))
         if self._key and not self.text():
             paint.key_cap(painter, self._theme, self.width() - 5, middle, self._key)
         painter.end()

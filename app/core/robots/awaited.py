@@ -1,0 +1,54 @@
+"""What the open behaviours wait for of a robot: words that it is to hear, and other things that happen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from app.blocks.model.robot_text import TextParts, type_of
+from app.blocks.model.workspace import saved_blocks
+from app.robots.description.description import Event, Robot
+
+MOST = 12
+SHORTEST, LONGEST = 1, 60
+
+
+def awaited_values(
+    workspaces: Iterable[Mapping[str, object]], robot: Robot, event: Event, name: str
+) -> tuple[str, ...]:
+    """What hats and comparisons wait for in the datum ``name`` of an event; then what is suggested.
+
+    Each once, at most twelve. ``workspaces`` are saved ones, the behaviour that shows first.
+    """
+    hat = type_of(robot.model, "when", event.name)
+    argument = TextParts(event.text, event.filters).arguments.get(name, "")
+    sensors = {type_of(robot.model, "get", each.name) for each in robot.sensors if each.kind == "text"}
+    found: dict[str, None] = {}
+    for workspace in workspaces:
+        for block in saved_blocks(workspace):
+            if block.get("type") == hat and _fields(block).get("ROBOT", robot.name) == robot.name:
+                found[str(_fields(block).get(argument) or "").strip()] = None
+            else:
+                found.update(dict.fromkeys(_compared(block, sensors)))
+    parameter = next((each for each in event.fields if each.name == name), None)
+    if parameter is not None and isinstance(parameter.default, str):
+        found[parameter.default] = None
+    return tuple(word for word in found if SHORTEST <= len(word) <= LONGEST)[:MOST]
+
+
+def _compared(block: Mapping[str, object], sensors: set[str]) -> list[str]:
+    """The texts beside a sensor in one block: “last word heard” = “yes”."""
+    inputs = block.get("inputs")
+    held: list[Mapping[str, object]] = []
+    for connection in inputs.values() if isinstance(inputs, Mapping) else ():
+        shown = connection.get("block", connection.get("shadow")) if isinstance(connection, Mapping) else None
+        if isinstance(shown, Mapping):
+            held.append(shown)
+    if not any(each.get("type") in sensors for each in held):
+        return []
+    texts = [_fields(each).get("TEXT") for each in held]
+    return [text.strip() for text in texts if isinstance(text, str)]
+
+
+def _fields(block: Mapping[str, object]) -> Mapping[str, object]:
+    fields = block.get("fields")
+    return fields if isinstance(fields, Mapping) else {}

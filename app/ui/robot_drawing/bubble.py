@@ -1,0 +1,133 @@
+"""The speech bubble of a robot: all of its words, wrapped; long ones scroll along with the speech."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen
+
+from app.ui.robot_drawing.room import Spot
+from app.ui.robot_drawing.state import RobotState
+
+LEAST_WIDTH, SHORT_WIDTH, LONG_WIDTH = 140.0, 190.0, 320.0
+SHORT_LINES, MOST_LINES, MOST_NARROW = 4, 6, 8
+LARGE, SMALL = 14, 12
+INSIDE, EDGE = 14.0, 8.0
+READ_AHEAD = 2
+"""So many lines before the one that is spoken stay in view."""
+
+
+@dataclass(frozen=True, slots=True)
+class BubbleText:
+    """Words in lines; ``first`` is the line at the top, ``shown`` are so many."""
+
+    lines: Sequence[str]
+    first: int
+    shown: int
+
+    @property
+    def visible(self) -> Sequence[str]:
+        """The lines that are seen now."""
+        return self.lines[self.first : self.first + self.shown]
+
+
+def wrapped(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
+    """All of the words in lines of this width; a word that is longer goes on in the next line."""
+    lines = [""]
+    for word in words.split():
+        tried = f"{lines[-1]} {word}".strip()
+        if metrics.horizontalAdvance(tried) <= width:
+            lines[-1] = tried
+            continue
+        for piece in _pieces(word, metrics, width):
+            if lines[-1]:
+                lines.append(piece)
+            else:
+                lines[-1] = piece
+    return lines
+
+
+def _pieces(word: str, metrics: QFontMetricsF, width: float) -> list[str]:
+    pieces = [""]
+    for letter in word:
+        if pieces[-1] and metrics.horizontalAdvance(pieces[-1] + letter) > width:
+            pieces.append("")
+        pieces[-1] += letter
+    return pieces
+
+
+def scrolled(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
+    """As many lines as fit, moved on so that the word that is spoken can be read (``spoken`` from 0 to 1)."""
+    shown = max(1, min(most, len(lines)))
+    letters = sum(len(line) for line in lines)
+    said, line = spoken * letters, 0
+    while line < len(lines) - 1 and said >= len(lines[line]):
+        said -= len(lines[line])
+        line += 1
+    first = min(max(0, line - (shown - 1 - READ_AHEAD if shown > READ_AHEAD else 0)), len(lines) - shown)
+    return BubbleText(lines, max(0, first), shown)
+
+
+def paint_bubble(p: QPainter, bounds: QRectF, head: Spot, state: RobotState, font: QFont) -> None:
+    """Paint what a robot says beside its ``head``, inside ``bounds``; ``p`` is in units of the stage."""
+    near, words = 31.0 * head.scale, state.speech or ""
+    room_right, room_left = bounds.right() - EDGE - head.u - near, head.u - near - bounds.left() - EDGE
+    face = QFont(font)
+    face.setWeight(QFont.Weight.DemiBold)
+    face.setPixelSize(LARGE)
+    width = min(SHORT_WIDTH, bounds.width() - 2 * EDGE)
+    lines = wrapped(words, QFontMetricsF(face), width - 2 * INSIDE)
+    if len(lines) > SHORT_LINES:
+        face.setPixelSize(SMALL)
+        beside = max(room_right, room_left)  # narrower and higher rather than over the face
+        width = min(max(LEAST_WIDTH, beside), LONG_WIDTH, bounds.width() - 2 * EDGE)
+        lines = wrapped(words, QFontMetricsF(face), width - 2 * INSIDE)
+    metrics = QFontMetricsF(face)
+    line_height = metrics.height() + 1
+    fits = int((bounds.height() - 2 * EDGE - 30) / line_height)
+    text = scrolled(lines, min(MOST_NARROW if width < SHORT_WIDTH else MOST_LINES, fits), state.spoken)
+    width = max(metrics.horizontalAdvance(line) for line in lines) + 2 * INSIDE
+    height = text.shown * line_height + 18
+    side = -1.0 if room_left > room_right and room_right < width else 1.0
+    left = head.u + near if side > 0 else head.u - near - width
+    left = min(max(left, bounds.left() + EDGE), max(bounds.left() + EDGE, bounds.right() - EDGE - width))
+    top = max(bounds.top() + EDGE, head.v - 39 * head.scale - height)
+    box = QRectF(left, top, width, height)
+    _paint_box(p, box, min(max(head.u + side * 58 * head.scale, box.left() + 18), box.right() - 30), side)
+    p.setFont(face)
+    p.setPen(QColor("#1C1B19"))
+    scrolls = text.shown < len(lines)
+    for number, line in enumerate(text.visible):
+        at = QRectF(box.left(), box.top() + 9 + number * line_height, width, line_height)
+        p.drawText(at, Qt.AlignmentFlag.AlignCenter, line)
+    if scrolls:
+        _paint_thumb(p, box, text)
+
+
+def _paint_box(p: QPainter, box: QRectF, foot: float, side: float) -> None:
+    shape = QPainterPath()
+    shape.addRoundedRect(box, min(12.0, box.height() / 2), min(12.0, box.height() / 2))
+    tail = QPainterPath(QPointF(foot, box.bottom() - 1))
+    tail.lineTo(foot + 15 if side > 0 else foot - 15, box.bottom() - 1)
+    tail.lineTo(foot - 2.5 * side, box.bottom() + 11)
+    tail.closeSubpath()
+    p.setPen(QPen(QColor("#C9C4BA"), 0.8))
+    p.setBrush(QColor("#FFFFFF"))
+    p.drawPath(shape.united(tail))
+
+
+def _paint_thumb(p: QPainter, box: QRectF, text: BubbleText) -> None:
+    """How far the words have scrolled."""
+    track = QRectF(box.right() - 7, box.top() + 10, 3, box.height() - 20)
+    count = len(text.lines)
+    thumb = QRectF(
+        track.left(),
+        track.top() + track.height() * text.first / count,
+        track.width(),
+        track.height() * text.shown / count,
+    )
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor("#C9C4BA"))
+    p.drawRoundedRect(thumb, 1.5, 1.5)

@@ -1,0 +1,54 @@
+"""The words that programs wait for, offered to a person who speaks to a robot."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.core.robots.awaited import MOST, awaited_values
+from app.robots.description.description import parse, td_for
+from app.robots.simulated import ROBOT
+
+PEPPER = parse(td_for(ROBOT.thing_model, "Pepper"))
+HEARD = PEPPER.event("heard")
+
+
+def hat(word: object, robot: str = "Pepper") -> dict[str, object]:
+    return {"type": "robot_pepper_when_heard", "fields": {"ROBOT": robot, "WORD": word}}
+
+
+def behaviour(*blocks: dict[str, object]) -> dict[str, object]:
+    return {"blocks": {"blocks": list(blocks)}}
+
+
+def words(*behaviours: dict[str, object]) -> tuple[str, ...]:
+    assert HEARD is not None
+    return awaited_values(behaviours, PEPPER, HEARD, "word")
+
+
+def test_the_words_of_its_own_hats_come_first_then_what_is_suggested() -> None:
+    assert words(behaviour(hat("yes"), hat("no"), hat("yes")), behaviour(hat("stop"))) == (
+        "yes",
+        "no",
+        "stop",
+        "hello",
+    )
+    assert words(behaviour(hat("yes", "Other"))) == ("hello",)
+    assert words() == ("hello",)
+
+
+def test_a_text_that_is_compared_with_what_it_heard_counts() -> None:
+    sensor = {"block": {"type": "robot_pepper_get_heard_word", "fields": {"ROBOT": "Pepper"}}}
+    text = {"block": {"type": "values_text", "fields": {"TEXT": " blue "}}}
+    compare = {"type": "values_compare", "inputs": {"A": sensor, "B": text}}
+    inside = {"type": "control_if", "inputs": {"IF": {"block": compare}}}
+    say = {"type": "robot_pepper_do_say", "inputs": {"TEXT": text}}
+    assert words(behaviour(inside, say)) == ("blue", "hello")
+
+
+@pytest.mark.parametrize("word", ["", "  ", None, "x" * 61])
+def test_what_is_no_word_is_left_out(word: object) -> None:
+    assert words(behaviour(hat(word), {"type": 3, "inputs": [1], "fields": "none"})) == ("hello",)  # type: ignore[dict-item]
+
+
+def test_no_more_are_offered_than_a_menu_can_show() -> None:
+    assert len(words(behaviour(*(hat(f"word {number}") for number in range(100))))) == MOST

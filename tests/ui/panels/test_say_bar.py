@@ -1,0 +1,89 @@
+"""What a person says to a virtual robot in its panel, and what they let happen."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMenu
+
+from app.robots.description.description import parse, td_for
+from app.robots.simulated import ROBOT
+from app.ui.panels.robot.panel import PANEL, RobotPanel
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, press
+from tests.ui.sample_data import drawing, pepper
+
+pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    made = Window(Session())
+    made.session.join(parse(td_for(ROBOT.thing_model, "Pepper")))
+    made.session.fleet.links[0].drawing = drawing()
+    return made
+
+
+@pytest.fixture
+def panel(qtbot, window) -> RobotPanel:
+    made = window.make(PANEL, (384, 320))
+    qtbot.addWidget(made)
+    for widget in made.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(made, RobotPanel)
+    return made
+
+
+def menu(panel: RobotPanel) -> QMenu:
+    """The menu that is open."""
+    return next(each for each in panel.say.findChildren(QMenu) if each.isVisible())
+
+
+def choose(panel: RobotPanel, words: str) -> None:
+    opened = menu(panel)
+    (action,) = [each for each in opened.actions() if each.text() == words]
+    place = opened.actionGeometry(action).center()
+    QTest.mouseClick(opened, Qt.MouseButton.LeftButton, pos=place)
+
+
+def test_what_is_typed_is_heard_with_return(panel, window) -> None:
+    assert panel.say.field.placeholderText() == "Say something to Pepper"
+    QTest.keyClicks(panel.say.field, " good morning ")
+    assert window.session.changes("Pepper") == []
+    QTest.keyClick(panel.say.field, Qt.Key.Key_Return)
+    assert window.session.changes("Pepper") == [{"say": "good morning"}]
+    assert panel.say.field.text() == ""
+    QTest.keyClick(panel.say.field, Qt.Key.Key_Return)
+    assert window.session.changes("Pepper") == []
+    QTest.keyClick(panel.say.field, Qt.Key.Key_Up)
+    assert panel.say.field.text() == "good morning"
+
+
+def test_the_words_that_the_behaviour_waits_for_are_offered(panel, window) -> None:
+    hat = {"type": "robot_pepper_when_heard", "fields": {"ROBOT": "Pepper", "WORD": "quiz"}}
+    window.session.document.workspace = {"blocks": {"blocks": [hat]}}
+    press(panel.say.words)
+    assert [action.text() for action in menu(panel).actions()] == ["quiz", "hello"]
+    choose(panel, "quiz")
+    assert window.session.changes("Pepper") == [{"say": "quiz"}]
+    QTest.keyClick(panel.say.field, Qt.Key.Key_Down)
+    assert [action.text() for action in menu(panel).actions()] == ["quiz", "hello"]
+
+
+def test_anything_else_can_be_let_happen(panel, window) -> None:
+    press(panel.say.events)
+    entries = [action.text() for action in menu(panel).actions()]
+    assert {"Sees a face", "Bumps with its front", "Left hand is touched"} <= set(entries)
+    assert not any("hears" in entry for entry in entries)
+    choose(panel, "Bumps with its front")
+    assert window.session.changes("Pepper") == [{"happen": "bumped", "side": "front"}]
+
+
+def test_nothing_can_be_said_to_a_real_robot(qtbot) -> None:
+    window = Window(Session())
+    window.session.join(pepper("Table"), virtual=False)
+    panel = window.make(PANEL, (384, 320))
+    qtbot.addWidget(panel)
+    assert isinstance(panel, RobotPanel)
+    assert not panel.say.isVisibleTo(panel)
