@@ -140,6 +140,13 @@ class PanelWidget(QWidget):
     def refresh(self) -> None:
         """Show what is in the session now; called 30 times a second while the panel can be seen."""
 
+    def badge(self) -> tuple[str, str] | None:
+        """What waits in it while it stands behind another panel: a count and a status; None for nothing.
+
+        Asked with every tick of a panel that shares its place, so it costs nothing when nothing changed.
+        """
+        return None
+
     def set_density(self, density: Density) -> None:
         """Comfortable rows and text in the Behaviour layout, compact ones in Developer."""
         self.density = density

@@ -197,6 +197,10 @@ class ProblemsPanel(PanelWidget):
             self.rows[place].setFocus(Qt.FocusReason.TabFocusReason)
             self._scroll.ensureWidgetVisible(self.rows[place])
 
+    def badge(self) -> tuple[str, str] | None:
+        self.refresh()  # nobody else asks a panel that stands behind another one
+        return (self.chip.text, self.chip.status) if self._found else None
+
     def _count(self, found: tuple[Listed, ...]) -> None:
         if not found:
             self.chip.set(pgettext("problems", "none"), "ok")

@@ -40,7 +40,7 @@ from app.ui.widgets.file_dialogs import FileDialogs, SystemDialogs
 from nep.i18n import _, lazy
 
 TICK_MS = 33
-SMALLEST = QSize(1100, 700)
+SMALLEST = QSize(960, 540)  # on a screen of 1024 x 600 the system's own bars take some
 FIRST_SIZE = QSize(1440, 900)
 FACTS_EVERY = 8  # ticks
 SOON_WORDS = {"behaviour": lazy("Getting the blocks ready.")}

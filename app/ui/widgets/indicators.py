@@ -9,6 +9,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPainterPath, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -59,6 +60,7 @@ class Chip(QWidget):
         self._theme = theme
         self._large = large
         self._text, self._status, self._icon = "", "", icon
+        self._bare = False
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self.updateGeometry)
         self.set(text, status, icon)
@@ -83,8 +85,22 @@ class Chip(QWidget):
         self._text, self._status, self._icon = text, status, icon
         self.setAccessibleName(text)
         paint.show_when(self, bool(text))
+        if self._bare:
+            self._tell_whole()
         self.updateGeometry()
         self.update()
+
+    def set_bare(self, bare: bool) -> None:
+        """Where there is no room for words, only the icon is left; its tooltip has the words."""
+        if bare != self._bare:
+            self._bare = bare
+            self.updateGeometry()
+            self.update()
+
+    def full_width(self) -> int:
+        """The width with its words."""
+        width = paint.width_of(self._font(), self._text) + 2 * CHIP_PADDING + (2 if self._large else 0)
+        return round(width + (self._side() + CHIP_GAP if self._icon_name() else 0)) + 1
 
     def _icon_name(self) -> str:
         return self._theme.status(self._status).icon if self._icon is None else self._icon
@@ -98,18 +114,22 @@ class Chip(QWidget):
         return font
 
     def sizeHint(self) -> QSize:
-        width = paint.width_of(self._font(), self._text) + 2 * CHIP_PADDING + (2 if self._large else 0)
-        if self._icon_name():
-            width += self._side() + CHIP_GAP
         least = CHIP_HEIGHT + (4 if self._large else 0)
-        return QSize(round(width) + 1, max(least, round(paint.height_of(self._font())) + 6))
+        high = max(least, round(paint.height_of(self._font())) + 6)
+        return QSize(max(high, round(self._side()) + CHIP_PADDING) if self._bare else self.full_width(), high)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
+        self._tell_whole()
+
+    def _tell_whole(self) -> None:
         paint.tell_whole(self, self._text)
+        if self._bare:
+            self.setProperty("shortened", True)
+            self.setToolTip(plain.tip(self._text))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
@@ -125,10 +145,12 @@ class Chip(QWidget):
         name = self._icon_name()
         if name:
             side = self._side()
+            left = (rect.width() - side) / 2 if self._bare else left
             square = QRectF(left, (rect.height() - side) / 2, side, side)
             paint_icon(painter, square, name, theme.colour(status.colour) if name == "dot" else ink)
             left += side + CHIP_GAP
-        paint.words(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), ink)
+        if not self._bare:
+            paint.words(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), ink)
         painter.end()
 
 

@@ -19,7 +19,8 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
         ([120, 384], 1424, [False, True], [1040, 384]),
         ([327, 275, 140], 742, [False, False, True], [327, 275, 140]),
         ([327, 275, 140], 1042, [False, False, True], [490, 412, 140]),
-        ([120, 384], 300, [False, True], [120, 384]),
+        ([380, 394], 480, [False, True], [236, 244]),
+        ([120, 384], 300, [False, True], [120, 229]),
     ],
 )
 def test_what_is_kept_and_what_grows(

@@ -24,6 +24,8 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.field.placeholder = t('Find a block');
     this.field.spellcheck = false;
     this.field.setAttribute('aria-label', t('Find a block: type words, Enter takes the first'));
+    this.field.title = t('Find a block');
+    this.field.onfocus = this.field.onblur = () => this.dress();
     this.field.oninput = () => this.show();
     this.field.onkeydown = (event) => this.onKey(event);
     // Otherwise the toolbox takes it for a click beside its categories and closes the blocks.
@@ -51,6 +53,17 @@ export class SearchItem extends Blockly.ToolboxItem {
 
   clear(): void {
     this.field.value = '';
+    this.dress();
+  }
+
+  /** While somebody looks for a block, a toolbox of tiles is whole. */
+  private dress(): void {
+    const whole = document.activeElement === this.field || this.field.value !== '';
+    const box = this.div.closest('.blocklyToolbox');
+    if (!box || box.classList.contains('nepWhole') === whole) return;
+    box.classList.toggle('nepWhole', whole);
+    const workspace = this.parentToolbox_.getWorkspace();
+    if (workspace.getParentSvg().isConnected) Blockly.svgResize(workspace);
   }
 
   private get toolbox(): SearchedToolbox {

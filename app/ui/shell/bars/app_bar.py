@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
 
 from app.core.robots.robot_link import RobotLink
@@ -23,6 +23,7 @@ from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _, lazy, ngettext
 
 WIDE, HIGH, LEFT, ICON, GAP = 248, 28, 10, 14, 9
+SPACES = 64  # px between the parts of the bar
 LEAST_ROOM = 44  # px of the field: less than that for the words, and only icon and key are shown
 CHIP_WORDS = {
     "ready": lazy("{robot} ready"),
@@ -94,6 +95,23 @@ class AppBar(QWidget):
         font = self._theme.font("body")
         font.setWeight(font.Weight.Medium)
         self.menus.setFont(font)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """Where the menus have no room: first the field loses its words, then the switch, then the chip."""
+        switch, chip = self.switch, self.chip
+        switch.set_bare(False)
+        wanted = [widget for widget in (self.search, self.stop) if not widget.isHidden()]
+        fixed = sum(widget.minimumSizeHint().width() for widget in wanted) + SPACES
+        fixed += self.menus.sizeHint().width() + self.height()  # the logo is about as wide as the bar is high
+        words = 0 if switch.isHidden() else switch.sizeHint().width()
+        switch.set_bare(fixed + words + chip.full_width() > self.width())
+        words = 0 if switch.isHidden() else switch.sizeHint().width()
+        chip.set_bare(fixed + words + chip.full_width() > self.width())
 
     def use(self, actions: Actions) -> None:
         """Let its buttons trigger these."""
@@ -113,10 +131,15 @@ class AppBar(QWidget):
             self.switch.set_value(name)
         self.switch.setVisible(name is not None)
         self.stop.setVisible(name is None)
+        self._fit()
 
     def show_robots(self, text: str, status: str) -> None:
         """The chip: which robots there are and how they are."""
-        self.chip.set(text, status)
+        if text != self.chip.text:
+            self.chip.set(text, status)
+            self._fit()
+        else:
+            self.chip.set(text, status)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)

@@ -203,6 +203,14 @@ class Dock(QDockWidget):
             return None
         return self._try(self.panel.refresh)
 
+    def badge(self) -> tuple[str, str] | None:
+        """What its tab says while it stands behind another panel."""
+        if self.front or self.failed:
+            return None
+        found: list[tuple[str, str] | None] = []
+        self._try(lambda: found.append(self.panel.badge()))
+        return found[0] if found else None
+
     def _try(self, act: Callable[[], object]) -> str | None:
         try:
             act()

@@ -5,39 +5,103 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.ui.panels.base import Density, PanelWidget
+from app.ui.text import plain
+from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ElidedLabel, IconButton, paint, set_role
 from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _
 
+ICON, GAP = 16, 7
+BADGE = 18
+LEAST_NAME = 56  # px at 100 %: in less room the name of the panel in front is an icon, too
+
 
 class TitleTab(PaintedButton):
-    """The name of a panel that shares its place with others; a press brings it to the front."""
+    """The name of a panel that shares its place with others; a press brings it to the front.
+
+    In a narrow title only its icon is left, and the name is its tooltip. ``badge``: a count and its status.
+    """
 
     shortens = True
 
-    def __init__(self, theme: Theme, text: str, chosen: bool) -> None:
+    def __init__(self, theme: Theme, text: str, icon: str, chosen: bool) -> None:
         super().__init__(theme, text, checkable=True)
+        self._icon = icon
+        self._bare = False
+        self.badge: tuple[str, str] | None = None
         self.setChecked(chosen)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
+    def set_bare(self, bare: bool) -> None:
+        """Show only the icon, or the name again."""
+        if bare != self._bare:
+            self._bare = bare
+            self.updateGeometry()
+            self.update()
+
+    def show_badge(self, badge: tuple[str, str] | None) -> None:
+        """How many things wait there for a person, and the status of the worst; None for nothing."""
+        if badge != self.badge:
+            self.badge = badge
+            self.setAccessibleDescription(badge[0] if badge else "")
+            self.updateGeometry()
+            self.update()
+
+    def full_width(self) -> int:
+        """The width with its name."""
+        return round(paint.width_of(self._theme.font("title"), self.text()) + 21 + self._badge_room())
+
+    def _badge_room(self) -> float:
+        return self._badge_width() + GAP if self.badge else 0.0
+
+    def _badge_width(self) -> float:
+        words = self.badge[0] if self.badge else ""
+        return max(self._theme.scaled(BADGE), paint.width_of(self._theme.font("caption"), words) + 10)
+
+    def bare_width(self) -> int:
+        """The width with its icon alone."""
+        return round(self._theme.scaled(ICON) + 16 + self._badge_room())
+
     def sizeHint(self) -> QSize:
-        font = self._theme.font("title")
-        return QSize(round(paint.width_of(font, self.text())) + 21, max(26, round(paint.height_of(font)) + 6))
+        high = max(26, round(paint.height_of(self._theme.font("title"))) + 6)
+        return QSize(self.bare_width() if self._bare else self.full_width(), high)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(48, self.sizeHint().height())
+        return QSize(min(self.bare_width(), self.full_width()), self.sizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self._bare:
+            self.setProperty("shortened", True)
+            self.setToolTip(plain.tip(self.text()))
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
         if self.isChecked() or self.is_hovered:
             paint.box(painter, rect, theme.radius("small"), theme.colour("hover"))
         ink = theme.colour("text" if self.isChecked() else "textSecondary")
-        paint.words(painter, rect, self.text(), theme.font("title"), ink, paint.CENTRE)
+        room = rect.adjusted(0, 0, -self._badge_room(), 0)
+        if self._bare:
+            side = theme.scaled(ICON)
+            square = QRectF(0, 0, side, side)
+            square.moveCenter(room.center())
+            paint_icon(painter, square, self._icon, ink)
+        else:
+            paint.words(painter, room, self.text(), theme.font("title"), ink, paint.CENTRE)
+        if self.badge:
+            self._paint_badge(painter, rect, *self.badge)
+
+    def _paint_badge(self, painter: QPainter, rect: QRectF, words: str, status: str) -> None:
+        theme, high, wide = self._theme, self._theme.scaled(BADGE), self._badge_width()
+        place = QRectF(rect.right() - wide - 8, rect.center().y() - high / 2, wide, high)
+        look = theme.status(status)
+        paint.box(painter, place, high / 2, theme.colour(look.tint or "sunken"), theme.colour(look.colour))
+        paint.words(painter, place, words, theme.font("caption"), theme.colour(look.colour), paint.CENTRE)
 
 
 class DockTitle(QWidget):
@@ -101,19 +165,56 @@ class DockTitle(QWidget):
         """The panel has the focus: its name is darker."""
         set_role(self.name, "text" if active else "textSecondary")
 
-    def set_tabs(self, names: Sequence[tuple[str, bool, Callable[[], object]]]) -> None:
-        """The panels of one place: (name, whether it is this one, how to bring it to the front)."""
+    def set_tabs(self, names: Sequence[tuple[str, str, bool, Callable[[], object]]]) -> None:
+        """The panels of one place: (name, icon, whether it is this one, how to bring it to the front)."""
         for old in self._tabs:
             self._row.removeWidget(old)
             old.deleteLater()
         self._tabs = []
         paint.show_when(self.name, not names and self._whole is None)
-        for index, (text, chosen, bring) in enumerate(names):
-            tab = TitleTab(self._theme, text, chosen)
+        for index, (text, icon, chosen, bring) in enumerate(names):
+            tab = TitleTab(self._theme, text, icon, chosen)
             tab.clicked.connect(lambda _on=False, bring=bring: bring())
             self._row.insertWidget(index, tab)
             self._tabs.append(tab)
         self._row.setContentsMargins(5 if names else self._left(), 1, self._row.contentsMargins().right(), 1)
+        self.fit_tabs()
+
+    def fit_tabs(self) -> None:
+        """Where the names have no room, that of the panel in front is left, and the icons of the others.
+
+        In still less room all are icons.
+        """
+        if not self._tabs:
+            return
+        margins, others, count = self._row.contentsMargins(), 0, 0
+        for place in range(self._row.count()):
+            item = self._row.itemAt(place)
+            widget = item.widget() if item is not None else None
+            if widget is not None and not widget.isHidden() and widget not in self._tabs:
+                others += (
+                    widget.minimumSizeHint().width()
+                    if widget is self._subtitle
+                    else widget.sizeHint().width()
+                )
+                count += 1
+        room = self.width() - margins.left() - margins.right() - others
+        room -= self._row.spacing() * (count + len(self._tabs) - 1)
+        bare = sum(tab.full_width() for tab in self._tabs) > room
+        front = room - sum(tab.bare_width() for tab in self._tabs if not tab.isChecked())
+        for tab in self._tabs:
+            tab.set_bare(bare and (not tab.isChecked() or front < self._theme.scaled(LEAST_NAME)))
+
+    def show_badges(self, badges: Sequence[tuple[str, str] | None]) -> None:
+        """What waits in the panels of this place, one for each tab."""
+        for tab, badge in zip(self._tabs, badges, strict=False):
+            if badge != tab.badge:
+                tab.show_badge(badge)
+                self.fit_tabs()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.fit_tabs()
 
     def _left(self) -> int:
         if self._whole is not None:

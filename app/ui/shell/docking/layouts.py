@@ -11,19 +11,40 @@ from nep.i18n import lazy
 
 @dataclass(frozen=True)
 class DockColumn:
-    """Panels above each other: (names that share a place, height). ``width`` 0 takes the rest."""
+    """Panels above each other: (names that share a place, height). ``width`` 0 takes the rest.
+
+    The width grows with the text, up to ``most`` of the window's.
+    """
 
     width: int
     rows: tuple[tuple[tuple[str, ...], int], ...]
+    most: float = 1.0
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Panels that become tabs of ``into`` where there is less room than this, in px at 100 % text.
+
+    Its first panel tells a fold from the others of a layout.
+    """
+
+    into: str
+    panels: tuple[str, ...]
+    below_width: int = 0
+    below_height: int = 0
+
+    def wanted(self, width: float, height: float) -> bool:
+        """Whether a workbench of this size, in px at 100 % text, has too little room."""
+        return width < self.below_width or height < self.below_height
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A layout as it is at first: columns from the left; in narrow windows ``narrow`` become tabs.
+    """A layout as it is at first: columns from the left; where there is little room, ``folds`` make tabs.
 
     ``title`` is marked with `lazy`. ``homes`` tells beside which panel another one opens, as a tab; the rest
     open beside the last panel. ``brings`` tells which panel comes with another one when that is opened; it is
-    ``lazy_module``: at first its row is not there.
+    ``later``: at first its row is not there.
     """
 
     name: str
@@ -31,7 +52,7 @@ class Layout:
     icon: str
     density: Density
     columns: tuple[DockColumn, ...]
-    narrow: tuple[str, str]
+    folds: tuple[Fold, ...]
     homes: Mapping[str, str]
     brings: Mapping[str, str] = field(default_factory=dict)
 
@@ -48,9 +69,17 @@ BEHAVIOUR = Layout(
     "comfortable",
     (
         DockColumn(0, ((("behaviour",), 626), (("problems",), 124))),
-        DockColumn(384, ((("robot",), 327), (("camera",), 275), (("sensors",), 140), (("health",), 190))),
+        DockColumn(
+            384,
+            ((("robot",), 327), (("camera",), 275), (("sensors",), 140), (("health",), 190)),
+            most=0.36,
+        ),
     ),
-    ("robot", "camera"),
+    (
+        Fold("robot", ("camera",), below_width=1280),
+        Fold("sensors", ("problems",), below_height=560),
+        Fold("robot", ("sensors", "problems"), below_height=400),
+    ),
     {
         "robots": "behaviour",
         "doctor": "behaviour",
@@ -68,11 +97,14 @@ DEVELOPER = Layout(
     "activity",
     "compact",
     (
-        DockColumn(640, ((("topics",), 780),)),
-        DockColumn(330, ((("inspector",), 780),)),
+        DockColumn(640, ((("topics",), 780),), most=0.62),
+        DockColumn(330, ((("inspector",), 780),), most=0.28),
         DockColumn(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
     ),
-    ("topics", "inspector"),
+    (
+        Fold("topics", ("inspector",), below_width=1280),
+        Fold("image", ("console",), below_height=400),
+    ),
     {"robots": "topics", "doctor": "topics", "robot": "image", "camera": "image", "health": "console"},
 )
 LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)

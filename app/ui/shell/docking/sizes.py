@@ -1,12 +1,13 @@
 """How large the panels of a layout are until a person moves the lines between them.
 
 A column keeps its width and the last panel of a column its height, and so does one with only panels below it
-that come later; what a larger window gives goes to the others.
+that come later; what a larger window gives goes to the others. In a small window nothing keeps more than its
+part; a column grows with the text, up to what the layout lets it have.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow
@@ -17,35 +18,54 @@ LEAST_PX = 120
 
 
 def shares(wanted: Sequence[int], room: int, *, keep: Sequence[bool]) -> list[int]:
-    """Sizes that fill ``room``: those to keep as they are wanted, the others in their proportion."""
-    kept = sum(size for size, kept in zip(wanted, keep, strict=True) if kept)
+    """Sizes that fill ``room``: those to keep as they are wanted, the others in their proportion.
+
+    In little room also those to keep have their proportion, and at least `LEAST_PX`.
+    """
+    whole = max(1, sum(wanted))
+    sizes = [min(size, max(LEAST_PX, round(room * size / whole))) for size in wanted]
+    kept = sum(size for size, kept in zip(sizes, keep, strict=True) if kept)
     free = sum(size for size, kept in zip(wanted, keep, strict=True) if not kept)
     left = max(room - kept, LEAST_PX * sum(1 for kept in keep if not kept))
     return [
-        size if kept else round(left * size / max(1, free)) for size, kept in zip(wanted, keep, strict=True)
+        own if kept else round(left * size / max(1, free))
+        for own, size, kept in zip(sizes, wanted, keep, strict=True)
     ]
 
 
-def fit(bench: QMainWindow, layout: Layout, docks: Mapping[str, QDockWidget], gap: int) -> None:
-    """Give every column and every panel in it the size of the layout, in the room that there is now."""
+def fit(
+    bench: QMainWindow,
+    layout: Layout,
+    docks: Mapping[str, QDockWidget],
+    gap: int,
+    scale: float = 1.0,
+    folded: Container[str] = (),
+) -> None:
+    """Give every column and every panel in it the size of the layout, in the room that there is now.
+
+    ``scale`` is that of the text; the panels in ``folded`` stand in the place of another column.
+    """
     columns = []
     before: list[QDockWidget] = []
     for column in layout.columns:
         there = []
         for names, height in column.rows:
-            dock = _first(docks, names)
+            dock = _first(docks, [name for name in names if name not in folded])
             if dock is not None and not any(dock in bench.tabifiedDockWidgets(b) for b in before):
                 before.append(dock)
                 there.append((dock, height, set(names) <= layout.later))
         if there:
-            columns.append((column.width, there))
+            columns.append((column, there))
     if not columns:
         return
     margins = bench.contentsMargins()
     wide = bench.width() - margins.left() - margins.right() - gap * (len(columns) - 1)
     high = bench.height() - margins.top() - margins.bottom()
-    wanted = [width or LEAST_PX for width, _ in columns]
-    keep = [bool(width) for width, _ in columns]
+    wanted = [
+        round(min(column.width * scale, column.most * wide)) if column.width else LEAST_PX
+        for column, _ in columns
+    ]
+    keep = [bool(column.width) for column, _ in columns]
     if all(keep):
         keep[-1] = False
     heads = [there[0][0] for _, there in columns]

@@ -12,14 +12,13 @@ from PySide6.QtWidgets import QApplication, QMainWindow
 
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.shell.docking.dock import Dock, make_dock
-from app.ui.shell.docking.layouts import Layout
+from app.ui.shell.docking.layouts import Fold, Layout
 from app.ui.shell.docking.sizes import fit
 from app.ui.theme.theme import Theme
 from nep.i18n import _
 
 ACROSS = Qt.Orientation.Horizontal
 DOWN = Qt.Orientation.Vertical
-NARROW_PX = 1280
 AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 STATE_VERSION = 1
 
@@ -40,8 +39,9 @@ class Workbench(QMainWindow):
         self._theme, self._layout, self._panels, self._context = theme, layout, panels, context
         self.docks: dict[str, Dock] = {}
         self._floating: list[Dock] = []
-        self._narrow = False
-        self._wide = QByteArray()  # the state before a narrow window made tabs
+        self._sharing: dict[Dock, list[Dock]] = {}  # the panels of a place, in the order of its tabs
+        self._folded: tuple[Fold, ...] = ()  # which panels a small window, or large text, made tabs of
+        self._wide = QByteArray()  # the state before that
         self._arranged = False
         self._moved = False  # a person moved the lines between panels
         self.setWindowFlags(Qt.WindowType.Widget)
@@ -60,6 +60,10 @@ class Workbench(QMainWindow):
         self._size_timer = QTimer(self)  # sizes hold only when Qt has laid the docks out
         self._size_timer.setSingleShot(True)
         self._size_timer.timeout.connect(self._size)
+        self._fold_timer = QTimer(self)
+        self._fold_timer.setSingleShot(True)
+        self._fold_timer.timeout.connect(self._adapt)
+        theme.changed.connect(self._text_changed)
 
     # -- opening ----------------------------------------------------------------------------------
 
@@ -82,7 +86,7 @@ class Workbench(QMainWindow):
             above = head
             for names in rows:
                 above = self._put(names, above, None) or above
-        self._arranged, self._moved, self._narrow = True, False, False
+        self._arranged, self._moved, self._folded = True, False, ()
         self._size()
         self._size_timer.start(0)
         self._adapt()
@@ -110,8 +114,9 @@ class Workbench(QMainWindow):
 
     def _size(self) -> None:
         """Give everything its size, unless a person moved the lines between the panels."""
-        if self._arranged and not self._moved:
-            fit(self, self._layout, self.docks, self._theme.size("gap", self._layout.density))
+        if self._arranged and not self._moved and not self._fold_timer.isActive():
+            gap, scale = self._theme.size("gap", self._layout.density), self._theme.scaled(1)
+            fit(self, self._layout, self.docks, gap, scale, self._behind())
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
@@ -162,7 +167,8 @@ class Workbench(QMainWindow):
         self._tabs_timer.start(0)
 
     def _show_tabs(self) -> None:
-        order = list(self.docks.values())
+        later = {name: place for place, name in enumerate(n for f in self._folded for n in f.panels)}
+        order = sorted(self.docks.values(), key=lambda dock: later.get(dock.description.name, -1))
         for dock in order:
             together = [
                 other
@@ -170,38 +176,79 @@ class Workbench(QMainWindow):
                 if other is dock or (other in self.tabifiedDockWidgets(dock) and not other.isHidden())
             ]
             if dock.isFloating() or len(together) < 2:
+                together = []
                 dock.title.set_tabs(())
             else:
                 dock.title.set_tabs(
-                    [(other.panel.title(), other is dock, _raiser(other)) for other in together]
+                    [
+                        (other.panel.title(), other.description.icon, other is dock, _raiser(other))
+                        for other in together
+                    ]
                 )
+            self._sharing[dock] = together
 
-    # -- narrow windows ---------------------------------------------------------------------------
+    # -- little room ------------------------------------------------------------------------------
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._adapt()
         self._size()
 
+    def _text_changed(self) -> None:
+        """Larger text leaves less room."""
+        self._adapt()
+        self._size_timer.start(0)
+
     def _adapt(self) -> None:
-        narrow = self.width() < NARROW_PX
-        if not self._arranged or narrow == self._narrow:
+        """Make tabs of panels where there is too little room for all, and end that where there is enough."""
+        scale = self._theme.scaled(1)
+        room = self.width() / scale, self.height() / scale
+        wanted = tuple(fold for fold in self._layout.folds if fold.wanted(*room) and self._can(fold))
+        if not self._arranged or wanted == self._folded or self._fold_timer.isActive():
             return
-        first, second = (self.docks.get(name) for name in self._layout.narrow)
-        if first is None or second is None or first.isFloating() or second.isFloating():
+        if set(self._folded) - set(wanted):
+            self._fold_timer.start(0)  # Qt makes no tabs in the turn in which it puts docks back
+            self._unfold()
             return
-        self._narrow = narrow
-        if narrow:
+        if not self._folded and wanted:
             self._wide = self.saveState(STATE_VERSION)
-            self.tabifyDockWidget(first, second)
-            first.raise_()
-        elif second in self.tabifiedDockWidgets(first):
-            self._widen()
+        for fold in wanted:
+            if fold not in self._folded:
+                self._fold(fold)
+        self._folded = wanted
         self._size_timer.start(0)
         self._tabs_soon()
 
-    def _widen(self) -> None:
+    def _can(self, fold: Fold) -> bool:
+        """Whether the panels are there for a fold: what was folded stays so wherever a person put it then."""
+        if fold in self._folded:
+            return True
+        docks = [self.docks.get(name) for name in (fold.into, *fold.panels)]
+        return all(dock is not None and not dock.isFloating() for dock in docks)
+
+    def _fold(self, fold: Fold) -> None:
+        """Make these panels, with those that share their place, tabs of another one, which stays in front."""
+        into = self.docks[fold.into]
+        for name in fold.panels:
+            dock = self.docks[name]
+            if dock in self.tabifiedDockWidgets(into):
+                continue
+            for each in (dock, *self.tabifiedDockWidgets(dock)):
+                self.tabifyDockWidget(into, each)
+        into.raise_()
+
+    def _behind(self) -> set[str]:
+        """The panels that a fold made tabs of, and that a person left there."""
+        return {
+            name
+            for fold in self._folded
+            for name in fold.panels
+            if self.docks[name] in self.tabifiedDockWidgets(self.docks[fold.into])
+        }
+
+    def _unfold(self) -> None:
         """Put back what was before the tabs: Qt makes a tab of whatever is split off a tab."""
+        self._folded = ()
         opened = self.open_names()
         if not self.restoreState(self._wide, STATE_VERSION):
             self.arrange()
@@ -210,6 +257,8 @@ class Workbench(QMainWindow):
                 dock.close()
             elif dock.isHidden():
                 self.open(name)
+        self._size_timer.start(0)
+        self._tabs_soon()
 
     def hideEvent(self, event: QHideEvent) -> None:
         self._floating = [dock for dock in self.docks.values() if dock.isFloating() and dock.isVisible()]
@@ -240,6 +289,8 @@ class Workbench(QMainWindow):
             if pictures and not dock.panel.shows_pictures:
                 continue
             self._tell_failure(name, dock.refresh())
+            if dock.shown():
+                dock.title.show_badges([other.badge() for other in self._sharing.get(dock, ())])
 
     def _tell_failure(self, name: str, sentence: str | None) -> None:
         if sentence is not None:
@@ -270,7 +321,7 @@ class Workbench(QMainWindow):
             "docks": state_text(self.saveState(STATE_VERSION)),
             "wide": state_text(self._wide),
             "panels": {name: dock.saved_state() for name, dock in self.docks.items()},
-            "narrow": self._narrow,
+            "folds": [fold.panels[0] for fold in self._folded],
             "moved": self._moved,
         }
 
@@ -288,13 +339,21 @@ class Workbench(QMainWindow):
             return False
         self._size_timer.stop()  # a person's sizes, not those of `arrange`
         self._wide = state_of(saved.get("wide"))
-        self._narrow, self._moved = saved.get("narrow") is True, saved.get("moved") is True
+        self._folded, self._moved = self._folds_of(saved), saved.get("moved") is True
         for name, dock in self.docks.items():
             kept = panels.get(name) if isinstance(panels, Mapping) else None
             if isinstance(kept, Mapping):
                 dock.give_back(kept)
+        self._adapt()  # the window, or its text, may have another size than then
         self._tabs_soon()
         return True
+
+    def _folds_of(self, saved: Mapping[str, object]) -> tuple[Fold, ...]:
+        """What was folded when that was saved; older settings know the first fold alone, as "narrow"."""
+        names = saved.get("folds")
+        if not isinstance(names, list):
+            return self._layout.folds[:1] if saved.get("narrow") is True else ()
+        return tuple(fold for fold in self._layout.folds if fold.panels[0] in names)
 
     def shut(self) -> None:
         """The window closes: every panel ends its watches."""

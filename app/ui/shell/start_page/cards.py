@@ -80,6 +80,7 @@ class ExampleCard(PaintedButton):
         self._text, self._rows = text, rows
         self.path = path
         self.say(name, _("Open the example {name}. {description}").format(name=name, description=text))
+        self.setToolTip(plain.tip(text))  # a narrow card shortens it
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def _fonts(self) -> tuple[float, float]:

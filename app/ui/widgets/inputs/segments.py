@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Literal
 
 from PySide6.QtCore import QRectF, QSize, Signal
-from PySide6.QtGui import QFont, QPainter, QPaintEvent
+from PySide6.QtGui import QFont, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLayout, QSizePolicy, QWidget
 
+from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -28,9 +29,26 @@ class _Segment(PaintedButton):
 
     def __init__(self, theme: Theme, label: str, icon: str | None, size: str, check: bool) -> None:
         self._icon, self._check = icon, check
+        self._bare = False
         self._height, self._padding, self._kind = _HEIGHTS[size]
         super().__init__(theme, label, checkable=True)
         self.setAutoExclusive(True)
+
+    def set_bare(self, bare: bool) -> None:
+        """Show only the icon, with the word as its tooltip, or the word again."""
+        self._bare = bare and self._icon is not None
+        self.updateGeometry()
+        self.update()
+
+    def shown_word(self) -> str:
+        """The word that is painted."""
+        return "" if self._bare else self.text()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self._bare:
+            self.setProperty("shortened", True)
+            self.setToolTip(plain.tip(self.text()))
 
     def _font(self) -> QFont:
         font = self._theme.font(self._kind)
@@ -41,10 +59,11 @@ class _Segment(PaintedButton):
         return round(self._theme.scaled(16))
 
     def _icons_width(self) -> int:
-        return (self._side() + GAP) * (int(self._icon is not None) + int(self._check))
+        shown = int(self._icon is not None) + int(self._check)
+        return (self._side() + GAP) * shown - (GAP if self._bare else 0)
 
     def sizeHint(self) -> QSize:
-        width = paint.width_of(self._font(), self.text()) + 2 * self._padding + self._icons_width()
+        width = paint.width_of(self._font(), self.shown_word()) + 2 * self._padding + self._icons_width()
         return QSize(round(width) + 1, max(self._height, round(paint.height_of(self._font())) + 6))
 
     def minimumSizeHint(self) -> QSize:
@@ -60,13 +79,13 @@ class _Segment(PaintedButton):
             paint.box(painter, rect, theme.radius("small"), theme.colour("pressed"))
         ink = theme.colour("text" if chosen else "textSecondary" if self.isEnabled() else "textDisabled")
         shown = [name for name in ("check" if self._check and chosen else None, self._icon) if name]
-        text_width = paint.width_of(self._font(), self.text())
+        text_width = paint.width_of(self._font(), self.shown_word()) - (GAP if self._bare else 0)
         side = self._side()
         left = max(6.0, rect.center().x() - (text_width + len(shown) * (side + GAP)) / 2)
         for name in shown:
             paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, ink)
             left += side + GAP
-        paint.words(painter, rect.adjusted(left, 0, 2, 0), self.text(), self._font(), ink)
+        paint.words(painter, rect.adjusted(left, 0, 2, 0), self.shown_word(), self._font(), ink)
 
 
 class Segments(QWidget):
@@ -108,6 +127,11 @@ class Segments(QWidget):
             self._segments[key] = segment
             segment.clicked.connect(lambda _on=False, key=key: self.changed.emit(key))
         self.set_value(value if value is not None else next(iter(self._segments), ""))
+
+    def set_bare(self, bare: bool) -> None:
+        """Where there is no room for words, only the icons are left."""
+        for segment in self._segments.values():
+            segment.set_bare(bare)
 
     @property
     def value(self) -> str:

@@ -1,0 +1,81 @@
+"""The page where there is little room: a toolbox of tiles, which say their names and open the same blocks."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from tests.ui.blockly_person import START, TOKENS, WAIT_MS, Person
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+BOX = "document.querySelector('.nepTab:not([hidden]) .blocklyToolbox')"
+WIDE = f"{BOX}.getBoundingClientRect().width"
+SHOWN = (
+    f"[...{BOX}.querySelectorAll('.blocklyToolboxCategoryLabel')]"
+    ".filter(e => e.getBoundingClientRect().width > 0).map(e => e.textContent)"
+)
+
+
+def narrow(view, person, width: int = 620) -> Person:
+    them = person(START)
+    view.resize(width, 420)
+    them.wait_for(WIDE, 52)
+    return them
+
+
+def first_tile(them: Person, number: int = 0) -> QPoint:
+    script = (
+        f"(r => [r.left + r.width / 2, r.top + r.height / 2])({BOX}.querySelectorAll('.nepTile')[{number}]"
+    )
+    x, y = them.ask(f"{script}.getBoundingClientRect())")
+    return QPoint(round(x), round(y))
+
+
+@pytest.mark.parametrize(
+    ("width", "percent", "tiles"), [(700, 100, False), (620, 100, True), (900, 150, True)]
+)
+def test_a_narrow_page_or_large_text_leaves_a_column_of_tiles(view, person, width, percent, tiles) -> None:
+    them = person(START)
+    view.set_theme({**TOKENS, "textPercent": percent}, False)
+    view.resize(width, 420)
+    them.wait_for(WIDE, 52 if tiles else 196)
+    them.wait_for(f"{SHOWN}.length > 0", not tiles)
+    left = (
+        "document.querySelector('.nepTab:not([hidden]) .blocklyBlockCanvas [data-id=start]')"
+        ".getBoundingClientRect().left"
+    )
+    them.wait_for(f"{left} > {WIDE}")
+    room = them.ask(f"(innerWidth - {WIDE}) * devicePixelRatio")
+    assert room >= 420
+
+
+def test_a_tile_says_its_name_under_the_mouse_and_opens_its_blocks(view, person) -> None:
+    them = narrow(view, person)
+    assert them.ask(SHOWN) == []
+    QTest.mouseMove(them.target, first_tile(them))
+    them.wait_for(f"{SHOWN}.length", 1)
+    chip = them.ask(
+        f"(r => [r.left, r.right, r.width])([...{BOX}.querySelectorAll('.blocklyToolboxCategoryLabel')]"
+        ".find(e => e.getBoundingClientRect().width > 0).getBoundingClientRect())"
+    )
+    assert chip[0] >= 52  # beside the tile, which it does not cover
+    assert chip[1] < 620
+    QTest.mouseClick(them.target, Qt.LeftButton, pos=first_tile(them))
+    flyout = "document.querySelector('.nepTab:not([hidden]) .blocklyFlyout')"
+    them.wait_for(f"{flyout}.getBoundingClientRect().left", 52)
+    them.box(".nepTab:not([hidden]) .blocklyFlyout .blocklyBlock")
+
+
+def test_whoever_looks_for_a_block_has_the_whole_toolbox_meanwhile(qtbot, view, person) -> None:
+    them = narrow(view, person)
+    them.click(".nepTab:not([hidden]) .nepSearch input")
+    them.wait_for(WIDE, 196)
+    QTest.keyClicks(them.target, "wait")
+    them.wait_for("document.querySelector('.nepSearch input').value", "wait")
+    flyout = "document.querySelector('.nepTab:not([hidden]) .blocklyFlyout')"
+    them.wait_for(f"{flyout}.getBoundingClientRect().left", 196)
+    QTest.keyClick(them.target, Qt.Key_Escape)
+    them.wait_for(WIDE, 52)
+    qtbot.waitUntil(lambda: them.tops() == [START], timeout=WAIT_MS)

@@ -1,0 +1,244 @@
+"""The window at every size, with every size of text: nothing is cut, nothing overlaps, Stop is whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, QRect
+from PySide6.QtWidgets import QWidget
+
+from app import resources
+from app.blocks import Problem
+from app.ui.panels.base import Panel, PanelWidget
+from app.ui.panels.registry import PanelRegistry
+from app.ui.shell.bars.app_bar import AppBar
+from app.ui.shell.bars.run_bar import RunBar, ToolBar
+from app.ui.shell.bars.status_bar import StatusBar
+from app.ui.shell.docking.dock import Dock
+from app.ui.shell.docking.dock_title import DockTitle, TitleTab
+from app.ui.shell.docking.layouts import BEHAVIOUR
+from app.ui.shell.docking.workbench import Workbench
+from app.ui.shell.main_window import MainWindow
+from app.ui.shell.start_page.page import read_examples
+from app.ui.theme.theme import Mode, Theme
+from app.ui.widgets import StopButton
+from tests.ui.clipping import clipped
+from tests.ui.fakes import Session
+from tests.ui.shell_parts import Answers
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+SIZES = (
+    (1024, 600),  # a projector, an old laptop
+    (1093, 614),  # 1366 x 768 at 125 %
+    (1366, 768),
+    (1440, 900),
+    (1920, 1080),
+)
+TEXT = (100, 150, 200)
+TILES, NAMES, NARROW = 52, 196, 655  # px: the toolbox of a narrow page, of a wide one, and which is narrow
+LEAST_CANVAS = 420
+SETTLE_MS = 15
+# The blocks without their web view, which has tests of its own.
+BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _text_as_before(qapp: object) -> Iterator[None]:
+    yield
+    Theme("light").apply()
+
+
+@pytest.fixture
+def window(qtbot, theme: Theme) -> Iterator[MainWindow]:
+    """The window with its real panels, a robot and everything that it tells."""
+    panels = {**PanelRegistry(), "behaviour": BLOCKS}
+    examples = read_examples(resources.folder() / "examples")
+    made = MainWindow(Session.full(), theme, panels, examples, asks=Answers())
+    qtbot.addWidget(made)
+    theme.set_motion("on")
+    made.show()
+    yield made
+    made.close()
+
+
+def settle(qtbot, window: MainWindow) -> None:
+    """Let layouts come to rest and panels show what there is."""
+    for _ in range(3):
+        qtbot.wait(SETTLE_MS)
+        window.tick()
+    qtbot.wait(SETTLE_MS)
+
+
+def place(widget: QWidget) -> QRect:
+    return QRect(widget.mapTo(widget.window(), QPoint()), widget.size())
+
+
+def stops(window: MainWindow) -> Iterator[str]:
+    """What is wrong with the Stops that can be seen, and that there is none."""
+    seen = [stop for stop in window.findChildren(StopButton) if stop.isVisible()]
+    if not any(stop.window() is window for stop in seen):
+        yield "no Stop"
+    for stop in seen:
+        if stop.width() < stop.sizeHint().width() or stop.height() < stop.sizeHint().height():
+            yield f"Stop is {stop.size()} and needs {stop.sizeHint()}"
+        if not window.rect().contains(place(stop)):
+            yield f"Stop at {place(stop)} is not whole in the window"
+
+
+def overlaps(window: MainWindow) -> Iterator[str]:
+    """What lies on each other in a bar, in a title, and among the docks."""
+    bars = [
+        bar for kind in (AppBar, RunBar, ToolBar, StatusBar, DockTitle) for bar in window.findChildren(kind)
+    ]
+    for bar in bars:
+        if (
+            bar.isVisible() and not bar.visibleRegion().isEmpty()
+        ):  # not those that Qt moved away, behind a tab
+            yield from _pairs([child for child in bar.children() if isinstance(child, QWidget)])
+    if window.bench is not None:
+        docks = window.bench.docks.values()
+        yield from _pairs([dock for dock in docks if dock.front and not dock.isFloating()])
+
+
+def _pairs(widgets: list[QWidget]) -> Iterator[str]:
+    seen = [each for each in widgets if each.isVisible() and not each.size().isEmpty()]
+    for one, other in combinations(seen, 2):
+        if place(one).intersects(place(other)):
+            names = [
+                f"{type(each).__name__} “{each.accessibleName()}” {place(each)}" for each in (one, other)
+            ]
+            yield f"{names[0]} lies on {names[1]}"
+
+
+@pytest.mark.parametrize("mode", ["light", "dark"])
+@pytest.mark.parametrize("percent", TEXT)
+def test_every_size_shows_everything_whole(qtbot, window: MainWindow, mode: Mode, percent: int) -> None:
+    window.theme.set_mode(mode)
+    window.theme.set_text_percent(percent)
+    faults: list[str] = []
+    for size in SIZES:
+        for layout in ("start", "behaviour", "developer"):
+            if layout == "start":
+                window.show_start()
+            else:
+                window.show_layout(layout)
+            window.resize(*size)
+            settle(qtbot, window)
+            assert window.size().toTuple() == size
+            found = [*stops(window), *overlaps(window), *clipped(window)]
+            if layout == "behaviour":
+                page = window.benches[layout].docks["behaviour"].width()
+                tools = (TILES if page < NARROW * percent / 100 else NAMES) * percent / 100
+                if page - tools < LEAST_CANVAS:
+                    found.append(f"the canvas has {page - tools:.0f} px")
+            faults += [f"{size}, {percent} %, {layout}: {fault}" for fault in found]
+    assert not faults, "\n".join(["", *faults])
+
+
+def tabs_of(bench: Workbench, name: str) -> set[str]:
+    """The panels that are tabs of this one."""
+    return {
+        dock.description.name
+        for dock in bench.tabifiedDockWidgets(bench.docks[name])
+        if isinstance(dock, Dock)
+    }
+
+
+def test_panels_fold_into_tabs_step_by_step_and_come_back(qtbot, window: MainWindow) -> None:
+    window.resize(1440, 900)
+    bench = window.show_layout("behaviour")
+    docks = bench.docks
+    settle(qtbot, window)
+    assert tabs_of(bench, "robot") == set() == tabs_of(bench, "sensors")
+    for percent, size, of_robot, of_sensors in (
+        (100, (1100, 800), {"camera"}, set()),
+        (100, (1024, 600), {"camera"}, {"problems"}),
+        (200, (1024, 600), {"camera", "sensors", "problems"}, {"camera", "robot", "problems"}),
+        (100, (1024, 600), {"camera"}, {"problems"}),
+        (100, (1440, 900), set(), set()),
+    ):
+        window.theme.set_text_percent(percent)
+        window.resize(*size)
+        qtbot.waitUntil(lambda of_robot=of_robot: tabs_of(bench, "robot") == of_robot)
+        qtbot.waitUntil(lambda of_sensors=of_sensors: tabs_of(bench, "sensors") == of_sensors)
+        settle(qtbot, window)
+        assert docks["robot"].front
+        assert (
+            "problems" not in of_robot or bench.docks["robot"].title.tabs[0] == docks["robot"].panel.title()
+        )
+    columns = [(docks[name].x(), docks[name].y()) for name in ("behaviour", "robot", "camera", "sensors")]
+    assert columns[0][0] < columns[1][0] == columns[2][0] == columns[3][0]
+    assert columns[1][1] < columns[2][1] < columns[3][1]
+    assert docks["problems"].x() == docks["behaviour"].x()
+
+
+def test_what_is_folded_comes_back_folded_at_the_next_start(qtbot, window: MainWindow) -> None:
+    window.resize(1024, 600)
+    bench = window.show_layout("behaviour")
+    settle(qtbot, window)
+    again = Workbench(window.theme, BEHAVIOUR, window.panels, window.context)
+    qtbot.addWidget(again)
+    again.resize(bench.size())
+    again.show()
+    assert again.restore(bench.save())
+    qtbot.waitUntil(lambda: tabs_of(again, "sensors") == {"problems"})
+    again.resize(1440, 800)
+    qtbot.waitUntil(lambda: tabs_of(again, "sensors") == set() == tabs_of(again, "robot"))
+    again.shut()
+
+
+def test_a_folded_panel_tells_how_much_waits_in_it(qtbot, window: MainWindow) -> None:
+    window.resize(1024, 600)
+    bench = window.show_layout("behaviour")
+    settle(qtbot, window)
+    document = window.session.document
+
+    def badge() -> tuple[str, str] | None:
+        window.tick()
+        tabs = bench.docks["sensors"].title.findChildren(TitleTab)
+        return next(tab.badge for tab in tabs if tab.text() == "Problems" and tab.isVisible())
+
+    document.found = (Problem("error", None, None, "x", "x is not known."),)
+    document.edited({"blocks": {"blocks": [{"type": "control_wait", "id": "one"}]}})
+    qtbot.waitUntil(lambda: badge() == ("1", "error"))
+    document.found = ()
+    document.edited({"blocks": {"blocks": [{"type": "control_wait", "id": "two"}]}})
+    qtbot.waitUntil(lambda: badge() is None)
+
+
+def test_in_a_narrow_title_the_other_tabs_are_icons_with_their_names(qtbot, window: MainWindow) -> None:
+    window.theme.set_text_percent(200)
+    window.resize(1024, 600)
+    bench = window.show_layout("behaviour")
+    settle(qtbot, window)
+    tabs = {tab.text(): tab for tab in bench.docks["robot"].title.findChildren(TitleTab) if tab.isVisible()}
+    assert tabs["Problems"].toolTip() == "Problems"
+    assert tabs["Problems"].width() < tabs["Problems"].full_width()
+    window.theme.set_text_percent(100)
+    settle(qtbot, window)
+    tabs = {tab.text(): tab for tab in bench.docks["sensors"].title.findChildren(TitleTab) if tab.isVisible()}
+    assert tabs["Problems"].width() >= tabs["Problems"].full_width()
+    assert tabs["Problems"].toolTip() == ""
+
+
+def test_the_app_bar_shortens_its_words_before_its_menus(qtbot, window: MainWindow, tmp_path: Path) -> None:
+    window.resize(1024, 600)
+    window.show_layout("behaviour")
+    settle(qtbot, window)
+    bar = window.bar
+    assert bar.menus.width() >= bar.menus.sizeHint().width()
+    wide = bar.switch.width()
+    window.theme.set_text_percent(200)
+    settle(qtbot, window)
+    assert bar.menus.width() >= bar.menus.sizeHint().width()
+    assert bar.switch.width() < wide
+    button = bar.switch.chosen_button()
+    assert button is not None
+    assert button.toolTip() == "Behaviour"
+    window.theme.set_text_percent(100)
+    settle(qtbot, window)
+    assert bar.switch.width() == wide
+    assert button.toolTip() == ""
