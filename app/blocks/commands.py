@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import sys
 
-from app.blocks.runtime.calculation import (
+from app.blocks.runtime.find_robots import find_robots
+from app.blocks.runtime.interrupts import without_interrupts
+from app.blocks.runtime.network import Network
+from app.blocks.runtime.pure.calculation import (
     absolute,
     arc_cosine,
     arc_sine,
@@ -35,13 +38,11 @@ from app.blocks.runtime.calculation import (
     tangent,
     ten_to_the,
 )  # fmt: skip
-from app.blocks.runtime.clock import (
+from app.blocks.runtime.pure.clock import (
     now,
     seconds_since,
 )  # fmt: skip
-from app.blocks.runtime.find_robots import find_robots
-from app.blocks.runtime.interrupts import without_interrupts
-from app.blocks.runtime.lists import (
+from app.blocks.runtime.pure.lists import (
     add_item,
     average_of,
     clear_list,
@@ -67,9 +68,7 @@ from app.blocks.runtime.lists import (
     sum_of,
     turned_round,
 )  # fmt: skip
-from app.blocks.runtime.network import Network
-from app.blocks.runtime.runtime import Runtime, stop_script
-from app.blocks.runtime.texts import (
+from app.blocks.runtime.pure.texts import (
     backwards,
     ends_with,
     has_in_it,
@@ -86,6 +85,7 @@ from app.blocks.runtime.texts import (
     starts_with,
     without_spaces_around,
 )  # fmt: skip
+from app.blocks.runtime.runtime import Runtime, stop_script
 from app.blocks.runtime.values import (
     is_known,
     join,
@@ -103,17 +103,18 @@ from nep.system.streams import prepare_streams
 
 __all__ = [
     "absolute", "add_item", "arc_cosine", "arc_sine", "arc_tangent", "average_of", "backwards",
-    "clear_list", "contains", "copy_of", "cosine", "counting", "e_to_the", "each", "ends_with", "fail",
-    "has_in_it", "has_number", "in_capitals", "in_small_letters", "insert_item", "is_divisible",
-    "is_empty", "is_empty_list", "is_even", "is_known", "is_negative", "is_odd", "is_positive",
-    "is_whole", "item", "join", "join_items", "larger", "largest_of", "length", "letter", "limited",
-    "logarithm", "mapped", "middle_of", "natural_logarithm", "new_list", "newest", "now", "number_in",
-    "on_message", "on_start", "on_true", "part", "part_of_list", "part_of_text", "position",
-    "position_in_text", "publish", "random_number", "remove_item", "repeat", "replaced", "reset_timer",
-    "robot", "rounded", "rounded_down", "rounded_to", "rounded_up", "run", "same_words", "seconds_since",
-    "set_item", "shuffled", "sign", "sine", "smaller", "smallest_of", "sorted_down", "sorted_up",
-    "split_text", "square_root", "starts_with", "stop_program", "stop_script", "sum_of", "tangent",
-    "ten_to_the", "timer", "turned_round", "wait", "wait_until", "without_spaces_around", "write",
+    "broadcast", "broadcast_and_wait", "clear_list", "contains", "copy_of", "cosine", "counting",
+    "e_to_the", "each", "ends_with", "fail", "has_in_it", "has_number", "in_capitals", "in_small_letters",
+    "insert_item", "is_divisible", "is_empty", "is_empty_list", "is_even", "is_known", "is_negative",
+    "is_odd", "is_positive", "is_whole", "item", "join", "join_items", "larger", "largest_of", "length",
+    "letter", "limited", "logarithm", "mapped", "middle_of", "natural_logarithm", "new_list", "newest",
+    "now", "number_in", "on_broadcast", "on_message", "on_start", "on_true", "part", "part_of_list",
+    "part_of_text", "position", "position_in_text", "publish", "random_number", "remove_item", "repeat",
+    "replaced", "reset_timer", "robot", "rounded", "rounded_down", "rounded_to", "rounded_up", "run",
+    "same_words", "seconds_since", "set_item", "shuffled", "sign", "sine", "smaller", "smallest_of",
+    "sorted_down", "sorted_up", "split_text", "square_root", "starts_with", "stop_others", "stop_program",
+    "stop_script", "sum_of", "tangent", "ten_to_the", "timer", "turned_round", "wait", "wait_until",
+    "without_spaces_around", "write",
 ]  # fmt: skip
 
 
@@ -123,14 +124,18 @@ def _say(line: str) -> None:
 
 _runtime = Runtime(_say)
 
+broadcast = _runtime.broadcast
+broadcast_and_wait = _runtime.broadcast_and_wait
 fail = _runtime.fail
 newest = _runtime.newest
+on_broadcast = _runtime.on_broadcast
 on_message = _runtime.on_message
 on_start = _runtime.on_start
 on_true = _runtime.on_true
 publish = _runtime.publish
 reset_timer = _runtime.reset_timer
 robot = _runtime.robot
+stop_others = _runtime.stop_others
 stop_program = _runtime.stop_program
 timer = _runtime.timer
 wait = _runtime.wait

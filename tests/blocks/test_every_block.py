@@ -95,6 +95,8 @@ def own(described) -> dict[str, object]:
         parts["ROBOT"] = "Pepper"
     if described.argument("VAR"):
         parts["VAR"] = {"id": "score"}
+    if described.type.startswith(("events_broadcast", "events_received")):
+        parts["NAME"] = "go"
     if described.argument("SECONDS"):
         parts["SECONDS"] = number(0.05)
     if described.type == "robot_pepper_do_listen":
@@ -115,7 +117,9 @@ def around(described) -> dict[str, object]:
     if described.needs_message:
         return workspace(stack(block("events_message", TOPIC="/x"), it), variables=("score",))
     end = [] if described.shape == "cap" else [block("control_stop_program")]
-    return workspace(started(it, *end), variables=("score",))
+    begin = block("variables_set", VAR={"id": "score"}, VALUE=number(0))
+    go = stack(block("events_received", NAME="go"), write(text("received")))
+    return workspace(started(begin, it, *end), go, variables=("score",))
 
 
 def link() -> FakeLink:

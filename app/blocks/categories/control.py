@@ -129,6 +129,17 @@ CATEGORY = Category(
             python_in_function="stop_script()",
         ),
         Block(
+            type="control_stop_others",
+            text="stop the other scripts",
+            shape="statement",
+            style="control",
+            icon="octagon-minus",
+            tooltip="Ends what all other scripts do now; this one goes on. Events start them again.",
+            help="What a robot does for one of them is taken back.",
+            python="stop_others()",
+            words=("end", "cancel", "all", "kill"),
+        ),
+        Block(
             type="control_stop_program",
             text="stop the behaviour",
             shape="cap",

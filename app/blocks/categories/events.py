@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from app.blocks.model.block import Block
 from app.blocks.model.category import Category
-from app.blocks.model.fields import TopicField, ValueInput
+from app.blocks.model.fields import BroadcastField, TopicField, ValueInput
+
+_NAME = BroadcastField("NAME", "start quiz")
 
 CATEGORY = Category(
     name="events",
@@ -43,6 +45,41 @@ CATEGORY = Category(
             tooltip="The blocks below run each time this was not so and now is.",
             python="on_true(lambda: %CONDITION)",
             arguments=(ValueInput("CONDITION", "Boolean"),),
+        ),
+        Block(
+            type="events_received",
+            text="when I receive %NAME",
+            shape="hat",
+            style="events",
+            icon="inbox",
+            tooltip="The blocks below run when a block of this behaviour broadcasts this name.",
+            help="Several scripts may receive the same name. One that still runs begins anew.",
+            python="on_broadcast(%NAME)",
+            arguments=(_NAME,),
+            words=("broadcast", "message", "signal", "event", "start"),
+        ),
+        Block(
+            type="events_broadcast",
+            text="broadcast %NAME",
+            shape="statement",
+            style="events",
+            icon="megaphone",
+            tooltip="Starts the scripts that receive this name, and goes on at once.",
+            help="It stays inside this behaviour. “publish” in Messages tells other programs and robots.",
+            python="broadcast(%NAME)",
+            arguments=(_NAME,),
+            words=("send", "message", "signal", "event", "start"),
+        ),
+        Block(
+            type="events_broadcast_wait",
+            text="broadcast %NAME and wait",
+            shape="statement",
+            style="events",
+            icon="megaphone",
+            tooltip="Starts the scripts that receive this name, and waits until they have ended.",
+            python="broadcast_and_wait(%NAME)",
+            arguments=(_NAME,),
+            words=("send", "message", "signal", "event", "start"),
         ),
     ),
 )

@@ -29,6 +29,7 @@ CATEGORY = Category(
     style="values",
     icon="equal",
     order=25,
+    within="numbers",
     blocks=(
         Block(
             type="values_compare",

@@ -231,9 +231,10 @@ _MORE = (
 
 CATEGORY = Category(
     name="numbers",
-    title="Numbers",
+    title="Numbers and logic",
     style="values",
     icon="hash",
     order=30,
     blocks=(*_BASIC, *_MORE),
+    headings={"values_number": "Calculate", "numbers_is": "Questions about numbers"},
 )

@@ -1,4 +1,4 @@
-"""Ask and time: the timer, and the date and time of now."""
+"""Time: the timer, and the date and time of now."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ _PARTS = (
 
 CATEGORY = Category(
     name="sensing",
-    title="Ask and time",
+    title="Time",
     style="values",
     icon="clock",
     order=37,
+    within="numbers",
     blocks=(
         _value(
             "sensing_timer",

@@ -207,9 +207,10 @@ _QUESTIONS = (
 
 CATEGORY = Category(
     name="texts",
-    title="Text",
+    title="Text and answers",
     style="values",
     icon="type",
     order=35,
     blocks=(*_BASIC, *_TAKING_APART, *_QUESTIONS),
+    headings={"values_text": "Text", "texts_contains": "Questions about text"},
 )

@@ -7,6 +7,7 @@ import keyword
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from app.blocks.compiler.loose_ends import LooseEnds
 from app.blocks.compiler.lowering import END, Function, Lowering
 from app.blocks.compiler.problems import ProblemCollector
 from app.blocks.compiler.render import instrumented, readable
@@ -26,16 +27,17 @@ from app.blocks.model.names import Names
 from app.blocks.model.program import Program
 from app.blocks.model.template import expression, literal, statements
 from app.blocks.model.workspace import Placed, Workspace, parse_workspace
-from app.blocks.runtime import calculation, clock, lists, texts
 from app.blocks.runtime.publishing import moved_by
+from app.blocks.runtime.pure import calculation, clock, lists, texts
 from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Robot
 
 COMMANDS = frozenset(
     {
-        "fail", "is_known", "join", "length", "newest", "on_message", "on_start", "on_true", "part",
-        "publish", "random_number", "repeat", "reset_timer", "robot", "rounded", "rounded_down",
-        "rounded_up", "run", "stop_program", "stop_script", "timer", "wait", "wait_until", "write",
+        "broadcast", "broadcast_and_wait", "fail", "is_known", "join", "length", "newest", "on_broadcast",
+        "on_message", "on_start", "on_true", "part", "publish", "random_number", "repeat", "reset_timer",
+        "robot", "rounded", "rounded_down", "rounded_up", "run", "stop_others", "stop_program",
+        "stop_script", "timer", "wait", "wait_until", "write",
         *calculation.__all__, *clock.__all__, *lists.__all__, *texts.__all__,
     }
 )  # fmt: skip
@@ -122,6 +124,7 @@ class _Compiler:
         self._readings: dict[str, str] = {}
         self._labels: dict[str, str] = {}
         self._uses = _Uses()
+        self._ends = LooseEnds()
         self._in_message = False
         self._numbers: set[str] = set()  # the blocks that must give a number
 
@@ -131,6 +134,7 @@ class _Compiler:
             function for script in self._workspace.scripts if (function := self._script(script)) is not None
         ]
         self._notes.check_starts(len(functions))
+        self._ends.tell(self._notes, self._workspace)
         body: list[ast.stmt] = [
             *statements("\n".join(f"{name} = 0" for name in self._variables.values()), {}),
             *own,
@@ -179,6 +183,7 @@ class _Compiler:
             return None
         decorator = expression(self._template(block, first), expressions, keywords(block, expressions))
         self._uses.remember(first, block)
+        self._ends.remember(first, block)
         parameters = ", ".join(block.parameters)
         (function,) = statements(
             f"@%DECORATOR\ndef script({parameters}):\n    %BODY",
@@ -249,6 +254,7 @@ class _Compiler:
         except _Skip:
             return []
         self._uses.remember(placed, block)
+        self._ends.remember(placed, block)
         self._notes.look(placed, block)
         if block.publishes:
             self._move(placed, block)
@@ -316,6 +322,7 @@ class _Compiler:
             made = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
         else:
             self._uses.remember(placed, block)
+            self._ends.remember(placed, block)
             made = expression(self._template(block, placed), expressions, keywords(block, expressions))
         if block.fails or missing is not None:
             self._marks[made] = placed.id

@@ -99,6 +99,29 @@ class ProblemCollector:
             mend=_("Define it"), mend_action=f"define:{placed.id}",
         )  # fmt: skip
 
+    def never_set(self, placed: Placed, block: Block, id: str, name: str, *, is_list: bool) -> None:
+        """A variable that blocks read and nothing sets: it stays 0, and is no list."""
+        subject = f"“{name}”"
+        self._note(
+            "warning", placed, block, subject, _("{name} is used but never set.").format(name=subject),
+            mend=_("Set it to an empty list at the start") if is_list else _("Set it to 0 at the start"),
+            mend_action=f"begin:{'list' if is_list else 'number'}:{id}",
+        )  # fmt: skip
+
+    def never_received(self, placed: Placed, block: Block, name: str) -> None:
+        """A broadcast that starts nothing."""
+        subject = f"“{name}”"
+        self._note(
+            "warning", placed, block, subject, _("Nothing receives {name}.").format(name=subject),
+            mend=_("Add “when I receive”"), mend_action=f"receive:{name}",
+        )  # fmt: skip
+
+    def never_sent(self, placed: Placed, block: Block, name: str) -> None:
+        """A script that waits for a broadcast which no block sends."""
+        subject = f"“{name}”"
+        sentence = _("Nothing broadcasts {name}, so this script does not run.").format(name=subject)
+        self._note("info", placed, block, subject, sentence)
+
     def wrong_field(self, placed: Placed, block: Block, error: FieldError) -> None:
         """A field with something that its block can't use."""
         name = self.label(placed, block)

@@ -7,17 +7,22 @@ from collections.abc import Mapping
 
 from app.blocks.compiler.lowering import CALL, CALL_RESULT, PLAIN, RESULT
 from app.blocks.model.mutators import inputs_of, name_of
-from app.blocks.model.workspace import Placed, saved_blocks
+from app.blocks.model.workspace import Placed, is_enabled, saved_blocks
 from app.blocks.toolbox.catalogue import categories
 
 LIMIT_S = 10
+LEFT, TOP = 40, 40
+ASIDE = 420
+"""How far to the right of the others a new script stands: most are not wider."""
 
 
 def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
     """The workspace after a problem's ``mend_action``; None for an action that is no matter of blocks.
 
     ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script that
-    nothing starts, ``define:<id>`` makes the function that a block calls.
+    nothing starts, ``define:<id>`` makes the function that a block calls, ``begin:list:<id>`` and
+    ``begin:number:<id>`` set a variable where the behaviour starts, ``receive:<name>`` makes a script that
+    receives a message.
     """
     verb, _, object_ = action.partition(":")
     made: dict[str, object] = copy.deepcopy(dict(workspace))
@@ -30,9 +35,48 @@ def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | No
         for block in saved_blocks(made):
             if block.get("id") == object_ and block.get("type") in (CALL, CALL_RESULT):
                 return _defined(made, block)
+    if verb == "begin":
+        kind, _, variable = object_.partition(":")
+        return _begun(made, variable, is_list=kind == "list")
+    if verb == "receive":
+        return _added(made, {"type": "events_received", "fields": {"NAME": object_}})
     if verb == "add":
         return _started(made, object_)
     return None
+
+
+def _begun(workspace: dict[str, object], variable: str, *, is_list: bool) -> dict[str, object]:
+    """The first script that the start of the behaviour starts sets the variable first."""
+    empty: dict[str, object] = {"block": {"type": "lists_empty"}}
+    zero: dict[str, object] = {"shadow": {"type": "values_number", "fields": {"NUMBER": 0}}}
+    setting: dict[str, object] = {
+        "type": "variables_set",
+        "fields": {"VAR": {"id": variable}},
+        "inputs": {"VALUE": empty if is_list else zero},
+    }
+    for top in _tops(workspace):
+        if isinstance(top, dict) and top.get("type") == "events_started" and is_enabled(top):
+            if isinstance(top.get("next"), dict):
+                setting["next"] = top["next"]
+            top["next"] = {"block": setting}
+            return workspace
+    return _added(workspace, {"type": "events_started", "next": {"block": setting}})
+
+
+def _tops(workspace: dict[str, object]) -> list[object]:
+    """The blocks that hang under nothing, as the workspace holds them."""
+    blocks = workspace.setdefault("blocks", {"languageVersion": 0, "blocks": []})
+    tops = blocks.setdefault("blocks", []) if isinstance(blocks, dict) else None
+    return tops if isinstance(tops, list) else []
+
+
+def _added(workspace: dict[str, object], block: dict[str, object]) -> dict[str, object]:
+    """With one more script, to the right of the others."""
+    tops = _tops(workspace)
+    places = [top.get("x") for top in tops if isinstance(top, dict)]
+    right = max((x for x in places if isinstance(x, (int, float))), default=LEFT - ASIDE)
+    tops.append({**block, "x": right + ASIDE, "y": TOP})
+    return workspace
 
 
 def _limit(block: dict[str, object]) -> None:

@@ -47,6 +47,7 @@ class Category:
     make: Callable[[Robot, Sequence[Robot]], tuple[Block, ...]] | None = None
     dynamic: str = ""  # the editor adds what people made themselves: "functions"
     headings: Mapping[str, str] = field(default_factory=dict)  # type of a block -> what stands above it
+    within: str = ""  # the category whose blocks these stand among, under their title
     groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
 
     def translated(self, say: Say) -> Category:

@@ -230,6 +230,28 @@ class TopicField(Field):
 
 
 @dataclass(frozen=True)
+class BroadcastField(Field):
+    """The name of a message that scripts of one behaviour send each other; chosen, or a new one typed."""
+
+    value: str = "start"
+
+    def to_blockly(self) -> dict[str, object]:
+        """Our drop-down of the names that are used in the behaviour."""
+        return {"type": "field_broadcast", "name": self.name, "value": self.value}
+
+    def translated(self, say: Say) -> Argument:
+        """The name that it holds at first."""
+        return replace(self, value=say("example", self.value))
+
+    def read(self, saved: object) -> object:
+        """A name on one line; spaces around it do not count."""
+        name = " ".join((self.value if saved is None else str(saved)).split())
+        if not name:
+            raise FieldError(_("needs the name of a message"))
+        return name
+
+
+@dataclass(frozen=True)
 class PathField(Field):
     """The path of a field inside a topic's messages, such as ``faces.0.name``; typed or chosen."""
 

@@ -116,14 +116,14 @@ def _block(saved: Mapping[str, object], depth: int, ids: Unique, *, shadow: bool
         type=str(saved["type"]),
         fields=dict(fields) if isinstance(fields, Mapping) else {},
         inputs=inputs,
-        enabled=_enabled(saved),
+        enabled=is_enabled(saved),
         shadow=shadow,
         extra=dict(extra) if isinstance(extra := saved.get("extraState"), Mapping) else {},
         too_deep=depth >= MAX_DEPTH and bool(connections),
     )
 
 
-def _enabled(saved: Mapping[str, object]) -> bool:
+def is_enabled(saved: Mapping[str, object]) -> bool:
     """Whether a person switched the block off; other reasons (an absent robot) are ours to judge."""
     if saved.get("enabled") is False:
         return False

@@ -15,7 +15,7 @@ from typing import Protocol
 from app.blocks.runtime import values
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.link import ProgramLink, RobotCall
-from app.blocks.runtime.scheduler import Scheduler
+from app.blocks.runtime.scheduler import EndScript, Scheduler
 from app.robots.description.description import Action, Parameter, Robot
 from app.robots.description.inputs import from_words
 from nep.i18n import _, listed
@@ -174,7 +174,11 @@ class RobotHandle:
         """One command, or several when a pause takes it back and what is left is done afterwards."""
         while True:
             call = self._runtime.linked().invoke(self._name, action.name, input)
-            self._await(robot, action, call, words)
+            try:
+                self._await(robot, action, call, words)
+            except EndScript:  # the program goes on, the robot shall not
+                self._runtime.linked().cancel(call)
+                raise
             if not call.held or call.state != "canceled":
                 return call
             self._stay(action, is_unknown(action, input, call))

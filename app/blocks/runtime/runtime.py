@@ -13,18 +13,21 @@ from contextlib import suppress
 from functools import partial
 from types import ModuleType
 
-from app.blocks.runtime import calculation, clock, lists, texts, values
+from app.blocks.runtime import values
+from app.blocks.runtime.broadcasts import Broadcasts, Receiver
 from app.blocks.runtime.errors import BehaviourError, explain
 from app.blocks.runtime.link import ProgramLink
+from app.blocks.runtime.pure import calculation, clock, lists, texts
 from app.blocks.runtime.robot_handle import RobotHandle, StatusText
-from app.blocks.runtime.scheduler import Scheduler, Stopped
+from app.blocks.runtime.scheduler import EndScript, Scheduler, Stopped
 from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
 from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
 
 _OWN = (
-    "called", "fail", "newest", "number", "on_message", "on_start", "on_true", "publish", "reset_timer",
-    "robot", "step", "stop_program", "timer", "value", "wait", "wait_until", "write",
+    "broadcast", "broadcast_and_wait", "called", "fail", "newest", "number", "on_broadcast", "on_message",
+    "on_start", "on_true", "publish", "reset_timer", "robot", "step", "stop_others", "stop_program", "timer",
+    "value", "wait", "wait_until", "write",
 )  # fmt: skip
 _PURE = (
     "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
@@ -40,10 +43,6 @@ EVENTS_WAITING = 1
 MOST_DEEP = 200
 """How deep functions may call each other."""
 _FRAMES = 6000  # Python's own limit: a call of ours with its values takes up to a dozen of its calls
-
-
-class EndScript(Stopped):
-    """Raised by "stop this script" inside a function: the script ends, the others go on."""
 
 
 def stop_script() -> None:
@@ -109,6 +108,7 @@ class Runtime:
         self.scheduler = Scheduler()
         self.saying = StatusText(self.scheduler.block, readings or {})
         self._calls = Calls(self.scheduler)
+        self._broadcasts = Broadcasts(self.scheduler, self._one_more, self._one_less)
         self.finished = threading.Event()
         self.error: BehaviourError | None = None
 
@@ -135,22 +135,31 @@ class Runtime:
         self._running = len(self._starts) + len(self._hats)
         if not self._running:
             self.finished.set()
+        with self.scheduler.opening():
+            self._start_scripts()
+
+    def _start_scripts(self) -> None:
+        for receiver in self._broadcasts.receivers:
+            # Not counted: when nothing else runs any more, nobody can send it anything.
+            self.scheduler.start(receiver.name, self._guarded(partial(receiver.serve, self.scheduler)))
         for script in self._starts:
-            self.scheduler.start(script.__name__, self._guarded(partial(self._once, script)))
+            body = self._guarded(partial(self._once, script), over=self._one_less)
+            self.scheduler.start(script.__name__, body, idle=False)
         for hat, script in self._hats:
-            self.scheduler.start(script.__name__, self._guarded(partial(self._each, hat, script)))
+            body = self._guarded(partial(self._each, hat, script), over=self._one_less)
+            self.scheduler.start(script.__name__, body)
 
     def _once(self, script: Script) -> None:
-        self.scheduler.begin()
         with suppress(EndScript):
+            self.scheduler.begin()
             script()
 
     def _each(self, hat: Hat, script: Script) -> None:
         """Run a script for each of its events, one after the other."""
         while True:
             arguments = hat.next(self.scheduler)
-            self.scheduler.begin()
             with suppress(EndScript):
+                self.scheduler.begin()
                 script(*arguments)
             self.scheduler.rest()
             if hat.dropped:
@@ -161,7 +170,9 @@ class Runtime:
                 )
                 hat.dropped = 0
 
-    def _guarded(self, body: Callable[[], None]) -> Callable[[], None]:
+    def _guarded(
+        self, body: Callable[[], None], over: Callable[[], None] = lambda: None
+    ) -> Callable[[], None]:
         def run() -> None:
             try:
                 body()
@@ -169,13 +180,22 @@ class Runtime:
                 block = self.scheduler.block()
                 self._fail(explain(error, self._labels.get(block or "", ""), block))
             finally:
-                with self._count_lock:
-                    self._running -= 1
-                    last = self._running == 0
-                if last:
-                    self.finished.set()
+                over()
 
         return run
+
+    def _one_more(self) -> None:
+        with self._count_lock:
+            self._running += 1
+
+    def _one_less(self) -> None:
+        """A script has ended, or has done what a message asked for; the last one ends the program."""
+        with self._count_lock:
+            self._running -= 1
+            last = self._running == 0
+        if last:
+            self.scheduler.stop()  # those that only receive wait for nobody any more
+            self.finished.set()
 
     def _fail(self, error: BehaviourError) -> None:
         if self.error is None and not self.scheduler.stopping:
@@ -195,6 +215,10 @@ class Runtime:
         self.scheduler.stop()
         self.finished.set()
         raise Stopped
+
+    def stop_others(self) -> None:
+        """End what all other scripts do now; events start them again."""
+        self.scheduler.end_others()
 
     # ---- blocks
 
@@ -262,6 +286,15 @@ class Runtime:
         message = self._linked().newest(topic)
         return None if message is None else values.part(message, path)
 
+    def broadcast(self, name: str) -> None:
+        """Start the scripts that receive this name."""
+        self._broadcasts.send(name)
+
+    def broadcast_and_wait(self, name: str) -> None:
+        """Start the scripts that receive this name, and wait until they have ended."""
+        sent = self._broadcasts.send(name)
+        self.scheduler.wait_until(lambda: all(each.done for each in sent), None)
+
     # ---- what starts a script
 
     def on_start(self, script: Script) -> Script:
@@ -278,6 +311,15 @@ class Runtime:
         return self._hat(
             _("when a message arrives on {topic}").format(topic=topic), prepare, MESSAGES_WAITING
         )
+
+    def on_broadcast(self, name: str) -> Decorator:
+        """The script runs each time this name is broadcast; from its beginning, if it still runs."""
+
+        def decorate(script: Script) -> Script:
+            self._broadcasts.receivers.append(Receiver(name, script))
+            return script
+
+        return decorate
 
     def on_true(self, condition: Callable[[], object]) -> Decorator:
         """The script runs each time the condition becomes so."""

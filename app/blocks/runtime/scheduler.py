@@ -10,7 +10,8 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from nep.i18n import _
@@ -31,6 +32,10 @@ class Snapshot:
     paused: bool
 
 
+class EndScript(Stopped):
+    """Raised inside a script whose run ends while the program goes on; an event starts it again."""
+
+
 class Script:
     """One script: a thread, where it is, and how it is woken."""
 
@@ -39,6 +44,7 @@ class Script:
         self.wake = threading.Condition(lock)
         self.block: str | None = None
         self.idle = True  # waits for its event: it does nothing now
+        self.ended = False  # its run is to end: it is told so at its next call
         self.busy = False  # waits for something that goes on while paused: a robot's answer
         self.frozen = False  # waits for time or a condition, and stands while paused
 
@@ -54,6 +60,7 @@ class Scheduler:
         self._owner: Script | None = None
         self._parked: deque[Script] = deque()  # before a block
         self._resuming: deque[Script] = deque()  # inside a block, after a wait
+        self._opening = False  # scripts are being started: none gets the turn yet
         self._paused = False
         self._paused_since_s = 0.0
         self._stood_s = 0.0  # how long all pauses before took
@@ -63,9 +70,13 @@ class Scheduler:
 
     # ---- scripts
 
-    def start(self, name: str, body: Callable[[], None]) -> threading.Thread:
-        """Run `body` as a script in a thread of its own; it begins when it gets the turn."""
+    def start(self, name: str, body: Callable[[], None], *, idle: bool = True) -> threading.Thread:
+        """Run `body` as a script in a thread of its own; it begins when it gets the turn.
+
+        One that is not `idle` waits for no event: it counts as running from now on.
+        """
         script = Script(name, self._lock)
+        script.idle = idle
         with self._lock:
             self._scripts.append(script)
 
@@ -81,6 +92,16 @@ class Scheduler:
         thread = threading.Thread(target=run, name=f"script {name}", daemon=True)
         thread.start()
         return thread
+
+    @contextmanager
+    def opening(self) -> Iterator[None]:
+        """Start scripts in here: none gets the turn before all are there, so each knows all others."""
+        with self._lock:
+            self._opening = True
+        yield
+        with self._lock:
+            self._opening = False
+            self._grant()
 
     def begin(self) -> None:
         """The script's work begins: it takes the turn. Stopped is raised when the program ends."""
@@ -101,7 +122,7 @@ class Scheduler:
         """The script's work is done until its next event."""
         script = self._script()
         with self._lock:
-            script.idle, script.block = True, None
+            script.idle, script.block, script.ended = True, None, False
             self._leave(script)
 
     def step(self, block: str) -> None:
@@ -111,8 +132,7 @@ class Scheduler:
         """
         script = self._script()
         with self._lock:
-            if self._stopping:
-                raise Stopped
+            self._raise_if_over(script)
             script.block = block
             if self._stepping is script:
                 self._stepping = None
@@ -124,6 +144,28 @@ class Scheduler:
                 return
             self._leave(script, then_park=True)
             self._await_turn(script)
+
+    def me(self) -> Script:
+        """The calling script."""
+        return self._script()
+
+    def end_run(self, script: Script) -> None:
+        """End what the script does now: EndScript is raised in it at its next call; an idle one goes on."""
+        with self._lock:
+            self._end_run(script)
+
+    def end_others(self) -> None:
+        """End what all scripts but the calling one do now."""
+        mine = self._script()
+        with self._lock:
+            for script in self._scripts:
+                if script is not mine:
+                    self._end_run(script)
+
+    def _end_run(self, script: Script) -> None:
+        if not script.idle:
+            script.ended = True
+            script.wake.notify()
 
     # ---- waiting: the others run meanwhile
 
@@ -165,14 +207,13 @@ class Scheduler:
         with self._lock:
             script.busy = not idle
             self._leave(script)
-            while not self._stopping and not ready():
+            while not self._over(script) and not ready():
                 left = None if until is None else until - self._clock()
                 if left is not None and left <= 0:
                     break
                 script.wake.wait(left)
             script.busy = False
-            if self._stopping:
-                raise Stopped
+            self._raise_if_over(script)
             if not idle:
                 self._enter(script)
             return ready()
@@ -269,7 +310,7 @@ class Scheduler:
         used = 0.0
         script.frozen = True
         self._leave(script)
-        while not self._stopping and not (step_ends and self._stepping is script):
+        while not self._over(script) and not (step_ends and self._stepping is script):
             most = limit_s()
             if most is not None and used >= most:
                 break
@@ -303,13 +344,14 @@ class Scheduler:
         self._await_turn(script)
 
     def _await_turn(self, script: Script) -> None:
-        while self._owner is not script and not self._stopping:
+        while self._owner is not script and not self._over(script):
             script.wake.wait()
-        if self._stopping:
-            raise Stopped
+        if self._over(script) and self._owner is not script:
+            self._forget_turn(script)
+        self._raise_if_over(script)
 
     def _grant(self) -> None:
-        if self._owner is not None:
+        if self._owner is not None or self._opening:
             return
         if self._resuming:
             self._owner = self._resuming.popleft()
@@ -325,9 +367,22 @@ class Scheduler:
     def _end(self, script: Script) -> None:
         with self._lock:
             self._scripts.remove(script)
-            if self._stepping is script:
-                self._stepping = None
-            for queue in (self._parked, self._resuming):
-                if script in queue:
-                    queue.remove(script)
+            self._forget_turn(script)
             self._leave(script)
+
+    def _forget_turn(self, script: Script) -> None:
+        """The script waits for no turn and no step any more."""
+        if self._stepping is script:
+            self._stepping = None
+        for queue in (self._parked, self._resuming):
+            if script in queue:
+                queue.remove(script)
+
+    def _over(self, script: Script) -> bool:
+        return self._stopping or script.ended
+
+    def _raise_if_over(self, script: Script) -> None:
+        if self._stopping:
+            raise Stopped
+        if script.ended:
+            raise EndScript

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from app.blocks.model.category import Category, Group, ToolboxEntry
 from app.blocks.toolbox.catalogue import Catalogue, categories
@@ -39,7 +39,7 @@ def editor_definitions(
 
 def _toolbox(catalogue: Catalogue) -> dict[str, object]:
     contents: list[Mapping[str, object]] = [{"kind": "blocksHeading", "name": _("Blocks")}]
-    contents += [_category(category) for category in categories() if category.blocks]
+    contents += [_category(each) for each in categories() if each.blocks and not each.within]
     known = (*catalogue.connected.values(), *catalogue.absent.values())
     for robot in catalogue.connected.values():
         contents.append(_heading(robot, connected=True))
@@ -59,13 +59,22 @@ def _category(category: Category) -> dict[str, object]:
     if category.button is not None:
         words, key = category.button
         contents.append({"kind": "button", "text": words, "callbackkey": key})
-    for block in category.blocks:
-        if block.type in category.headings:
-            contents.append({"kind": "label", "text": category.headings[block.type]})
-        if block.in_toolbox:
-            contents.append(block.to_toolbox())
+    parts = [each for each in categories() if category.name in (each.name, each.within)]
+    for part in parts:
+        if part is not category:
+            contents.append({"kind": "label", "text": part.title})
+        contents += _shown(part)
     made = _entry(category.name, category.title, category.style, category.icon, contents)
     return made | {"dynamic": category.dynamic} if category.dynamic else made
+
+
+def _shown(category: Category) -> Iterator[Mapping[str, object]]:
+    """The blocks of a category with the headings above some of them."""
+    for block in category.blocks:
+        if block.type in category.headings:
+            yield {"kind": "label", "text": category.headings[block.type]}
+        if block.in_toolbox:
+            yield block.to_toolbox()
 
 
 def _group(robot: Robot, group: Group) -> dict[str, object]:

@@ -9,6 +9,7 @@ from app.blocks.model.block import Block
 from app.blocks.model.block_text import reading
 from app.blocks.model.fields import (
     Argument,
+    BroadcastField,
     ChoiceField,
     ColourField,
     LiveField,
@@ -50,6 +51,10 @@ EXAMPLES: Mapping[str, str] = {
     "values_known": "For example: wait until “newest name of /faces” is known.",
     "values_join": "For example: say join “Hello ” and the name that was heard.",
     "values_length": "For example: length of “Hello” gives 5.",
+    "events_received": "For example: when I receive “start quiz”, ask the first question.",
+    "events_broadcast": "For example: when the head is touched, broadcast “start quiz”.",
+    "events_broadcast_wait": "For example: broadcast “dance” and wait: all have danced, then say “Bravo”.",
+    "control_stop_others": "For example: when the hand is touched, stop the other scripts, say “Enough”.",
     "control_count": "For example: count “number” from 1 to 10 by 1: say “number”.",
     "numbers_function": "For example: square root of 9 gives 3, sin of 90 gives 1.",
     "numbers_round_to": "For example: round 3.14159 to 2 decimal places gives 3.14.",
@@ -201,6 +206,7 @@ def _kind(argument: Argument) -> str:
 _PLAIN: Mapping[type[Argument], str] = {
     StatementInput: lazy("blocks"),
     TextField: lazy("a text, typed into the block"),
+    BroadcastField: lazy("the name of a message; choose one or make a new one"),
     TopicField: lazy("the name of a topic; choose one or type it"),
     PathField: lazy("the name of a field in the topic's messages"),
     ColourField: lazy("a colour; click on it to choose"),

@@ -93,19 +93,19 @@ def test_the_toolbox():
     shape = [(item["kind"], item["name"]) for item in contents]
     assert shape == [
         ("blocksHeading", "Blocks"),
-        ("category", "Events"), ("category", "Control"), ("category", "Logic"), ("category", "Numbers"),
-        ("category", "Text"), ("category", "Ask and time"), ("category", "Variables"),
+        ("category", "Events"), ("category", "Control"), ("category", "Numbers and logic"),
+        ("category", "Text and answers"), ("category", "Variables"),
         ("category", "Lists"), ("category", "Functions"), ("category", "Messages"),
         ("robotHeading", "Pepper"),
         ("category", "Speech"), ("category", "Movement"), ("category", "Face and lights"),
         ("category", "Sensors"),
         ("robotHeading", "NAO"),
     ]  # fmt: skip
-    pepper, away = contents[11], contents[-1]
+    pepper, away = contents[9], contents[-1]
     assert (pepper["virtual"], pepper["connected"], away["connected"]) == (True, True, False)
-    assert len({item["toolboxitemid"] for item in contents if item["kind"] == "category"}) == 14
-    speech = contents[12]
-    assert (speech["icon"], speech["categorystyle"], contents[15]["categorystyle"]) == (
+    assert len({item["toolboxitemid"] for item in contents if item["kind"] == "category"}) == 12
+    speech = contents[10]
+    assert (speech["icon"], speech["categorystyle"], contents[13]["categorystyle"]) == (
         "message-circle", "robot", "sensors",
     )  # fmt: skip
     say = speech["contents"][0]
@@ -115,8 +115,8 @@ def test_the_toolbox():
         "fields": {"ROBOT": "Pepper"},
         "inputs": {"TEXT": {"shadow": {"type": "values_text", "fields": {"TEXT": "Hello"}}}},
     }
-    assert contents[9]["dynamic"] == "functions"
-    assert contents[7]["contents"][0] == {
+    assert contents[7]["dynamic"] == "functions"
+    assert contents[5]["contents"][0] == {
         "kind": "button", "text": "New variable", "callbackkey": "CREATE_VARIABLE",
     }  # fmt: skip
 
@@ -126,6 +126,14 @@ def test_a_long_category_has_headings_between_its_blocks():
     shown = [entry.get("text") or entry["type"] for entry in lists["contents"]]
     assert shown[:2] == ["Make a list", "lists_empty"]
     assert shown[shown.index("Change a list") + 1] == "lists_add"
+
+
+def test_a_category_may_stand_within_another_under_its_title():
+    (numbers,) = [item for item in DEFINITIONS["toolbox"]["contents"] if item["name"] == "Numbers and logic"]  # type: ignore[index]
+    shown = [entry.get("text") or entry["type"] for entry in numbers["contents"]]
+    assert shown[:2] == ["Logic", "values_compare"]
+    assert shown[shown.index("Calculate") + 1] == "values_number"
+    assert shown[shown.index("Time") + 1] == "sensing_timer"
 
 
 def test_every_entry_of_the_toolbox_is_defined_and_every_style_is_known():

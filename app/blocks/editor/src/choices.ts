@@ -28,6 +28,13 @@ export interface ChoiceConfig extends Blockly.FieldConfig {
   of?: string;
 }
 
+/** What people may type: the words of the last option, and those of the question. */
+const TYPED = {
+  topic: {other: () => t('other topic…'), name: () => t('Name of the topic')},
+  field: {other: () => t('other field…'), name: () => t('Name of the field')},
+  message: {other: () => t('New message…'), name: () => t('Name of the message')},
+};
+
 const OTHER = '\u0000other';
 
 export class FieldChoice extends Blockly.FieldDropdown {
@@ -36,8 +43,8 @@ export class FieldChoice extends Blockly.FieldDropdown {
   /** The value the block has although no option offers it. */
   private kept: string | null = null;
 
-  /** `typed`: what a person may type instead of choosing ("topic", "field"), or "". */
-  constructor(config: ChoiceConfig, private readonly typed = '') {
+  /** `typed`: what a person may type instead of choosing, or "". */
+  constructor(config: ChoiceConfig, private readonly typed: keyof typeof TYPED | '' = '') {
     super(Blockly.Field.SKIP_SETUP);
     this.given = (config.options ?? []).filter(isOption);
     this.source = config.source ?? (typed === 'topic' ? 'topics' : '');
@@ -48,12 +55,17 @@ export class FieldChoice extends Blockly.FieldDropdown {
     this.configure_(config);
   }
 
+  /** What is known to choose from now. */
+  protected offered(): Option[] {
+    return (this.source && sources.get(this.source)) || this.given;
+  }
+
   /** Present options, always with the present value among them and never empty. */
   private choices(): Option[] {
-    const options: Option[] = [...((this.source && sources.get(this.source)) || this.given)];
+    const options: Option[] = [...this.offered()];
     const kept = this.kept;
     if (kept !== null && !options.some((each) => each[1] === kept)) options.push([kept, kept]);
-    if (this.typed) options.push([this.typed === 'topic' ? t('other topic…') : t('other field…'), OTHER]);
+    if (this.typed) options.push([TYPED[this.typed].other(), OTHER]);
     return options.length ? options : [['–', '']];
   }
 
@@ -86,8 +98,8 @@ export class FieldChoice extends Blockly.FieldDropdown {
       super.onItemSelected_(menu, item);
       return;
     }
-    Blockly.dialog.prompt(this.typed === 'topic' ? t('Name of the topic') : t('Name of the field'), this.value_ ?? '', (words) => {
-      const name = words?.trim();
+    Blockly.dialog.prompt(TYPED[this.typed || 'topic'].name(), this.typed === 'message' ? '' : this.value_ ?? '', (words) => {
+      const name = words?.trim().replace(/\s+/g, ' ');
       if (name) this.setValue(name);
     });
     document.querySelector<HTMLInputElement>('.blocklyDialogInput')?.select();
@@ -109,5 +121,27 @@ export class FieldTopic extends FieldChoice {
   }
 }
 
+/** The name of a message that scripts send each other: one that a block has already, or a new one. */
+export class FieldBroadcast extends FieldChoice {
+  private static readonly types = ['events_received', 'events_broadcast', 'events_broadcast_wait'];
+
+  constructor(config: ChoiceConfig) {
+    super(config, 'message');
+  }
+
+  protected override offered(): Option[] {
+    const workspace = this.getSourceBlock()?.workspace as Blockly.WorkspaceSvg | undefined;
+    const main = workspace?.targetWorkspace ?? workspace;
+    const blocks = FieldBroadcast.types.flatMap((type) => main?.getBlocksByType(type, false) ?? []);
+    const names = new Set(blocks.map((block) => String(block.getFieldValue('NAME') ?? '')));
+    return [...names].filter(Boolean).sort((one, other) => one.localeCompare(other)).map((name) => [name, name]);
+  }
+
+  static override fromJson(config: Blockly.FieldConfig): FieldBroadcast {
+    return new FieldBroadcast(config as ChoiceConfig);
+  }
+}
+
+Blockly.fieldRegistry.register('field_broadcast', FieldBroadcast);
 Blockly.fieldRegistry.register('field_choice', FieldChoice);
 Blockly.fieldRegistry.register('field_topic', FieldTopic);

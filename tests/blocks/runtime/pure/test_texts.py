@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from app.blocks.runtime import texts, values
+from app.blocks.runtime import values
 from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.pure import texts
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, number, started, text, workspace, write
 

@@ -4,8 +4,8 @@ from datetime import datetime, timedelta
 
 import pytest
 
-from app.blocks.runtime import clock
 from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.pure import clock
 from app.blocks.runtime.scheduler import Scheduler
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, started, text, workspace, write

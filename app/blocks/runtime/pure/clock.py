@@ -1,4 +1,4 @@
-"""The date and time of this computer: called by the blocks of the category "Ask and time"."""
+"""The date and time of this computer: called by the blocks of the category "Time"."""
 
 from __future__ import annotations
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from app.blocks.runtime import calculation
 from app.blocks.runtime.errors import BehaviourError, explain
+from app.blocks.runtime.pure import calculation
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, number, started, text, workspace, write
 

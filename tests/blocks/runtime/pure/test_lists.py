@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.blocks.runtime import lists
 from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.pure import lists
 from app.blocks.runtime.values import LONGEST_TEXT
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, get, list_of, number, started, text, workspace, write

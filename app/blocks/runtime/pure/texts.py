@@ -1,4 +1,4 @@
-"""What programs do with text: pure functions, called by the blocks of the category "Text".
+"""What programs do with text: pure functions, called by the blocks of the category "Text and answers".
 
 Letters are counted from 1, as people see them (`values.letters`). Every value is taken as people write it.
 """

@@ -1,0 +1,73 @@
+"""What a program names in one place only: variables that nothing sets, messages that nothing receives."""
+
+from __future__ import annotations
+
+from app.blocks.compiler.problems import ProblemCollector
+from app.blocks.model.block import Block
+from app.blocks.model.fields import BroadcastField, FieldError, ValueInput, VariableField
+from app.blocks.model.mutators import InputField
+from app.blocks.model.workspace import Placed, Workspace
+
+_READS, _CHANGES, _RECEIVES = "variables_get", "variables_change", "events_received"
+
+
+class LooseEnds:
+    """Collects, block by block of what will run, what reads and sets, sends and receives."""
+
+    def __init__(self) -> None:
+        self._read: dict[str, tuple[Placed, Block]] = {}  # the first block that reads a variable
+        self._set: set[str] = set()
+        self._changed: set[str] = set()  # a number can be counted up from the 0 that it begins with
+        self._as_list: set[str] = set()
+        self._sent: dict[str, tuple[Placed, Block]] = {}
+        self._received: dict[str, tuple[Placed, Block]] = {}
+
+    def remember(self, placed: Placed, block: Block) -> None:
+        """Add what this block does."""
+        for argument in block.arguments:
+            if isinstance(argument, ValueInput) and (argument.check == "List" or argument.variable == "list"):
+                inner = placed.inputs.get(argument.name, ())
+                if inner and inner[0].type == _READS:
+                    self._as_list.add(_variable(inner[0]))
+            elif isinstance(argument, VariableField) and not isinstance(argument, InputField):
+                self._name_variable(placed, block)
+            elif isinstance(argument, BroadcastField):
+                both = self._received if block.type == _RECEIVES else self._sent
+                both.setdefault(_said(argument, placed), (placed, block))
+
+    def _name_variable(self, placed: Placed, block: Block) -> None:
+        id = _variable(placed)
+        if block.type == _READS:
+            self._read.setdefault(id, (placed, block))
+        elif block.type == _CHANGES:
+            self._changed.add(id)
+        else:
+            self._set.add(id)
+
+    def tell(self, notes: ProblemCollector, workspace: Workspace) -> None:
+        """Note what has no other end."""
+        for id, (placed, block) in self._read.items():
+            is_list = id in self._as_list
+            if id not in self._set and (is_list or id not in self._changed):
+                notes.never_set(placed, block, id, workspace.variables.get(id, id), is_list=is_list)
+        for name, (placed, block) in self._sent.items():
+            if name not in self._received:
+                notes.never_received(placed, block, name)
+        for name, (placed, block) in self._received.items():
+            if name not in self._sent:
+                notes.never_sent(placed, block, name)
+
+
+def _variable(placed: Placed) -> str:
+    """The id of the variable that the block names; "" when a file holds something else there."""
+    try:
+        return str(VariableField("VAR").read(placed.fields.get("VAR")))
+    except FieldError:
+        return ""
+
+
+def _said(field: BroadcastField, placed: Placed) -> str:
+    try:
+        return str(field.read(placed.fields.get(field.name)))
+    except FieldError:
+        return ""

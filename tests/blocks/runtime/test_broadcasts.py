@@ -1,0 +1,230 @@
+"""Broadcasts, and what ends the run of another script."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.fixes.fixes import mend
+from tests.blocks.fakes import FakeLink, Play, play, until
+from tests.blocks.samples import (
+    block,
+    boolean,
+    get,
+    number,
+    robot,
+    say,
+    stack,
+    started,
+    text,
+    workspace,
+    write,
+)
+
+
+def broadcast(name: str, *, wait: bool = False) -> dict[str, object]:
+    return block("events_broadcast_wait" if wait else "events_broadcast", NAME=name)
+
+
+def received(name: str, *blocks: dict[str, object]) -> dict[str, object]:
+    return stack(block("events_received", NAME=name), *blocks)
+
+
+def pause(seconds: float) -> dict[str, object]:
+    return block("control_wait", SECONDS=number(seconds))
+
+
+def until_so(variable: str) -> dict[str, object]:
+    return block("control_wait_until", CONDITION=get(variable))
+
+
+def put(variable: str, value: object) -> dict[str, object]:
+    return block("variables_set", VAR={"id": variable}, VALUE=value)
+
+
+def begin(saved: dict[str, object], link: FakeLink | None = None) -> Play:
+    return Play(compile_behaviour(saved, [robot()]), (robot(),), link).start()
+
+
+def test_several_scripts_receive_and_the_program_ends_when_all_have_run():
+    run = play(
+        workspace(
+            started(broadcast("quiz"), write(text("sent"))),
+            received("quiz", pause(0.05), write(text("one"))),
+            received("quiz", pause(0.05), broadcast("more")),
+            received("more", pause(0.05), write(text("two"))),
+            received("other", write(text("never"))),
+        )
+    )
+    assert run.runtime.error is None
+    assert run.lines == ["sent", "one", "two"]
+
+
+def test_broadcast_and_wait_waits_for_all_of_them():
+    run = play(
+        workspace(
+            started(broadcast("quiz", wait=True), broadcast("nobody", wait=True), write(text("after"))),
+            received("quiz", pause(0.05), write(text("one"))),
+            received("quiz", pause(0.1), write(text("two"))),
+        )
+    )
+    assert run.lines == ["one", "two", "after"]
+
+
+def test_a_message_that_comes_again_begins_its_script_anew():
+    again = received("go", write(text("begin")), until_so("ready"), write(text("end")))
+    run = play(
+        workspace(
+            started(broadcast("go"), pause(0.05), broadcast("go"), pause(0.05), put("ready", boolean(True))),
+            again,
+            variables=("ready",),
+        )
+    )
+    assert run.lines == ["begin", "begin", "end"]
+
+
+def test_two_messages_at_once_run_the_script_once():
+    run = play(workspace(started(broadcast("go"), broadcast("go")), received("go", write(text("ran")))))
+    assert run.lines == ["ran"]
+
+
+def test_a_script_that_sends_to_itself_begins_anew_until_the_program_is_stopped():
+    run = begin(workspace(started(broadcast("go")), received("go", write(text("x")), broadcast("go"))))
+    until(lambda: len(run.lines) > 3)
+    assert not run.runtime.finished.is_set()
+    run.stop()
+    run.end()
+
+
+def test_who_waits_for_a_script_that_begins_anew_waits_no_longer_for_its_first_run():
+    run = play(
+        workspace(
+            started(broadcast("go", wait=True), write(text("first is over")), put("ready", boolean(True))),
+            started(pause(0.05), broadcast("go", wait=True), write(text("second is over"))),
+            received("go", until_so("ready")),
+            variables=("ready",),
+        )
+    )
+    assert run.lines == ["first is over", "second is over"]
+
+
+def test_the_robot_does_not_go_on_for_a_script_that_begins_anew():
+    link = FakeLink()
+    link.held = {"say"}
+    run = begin(
+        workspace(started(broadcast("go"), until_so("again"), broadcast("go")), received("go", say("Hi"))),
+        link,
+    )
+    until(lambda: len(link.calls) == 1)
+    run.names["again"] = True
+    until(lambda: len(link.calls) == 2)
+    assert link.canceled == link.calls[:1]
+    link.answer(link.calls[1], "succeeded")
+    run.end()
+    assert run.runtime.error is None
+
+
+def test_stop_the_other_scripts_ends_what_they_do_and_takes_the_robots_task_back():
+    link = FakeLink()
+    link.held = {"say"}
+    run = begin(
+        workspace(
+            started(say("a long story"), write(text("never"))),
+            started(block("control_forever", BODY=[pause(0.01)])),
+            started(until_so("go"), block("control_stop_others"), write(text("alone"))),
+            variables=("go",),
+        ),
+        link,
+    )
+    until(lambda: len(link.calls) == 1)
+    run.names["go"] = True
+    run.end()
+    assert (run.lines, link.canceled, run.runtime.error) == (["alone"], link.calls, None)
+
+
+def test_a_script_that_has_not_begun_is_ended_too():
+    for _ in range(20):  # whichever of the two gets the turn first, nothing of the other is left
+        run = play(
+            workspace(
+                started(block("control_stop_others"), write(text("one"))),
+                started(block("control_stop_others"), write(text("two"))),
+            )
+        )
+        assert run.lines in (["one"], ["two"])
+
+
+def test_an_event_starts_a_script_again_that_was_ended():
+    link = FakeLink()
+    run = begin(
+        workspace(
+            stack(
+                block("events_message", TOPIC="/x"),
+                write(text("begin")),
+                until_so("ready"),
+                write(text("end")),
+            ),
+            stack(block("events_message", TOPIC="/stop"), block("control_stop_others"), write(text("ended"))),
+            variables=("ready",),
+        ),
+        link,
+    )
+    link.happen("/x", 1)
+    until(lambda: run.lines == ["begin"])
+    link.happen("/stop", 1)
+    until(lambda: run.lines == ["begin", "ended"])
+    link.happen("/x", 1)
+    until(lambda: run.lines == ["begin", "ended", "begin"])
+    run.stop()
+    run.end()
+
+
+def test_pause_holds_a_script_that_waits_for_others():
+    run = begin(
+        workspace(
+            started(broadcast("go", wait=True), write(text("after"))), received("go", until_so("ready")),
+            variables=("ready",),
+        )
+    )  # fmt: skip
+    until(lambda: len(run.runtime.scheduler.snapshot().blocks) == 2)
+    run.runtime.scheduler.pause()
+    until(lambda: run.runtime.scheduler.snapshot().paused)
+    run.names["ready"] = True
+    run.runtime.scheduler.go_on()
+    run.end()
+    assert run.lines == ["after"]
+
+
+@pytest.mark.parametrize("name", ["", "  ", "\n"])
+def test_a_message_needs_a_name(name):
+    (problem,) = [
+        p
+        for p in compile_behaviour(workspace(started(broadcast(name))), []).problems
+        if p.severity == "error"
+    ]
+    assert problem.sentence == "broadcast needs the name of a message. It is kept and skipped."
+
+
+@pytest.mark.parametrize(
+    "name", ["start quiz", "👍", "Olé “x”", "-1", str(2**64 - 1), "x" * 500, "{name}", "%NAME"]
+)
+def test_any_other_name_is_one_and_spaces_around_do_not_count(name):
+    run = play(workspace(started(broadcast(f" {name} ")), received(name, write(text("ran")))))
+    assert (run.program.problems, run.lines) == ((), ["ran"])
+
+
+def test_what_nothing_receives_is_a_problem_with_a_button_that_receives_it():
+    saved = workspace(started(broadcast("start quiz") | {"id": "b"}) | {"x": 10, "y": 30})
+    (problem,) = compile_behaviour(saved, []).problems
+    assert (problem.severity, problem.block_id) == ("warning", "b")
+    assert problem.sentence == "Nothing receives “start quiz”."
+    assert problem.subject in problem.sentence
+    mended = mend(saved, problem.mend_action or "")
+    assert mended is not None
+    assert compile_behaviour(mended, []).problems == ()
+    assert mended["blocks"]["blocks"][1]["x"] > 400
+
+
+def test_what_nothing_sends_is_told():
+    (problem,) = compile_behaviour(workspace(started(), received("quiz", write(text("x")))), []).problems
+    assert problem.sentence == "Nothing broadcasts “quiz”, so this script does not run."
+    assert problem.severity == "info"
