@@ -209,7 +209,7 @@ class _Compiler:
     def _definition(self, placed: Placed, function: Function) -> ast.stmt:
         self._in_message = False
         self._read(placed)
-        body = self._statements(placed.inputs.get("BODY", ()))
+        body = self._statements(placed.inputs.get("BODY", ()) if placed.enabled else ())
         if function.gives:
             body += self._statement(replace(placed, type=f"{END}:{placed.id}"))
         (made,) = statements("def script():\n    %BODY", {}, {"BODY": body})

@@ -8,10 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal, Slot
+from PySide6.QtGui import QGuiApplication
 
 from app.core.storage import deep_json
 
 Json = dict[str, object]
+COPIED = '{"nepStudio":'
+"""How copied blocks begin (`clipboard.ts`)."""
+MOST_COPIED = 5_000_000
 
 
 class BlocklyBridge(QObject):
@@ -67,6 +71,17 @@ class BlocklyBridge(QObject):
     @Slot(str)
     def offers(self, sensors: str) -> None:
         self.sensors_offered.emit(sensors)
+
+    @Slot(str)
+    def copy(self, blocks: str) -> None:
+        """Put copied blocks on the computer's clipboard, as text."""
+        QGuiApplication.clipboard().setText(blocks)
+
+    @Slot(result=str)
+    def copied(self) -> str:
+        """The copied blocks on the computer's clipboard; "" for all else, which is not the page's to read."""
+        text = QGuiApplication.clipboard().text()
+        return text if text.startswith(COPIED) and len(text) <= MOST_COPIED else ""
 
     @Slot(str)
     def failed(self, sentence: str) -> None:

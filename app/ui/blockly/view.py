@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.documents.workspace_json import WorkspaceJson
 from app.ui.blockly.bridge import Json
@@ -160,6 +160,19 @@ class BlocklyView(BlocklyHost):
     def redo(self) -> None:
         """Do it again."""
         self._tell("redo", None)
+
+    def edit(self, what: str) -> None:
+        """Do "copy", "cut", "paste" or "duplicate" with the chosen block, and give the page the keys.
+
+        Does nothing when the page has the keys: it has had its turn.
+        """
+        if self.web is not None and not self._has_keys():
+            self.setFocus()
+            self._tell("edit", what)
+
+    def _has_keys(self) -> bool:
+        focus = QApplication.focusWidget()
+        return focus is not None and self.isAncestorOf(focus)
 
     def zoom_in(self) -> None:
         """One step larger."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtCore import QKeyCombination, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QMainWindow, QMenuBar, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.documents.titles import recent_titles
@@ -43,6 +43,12 @@ TICK_MS = 33
 SMALLEST = QSize(960, 540)  # on a screen of 1024 x 600 the system's own bars take some
 FIRST_SIZE = QSize(1440, 900)
 FACTS_EVERY = 8  # ticks
+BLOCK_KEYS = {
+    QKeySequence.StandardKey.Copy: "copy",
+    QKeySequence.StandardKey.Cut: "cut",
+    QKeySequence.StandardKey.Paste: "paste",
+}
+DUPLICATE = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_D)
 SOON_WORDS = {"behaviour": lazy("Getting the blocks ready.")}
 OTHER_SOON_WORDS = lazy("Getting the panels ready.")
 
@@ -290,6 +296,16 @@ class MainWindow(QMainWindow):
 
     def _run(self, name: str) -> None:
         self.commands.run(name)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """A key that nobody else wanted: blocks are copied and pasted wherever a click has left the keys."""
+        what = next((what for key, what in BLOCK_KEYS.items() if event.matches(key)), "")
+        if event.keyCombination() == DUPLICATE:
+            what = "duplicate"
+        if what:
+            self._run(f"blocks.edit:{what}")
+        else:
+            super().keyPressEvent(event)
 
     # -- the tick ---------------------------------------------------------------------------------
 

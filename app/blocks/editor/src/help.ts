@@ -110,7 +110,7 @@ function element(tag: string, name: string, words = ''): HTMLElement {
 export function registerHelpMenu(show: (block: Blockly.BlockSvg) => void): void {
   Blockly.ContextMenuRegistry.registry.register({
     id: 'nepHelp',
-    weight: 7,
+    weight: 90,
     scopeType: Blockly.ContextMenuRegistry.ScopeType.BLOCK,
     displayText: () => t('Help'),
     preconditionFn: ({block}) => block && (isUnknown(block) || helpFor(block.type)) ? 'enabled' : 'hidden',

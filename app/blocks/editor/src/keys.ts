@@ -2,6 +2,8 @@
 // into nothing would change the program, so that each has Ctrl, Shift or Alt beside it here, or no key.
 // `app/ui/shell/actions/shortcuts.py` lists them for people.
 import * as Blockly from 'blockly/core';
+import type {Clipboard} from './clipboard';
+import {lazy, t} from './words';
 
 const {names} = Blockly.ShortcutItems;
 const {KeyCodes} = Blockly.utils;
@@ -58,6 +60,43 @@ function takeOut(): boolean {
   block.unplug(true);
   Blockly.Events.setGroup(false);
   return true;
+}
+
+const NAMES: Readonly<Record<number, string>> = {
+  [KeyCodes.DELETE]: lazy('Del'), [KeyCodes.ENTER]: '↵', [KeyCodes.UP]: '↑', [KeyCodes.DOWN]: '↓', [KeyCodes.SLASH]: '/',
+};
+
+/** The first key of a command as menus show it: Ctrl+D. */
+export function keyWords(name: string): string {
+  const [key] = registry.getKeyCodesByShortcutName(name);
+  if (!key) return '';
+  const parts = key.split('+');
+  const code = Number(parts.pop());
+  const last = NAMES[code];
+  const words = [['Control', t('Ctrl')], ['Meta', '⌘'], ['Alt', t('Alt')], ['Shift', t('Shift')]] as const;
+  const held = words.filter(([each]) => parts.includes(each)).map(([, word]) => word);
+  return [...held, last ? t(last) : String.fromCharCode(code)].join('+');
+}
+
+/** Copy, cut, paste and duplicate as our clipboard does them. */
+export function useClipboard(clipboard: Clipboard): void {
+  const may = (workspace: Blockly.WorkspaceSvg) =>
+    !workspace.isDragging() && !Blockly.getFocusManager().ephemeralFocusTaken();
+  const does = (name: string, run: () => unknown) => {
+    const keyCodes = registry.getKeyCodesByShortcutName(name);
+    give(name, keyCodes, {
+      preconditionFn: may,
+      callback: (_workspace, event) => {
+        event.preventDefault();
+        run();
+        return true;
+      },
+    });
+  };
+  does(names.COPY, () => clipboard.copy());
+  does(names.CUT, () => clipboard.cut());
+  does(names.PASTE, () => void clipboard.paste());
+  does(names.DUPLICATE, () => clipboard.duplicate());
 }
 
 /** Call it once, after everybody has registered their shortcuts. */

@@ -4,10 +4,11 @@ import './blockly_patches';
 import './fields';
 import './focus_after_delete';
 import './mutators';
+import {Clipboard} from './clipboard';
 import {HelpCard, focusedBlock, registerHelpMenu} from './help';
 import {iconElement} from './icons';
-import {useOwnKeys} from './keys';
-import {trimMenu} from './menu';
+import {useClipboard, useOwnKeys} from './keys';
+import {registerMenu, trimMenu} from './menu';
 import {FindBar} from './search';
 import {type Tab} from './tab';
 import {type Definitions, type ShownTab, Tabs} from './tabs';
@@ -27,6 +28,8 @@ interface Bridge {
   failed(sentence: string): void;
   on_block(has: boolean): void;
   offers(sensors: string): void;
+  copy(text: string): void;
+  copied(): Promise<string>;
 }
 
 declare const QWebChannel: new (transport: unknown, done: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
@@ -35,6 +38,7 @@ declare const qt: {webChannelTransport: unknown};
 class Editor {
   private readonly tabs: Tabs;
   private readonly help = new HelpCard();
+  private readonly clipboard: Clipboard;
   private offered = '[]';
   private readonly find = new FindBar(() => this.shown.workspace);
 
@@ -56,6 +60,14 @@ class Editor {
     document.addEventListener('visibilitychange', () => document.hidden && this.shown.program.flush());
     this.makeZoomButtons();
     registerHelpMenu((block) => this.help.show(block));
+    this.clipboard = new Clipboard({write: (text) => bridge.copy(text), read: () => bridge.copied()});
+    useClipboard(this.clipboard);
+    registerMenu(this.clipboard);
+    // Keys that come while nothing in the page has them, as after a change of tabs, are the canvas's.
+    document.addEventListener('keydown', (event) => {
+      if (document.activeElement !== document.body || !(event.ctrlKey || event.metaKey)) return;
+      Blockly.ShortcutRegistry.registry.onKeyDown(this.shown.workspace, event);
+    });
     let told = false;
     const tellBlock = () => queueMicrotask(() => {
       const has = focusedBlock() !== null;
@@ -103,6 +115,10 @@ class Editor {
     help: () => this.help.show(focusedBlock()),
     find: () => this.find.open(),
     search: () => this.shown.search(),
+    edit: (what: 'copy' | 'cut' | 'paste' | 'duplicate') => {
+      if (!this.shown.hasFocus) this.shown.focus();
+      void this.clipboard[what]();
+    },
   };
 
   private showTab(it: ShownTab): void {

@@ -1,14 +1,25 @@
-// Fewer entries, plain words.
+// The menus of blocks and of the canvas: their entries, their words, and how a row looks.
+// Who adds entries registers them with Blockly and names an icon with `menuIcon`. Weights: 0 to 9 what runs, 10 to 49
+// copying, 50 to 79 how the block is, 80 to 89 parts of it, 90 help, 99 deleting; the canvas has room from 70 on.
 import * as Blockly from 'blockly/core';
+import {type Clipboard} from './clipboard';
+import {focusedBlock} from './help';
+import {canFold, fold} from './folding';
+import {iconElement} from './icons';
+import {ctrl, keyWords} from './keys';
 import {registerRemoveMenu} from './remove_menu';
 import {lazy, t} from './words';
 
-const REMOVED = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockCollapseExpand', 'blockDisable',
-  'blockHelp', 'commentCreate', 'commentDelete', 'commentDuplicate'];
+const {names} = Blockly.ShortcutItems;
+const {ScopeType} = Blockly.ContextMenuRegistry;
+const OFF = 'MANUALLY_DISABLED';
+const SWITCH = 'nepSwitch';
+
+const REMOVED = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockHelp', 'commentCreate', 'commentDelete',
+  'commentDuplicate', 'blockDuplicate', 'blockCollapseExpand', 'blockDisable', 'blockDelete'];
 
 const WORDS: Readonly<Record<string, string>> = {
   CLEAN_UP: lazy('Tidy up'),
-  DUPLICATE_BLOCK: lazy('Duplicate'),
   ADD_COMMENT: lazy('Add a note'),
   REMOVE_COMMENT: lazy('Remove the note'),
   DELETE_BLOCK: lazy('Delete'),
@@ -20,11 +31,34 @@ const WORDS: Readonly<Record<string, string>> = {
   REDO: lazy('Redo'),
 };
 
+/** Blockly's own entries that stay: their weight here, and their icon. */
+const KEPT: Readonly<Record<string, [weight: number, icon: string]>> = {
+  undoWorkspace: [20, 'undo-2'],
+  redoWorkspace: [21, 'redo-2'],
+  cleanWorkspace: [40, 'list-checks'],
+  blockComment: [70, 'sticky-note'],
+  workspaceDelete: [99, 'trash-2'],
+};
+
+const icons = new Map<string, string>();
+
+/** The icon of an entry, by the entry's id. */
+export function menuIcon(id: string, icon: string): void {
+  icons.set(id, icon);
+}
+
+/** Before anything is made. */
 export function trimMenu(language: string): void {
   registerRemoveMenu();
-  for (const id of REMOVED) {
-    if (Blockly.ContextMenuRegistry.registry.getItem(id)) Blockly.ContextMenuRegistry.registry.unregister(id);
+  const registry = Blockly.ContextMenuRegistry.registry;
+  for (const id of REMOVED) if (registry.getItem(id)) registry.unregister(id);
+  for (const [id, [weight, icon]] of Object.entries(KEPT)) {
+    const item = registry.getItem(id);
+    if (item) item.weight = weight;
+    menuIcon(id, icon);
   }
+  menuIcon('nepHelp', 'circle-question-mark');
+  menuIcon('nepRemoveItem', 'list-minus');
   // Nothing asks: deleting can be undone.
   Blockly.dialog.setConfirm((_message, callback) => callback(true));
   // Blockly's own words stay where nobody has translated ours.
@@ -32,3 +66,155 @@ export function trimMenu(language: string): void {
     if (language === 'en' || t(english) !== english) Blockly.Msg[key] = t(english);
   }
 }
+
+type Scope = Blockly.ContextMenuRegistry.Scope;
+
+interface Entry {
+  id: string;
+  weight: number;
+  icon: string;
+  words: string | ((scope: Scope) => string);
+  /** The shortcut that does the same. */
+  shortcut?: string;
+  when(scope: Scope): boolean | 'disabled';
+  run(scope: Scope, place: {x: number; y: number}): unknown;
+}
+
+function add(scopeType: Blockly.ContextMenuRegistry.ScopeType, entry: Entry): void {
+  const {id, weight, icon, words, shortcut} = entry;
+  menuIcon(id, icon);
+  Blockly.ContextMenuRegistry.registry.register({
+    id, weight, scopeType,
+    displayText: typeof words === 'string' ? words : (scope) => words(scope),
+    ...(shortcut !== undefined && {associatedKeyboardShortcut: shortcut}),
+    preconditionFn: (scope) => {
+      const when = entry.when(scope);
+      return when === 'disabled' ? when : when ? 'enabled' : 'hidden';
+    },
+    callback: (scope, _opened, _chosen, place) => void entry.run(scope, place),
+  });
+}
+
+function line(scopeType: Blockly.ContextMenuRegistry.ScopeType, weight: number): void {
+  Blockly.ContextMenuRegistry.registry.register({id: `nepLine${scopeType}${weight}`, weight, scopeType, separator: true});
+}
+
+/** Whether a person may change the block of this menu. */
+function own({block}: Scope): boolean {
+  return block !== undefined && !block.isInFlyout && !block.isShadow();
+}
+
+export function registerMenu(clipboard: Clipboard): void {
+  const block = (entry: Entry) => add(ScopeType.BLOCK, entry);
+  block({id: 'nepDuplicate', weight: 10, icon: 'copy-plus', words: t('Duplicate'), shortcut: names.DUPLICATE,
+    when: own, run: (it) => clipboard.duplicate(it.block)});
+  block({id: 'nepCopy', weight: 11, icon: 'copy', words: t('Copy'), shortcut: names.COPY,
+    when: ({block: it}) => it !== undefined, run: (it) => clipboard.copy(it.block)});
+  block({id: 'nepCut', weight: 12, icon: 'scissors', words: t('Cut'), shortcut: names.CUT,
+    when: (it) => own(it) && it.block!.isDeletable(), run: (it) => clipboard.cut(it.block)});
+  block({id: 'nepPaste', weight: 13, icon: 'clipboard-paste', words: t('Paste'), shortcut: names.PASTE,
+    when: own, run: (_it, place) => clipboard.paste(place)});
+  line(ScopeType.BLOCK, 50);
+  block({id: 'nepCollapse', weight: 51, icon: 'fold-vertical', words: t('Fold up'),
+    when: (it) => own(it) && !it.block!.isCollapsed() && canFold(it.block!), run: (it) => fold(it.block!, true)});
+  block({id: 'nepExpand', weight: 52, icon: 'unfold-vertical', words: t('Unfold'),
+    when: (it) => own(it) && it.block!.isCollapsed(), run: (it) => fold(it.block!, false)});
+  block({id: 'nepOff', weight: 53, icon: 'power-off', words: t('Switch off'), shortcut: SWITCH,
+    when: (it) => own(it) && !it.block!.hasDisabledReason(OFF) && !it.block!.getInheritedDisabled(),
+    run: (it) => switchOff(it.block!, true)});
+  block({id: 'nepOn', weight: 54, icon: 'power', words: t('Switch on'), shortcut: SWITCH,
+    when: (it) => own(it) && it.block!.hasDisabledReason(OFF), run: (it) => switchOff(it.block!, false)});
+  line(ScopeType.BLOCK, 80);
+  line(ScopeType.BLOCK, 98);
+  block({id: 'nepDelete', weight: 99, icon: 'trash-2', shortcut: names.DELETE,
+    words: (it) => it.block ? deleteWords(it.block) : '',
+    when: (it) => own(it) && it.block!.isDeletable(), run: (it) => remove(it.block!)});
+
+  Blockly.ShortcutRegistry.registry.register({
+    name: SWITCH, keyCodes: [ctrl(Blockly.utils.KeyCodes.E)], displayText: () => t('Switch off'),
+    preconditionFn: (workspace) => !workspace.isDragging() && !workspace.isFlyout,
+    callback: () => {
+      const it = focusedBlock();
+      if (!it || it.isInFlyout || it.getInheritedDisabled()) return false;
+      switchOff(it, !it.hasDisabledReason(OFF));
+      return true;
+    },
+  });
+
+  add(ScopeType.WORKSPACE, {id: 'nepPasteHere', weight: 10, icon: 'clipboard-paste', words: t('Paste'),
+    shortcut: names.PASTE, when: () => true, run: (_it, place) => clipboard.paste(place)});
+  line(ScopeType.WORKSPACE, 15);
+  line(ScopeType.WORKSPACE, 35);
+  line(ScopeType.WORKSPACE, 98);
+}
+
+// ---- how a block is
+
+/** A block that is off is skipped; with the block that starts a script, all of the script. */
+export function switchOff(block: Blockly.BlockSvg, off: boolean): void {
+  step(() => {
+    const starts = !block.previousConnection && !block.outputConnection;
+    for (let each: Blockly.BlockSvg | null = block; each; each = starts ? each.getNextBlock() : null) {
+      each.setDisabledReason(off, OFF);
+    }
+  });
+}
+
+function step(change: () => void): void {
+  const group = Blockly.Events.getGroup();
+  if (!group) Blockly.Events.setGroup(true);
+  change();
+  Blockly.Events.setGroup(group);
+}
+
+/** Grey values in gaps are no blocks to a person. */
+function deleteWords(block: Blockly.BlockSvg): string {
+  const below = new Set(block.getNextBlock()?.getDescendants(false) ?? []);
+  const count = block.getDescendants(false).filter((each) => !each.isShadow() && !below.has(each)).length;
+  return count === 1 ? Blockly.Msg['DELETE_BLOCK'] ?? '' :
+    (Blockly.Msg['DELETE_X_BLOCKS'] ?? '').replace('%1', String(count));
+}
+
+function remove(block: Blockly.BlockSvg): void {
+  Blockly.getFocusManager().focusNode(block);
+  block.checkAndDelete();
+}
+
+// ---- how a row looks
+
+function row(icon: string, words: string, keys: string): HTMLElement {
+  const made = document.createElement('div');
+  made.className = 'nepMenuRow';
+  const label = document.createElement('span');
+  label.textContent = words;
+  const picture = document.createElement('i');
+  if (icon) picture.append(iconElement(icon, 18, 1.75));
+  made.append(picture, label);
+  if (keys) {
+    const hint = document.createElement('kbd');
+    hint.textContent = keys;
+    made.append(hint);
+  }
+  return made;
+}
+
+type Option = Blockly.ContextMenuRegistry.ContextMenuOption;
+
+/** No line at an end, and one where all between two is hidden. */
+function withoutSpareLines(options: Option[]): Option[] {
+  const first = options.findIndex((each) => !each.separator);
+  const ends = (at: number) => at + 1 === options.length || options[at + 1]?.separator === true;
+  return options.filter((each, at) => !each.separator || (at > first && !ends(at)));
+}
+
+const registryOf = Blockly.ContextMenuRegistry.prototype;
+const optionsOf = registryOf.getContextMenuOptions;
+registryOf.getContextMenuOptions = function (scope, event) {
+  const options = optionsOf.call(this, scope, event);
+  for (const each of options) {
+    if (each.separator || typeof each.text !== 'string') continue;
+    const {associatedKeyboardShortcut: shortcut} = each;
+    each.text = row(icons.get(each.id) ?? '', each.text, shortcut ? keyWords(shortcut) : '');
+  }
+  return withoutSpareLines(options);
+};

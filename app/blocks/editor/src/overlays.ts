@@ -2,6 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {definitionOf, sensorTypes} from './definitions';
 import {FieldLive} from './fields';
+import {seenInPlaceOf} from './folding';
 import {drawIcon} from './icons';
 import {isUnknown} from './unknown_blocks';
 import {type BlockState, pathOf} from './renderer';
@@ -89,6 +90,7 @@ export class Overlays {
 
   private onEvent(event: Blockly.Events.Abstract): void {
     if (event.type === Blockly.Events.BLOCK_CREATE) this.restore();
+    else if (event instanceof Blockly.Events.BlockChange && event.element === 'collapsed') this.outline();
     else if (event.type === Blockly.Events.BLOCK_CHANGE || event.type === Blockly.Events.TOOLBOX_ITEM_SELECT) {
       this.showLive();
     }
@@ -97,14 +99,19 @@ export class Overlays {
 
   /** Only blocks whose state differs are touched: this runs 30 times a second. */
   private outline(): void {
-    const wanted = new Set([...this.running, ...this.stopped, ...this.errors.keys()]);
+    const wanted = new Map<string, BlockState>();
+    // What counts most comes last: a folded block shows the state of all that is in it.
+    for (const id of this.stopped) wanted.set(this.seen(id), 'stopped');
+    for (const id of this.errors.keys()) wanted.set(this.seen(id), 'error');
+    for (const id of this.running) wanted.set(this.seen(id), 'running');
     for (const id of this.outlined) if (!wanted.has(id)) this.setState(id, null);
-    for (const id of wanted) this.setState(id, this.stateOf(id));
+    for (const [id, state] of wanted) this.setState(id, state);
   }
 
-  private stateOf(id: string): BlockState {
-    if (this.running.has(id)) return 'running';
-    return this.errors.has(id) ? 'error' : 'stopped';
+  /** The block that shows what this one does. */
+  private seen(id: string): string {
+    const block = this.workspace.getBlockById(id);
+    return block ? seenInPlaceOf(block).id : id;
   }
 
   private setState(id: string, state: BlockState | null): void {
@@ -164,8 +171,9 @@ export class Overlays {
       if (!block) continue;
       const bubble = this.bubbles.get(id) ?? this.makeBubble(sentence);
       this.bubbles.set(id, bubble);
-      const at = block.getRelativeToSurfaceXY();
-      bubble.setAttribute('transform', `translate(${at.x + block.width + GAP}, ${at.y + 4})`);
+      const seen = seenInPlaceOf(block);
+      const at = seen.getRelativeToSurfaceXY();
+      bubble.setAttribute('transform', `translate(${at.x + seen.width + GAP}, ${at.y + 4})`);
     }
   }
 

@@ -3,6 +3,7 @@ import * as Blockly from 'blockly/core';
 import {CHECKER} from './checker';
 import {FieldChoice} from './choices';
 import {Culling} from './culling';
+import {foldOnDoubleClick} from './folding';
 import {Functions} from './functions';
 import {visibleSensors, observeFlyout} from './visible_sensors';
 import {Program, holdsAny} from './program';
@@ -55,6 +56,7 @@ export class Tab {
     });
     this.overlays = new Overlays(this.workspace);
     this.functions = new Functions(this.workspace);
+    foldOnDoubleClick(this.workspace);
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.onFound = () => this.overlays.showLive();
     const flyout = this.workspace.getFlyout();

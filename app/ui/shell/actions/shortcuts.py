@@ -65,6 +65,7 @@ FIXED: tuple[Fixed, ...] = (
     Fixed(lazy("Blocks"), lazy("Move the block with the arrow keys; Enter puts it down"), "Ctrl+M"),
     Fixed(lazy("Blocks"), lazy("Move it with all blocks below it"), "Ctrl+Shift+M"),
     Fixed(lazy("Blocks"), lazy("Take the block out of its stack"), "Ctrl+Shift+X"),
+    Fixed(lazy("Blocks"), lazy("Switch the block off, or on again"), "Ctrl+E"),
     Fixed(lazy("Blocks"), lazy("Tidy up the canvas"), "Ctrl+L"),
     Fixed(lazy("Blocks"), lazy("Go to the toolbox"), "Ctrl+B"),
     Fixed(lazy("Blocks"), lazy("Go to the canvas"), "Ctrl+Shift+B"),

@@ -42,6 +42,14 @@ class SupportsUndo(Protocol):
 
 
 @runtime_checkable
+class SupportsBlockEdits(Protocol):
+    """A panel whose blocks can be copied and pasted."""
+
+    def edit_blocks(self, what: str) -> None:
+        """Do "copy", "cut", "paste" or "duplicate", unless the page has the keys itself."""
+
+
+@runtime_checkable
 class SupportsShowBlock(Protocol):
     """A panel that can bring a block into view."""
 
@@ -167,6 +175,12 @@ class BehaviourCommands:
         editor = self._shell.editor()
         if isinstance(editor, SupportsUndo):
             editor.redo()
+
+    def edit_blocks(self, what: str) -> None:
+        """Copy, cut, paste or duplicate blocks, wherever in the Behaviour layout the keys are."""
+        editor = self._shell.editor()
+        if self._shell.showing == "behaviour" and isinstance(editor, SupportsBlockEdits):
+            editor.edit_blocks(what)
 
     def show_block(self, block: str) -> None:
         """Scroll to a block by its id."""

@@ -248,6 +248,7 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("panel", str, lambda do, name: do.shell.open_panel(name) is not None),
     _about("inspect", str, lambda do, topic: do.view.inspect(topic)),
     _about("key", str, lambda do, key: do.view.press(key)),
+    _about("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
     _about("block", str, lambda do, block: do.behaviours.show_block(block)),
     _about("tab", str, lambda do, key: do.behaviours.show_tab(key)),
     _about("tab.close", str, lambda do, key: do.behaviours.close_tab(key)),

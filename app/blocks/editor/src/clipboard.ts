@@ -1,0 +1,169 @@
+// Copying, cutting, pasting and duplicating blocks and notes. What is copied is text on the computer's clipboard, so
+// that it can be pasted in another tab, in another Studio, or sent to somebody. What is pasted lies free and in sight.
+import * as Blockly from 'blockly/core';
+import {withoutTypeChecks} from './checker';
+import {freePlace, inSight, obstacles} from './free_place';
+import {focusedBlock} from './help';
+import {type BlockState, unwrapUnknown, wrapUnknown} from './unknown_blocks';
+
+/** Every text of ours begins so; `app/ui/blockly/bridge.py` looks for it. */
+const MARK = '{"nepStudio":';
+
+interface Copied {
+  nepStudio: 'block' | 'note';
+  state: BlockState;
+}
+
+type Item = Blockly.BlockSvg | Blockly.comments.RenderedWorkspaceComment;
+type Point = Blockly.utils.Coordinate;
+
+/** The computer's clipboard: the page itself may not read it. */
+export interface SystemClipboard {
+  write(text: string): void;
+  read(): Promise<string>;
+}
+
+const FROM_ORIGINAL = 34;
+
+export class Clipboard {
+  /** What was copied here: pasted when the computer's clipboard holds other things by now. */
+  private copied = '';
+  private mouse: {x: number; y: number} | null = null;
+
+  constructor(private readonly system: SystemClipboard) {
+    document.addEventListener('pointermove', (event) => this.mouse = {x: event.clientX, y: event.clientY}, true);
+    document.documentElement.addEventListener('pointerleave', () => this.mouse = null);
+  }
+
+  /** Whether there was something to copy. */
+  copy(item = focusedItem()): boolean {
+    const copied = item && stateOf(item);
+    if (!copied) return false;
+    this.copied = JSON.stringify(copied);
+    this.system.write(this.copied);
+    return true;
+  }
+
+  cut(item = focusedItem()): boolean {
+    if (!item || item.workspace.isFlyout || !item.isDeletable() || !this.copy(item)) return false;
+    if (item instanceof Blockly.BlockSvg) item.checkAndDelete();
+    else inOneStep(() => item.dispose());
+    return true;
+  }
+
+  /** Beside the original. */
+  duplicate(item = focusedItem()): boolean {
+    if (!item || item.workspace.isFlyout) return false;
+    const copied = stateOf(item);
+    if (copied) add(copied, item.workspace, beside(item));
+    return copied !== null;
+  }
+
+  /** At a place of the page, else under the mouse, beside the block that has the keys, or in the middle. */
+  async paste(where: {x: number; y: number} | null = null): Promise<void> {
+    const read = parse(await this.system.read()) ?? parse(this.copied);
+    if (!read) return;
+    const workspace = Blockly.common.getMainWorkspace() as Blockly.WorkspaceSvg;
+    add(read, workspace, where ? toCanvas(workspace, where) : this.wanted(workspace));
+  }
+
+  private wanted(workspace: Blockly.WorkspaceSvg): Point {
+    const block = focusedBlock();
+    const byKeys = Blockly.keyboardNavigationController.getIsActive();
+    if (!byKeys && this.mouse && isCanvas(workspace, this.mouse)) return toCanvas(workspace, this.mouse);
+    if (block && block.workspace === workspace) return beside(block);
+    const {left, right, top, bottom} = inSight(workspace);
+    return new Blockly.utils.Coordinate(left + (right - left) / 3, top + (bottom - top) / 3);
+  }
+}
+
+/** The block or note that has the keys, also by a field or gap of it. */
+export function focusedItem(): Item | null {
+  const node = Blockly.getFocusManager().getFocusedNode();
+  return node instanceof Blockly.comments.RenderedWorkspaceComment ? node : focusedBlock();
+}
+
+function stateOf(item: Item): Copied | null {
+  const data = item.toCopyData() as {blockState?: unknown; commentState?: unknown} | null;
+  if (data?.blockState) return {nepStudio: 'block', state: unwrapUnknown(data.blockState as BlockState)};
+  return data?.commentState ? {nepStudio: 'note', state: data.commentState as BlockState} : null;
+}
+
+/** What is on the clipboard, if it is ours. It may come from anywhere: whatever is in it has still to be made. */
+function parse(text: string): Copied | null {
+  if (!text.startsWith(MARK)) return null;
+  try {
+    const {nepStudio, state} = JSON.parse(text) as Copied;
+    const isOne = ['block', 'note'].includes(nepStudio) && typeof state === 'object' && state !== null;
+    return isOne && (nepStudio === 'note' || typeof state.type === 'string') ? {nepStudio, state} : null;
+  } catch {
+    return null;
+  }
+}
+
+function toCanvas(workspace: Blockly.WorkspaceSvg, {x, y}: {x: number; y: number}): Point {
+  return Blockly.utils.svgMath.screenToWsCoordinates(workspace, new Blockly.utils.Coordinate(x, y));
+}
+
+/** Whether the mouse is over the canvas itself, not over the toolbox or what floats. */
+function isCanvas(workspace: Blockly.WorkspaceSvg, {x, y}: {x: number; y: number}): boolean {
+  const under = document.elementFromPoint(x, y);
+  return under !== null && workspace.getParentSvg().contains(under) && !under.closest('.blocklyFlyout');
+}
+
+/** To the right of the stack that it is in, at its own height. */
+function beside(item: Item): Point {
+  const stack = item instanceof Blockly.BlockSvg ? item.getRootBlock() : item;
+  const {right} = (stack as Blockly.IBoundedElement).getBoundingRectangle();
+  return new Blockly.utils.Coordinate(right + FROM_ORIGINAL, item.getRelativeToSurfaceXY().y);
+}
+
+function inOneStep<T>(change: () => T): T {
+  const group = Blockly.Events.getGroup();
+  if (!group) Blockly.Events.setGroup(true);
+  try {
+    return change();
+  } finally {
+    Blockly.Events.setGroup(group);
+  }
+}
+
+/** Makes it as one step that undo takes back, lets it lie free, and gives it the keys. */
+function add(copied: Copied, workspace: Blockly.WorkspaceSvg, wanted: Point): void {
+  const there = new Set<unknown>([...workspace.getTopBlocks(false), ...workspace.getTopComments()]);
+  const {scrollX, scrollY} = workspace;
+  workspace.hideChaff();
+  const made = inOneStep(() => {
+    try {
+      return layFree(make(copied, workspace, wanted), wanted);
+    } catch (error) {
+      console.warn(`not pasted: ${String(error)}`);
+      for (const each of [...workspace.getTopBlocks(false), ...workspace.getTopComments()]) {
+        if (!there.has(each)) each.dispose();
+      }
+      return null;
+    }
+  });
+  workspace.scroll(scrollX, scrollY);  // more on the canvas is no reason to move what is there
+  if (made) Blockly.getFocusManager().focusNode(made);
+}
+
+function layFree(made: Item, wanted: Point): Item {
+  Blockly.renderManagement.triggerQueuedRenders();
+  const size = (made as Blockly.IBoundedElement).getBoundingRectangle();
+  const others = obstacles(made.workspace, new Set([made]));
+  const place = freePlace(wanted, {width: size.getWidth(), height: size.getHeight()}, others, inSight(made.workspace));
+  made.moveBy(place.x - size.left, place.y - size.top);
+  return made;
+}
+
+function make({nepStudio, state}: Copied, workspace: Blockly.WorkspaceSvg, {x, y}: Point): Item {
+  const {id, ...rest} = {...state, x, y};
+  void id;
+  const how = {recordUndo: true};
+  if (nepStudio === 'note') {
+    return Blockly.serialization.workspaceComments.append(rest, workspace, how) as unknown as Item;
+  }
+  const placed = wrapUnknown(rest as BlockState) as Blockly.serialization.blocks.State;
+  return withoutTypeChecks(() => Blockly.serialization.blocks.append(placed, workspace, how) as Blockly.BlockSvg);
+}

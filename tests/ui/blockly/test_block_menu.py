@@ -1,0 +1,155 @@
+"""The menus of blocks and of the canvas; blocks that are folded up or switched off."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from app.blocks import editor_definitions
+from app.blocks.compiler.compiler import compile_behaviour
+from app.ui.blockly.view import BlocklyView
+from tests.blocks.samples import number, robot, workspace
+from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor, outlined
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+ROWS = "[...document.querySelectorAll('.nepMenuRow')].map(e => e.querySelector('span').textContent)"
+
+
+@pytest.fixture
+def view(qtbot) -> BlocklyView:
+    return editor(qtbot, editor_definitions([robot()]))
+
+
+def wait(id: str, seconds: float = 1) -> dict:
+    return {"type": "control_wait", "id": id, "inputs": {"SECONDS": {"shadow": number(seconds)}}}
+
+
+def program() -> dict:
+    inner = wait("a", 1) | {"next": {"block": wait("b", 2)}}
+    loop = {"type": "control_forever", "id": "loop", "inputs": {"BODY": {"block": inner}}}
+    first = wait("first", 3) | {"next": {"block": loop}}
+    return workspace({"type": "events_started", "id": "start", "x": 60, "y": 60, "next": {"block": first}})
+
+
+@pytest.fixture
+def them(view, person) -> Person:
+    made: Person = person(state=program())
+    view.setFocus()
+    made.wait_for("document.hasFocus()")
+    return made
+
+
+def looked_at(them: Person, name: str) -> None:
+    """A picture for whoever asks for one: NEP_LOOK=FOLDER."""
+    folder = os.environ.get("NEP_LOOK")
+    if folder:
+        QTest.qWait(150)
+        them.view.grab().save(str(Path(folder) / f"{name}.png"))
+
+
+def open_menu(them: Person, id: str) -> list[str]:
+    box = them.box(f"[data-id={id}] > .blocklyPath")
+    at = QPoint(round(box["left"] + 14), round(box["top"] + 20))
+    QTest.mouseClick(them.target, Qt.RightButton, pos=at)
+    them.wait_for("!!document.querySelector('.blocklyContextMenu')")
+    return them.ask(ROWS)
+
+
+def choose(them: Person, id: str, words: str) -> None:
+    rows = open_menu(them, id)
+    assert words in rows
+    script = f"document.querySelectorAll('.blocklyContextMenu .nepMenuRow')[{rows.index(words)}]"
+    them.ask("document.querySelector('[data-test=row]')?.removeAttribute('data-test')")
+    them.ask(f"{script}.setAttribute('data-test', 'row')")
+    them.click("[data-test=row]")
+    them.wait_for("document.querySelector('.blocklyContextMenu') === null")
+
+
+def double_click(them: Person, id: str) -> None:
+    box = them.box(f"[data-id={id}] > .blocklyPath")
+    at = QPoint(round(box["left"] + 60), round(box["top"] + 8))
+    for _ in range(2):
+        QTest.mouseClick(them.target, Qt.LeftButton, pos=at)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_menu_of_a_block_has_rows_for_fingers_and_says_the_keys(view, them, dark):
+    view.set_theme(TOKENS, dark)
+    rows = open_menu(them, "loop")
+    looked_at(them, f"menu-{'dark' if dark else 'light'}")
+    assert rows[:4] == ["Duplicate", "Copy", "Cut", "Paste"]
+    assert {"Fold up", "Switch off", "Help"} <= set(rows)
+    assert rows[-1] == "Delete 3 blocks"
+    heights = (
+        "[...document.querySelectorAll('.blocklyContextMenu .blocklyMenuItem')].map(e => e.offsetHeight)"
+    )
+    assert min(them.ask(heights)) >= 36
+    assert them.ask("document.querySelector('.nepMenuRow kbd').textContent") == "Ctrl+D"
+    assert them.ask("document.querySelectorAll('.nepMenuRow svg').length") == len(rows)
+    them.press(Qt.Key_Escape)
+
+
+def test_the_menu_of_the_canvas(qtbot, them):
+    QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(900, 500))
+    them.wait_for("!!document.querySelector('.blocklyContextMenu')")
+    rows = them.ask(ROWS)
+    looked_at(them, "menu-canvas")
+    assert [row for row in rows if row in {"Paste", "Undo", "Redo", "Tidy up"}] == [
+        "Paste",
+        "Undo",
+        "Redo",
+        "Tidy up",
+    ]
+    them.press(Qt.Key_Down)
+    them.press(Qt.Key_Escape)
+    them.wait_for("document.querySelector('.blocklyContextMenu') === null")
+
+
+def test_a_block_that_is_off_is_skipped_and_the_next_one_runs(qtbot, them):
+    choose(them, "first", "Switch off")
+    them.wait_for("document.querySelector('[data-id=first]').classList.contains('blocklyDisabled')")
+    looked_at(them, "off")
+    made = compile_behaviour(them.newest(), [])
+    assert "wait(3)" not in made.source
+    assert "wait(1)" in made.source
+    assert not made.problems
+    assert "Switch on" in open_menu(them, "first")
+    them.press(Qt.Key_Escape)
+    choose(them, "first", "Switch on")
+    qtbot.waitUntil(lambda: "wait(3)" in compile_behaviour(them.newest(), []).source, timeout=WAIT_MS)
+
+
+def test_a_script_that_is_off_is_grey_as_a_whole(qtbot, them):
+    choose(them, "start", "Switch off")
+    them.wait_for("document.querySelectorAll('.blocklyDisabled').length >= 5")
+    made = compile_behaviour(them.newest(), [])
+    assert "wait(" not in made.source
+    assert not any(each.severity == "error" for each in made.problems)
+    them.view.undo()
+    them.wait_for("document.querySelectorAll('.blocklyDisabled').length", 0)
+
+
+def test_a_double_click_folds_a_block_up_and_it_still_shows_what_happens_in_it(qtbot, view, them):
+    double_click(them, "loop")
+    qtbot.waitUntil(lambda: '"collapsed": True' in str(them.newest()).replace("'", '"'), timeout=WAIT_MS)
+    view.highlight(["b"])
+    them.wait_for(outlined("running"), ["loop"])
+    looked_at(them, "folded")
+    view.set_errors({"b": "The robot does not answer."})
+    view.highlight([])
+    them.wait_for(outlined("error"), ["loop"])
+    them.wait_for("document.querySelector('.nepBubble').getBoundingClientRect().left > 250")
+    double_click(them, "loop")
+    them.wait_for(outlined("error"), ["b"])
+
+
+def test_a_double_click_beside_the_fields_of_a_small_block_does_nothing(them):
+    before = them.newest()
+    double_click(them, "first")
+    assert them.newest() == before

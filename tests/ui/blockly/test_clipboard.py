@@ -1,0 +1,162 @@
+"""Copying and pasting blocks: they lie free, in sight, in any tab, and come from other Studios as text."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
+
+from app.blocks import editor_definitions
+from app.ui.blockly.view import BlocklyView
+from tests.blocks.samples import number, robot, started, workspace
+from tests.ui.blockly_person import WAIT_MS, Person, editor
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+BOXES = """[...document.querySelectorAll('.nepTab:not([hidden]) .blocklyBlockCanvas > .blocklyDraggable')]
+    .map(e => (r => [r.left, r.top, r.right, r.bottom])(e.getBoundingClientRect()))"""
+
+
+@pytest.fixture
+def view(qtbot) -> BlocklyView:
+    return editor(qtbot, editor_definitions([robot()]))
+
+
+def wait_block(id: str, seconds: float = 5) -> dict:
+    return {"type": "control_wait", "id": id, "inputs": {"SECONDS": {"shadow": number(seconds)}}}
+
+
+@pytest.fixture
+def them(view, person) -> Person:
+    QGuiApplication.clipboard().setText("")
+    state = workspace(started(wait_block("w")) | {"id": "start", "x": 60, "y": 60})
+    made: Person = person(state=state)
+    take_the_keys(made)
+    return made
+
+
+def take_the_keys(them: Person) -> None:
+    them.view.setFocus()
+    them.wait_for("document.hasFocus()")
+
+
+def press(them: Person, key: Qt.Key) -> None:
+    them.press(key, Qt.ControlModifier)
+
+
+def types(them: Person) -> list[str]:
+    return sorted(top["type"] for top in them.tops())
+
+
+def apart(boxes: list[list[float]]) -> bool:
+    return all(
+        one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+        for place, one in enumerate(boxes)
+        for other in boxes[place + 1 :]
+    )
+
+
+def test_duplicates_lie_free_beside_the_original_and_in_sight(qtbot, them):
+    them.click("[data-id=w] > .blocklyPath")
+    them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")
+    for count in range(2, 6):
+        press(them, Qt.Key_D)
+        qtbot.waitUntil(lambda count=count: len(them.tops()) == count, timeout=WAIT_MS)
+    boxes = them.ask(BOXES)
+    assert len(boxes) == 5
+    assert apart(boxes)
+    room = them.box(".blocklySvg")
+    assert all(room["left"] < box[0] and box[2] < room["right"] for box in boxes)
+    assert all(room["top"] < box[1] and box[3] < room["bottom"] for box in boxes)
+    assert "next" in them.tops()[0]  # nothing was torn off, nothing was put in between
+
+
+def test_copies_are_pasted_under_the_mouse_and_undone_in_one_step(qtbot, them):
+    them.click("[data-id=w] > .blocklyPath")
+    them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")
+    press(them, Qt.Key_C)
+    qtbot.waitUntil(lambda: QGuiApplication.clipboard().text().startswith('{"nepStudio":"block"'))
+    at = QPoint(700, 400)
+    QTest.mouseMove(them.target, at)
+    them.ask("new Promise(done => requestAnimationFrame(done)) && 0")
+    press(them, Qt.Key_V)
+    qtbot.waitUntil(lambda: types(them) == ["control_wait", "events_started"], timeout=WAIT_MS)
+    box = them.ask(BOXES)[1]
+    assert abs(box[0] - at.x()) < 12
+    assert abs(box[1] - at.y()) < 12
+    assert them.tops()[1]["inputs"]["SECONDS"]["shadow"]["fields"]["NUMBER"] == 5
+    them.view.undo()
+    qtbot.waitUntil(lambda: types(them) == ["events_started"], timeout=WAIT_MS)
+
+
+def test_what_is_cut_in_one_tab_is_pasted_in_another_at_once(qtbot, view, them):
+    view.show_tab("first", them.newest())
+    take_the_keys(them)
+    them.click(".nepTab:not([hidden]) [data-id=w] > .blocklyPath")
+    them.wait_for("!!document.querySelector('.nepTab:not([hidden]) .blocklySelected')")
+    press(them, Qt.Key_X)
+    qtbot.waitUntil(lambda: "next" not in them.tops()[0], timeout=WAIT_MS)
+    view.show_tab("second", workspace())
+    press(them, Qt.Key_V)
+    qtbot.waitUntil(lambda: types(them) == ["control_wait"], timeout=WAIT_MS)
+    view.show_tab("first", workspace())
+    assert types(them) == ["events_started"]
+
+
+def test_keys_that_are_elsewhere_in_the_window_paste_all_the_same(qtbot, view, them):
+    window, other = QWidget(), QLineEdit()
+    qtbot.addWidget(window)
+    column = QVBoxLayout(window)
+    column.addWidget(other)
+    column.addWidget(view)
+    window.resize(1300, 760)
+    window.show()
+    them.click("[data-id=w] > .blocklyPath")
+    them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")
+    other.setFocus()
+    them.wait_for("document.hasFocus()", False)
+    view.edit("copy")
+    them.wait_for("document.hasFocus()")
+    view.edit("paste")  # has the keys now: what it does with them is its own
+    other.setFocus()
+    them.wait_for("document.hasFocus()", False)
+    view.edit("paste")
+    qtbot.waitUntil(lambda: types(them) == ["control_wait", "events_started"], timeout=WAIT_MS)
+    view.setParent(None)
+
+
+def test_text_of_another_studio_is_pasted_and_other_text_is_not(qtbot, them):
+    clipboard = QGuiApplication.clipboard()
+    press(them, Qt.Key_V)
+    clipboard.setText("a shopping list")
+    press(them, Qt.Key_V)
+    clipboard.setText(
+        '{"nepStudio":"block","state":{"type":"control_wait","inputs":{"SECONDS":{"block":7}}}}'
+    )
+    press(them, Qt.Key_V)
+    clipboard.setText('{"nepStudio":"block","state":')
+    press(them, Qt.Key_V)
+    there = {"type": "robot_nao_do_sing", "fields": {"SONG": "la"}}
+    clipboard.setText(json.dumps({"nepStudio": "block", "state": there}, separators=(",", ":")))
+    press(them, Qt.Key_V)
+    qtbot.waitUntil(lambda: "robot_nao_do_sing" in types(them), timeout=WAIT_MS)
+    made = next(top for top in them.tops() if top["type"] == "robot_nao_do_sing")
+    assert made["fields"] == {"SONG": "la"}  # not known here, and kept as it is
+
+
+def test_a_field_that_is_open_pastes_into_its_text(qtbot, them):
+    them.click("[data-id=w] > .blocklyPath")
+    press(them, Qt.Key_C)
+    qtbot.waitUntil(lambda: QGuiApplication.clipboard().text() != "")
+    QGuiApplication.clipboard().setText("12")
+    them.click("[data-id=w] .blocklyEditableField", dx=8, dy=8)
+    them.wait_for("!!document.querySelector('.blocklyHtmlInput')")
+    press(them, Qt.Key_V)
+    them.wait_for("document.querySelector('.blocklyHtmlInput').value", "12")
+    them.press(Qt.Key_Return)
+    assert types(them) == ["events_started"]
