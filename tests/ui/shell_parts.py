@@ -42,6 +42,7 @@ class PlainPanel(PanelWidget):
         self.undone: list[str] = []
         self.flushed = 0
         self.blocks: list[str] = []
+        self.edited: list[Mapping[str, object]] = []
         self.explode = False
         self.filter = QLineEdit()
         column = QVBoxLayout(self)
@@ -51,6 +52,9 @@ class PlainPanel(PanelWidget):
         if self.explode:
             raise ValueError("no such luck")
         self.refreshed += 1
+
+    def edit_variable(self, edit: Mapping[str, object]) -> None:
+        self.edited.append(edit)
 
     def show_topic(self, name: str) -> None:
         self.topics.append(name)

@@ -24,7 +24,7 @@ from app.blocks.model.fields import (
 )
 from app.blocks.model.mutators import InputField
 from app.blocks.model.names import Names
-from app.blocks.model.program import Program
+from app.blocks.model.program import Program, Variable
 from app.blocks.model.template import expression, literal, statements
 from app.blocks.model.workspace import Placed, Workspace, parse_workspace
 from app.blocks.runtime.publishing import moved_by
@@ -156,10 +156,17 @@ class _Compiler:
             actions=actions,
             readings=self._readings,
             labels=self._labels,
+            variables=self._all_variables(),
             problems=self._notes.problems(),
             starts=len(functions),
             absent=self._notes.absent_blocks(),
         )
+
+    def _all_variables(self) -> tuple[Variable, ...]:
+        """The behaviour's variables as they were made, those that no script uses, too."""
+        own, shown = self._shaping.variables, self._workspace.variables
+        names = dict(own) | {id: shown.get(id, id) for id in self._variables}
+        return tuple(Variable(id, name, self._variables.get(id, "")) for id, name in names.items())
 
     # ---- scripts and statements
 

@@ -42,6 +42,7 @@ class Lowering:
     def __init__(self, workspace: Workspace, catalogue: Catalogue, names: Names) -> None:
         """Find the functions, describe their calls in the catalogue."""
         self._catalogue = catalogue
+        self.variables = workspace.variables  # without the inputs of functions
         self._by_id: dict[str, Function] = {}
         for script in workspace.scripts:
             if script[0].type in _GIVES and script[0].enabled:

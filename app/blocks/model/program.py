@@ -29,6 +29,18 @@ class Problem:
 
 
 @dataclass(frozen=True)
+class Variable:
+    """A variable of a behaviour: the editor's ``id``, its ``name``, and what it is called in ``python``.
+
+    Nothing when no script that can start uses it.
+    """
+
+    id: str
+    name: str
+    python: str
+
+
+@dataclass(frozen=True)
 class Program:
     """A behaviour as a program.
 
@@ -37,7 +49,7 @@ class Program:
     there, and those that it moves by publishing on their topics (``moves``); ``sensors`` and ``events`` are
     (robot, name). ``actions`` are what its blocks ask of each robot, None when that can't be told: then it
     may be anything. ``readings`` are the blocks in words ("wait 2 s"), ``labels`` the words that name them
-    ("wait").
+    ("wait"). ``variables`` are the behaviour's: its scripts share them.
     """
 
     name: str
@@ -53,6 +65,7 @@ class Program:
     actions: Mapping[str, tuple[str, ...]] | None = None
     readings: Mapping[str, str] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
+    variables: tuple[Variable, ...] = ()
     problems: tuple[Problem, ...] = ()
     starts: int = 0  # how many scripts something can start
     absent: tuple[str, ...] = ()  # the blocks of robots that are not connected, whether they would run or not
@@ -85,6 +98,7 @@ class Program:
             moves=_texts(saved.get("moves", ())),
             readings=_table(saved["readings"]),
             labels=_table(saved["labels"]),
+            variables=_variables(saved.get("variables", ())),
         )
 
 
@@ -92,6 +106,12 @@ def _texts(saved: object) -> tuple[str, ...]:
     if not isinstance(saved, (list, tuple)):
         raise TypeError("not a list")
     return tuple(str(item) for item in saved)
+
+
+def _variables(saved: object) -> tuple[Variable, ...]:
+    if not isinstance(saved, (list, tuple)):
+        raise TypeError("not a list")
+    return tuple(Variable(str(each["id"]), str(each["name"]), str(each["python"])) for each in saved)
 
 
 def _pairs(saved: object) -> tuple[tuple[str, str], ...]:

@@ -2,14 +2,16 @@
 
 In, one per line: ``{"do": "start", "program": …, "robots": [descriptions], "owners": {robot: node's id},
 "master": …, "name": …, "paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" |
-"stop"}``, ``{"do": "pace", "pace_s": seconds}`` (slow motion), or ``{"do": "robots", "owners": …,
-"guarded": {topic: [robots]}}`` when robots came or were started anew. Out: ``{"is": "ready" | "running" |
-"paused" | "error" | "print" | "ended", …}``. When its input ends, the program ends, and its robots are told.
+"stop"}``, ``{"do": "pace", "pace_s": seconds}`` (slow motion), ``{"do": "variable", "python": name, "value":
+…}`` (a person gives it another value), or ``{"do": "robots", "owners": …, "guarded": {topic: [robots]}}``
+when robots came or were started anew. Out: ``{"is": "ready" | "running" | "paused" | "error" | "print" |
+"variables" | "ended", …}``. When its input ends, the program ends, and its robots are told.
 """
 
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import os
 import queue
@@ -28,12 +30,15 @@ from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.network import Network
 from app.blocks.runtime.publishing import PublishGuard, guarded
 from app.blocks.runtime.runtime import Runtime
+from app.blocks.runtime.variables import VariableWatch
 from app.errors import AppError
 from app.robots.description.description import Robot, parse
 from nep.errors import NepError
 from nep.i18n import _
 
 SAMPLE_S = 1 / 30
+VARIABLES_EVERY = 3
+"""Samples between two looks at the variables: ten looks a second."""
 STOP_ANSWER_S = 1.0
 FLUSH_S = 0.03
 LONGEST_LINE = 2000
@@ -126,6 +131,7 @@ class Run:
         self._out = out
         self._runtime = Runtime(out.print, labels=self._program.labels, readings=self._program.readings)
         self._network: Network | None = None
+        self._variables = VariableWatch({}, ())
         self._began = time.monotonic()
         self._stop_answer_s = STOP_ANSWER_S
         self.set_pace(order)
@@ -185,6 +191,7 @@ class Run:
                 node.log.error("%s", error.sentence)
                 self._out.send("error", block=error.block, sentence=error.sentence)
             self._out.send_printed()
+            self._send_variables()
             elapsed_s = round(time.monotonic() - self._began, 3)
             self._out.send("ended", ok=error is None, elapsed_s=elapsed_s, silent=silent)
             node.close(FLUSH_S if self._stop_answer_s == 0.0 else 2 * STOP_ANSWER_S)
@@ -217,6 +224,7 @@ class Run:
 
     def _begin(self, network: Network) -> None:
         names = self._runtime.namespace() | {"step": partial(self._step, network)}
+        self._variables = VariableWatch(names, self._program.variables)
         code = compile(self._program.runnable, "<behaviour>", "exec")
         exec(code, names)  # noqa: S102 (the compiler's own tree: no text of a file is in it but as a literal)
         self._began = time.monotonic()
@@ -230,10 +238,25 @@ class Run:
         else:
             self._runtime.step(block)
 
+    def put(self, order: Mapping[str, object]) -> None:
+        """A person gives a variable another value."""
+        value = order.get("value")
+        if isinstance(value, (str, int, float)):
+            self._variables.put(str(order.get("python")), value)
+
+    def _send_variables(self) -> None:
+        """Tell the values that have changed."""
+        changes = self._variables.changes()
+        if changes:
+            self._out.send("variables", values=[value.to_json() for value in changes])
+
     def _watch(self) -> None:
         """Tell 30 times a second what runs, when it changed."""
         runtime, saying, before = self._runtime, self._runtime.saying, None
+        looks = itertools.count()
         while not runtime.finished.wait(SAMPLE_S):
+            if next(looks) % VARIABLES_EVERY == 0:
+                self._send_variables()
             now = runtime.scheduler.snapshot()
             words, warning = saying.says(now.blocks), saying.warns(now.blocks)
             self._out.send_printed()
@@ -295,6 +318,8 @@ def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
             run.set_pace(order)
         elif order.get("do") == "robots":
             run.know(order)
+        elif order.get("do") == "variable":
+            run.put(order)
         do = obeyed.get(str(order.get("do")))
         if do is not None:
             do()

@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
+from app.blocks.model.program import Variable
 from app.blocks.runtime.publishing import guarded
+from app.blocks.runtime.variables import VariableValue
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.document import Document
@@ -116,6 +118,10 @@ class Runs:
         self.stopped_blocks: tuple[str, ...] = ()
         self.block_errors: Mapping[str, str] = {}
         self.blocks_revision = 0
+        self.values: Mapping[str, VariableValue] = {}
+        """What the run's variables hold, by their ids; after its end what they held then."""
+        self.values_revision = 0
+        self._variables: Mapping[str, Variable] = {}
 
     # -- what a person does ------------------------------------------------------------------------------
 
@@ -192,6 +198,14 @@ class Runs:
         self.pace_s, self._view = seconds, None
         if self._runner is not None:
             self._runner.set_pace(seconds)
+
+    def put_variable(self, id: str, value: str | float | bool) -> bool:
+        """Give a variable of the program that runs another value; whether it has such a variable."""
+        variable = self._variables.get(id)
+        if self._runner is None or not self.active or variable is None or not variable.python:
+            return False
+        self._runner.put_variable(variable.python, value)
+        return True
 
     def pause(self) -> None:
         """Hold the program; its robots stand still (docs/adr/0006), its clock stands."""
@@ -320,6 +334,8 @@ class Runs:
                 self._on_error(event)
             case "print":
                 self._console.add("info", run.name, event.text)
+            case "variables":
+                self._show_values({**self.values, **{value.id: value for value in event.values}})
             case "ended":
                 self._on_end(event)
 
@@ -398,6 +414,8 @@ class Runs:
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self._wanted, self._told_owners, self._robots_told = asked, owners, self._fleet.revision
         self.kept, self._program_key = frozenset(program.robots), runner.program_key
+        self._variables = {variable.id: variable for variable in program.variables}
+        self._show_values({})
         self._console.leave_out(runner.pid)
         self._edits.ran(document, program)
         last = self._run.last_words
@@ -527,6 +545,10 @@ class Runs:
         self.block_errors = errors
         self._run = replace(self._run, errors=errors)
         self.blocks_revision += 1
+
+    def _show_values(self, values: Mapping[str, VariableValue]) -> None:
+        self.values = values
+        self.values_revision += 1
 
     def _mark(self, running: tuple[str, ...] = (), stopped: tuple[str, ...] = ()) -> None:
         self.running_blocks, self.stopped_blocks = running, stopped

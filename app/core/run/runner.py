@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from app.blocks.model.program import Program
+from app.blocks.runtime.variables import VariableValue
 from app.core.run.child_output import Gate, Output, text_of, texts
 from app.core.run.child_process import MOST_BYTES, ChildProcess, home
 from app.core.run.child_process import child_command as child_command
@@ -21,7 +22,7 @@ from app.errors import RunnerError
 from app.robots.identity import program_of
 from nep.i18n import _, ngettext, number
 
-Kind = Literal["ready", "running", "paused", "error", "print", "ended"]
+Kind = Literal["ready", "running", "paused", "error", "print", "variables", "ended"]
 
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
@@ -50,7 +51,7 @@ class RunnerEvent:
     first is the next one), or failed (error). ``says`` is what happens, in words (for paused: the next block
     in words); ``text`` a printed line, what a person should know (paused), an error's sentence, or at the end
     why it did not end well. ``ok``: it ended, and no block failed. ``silent``: robots that did not answer the
-    program's own stop at its end.
+    program's own stop at its end. ``values`` are the variables whose values have changed.
     """
 
     kind: Kind
@@ -61,6 +62,7 @@ class RunnerEvent:
     ok: bool = True
     elapsed_s: float | None = None
     silent: tuple[str, ...] = ()
+    values: tuple[VariableValue, ...] = ()
 
 
 class Runner:
@@ -154,6 +156,10 @@ class Runner:
         topics = {topic: list(names) for topic, names in guarded.items()}
         self._orders.put({"do": "robots", "owners": dict(owners), "guarded": topics})
 
+    def put_variable(self, python: str, value: str | float | bool) -> None:
+        """Give a variable another value while the program runs; ``python`` is its name there."""
+        self._orders.put({"do": "variable", "python": python, "value": value})
+
     def pause(self) -> None:
         """Hold the program, and what its robots do; the event "paused" says when all stand still."""
         self._orders.put({"do": "pause"})
@@ -222,7 +228,7 @@ class Runner:
             elif event.kind == "ended":
                 self._last = event
                 break
-            elif event.kind == "ready" or gate.passes():
+            elif event.kind in ("ready", "variables") or gate.passes():
                 self._tell(event, gate)
         self._left_out(gate.kept_back, output.strange_bytes)
         child.popen.stdout.close()
@@ -323,6 +329,10 @@ class Runner:
             return RunnerEvent("error", self.run, blocks=first, text=text_of(said, "sentence"), ok=False)
         if kind == "print":
             return RunnerEvent("print", self.run, text=text_of(said, "text"))
+        if kind == "variables":
+            told = said.get("values")
+            made = map(VariableValue.from_json, told if isinstance(told, list) else ())
+            return RunnerEvent("variables", self.run, values=tuple(each for each in made if each is not None))
         if kind == "ended":
             elapsed_s = said.get("elapsed_s")
             return RunnerEvent(

@@ -29,6 +29,8 @@ class BlocklyBridge(QObject):
     answered = Signal(int, str)  # token of a flush, workspace as JSON
     went_wrong = Signal(str)
     block_focused = Signal(bool)  # whether the keys go to a block
+    command_wanted = Signal(str)  # a command of the window about variables
+    values_watched = Signal(str)  # the variables whose values the page shows, as JSON: [id, …]
     sensors_offered = Signal(str)  # the sensors in the open toolbox as JSON: [[robot, sensor], …]
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
@@ -82,6 +84,14 @@ class BlocklyBridge(QObject):
         """The copied blocks on the computer's clipboard; "" for all else, which is not the page's to read."""
         text = QGuiApplication.clipboard().text()
         return text if text.startswith(COPIED) and len(text) <= MOST_COPIED else ""
+
+    def command(self, name: str) -> None:
+        if name.startswith("variable."):
+            self.command_wanted.emit(name)
+
+    @Slot(str)
+    def watches(self, variables: str) -> None:
+        self.values_watched.emit(variables)
 
     @Slot(str)
     def failed(self, sentence: str) -> None:

@@ -31,6 +31,8 @@ class BlocklyView(BlocklyHost):
     history_changed = Signal(bool, bool)  # can undo, can redo: of the shown tab
     block_selected = Signal(str)  # a block's id; "" when nothing is selected
     sensors_offered = Signal(tuple)  # (robot, sensor) of each one that the open toolbox shows
+    command_wanted = Signal(str)  # a command of the window: "variable.rename:ID"
+    values_watched = Signal(tuple)  # the variables (ids) whose values the page shows
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
         super().__init__(parent, language or i18n.language())
@@ -38,12 +40,15 @@ class BlocklyView(BlocklyHost):
         self._definitions: Json = {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
         self._live: Json = {"values": {}, "old": []}
         self._alarms: Json = {}
+        self._values: Json = {}
         self._waiting: dict[int, Callable[[WorkspaceJson], None]] = {}
         self._tokens = 0
         self._bridge.edited.connect(self._edited)
         self._bridge.undo_changed.connect(self.history_changed)
         self._bridge.block_chosen.connect(self.block_selected)
         self._bridge.answered.connect(self._answered)
+        self._bridge.command_wanted.connect(self.command_wanted)
+        self._bridge.values_watched.connect(lambda text: self.values_watched.emit(_texts(text)))
         self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(_pairs(text)))
 
     # -- the program ------------------------------------------------------------------------------
@@ -141,6 +146,16 @@ class BlocklyView(BlocklyHost):
             self._live = live
             self._tell("live", self._live)
 
+    def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None:
+        """Say what the variables hold that the page shows: by id, as `VariableValue.to_json`."""
+        if values != self._values:
+            self._values = dict(values)
+            self._tell("values", self._values)
+
+    def edit_variable(self, edit: Mapping[str, object]) -> None:
+        """Do something with a variable: ``{"do": "new" | "rename" | "delete" | "watch" | "show", …}``."""
+        self._tell("variable", dict(edit))
+
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None:
         """Say in the toolbox what is wrong with robots: name -> status of its dot, words.
 
@@ -216,6 +231,7 @@ class BlocklyView(BlocklyHost):
             done(self._tabs.shown.program)
         self.history_changed.emit(False, False)
         self.sensors_offered.emit(())
+        self.values_watched.emit(())
 
     def _send_tab(self) -> None:
         """Let the page show this tab: its program when the page does not hold it, and what its blocks say."""
@@ -230,6 +246,7 @@ class BlocklyView(BlocklyHost):
         for name, value in tab.states.items():
             self._bridge.tell(name, value)
         self._bridge.tell("live", self._live)
+        self._bridge.tell("values", self._values)
 
     def _show(self, name: str, value: object) -> None:
         states = self._tabs.shown.states
@@ -247,6 +264,10 @@ class BlocklyView(BlocklyHost):
         done = self._waiting.pop(token, None)
         if done is not None:
             done(WorkspaceJson(workspace))
+
+
+def _texts(text: str) -> tuple[str, ...]:
+    return tuple(map(str, json.loads(text)))
 
 
 def _pairs(text: str) -> tuple[tuple[str, str], ...]:

@@ -11,7 +11,7 @@ import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.runtime import child
-from tests.blocks.samples import block, number, say, stack, started, text, workspace, write
+from tests.blocks.samples import block, get, number, say, stack, started, text, workspace, write
 from tests.blocks.wire_robot import WireRobot
 
 LONG_S = 30.0
@@ -209,3 +209,40 @@ def test_without_a_master_it_says_so(running):
     )
     assert "The program can't begin" in str(running.until("error")["sentence"])
     assert running.end() == 1
+
+
+def set_score(value, id=None):
+    return block("variables_set", id, VAR={"id": "score"}, VALUE=value)
+
+
+def values_of(said):
+    """What was told of variables, in its order."""
+    lines = [line["values"] for line in said if line["is"] == "variables"]
+    return [(value["id"], value["text"]) for values in lines for value in values]
+
+
+def test_what_variables_hold_is_told_and_at_the_end_once_more(running, master):
+    saved = workspace(started(set_score(number(7)), set_score(number(8))), variables=("score",))
+    running.start(saved, master=master.address)
+    running.until("ended")
+    assert values_of(running.said)[-1] == ("score", "8")
+
+
+def test_a_person_gives_a_variable_another_value(running, master):
+    saved = workspace(
+        started(
+            set_score(number(7)),
+            block(
+                "control_wait_until",
+                CONDITION=block("values_compare", A=get("score"), B=text("go"), RELATION="=="),
+            ),
+            write(text("gone on")),
+        ),
+        variables=("score",),
+    )
+    running.start(saved, master=master.address)
+    while ("score", "7") not in values_of(running.said):
+        running.until("variables")
+    running.order(do="variable", python="score", value="go")
+    running.until("ended", ok=True)
+    assert {"is": "print", "text": "gone on"} in running.said

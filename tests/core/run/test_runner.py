@@ -12,10 +12,11 @@ import pytest
 
 import nep
 from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.runtime.variables import VariableValue
 from app.core.run import runner as runner_module
 from app.core.run.runner import Runner, RunnerEvent, child_command
 from app.errors import RunnerError
-from tests.blocks.samples import block, number, say, started, text, workspace, write
+from tests.blocks.samples import block, get, number, say, started, text, workspace, write
 from tests.blocks.wire_robot import WireRobot
 
 LONG_S = 30.0
@@ -295,3 +296,20 @@ def test_an_error_has_its_block_and_its_sentence(runner, heard, master):
 def test_a_frozen_studio_is_its_own_child(monkeypatch):
     monkeypatch.setattr(sys, "frozen", True, raising=False)
     assert child_command() == (sys.executable, "--child")
+
+
+def test_the_values_of_variables_come_and_can_be_given(runner, heard, master):
+    same = block("values_compare", A=get("n"), B=number(5), RELATION="==")
+    saved = workspace(
+        started(
+            block("variables_set", VAR={"id": "n"}, VALUE=number(3)),
+            block("control_wait_until", CONDITION=same),
+        ),
+        variables=("n",),
+    )
+    started_runner = runner()
+    started_runner.start(compile_behaviour(saved, []), [], master.address)
+    heard.until("variables", values=(VariableValue("n", "number", "3"),))
+    started_runner.put_variable("n", 5)
+    assert heard.until("ended").ok
+    heard.until("variables", values=(VariableValue("n", "number", "5"),))

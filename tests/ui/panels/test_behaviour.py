@@ -24,6 +24,8 @@ class Editor(QWidget):
     key_pressed = Signal(str)
     recovered = Signal()
     sensors_offered = Signal(tuple)
+    command_wanted = Signal(str)
+    values_watched = Signal(tuple)
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)

@@ -15,6 +15,8 @@ import {type Definitions, type ShownTab, Tabs} from './tabs';
 import {setCssVariables} from './theme';
 import {type Tokens, useTokens} from './tokens';
 import {type Alarm, showAlarms} from './toolbox';
+import {type VariableEdit, askWindow, registerVariableMenu} from './variable_edits';
+import type {VariableValue} from './watched_values';
 import {t, useWords} from './words';
 
 interface Bridge {
@@ -30,6 +32,8 @@ interface Bridge {
   offers(sensors: string): void;
   copy(text: string): void;
   copied(): Promise<string>;
+  command(name: string): void;
+  watches(variables: string): void;
 }
 
 declare const QWebChannel: new (transport: unknown, done: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
@@ -40,6 +44,7 @@ class Editor {
   private readonly help = new HelpCard();
   private readonly clipboard: Clipboard;
   private offered = '[]';
+  private watched = '[]';
   private readonly find = new FindBar(() => this.shown.workspace);
 
   constructor(private readonly bridge: Bridge) {
@@ -54,6 +59,7 @@ class Editor {
       history: (tab, canUndo, canRedo) => ofShown(tab, () => bridge.history(canUndo, canRedo)),
       selected: (tab, id) => ofShown(tab, () => bridge.selected(id)),
       offered: (tab) => ofShown(tab, () => this.tellOffered()),
+      watched: (tab) => ofShown(tab, () => this.tellWatched()),
     });
     new ResizeObserver(() => this.shown.resize()).observe(document.body);
     // A hidden page draws no frames, and Blockly tells of edits only after a frame.
@@ -68,6 +74,8 @@ class Editor {
       if (document.activeElement !== document.body || !(event.ctrlKey || event.metaKey)) return;
       Blockly.ShortcutRegistry.registry.onKeyDown(this.shown.workspace, event);
     });
+    askWindow((command) => bridge.command(command));
+    registerVariableMenu((id) => this.shown.watched.isWatched(id));
     let told = false;
     const tellBlock = () => queueMicrotask(() => {
       const has = focusedBlock() !== null;
@@ -103,6 +111,8 @@ class Editor {
     stopped: (ids: string[]) => this.shown.overlays.markStopped(ids),
     errors: (errors: Record<string, string>) => this.shown.overlays.setErrors(errors),
     absent: (ids: string[]) => this.shown.overlays.setAbsent(ids),
+    values: (values: Record<string, VariableValue>) => this.shown.watched.show(values),
+    variable: (it: VariableEdit) => this.shown.editVariable(it),
     alarms: (alarms: Record<string, Alarm>) => showAlarms(alarms),
     live: (it: {values: Record<string, string>; old: string[]}) => this.shown.overlays.setLive(it.values, it.old),
     flush: (token: number) => this.bridge.flushed(token, this.shown.program.flush()),
@@ -126,6 +136,13 @@ class Editor {
     this.tabs.show(it);
     this.find.again();
     this.tellOffered();
+    this.tellWatched();
+  }
+
+  /** The window tells what these variables hold. */
+  private tellWatched(): void {
+    const watched = JSON.stringify(this.shown.watched.ids);
+    if (watched !== this.watched) this.bridge.watches(this.watched = watched);
   }
 
   /** The window watches the sensors in the toolbox as long as it shows them. */

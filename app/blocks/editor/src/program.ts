@@ -99,6 +99,12 @@ export class Program {
     return json;
   }
 
+  /** Something of the behaviour has changed that is no edit of its blocks, and that undo leaves alone. */
+  touched(): void {
+    window.clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => this.flush(), QUIET_MS);
+  }
+
   /** Puts the program's top left corner near the workspace's. */
   goHome(): void {
     const blocks = this.workspace.getTopBlocks(false);

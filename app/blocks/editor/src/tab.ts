@@ -11,6 +11,8 @@ import {RENDERER} from './renderer';
 import {Overlays} from './overlays';
 import {makeTheme} from './theme';
 import {Toolbox} from './toolbox';
+import {type VariableEdit, editVariable, registerVariableButtons} from './variable_edits';
+import {WatchedValues} from './watched_values';
 
 const SCALE = 0.8;
 
@@ -18,6 +20,8 @@ export interface TabListener {
   changed(tab: Tab, json: string): void;
   history(tab: Tab, canUndo: boolean, canRedo: boolean): void;
   selected(tab: Tab, id: string): void;
+  /** Other variables are shown beside the blocks. */
+  watched(tab: Tab): void;
   /** Other sensors may be shown in the toolbox. */
   offered(tab: Tab): void;
 }
@@ -26,6 +30,7 @@ export class Tab {
   readonly workspace: Blockly.WorkspaceSvg;
   readonly program: Program;
   readonly overlays: Overlays;
+  readonly watched: WatchedValues;
   private readonly functions: Functions;
   private readonly culling: Culling;
   key = '';
@@ -61,8 +66,13 @@ export class Tab {
     if (toolbox instanceof Toolbox) toolbox.onFound = () => this.overlays.showLive();
     const flyout = this.workspace.getFlyout();
     if (flyout) observeFlyout(flyout, () => listener.offered(this));
-    this.workspace.registerButtonCallback('CREATE_VARIABLE', (button) =>
-      Blockly.Variables.createVariableButtonHandler(button.getTargetWorkspace()));
+    registerVariableButtons(this.workspace);
+    this.watched = new WatchedValues(this.workspace, this.frame, {
+      changed: () => {
+        this.program.touched();
+        listener.watched(this);
+      },
+    });
   }
 
   /** Shows another program here, with an empty history. */
@@ -191,6 +201,11 @@ export class Tab {
       this.workspace.setScale(1);
       this.workspace.scrollCenter();
     }
+  }
+
+  editVariable(edit: VariableEdit): void {
+    if (edit.do === 'watch' && edit.id) this.watched.toggle(edit.id);
+    else editVariable(this.workspace, edit);
   }
 
   reveal(id: string): void {

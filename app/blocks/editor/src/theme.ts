@@ -47,9 +47,10 @@ export function makeTheme(): Blockly.Theme {
   });
 }
 
-/** Puts every colour role on the page as `--nep-<role>`. */
+/** Puts every colour role on the page as `--nep-<role>`, and those of blocks as `--nep-block-<category>`. */
 export function setCssVariables(dark: boolean): void {
   const style = document.documentElement.style;
   for (const [role, value] of roles()) style.setProperty(`--nep-${role}`, value);
+  for (const [name, {primary}] of categories()) style.setProperty(`--nep-block-${name}`, primary);
   style.setProperty('color-scheme', dark ? 'dark' : 'light');
 }

@@ -47,6 +47,8 @@ class Editor(Protocol):
     key_pressed: SignalInstance
     recovered: SignalInstance
     sensors_offered: SignalInstance
+    command_wanted: SignalInstance
+    values_watched: SignalInstance
 
     @property
     def is_ready(self) -> bool: ...
@@ -63,6 +65,8 @@ class Editor(Protocol):
     def set_absent(self, ids: Sequence[str]) -> None: ...
     def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None: ...
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None: ...
+    def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None: ...
+    def edit_variable(self, edit: Json) -> None: ...
     def undo(self) -> None: ...
     def edit(self, what: str) -> None: ...
     def open_find(self) -> None: ...
@@ -118,6 +122,7 @@ class BehaviourPanel(PanelWidget):
         self._watches: dict[str, Watch] = {}
         self._sensors: tuple[tuple[str, str], ...] = ()
         self._offered: tuple[tuple[str, str], ...] = ()  # in the toolbox, while it is open
+        self._watched: tuple[str, ...] = ()  # the variables whose values the page shows
         self._ticks = 0
 
     def replaces_title(self) -> QWidget:
@@ -147,6 +152,11 @@ class BehaviourPanel(PanelWidget):
         alarms = alarms_of(self.session.fleet.links)
         if self._new("alarms", alarms):
             self.editor.set_alarms(alarms)
+        if self._new("values", (runs.values_revision, mine, self._watched)):
+            values = runs.values if mine else {}
+            self.editor.set_variable_values(
+                {id: values[id].to_json() for id in self._watched if id in values}
+            )
         if self._ticks % LIVE_EVERY == 0:
             self._show_live()
         self.waiting.tell(ready=self.editor.is_ready)
@@ -186,6 +196,8 @@ class BehaviourPanel(PanelWidget):
         editor.history_changed.connect(self._history)
         editor.key_pressed.connect(self._key)
         editor.sensors_offered.connect(self._offer)
+        editor.command_wanted.connect(self.context.run)
+        editor.values_watched.connect(self._watch_variables)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
         if isinstance(editor, QWidget):
             had_focus = self.hasFocus()
@@ -214,6 +226,20 @@ class BehaviourPanel(PanelWidget):
     def _offer(self, sensors: tuple[tuple[str, str], ...]) -> None:
         self._offered = sensors
         self._show_live()
+
+    def _watch_variables(self, ids: tuple[str, ...]) -> None:
+        self._watched = ids
+
+    def edit_variable(self, edit: Mapping[str, object]) -> None:
+        """Make, rename or delete a variable, or show it; the blocks come to the front."""
+        self.set_mode("blocks")
+        if self.editor is not None:
+            if edit.get("do") == "undo":
+                self.editor.undo()
+            elif edit.get("do") == "show":
+                self.editor.show_block(str(edit.get("id")))
+            else:
+                self.editor.edit_variable(edit)
 
     def _show_live(self) -> None:
         """What sensor blocks say now: "84 %" on the battery, in the behaviour and in the open toolbox."""

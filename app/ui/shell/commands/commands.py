@@ -14,6 +14,7 @@ from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.robots import RobotCommands
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS, Handlers
+from app.ui.shell.commands.variables import VariableCommands
 from app.ui.shell.commands.view import ViewCommands
 from app.ui.shell.documents import DocumentController
 from app.ui.shell.stop_keys import StopKeys
@@ -34,7 +35,10 @@ class Commands:
         self.robots = RobotCommands(shell, session, self.files, self.behaviours.undo)
         self.view = ViewCommands(shell, session, self.files, keys)
         self.shortcuts = keys
-        self._do = Handlers(session, shell, self.files, self.behaviours, self.robots, self.view)
+        self.variables = VariableCommands(shell, session, self.files)
+        self._do = Handlers(
+            session, shell, self.files, self.variables, self.behaviours, self.robots, self.view
+        )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.why_not, keys)
         menus = self.actions.fill(shell.menu_bar, MENUS)

@@ -16,6 +16,7 @@ from app.ui.shell.commands.behaviours import BehaviourCommands, TabPlace
 from app.ui.shell.commands.freeze import freezable
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
 from app.ui.shell.commands.shell import START, Shell
+from app.ui.shell.commands.variables import VariableCommands
 from app.ui.shell.commands.view import TEXT_STEP, ViewCommands
 from app.ui.shell.documents import DocumentController
 from app.ui.theme.theme import TEXT_PERCENT
@@ -37,6 +38,7 @@ class Handlers:
     session: Session
     shell: Shell
     files: DocumentController
+    variables: VariableCommands
     behaviours: BehaviourCommands
     robots: RobotCommands
     view: ViewCommands
@@ -149,6 +151,10 @@ COMMANDS: tuple[C, ...] = (
       ("Ctrl+F",), "search", above=True),
     C("blocks.search", lazy("Find a block to add"), lambda do: do.behaviours.find_blocks(to_add=True),
       "Edit"),
+    C("variable.new", lazy("New variable"), lambda do: do.variables.new(is_list=False), "Edit",
+      icon="variable", above=True),
+    C("variable.new_list", lazy("New list"), lambda do: do.variables.new(is_list=True), "Edit",
+      icon="list-plus"),
     C("palette.open", lazy("Find a command or panel"), lambda do: do.view.open_palette(), "View", ("Ctrl+K",),
       "search", in_palette=False),
     # with Option (Alt) a Mac types signs, and Cmd+Tab is the system's
@@ -250,6 +256,11 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("key", str, lambda do, key: do.view.press(key)),
     _about("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
     _about("block", str, lambda do, block: do.behaviours.show_block(block)),
+    _about("variable.rename", str, lambda do, id: do.variables.ask_other_name(id)),
+    _about("variable.delete", str, lambda do, id: do.variables.delete(id)),
+    _about("variable.watch", str, lambda do, id: do.variables.watch(id)),
+    _about("variable.find", str, lambda do, id: do.variables.find(id)),
+    _about("variable.put", str, lambda do, id: do.variables.put(id)),
     _about("tab", str, lambda do, key: do.behaviours.show_tab(key)),
     _about("tab.close", str, lambda do, key: do.behaviours.close_tab(key)),
     _about("tab.close_others", str, lambda do, key: do.behaviours.close_other_tabs(key)),

@@ -44,7 +44,7 @@ class NameSheet(Overlay):
         for widget in (self.heading, self.field, self.wrong):
             column.addWidget(widget)
         column.addLayout(row)
-        self.field.textEdited.connect(lambda _text: self._complain(""))
+        self.field.textEdited.connect(self._typed)
         self.button.clicked.connect(self._done)
 
     def ask(
@@ -63,7 +63,7 @@ class NameSheet(Overlay):
         self.field.setText(name)
         self.field.selectAll()
         self.button.set_word(verb)
-        self._complain("")
+        self._typed(name)
         self.open()
 
     def first(self) -> QWidget:
@@ -89,6 +89,13 @@ class NameSheet(Overlay):
         self.place()
         if sentence:
             paint.announce(self.wrong, sentence)
+
+    def _typed(self, text: str) -> None:
+        """Say at once why a name can't be; an empty field is only not done yet."""
+        name = text.strip()
+        sentence = self._refusal(name) if name else ""
+        self._complain(sentence)
+        self.button.setEnabled(not sentence and bool(name or not self._refusal("")))
 
     def _done(self) -> None:
         name = self.field.text().strip()

@@ -68,7 +68,7 @@ BEHAVIOUR = Layout(
     "blocks",
     "comfortable",
     (
-        DockColumn(0, ((("behaviour",), 626), (("problems",), 124))),
+        DockColumn(0, ((("behaviour",), 626), (("problems", "variables"), 124))),
         DockColumn(
             384,
             ((("robot",), 327), (("camera",), 275), (("sensors",), 140), (("health",), 190)),
@@ -77,8 +77,8 @@ BEHAVIOUR = Layout(
     ),
     (
         Fold("robot", ("camera",), below_width=1280),
-        Fold("sensors", ("problems",), below_height=560),
-        Fold("robot", ("sensors", "problems"), below_height=400),
+        Fold("sensors", ("problems", "variables"), below_height=560),
+        Fold("robot", ("sensors", "problems", "variables"), below_height=400),
     ),
     {
         "robots": "behaviour",
@@ -105,7 +105,14 @@ DEVELOPER = Layout(
         Fold("topics", ("inspector",), below_width=1280),
         Fold("image", ("console",), below_height=400),
     ),
-    {"robots": "topics", "doctor": "topics", "robot": "image", "camera": "image", "health": "console"},
+    {
+        "robots": "topics",
+        "doctor": "topics",
+        "robot": "image",
+        "camera": "image",
+        "health": "console",
+        "variables": "console",
+    },
 )
 LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
 

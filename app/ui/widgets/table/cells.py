@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QHeaderView, QStyle, QStyledItemDelegate, QStyleOp
 from app.ui.theme.icons import paint_icon, paint_icon_again
 from app.ui.theme.theme import Theme
 from app.ui.widgets.indicators import SPARK, paint_sparkline
+from app.ui.widgets.paint import box as paint_box
 from app.ui.widgets.table.model import Cell, Column, Order
 from nep.i18n import _
 
@@ -126,6 +127,10 @@ class CellDelegate(QStyledItemDelegate):
             top = box.center().y() - ICON / 2
             paint_icon_again(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
             x += ICON + 5.0
+        if cell.tint and text:
+            high = metrics.height() + 2
+            ground = QRectF(x - 4, box.center().y() - high / 2, advance + 8, high)
+            paint_box(painter, ground, theme.radius("key"), theme.colour(cell.tint))
         painter.setFont(font)
         painter.setPen(colour)
         painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)

@@ -27,7 +27,8 @@ class Cell:
     """What one cell shows; ``role`` is its colour's role, ``chip`` a state word behind the text.
 
     Text that does not fit is shortened at its end, or in its ``middle``. ``curve`` are values to draw as a
-    sparkline in place of the text, ``indent`` pixels to stand further in.
+    sparkline in place of the text, ``indent`` pixels to stand further in, ``tint`` the role of a box behind
+    the text.
     """
 
     text: str = ""
@@ -40,6 +41,7 @@ class Cell:
     middle: bool = False
     curve: Sequence[float] = ()
     indent: int = 0
+    tint: str = ""
 
 
 @dataclass(frozen=True, slots=True)

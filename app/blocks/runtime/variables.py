@@ -1,0 +1,180 @@
+"""The variables of a program as people see them while it runs: short words, however large the values are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, cast
+
+from app.blocks.model.program import Variable
+from app.blocks.runtime import values
+from nep.i18n import _
+
+ValueKind = Literal["number", "text", "boolean", "list", "unknown", "other"]
+
+LONGEST_TEXT = 200
+LONGEST_ITEM = 80
+MOST_ITEMS = 100
+MOST_INSIDE = 20
+"""So many parts of a message or of a list in a list are put into words."""
+MOST_CHARACTERS = 200_000
+"""So much is told at once; what is left comes with the next look."""
+_DIGITS_BITS = 600
+"""A whole number with more bits than this is told by its length: to write it out could take seconds."""
+_CUT = "…"
+
+
+@dataclass(frozen=True)
+class VariableValue:
+    """What a variable holds: ``text`` in short, and of a list the first ``items`` of ``length``."""
+
+    id: str
+    kind: ValueKind
+    text: str
+    items: tuple[str, ...] = ()
+    length: int = 0
+
+    def to_json(self) -> dict[str, object]:
+        """As a line between processes holds it."""
+        return {
+            "id": self.id,
+            "kind": self.kind,
+            "text": self.text,
+            "items": list(self.items),
+            "length": self.length,
+        }
+
+    @classmethod
+    def from_json(cls, told: object) -> VariableValue | None:
+        """What `to_json` wrote; None when it is something else. No text is longer than it may be."""
+        if not isinstance(told, Mapping):
+            return None
+        items, length = told.get("items"), told.get("length")
+        kind = str(told.get("kind"))
+        known = kind in ("number", "text", "boolean", "list", "unknown", "other")
+        return cls(
+            str(told.get("id"))[:LONGEST_TEXT],
+            cast("ValueKind", kind) if known else "other",
+            str(told.get("text", ""))[: LONGEST_TEXT + 1],
+            tuple(str(each)[: LONGEST_ITEM + 1] for each in items[:MOST_ITEMS])
+            if isinstance(items, list)
+            else (),
+            length if isinstance(length, int) else 0,
+        )
+
+
+class VariableWatch:
+    """Finds what has changed in a program's variables; the program itself does nothing for it."""
+
+    def __init__(self, names: dict[str, object], variables: Sequence[Variable]) -> None:
+        """``names`` are the program's own, in which its scripts put values meanwhile."""
+        self._names = names
+        self._variables = {variable.python: variable for variable in variables if variable.python}
+        self._seen: dict[str, object] = {}
+        self._told: dict[str, VariableValue] = {}
+
+    def changes(self) -> list[VariableValue]:
+        """The variables whose values look otherwise than at the last look, at first all."""
+        found, characters = [], 0
+        for python, variable in self._variables.items():
+            if characters > MOST_CHARACTERS:
+                break
+            value = self._names.get(python)
+            if python in self._told and self._is_same(python, value):
+                continue
+            try:
+                told = brief(variable.id, value)
+            except RuntimeError:
+                continue  # a script changes it at this moment: the next look sees it
+            self._seen[python] = _kept(value)
+            if told != self._told.get(python):
+                self._told[python] = told
+                found.append(told)
+                characters += len(told.text) + sum(map(len, told.items))
+        return found
+
+    def put(self, python: str, value: str | float | bool) -> None:
+        """A person gives a variable of the program another value; any other name is left alone."""
+        if python in self._variables:
+            self._names[python] = value
+
+    def _is_same(self, python: str, value: object) -> bool:
+        """Whether nothing can have changed. What holds other things is looked at each time."""
+        seen = self._seen.get(python)
+        if isinstance(value, list):
+            return isinstance(seen, tuple) and seen == _kept(value) and all(map(_is_plain, seen[1]))
+        return seen is value and _is_plain(value)
+
+
+def _kept(value: object) -> object:
+    """What can be compared later with what is there then."""
+    return (len(value), tuple(value[:MOST_ITEMS])) if isinstance(value, list) else value
+
+
+def _is_plain(value: object) -> bool:
+    return value is None or isinstance(value, (str, int, float))
+
+
+def brief(id: str, value: object) -> VariableValue:
+    """A value in short. RuntimeError when somebody changes it meanwhile."""
+    if value is None:
+        return VariableValue(id, "unknown", _("not known"))
+    if isinstance(value, (list, tuple)):
+        items = tuple(words(each, LONGEST_ITEM) for each in value[:MOST_ITEMS])
+        return VariableValue(id, "list", words(value, LONGEST_TEXT), items, len(value))
+    kind: ValueKind = "other"
+    if isinstance(value, bool):
+        kind = "boolean"
+    elif isinstance(value, (int, float)):
+        kind = "number"
+    elif isinstance(value, str):
+        kind = "text"
+    return VariableValue(id, kind, words(value, LONGEST_TEXT))
+
+
+def words(value: object, most: int) -> str:
+    """A value as text of so many characters at most; no part of it is read that is not shown."""
+    if isinstance(value, str):
+        return _cut(value[: most + 1], most)
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > _DIGITS_BITS:
+        about = round(value.bit_length() * 0.30103)
+        return _("a number with about {count} digits").format(count=about)
+    if isinstance(value, (list, tuple, Mapping)):
+        parts: list[str] = []
+        left = most
+        for part in _parts(value, 0):
+            parts.append(part)
+            left -= len(part)
+            if left < 0:
+                break
+        return _cut("".join(parts), most)
+    return _cut(values.text(value), most)
+
+
+def _parts(value: object, depth: int) -> Iterator[str]:
+    """The text of a value, piece by piece: whoever has enough does not ask for more."""
+    if isinstance(value, Mapping):
+        yield from _inside("{", "}", ((f"{key}: ", each) for key, each in value.items()), depth)
+    elif isinstance(value, (list, tuple)):
+        yield from _inside("[", "]", (("", each) for each in value), depth)
+    else:
+        yield words(value, LONGEST_ITEM)
+
+
+def _inside(begin: str, end: str, parts: Iterator[tuple[str, object]], depth: int) -> Iterator[str]:
+    if depth >= MOST_INSIDE:
+        yield _CUT
+        return
+    yield begin
+    for place, (name, each) in enumerate(parts):
+        yield (", " if place else "") + name[:LONGEST_ITEM]
+        if place >= MOST_ITEMS:
+            yield _CUT
+            break
+        yield from _parts(each, depth + 1)
+    yield end
+
+
+def _cut(text: str, most: int) -> str:
+    text = text.replace("\n", " ")
+    return text if len(text) <= most else text[: most - 1] + _CUT

@@ -1,0 +1,281 @@
+"""Variables: the names of the behaviour and what they hold, while it runs and when it has ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtGui import QAction, QKeyEvent
+from PySide6.QtWidgets import QVBoxLayout
+
+from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.table_panel import TablePanel, TableWords
+from app.ui.widgets import EmptyAction, IconButton, label
+from app.ui.widgets.menus import Menu
+from app.ui.widgets.table.model import Cell, Column, Order, TableModel
+from app.ui.widgets.table.view import TableView
+from nep.i18n import _, lazy, ngettext
+
+if TYPE_CHECKING:
+    from app.blocks.model.program import Variable
+    from app.blocks.runtime.variables import VariableValue
+
+WORDS = TableWords(
+    title=lazy("Variables"),
+    filter=lazy("Filter variables"),
+    nothing_fits=lazy("No variable has these words"),
+    clear_the_filter=lazy("Clear the filter to see all variables."),
+)
+FRESH_S = 0.8
+"""How long a new value is marked."""
+INDENT = 19
+ICONS = {"number": "hash", "text": "quote", "boolean": "toggle-left", "list": "list", "other": "braces"}
+
+
+@dataclass(frozen=True, slots=True)
+class VariableRow:
+    """A variable, or below a list one of its items, counted from 1; no ``value`` before the first run."""
+
+    variable: Variable
+    value: VariableValue | None
+    opened: bool = False
+    item: int = 0
+    fresh: bool = False
+    over: bool = False
+
+    @property
+    def key(self) -> str:
+        """Names the row for ever."""
+        return f"{self.variable.id} {self.item}"
+
+    @property
+    def words(self) -> str:
+        """What it holds, in short."""
+        if self.value is None:
+            return ""
+        if self.item:
+            return self.value.items[self.item - 1]
+        if self.value.kind != "list" or not self.value.length:
+            return self.value.text if self.value.kind != "list" else _("empty")
+        count = ngettext("{count} item", "{count} items", self.value.length).format(count=self.value.length)
+        return count if self.opened else f"{count}: {', '.join(self.value.items)}"
+
+
+def name_cell(row: VariableRow) -> Cell:
+    """The variable's name with what kind of thing it holds; a list with its arrow."""
+    if row.item:
+        return Cell(str(row.item), role="textTertiary", indent=INDENT)
+    kind = row.value.kind if row.value is not None else ""
+    if kind == "list":
+        icon: str | None = "chevron-down" if row.opened else "chevron-right"
+    else:
+        icon = ICONS.get(kind, "variable")
+    return Cell(row.variable.name, icon)
+
+
+def value_cell(row: VariableRow) -> Cell:
+    """What it holds, marked while that is new; grey when the behaviour has ended."""
+    if row.fresh and not row.item:
+        return Cell(row.words, role="changed", tint="changedTint")
+    return Cell(row.words, role="textSecondary" if row.over else "text")
+
+
+COLUMNS: tuple[Column[VariableRow], ...] = (
+    Column("name", lazy("Name"), 150, name_cell, lambda row: row.variable.name.casefold()),
+    Column(
+        "value", lazy("Value"), 160, value_cell, stretch=True,
+        tip=lambda row: row.value.text if row.value is not None and not row.item else row.words,
+    ),
+)  # fmt: skip
+
+
+def rows_of(
+    variables: Sequence[Variable],
+    values: Mapping[str, VariableValue],
+    opened: Collection[str],
+    order: Order[VariableRow],
+    *,
+    fresh: Collection[str] = (),
+    over: bool = False,
+) -> list[VariableRow]:
+    """The variables in their order, and below each list that is ``opened`` (ids) its first items."""
+    rows: list[VariableRow] = []
+    heads = [
+        VariableRow(each, values.get(each.id), each.id in opened, fresh=each.id in fresh, over=over)
+        for each in variables
+    ]
+    for head in order.sort(heads):
+        rows.append(head)
+        if head.opened and head.value is not None:
+            rows += [
+                VariableRow(head.variable, head.value, item=number, over=over)
+                for number in range(1, len(head.value.items) + 1)
+            ]
+    return rows
+
+
+class VariablesPanel(TablePanel[VariableRow]):
+    """The table of variables; what is done with one is in its menu."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, WORDS, "variable")
+        self.clock: Callable[[], float] = time.monotonic
+        self.add = IconButton(self.theme, "plus", _("New variable"), size=26)
+        self.add.clicked.connect(lambda: context.run("variable.new"))
+        self.when = label("", "body", role="textSecondary")
+        self.header = [self.when, self.filter, self.add]
+        self.table.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.table.customContextMenuRequested.connect(self._show_menu)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.pages, 1)
+        column.addWidget(self.line)
+        column.addWidget(self.foot)
+        self.line.hide()
+        self.foot.hide()
+        self._opened: set[str] = set()
+        self._variables: tuple[Variable, ...] = ()
+        self._seen: tuple[object, ...] = ()
+        self._values: Mapping[str, VariableValue] = {}
+        self._fresh: dict[str, float] = {}  # variables whose value is new, and since when
+
+    def make_model(self) -> TableModel[VariableRow]:
+        return TableModel(COLUMNS, lambda row: row.key)
+
+    def make_table(self, model: TableModel[VariableRow]) -> TableView[VariableRow]:
+        table = _VariableTable(self.theme, model, "")
+        table.fold_wanted.connect(self._fold)
+        table.rename_wanted.connect(lambda key: self._about("variable.rename", key))
+        table.delete_wanted.connect(lambda key: self._about("variable.delete", key))
+        return table
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        runs, document = self.session.runs, self.session.document
+        program = document.newest()
+        if program is None:
+            return
+        mine = runs.document is document
+        now = self.clock()
+        values = runs.values if mine else {}
+        seen = (document.key, program.variables, runs.values_revision if mine else -1, mine and runs.active)
+        faded = [id for id, since in self._fresh.items() if now - since >= FRESH_S]
+        for id in faded:
+            del self._fresh[id]
+        if seen == self._seen and not faded:
+            return
+        if seen[:1] == self._seen[:1] and mine and runs.active:
+            self._fresh.update({id: now for id, value in values.items() if self._values.get(id) != value})
+        self._seen, self._variables, self._values = seen, program.variables, values
+        self.rebuild()
+
+    def rebuild(self) -> None:
+        words = self.filter_words()
+        found = [each for each in self._variables if all(word in each.name.casefold() for word in words)]
+        runs = self.session.runs
+        over = not (runs.active and runs.document is self.session.document)
+        self.model.set_rows(
+            rows_of(found, self._values, self._opened, self.table.order, fresh=self._fresh, over=over)
+        )
+        self.filter.setVisible(len(self._variables) > 0)
+        self.when.setText(self._when(over=over))
+        self.table.tell_visible_changed()
+        self.show_table(bool(found), bool(words))
+
+    def _when(self, *, over: bool) -> str:
+        if not self._variables or not self._values:
+            return ""
+        return _("When it ended") if over else _("Now")
+
+    def show_table(self, any_rows: bool, filtered: bool) -> None:
+        if any_rows or filtered:
+            super().show_table(any_rows, filtered)
+            self.doctor.hide()
+        else:  # whether there is a master says nothing of variables
+            self.pages.setCurrentIndex(1)
+            self.say_empty()
+
+    def say_empty(self) -> None:
+        self.empty.say(
+            _("No variables yet"),
+            _("A variable keeps a number, a text or a list under a name. Here you see what it holds."),
+            "variable",
+        )
+        new = EmptyAction(_("New variable"), lambda: self.context.run("variable.new"), "plus", primary=True)
+        self.empty.set_actions([new])
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def open_row(self, key: str) -> None:
+        row = self.model.row_at(self.model.index_of(key))
+        if row is not None and row.value is not None and row.value.kind == "list" and not row.item:
+            self._fold(key, row.variable.id not in self._opened)
+
+    def _fold(self, key: str, opened: bool) -> None:
+        row = self.model.row_at(self.model.index_of(key))
+        if row is None or (opened and row.item):
+            return
+        (self._opened.add if opened else self._opened.discard)(row.variable.id)
+        self.rebuild()
+        self.table.choose(VariableRow(row.variable, row.value).key)
+
+    def _about(self, command: str, key: str) -> None:
+        row = self.model.row_at(self.model.index_of(key))
+        if row is not None:
+            self.context.run(f"{command}:{row.variable.id}")
+
+    def menu_of(self, key: str) -> Menu | None:
+        """What can be done with the variable of this row."""
+        row = self.model.row_at(self.model.index_of(key))
+        if row is None:
+            return None
+        menu = Menu(self.theme, self)
+        runs = self.session.runs
+        running = runs.active and runs.document is self.session.document
+        for words, icon, command, possible in (
+            (_("Show beside the blocks"), "eye", "variable.watch", True),
+            (_("Show where it is used"), "search", "variable.find", bool(row.variable.python)),
+            (_("Give it another value"), "pencil", "variable.put", running and bool(row.variable.python)),
+            (_("Rename"), "text-cursor-input", "variable.rename", True),
+            (_("Delete"), "trash-2", "variable.delete", True),
+        ):
+            action = QAction(self.theme.icon(icon), words, menu)
+            action.setEnabled(possible)
+            action.triggered.connect(lambda _on=False, command=command: self._about(command, key))
+            menu.addAction(action)
+        return menu
+
+    def _show_menu(self, at: QPoint) -> None:
+        row = self.model.row_at(self.table.indexAt(at))
+        menu = self.menu_of(self.model.key_of(row)) if row is not None else None
+        if menu is not None:
+            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            menu.popup(self.table.viewport().mapToGlobal(at))
+
+
+class _VariableTable(TableView[VariableRow]):
+    """Right opens a list, Left closes it; F2 renames, Delete deletes."""
+
+    fold_wanted = Signal(str, bool)
+    rename_wanted = Signal(str)
+    delete_wanted = Signal(str)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        key = self.chosen_key()
+        if key is not None and event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
+            self.keyboard = True
+            self.fold_wanted.emit(key, event.key() == Qt.Key.Key_Right)
+        elif key is not None and event.key() == Qt.Key.Key_F2:
+            self.rename_wanted.emit(key)
+        elif key is not None and event.key() == Qt.Key.Key_Delete:
+            self.delete_wanted.emit(key)
+        else:
+            super().keyPressEvent(event)
+
+
+PANEL = Panel("variables", WORDS.title, "variable", (), VariablesPanel)

@@ -1,0 +1,185 @@
+"""What is done with the variables of the behaviour that shows: new ones, their names, where they are used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+from app.blocks.model.workspace import Placed, Workspace, parse_workspace
+from app.core.session import Session
+from app.ui.shell.commands.shell import Shell
+from app.ui.shell.documents import DocumentController
+from nep.i18n import _, ngettext
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.ui.shell.dialogs import name as name_sheet
+else:
+    name_sheet = lazy_module("app.ui.shell.dialogs.name")
+
+LONGEST = 60
+
+
+@runtime_checkable
+class SupportsVariables(Protocol):
+    """A panel in which variables can be edited."""
+
+    def edit_variable(self, edit: Mapping[str, object]) -> None:
+        """Make, rename or delete one, or show it: as one edit that can be undone."""
+
+
+class VariableCommands:
+    """Asks for names, says what was done; the editor of the blocks does it."""
+
+    def __init__(self, shell: Shell, session: Session, files: DocumentController) -> None:
+        self._shell, self._session, self._files = shell, session, files
+        self._sheet: name_sheet.NameSheet | None = None
+        self._used_before: dict[str, str] = {}  # of a variable the block that was shown last
+
+    def new(self, *, is_list: bool) -> None:
+        """Ask for the name of a new variable, or of a new list."""
+        question = _("Name of the new list") if is_list else _("Name of the new variable")
+        verb = _("Make the list") if is_list else _("Make the variable")
+
+        def asked() -> None:
+            take = lambda name: self._edit({"do": "new", "name": name, "list": is_list})  # noqa: E731
+            self._ask().ask(question, verb, self.refusal, take)
+
+        self._with_newest(asked)
+
+    def ask_other_name(self, id: str) -> None:
+        """Ask for another name of a variable."""
+
+        def asked() -> None:
+            old = self._workspace().variables.get(id)
+            if old is not None:
+                self._ask().ask(
+                    _("Another name for “{name}”").format(name=old),
+                    _("Rename it"),
+                    lambda name: "" if name == old else self.refusal(name, id),
+                    lambda name: self._edit({"do": "rename", "id": id, "name": name}),
+                    old,
+                )
+
+        self._with_newest(asked)
+
+    def delete(self, id: str) -> None:
+        """Delete a variable with the blocks that use it; it can be taken back."""
+
+        def delete() -> None:
+            workspace = self._workspace()
+            name, count = workspace.variables.get(id), len(uses_of(workspace, id))
+            if name is None:
+                return
+            self._edit({"do": "delete", "id": id})
+            said = _("Deleted “{name}”").format(name=name)
+            if count:
+                said = ngettext(
+                    "Deleted “{name}” and {count} block that used it",
+                    "Deleted “{name}” and {count} blocks that used it",
+                    count,
+                ).format(name=name, count=count)
+            self._shell.say(said, _("Undo"), lambda: self._edit({"do": "undo"}))
+
+        self._with_newest(delete)
+
+    def watch(self, id: str) -> None:
+        """Show the variable's value on the page of the blocks, or no longer."""
+        self._edit({"do": "watch", "id": id})
+
+    def find(self, id: str) -> None:
+        """Show a block that uses the variable; asked again, the next one."""
+
+        def show() -> None:
+            uses = uses_of(self._workspace(), id)
+            before = self._used_before.get(id, "")
+            if uses:
+                place = (uses.index(before) + 1) % len(uses) if before in uses else 0
+                self._used_before = {id: uses[place]}
+                self._edit({"do": "show", "id": uses[place]})
+
+        self._with_newest(show)
+
+    def put(self, id: str) -> None:
+        """Ask for another value while the program runs."""
+        runs = self._session.runs
+        name = self._workspace().variables.get(id)
+        now = runs.values.get(id)
+        if name is None or not runs.active:
+            return
+
+        def take(words: str) -> None:
+            if not runs.put_variable(id, value_of(words)):
+                self._shell.say(
+                    _("The behaviour has ended meanwhile: “{name}” is as it was").format(name=name)
+                )
+
+        self._ask().ask(
+            _("Another value for “{name}”").format(name=name),
+            _("Use it"),
+            lambda _words: "",
+            take,
+            now.text if now is not None and now.kind in ("number", "text", "boolean") else "",
+        )
+
+    def refusal(self, name: str, own: str = "") -> str:
+        """Why a variable can't have this name; nothing when it can. ``own`` is the one that would get it."""
+        if not name:
+            return _("A variable needs a name.")
+        if len(name) > LONGEST:
+            return _("This name is too long: {most} characters at most.").format(most=LONGEST)
+        used = {each.casefold() for id, each in self._workspace().variables.items() if id != own}
+        if name.casefold() in used:
+            return _("There is a variable “{name}” already. Choose another name.").format(name=name)
+        return ""
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _with_newest(self, act: Callable[[], None]) -> None:
+        self._shell.show_layout("behaviour")
+        self._files.with_newest(act)
+
+    def _workspace(self) -> Workspace:
+        return parse_workspace(self._session.document.workspace)
+
+    def _edit(self, edit: Mapping[str, object]) -> None:
+        editor = self._shell.editor()
+        if isinstance(editor, SupportsVariables):
+            editor.edit_variable(edit)
+
+    def _ask(self) -> name_sheet.NameSheet:
+        if self._sheet is None:
+            self._sheet = name_sheet.NameSheet(self._shell.theme, self._shell.surface)
+        return self._sheet
+
+
+def uses_of(workspace: Workspace, id: str) -> list[str]:
+    """The blocks that set, change or read a variable, in the order of the page."""
+    found: list[str] = []
+    waiting: list[Placed] = [placed for script in reversed(workspace.scripts) for placed in reversed(script)]
+    while waiting:
+        placed = waiting.pop()
+        if any(_names(value, id) for value in placed.fields.values()):
+            found.append(placed.id)
+        waiting += [each for chain in reversed(list(placed.inputs.values())) for each in reversed(chain)]
+    return found
+
+
+def _names(field: object, id: str) -> bool:
+    return isinstance(field, Mapping) and field.get("id") == id
+
+
+def value_of(words: str) -> str | float | bool:
+    """What a person typed: a number where it is one, “true” and “false”, else the text."""
+    plain = words.strip()
+    if plain.casefold() in ("true", "false"):
+        return plain.casefold() == "true"
+    try:
+        return int(plain)
+    except ValueError:
+        pass
+    try:
+        number = float(plain.replace(",", ".", 1))
+    except ValueError:
+        return words
+    return number if abs(number) < float("inf") else words

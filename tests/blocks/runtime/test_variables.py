@@ -1,0 +1,156 @@
+"""What people see of a program's variables: short words of any value, and only what has changed."""
+
+from __future__ import annotations
+
+import json
+import threading
+
+import pytest
+
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.model.program import Program, Variable
+from app.blocks.runtime.variables import (
+    LONGEST_TEXT,
+    MOST_CHARACTERS,
+    MOST_ITEMS,
+    VariableValue,
+    VariableWatch,
+    brief,
+)
+from tests.blocks.samples import block, get, number, started, workspace, write
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "text"),
+    [
+        (0, "number", "0"),
+        (-1, "number", "-1"),
+        (2.0, "number", "2"),
+        (2**64 - 1, "number", "18446744073709551615"),
+        pytest.param(10**100_000, "number", "a number with about 100000 digits", id="long"),
+        (float("nan"), "number", "nan"),
+        (float("-inf"), "number", "-inf"),
+        (True, "boolean", "true"),
+        ("", "text", ""),
+        ("two\nlines", "text", "two lines"),
+        ("🤖" * 3, "text", "🤖🤖🤖"),
+        (None, "unknown", "not known"),
+        ([], "list", "[]"),
+        ([1, "two", None, [True]], "list", "[1, two, , [true]]"),
+        ({"x": 1, "y": [2]}, "other", "{x: 1, y: [2]}"),
+    ],
+)
+def test_a_value_in_short(value: object, kind: str, text: str) -> None:
+    told = brief("v", value)
+    assert (told.kind, told.text) == (kind, text)
+    assert VariableValue.from_json(json.loads(json.dumps(told.to_json()))) == told
+
+
+def test_nothing_is_read_that_is_not_shown() -> None:
+    class Counted(dict[str, object]):
+        asked = 0
+
+        def items(self):  # type: ignore[no-untyped-def]
+            for pair in super().items():
+                Counted.asked += 1
+                yield pair
+
+    message = Counted({str(each): each for each in range(100_000)})
+    assert len(brief("v", message).text) == LONGEST_TEXT
+    assert Counted.asked < LONGEST_TEXT
+    assert len(brief("v", "x" * 10**6).text) == LONGEST_TEXT
+
+
+def test_a_list_that_holds_itself_and_one_nested_deep_have_an_end() -> None:
+    itself: list[object] = [1]
+    itself.append(itself)
+    assert brief("v", itself).text.startswith("[1, [1, [1,")
+    deep: list[object] = []
+    for _ in range(50_000):
+        deep = [deep]
+    assert "…" in brief("v", deep).text
+
+
+def test_of_a_long_list_its_first_items_and_its_length_are_told() -> None:
+    told = brief("v", list(range(5000)))
+    assert (len(told.items), told.length, told.items[-1]) == (MOST_ITEMS, 5000, "99")
+
+
+def watch(**names: object) -> tuple[VariableWatch, dict[str, object]]:
+    return VariableWatch(names, [Variable(f"id {name}", name, name) for name in names]), names
+
+
+def test_only_what_changed_is_told() -> None:
+    watched, names = watch(score=0, words=["a"], inner=[[1]], unused=None)
+    assert [each.id for each in watched.changes()] == ["id score", "id words", "id inner", "id unused"]
+    assert watched.changes() == []
+    names["score"] = 1
+    names["words"].append("b")  # type: ignore[attr-defined]
+    assert [(each.id, each.text) for each in watched.changes()] == [("id score", "1"), ("id words", "[a, b]")]
+    names["words"][0] = "c"  # type: ignore[index]
+    names["inner"][0].append(2)  # type: ignore[index]
+    assert [(each.id, each.text) for each in watched.changes()] == [
+        ("id words", "[c, b]"),
+        ("id inner", "[[1, 2]]"),
+    ]
+    names["score"] = 1.0  # looks the same
+    assert watched.changes() == []
+
+
+def test_much_at_once_comes_in_parts_and_all_of_it_comes() -> None:
+    many = {f"v{each}": ["x" * 80] * 100 for each in range(60)}
+    watched, _names = watch(**many)
+    first, rest = watched.changes(), list[VariableValue]()
+    while more := watched.changes():
+        rest += more
+    assert 0 < len(first) < 60
+    assert sum(len("".join(each.items)) for each in first) < 2 * MOST_CHARACTERS
+    assert {each.id for each in (*first, *rest)} == {f"id v{each}" for each in range(60)}
+
+
+def test_a_list_that_is_changed_meanwhile_does_no_harm() -> None:
+    watched, names = watch(table={"0": 0}, row=[0])
+    over = threading.Event()
+
+    def change() -> None:
+        for each in range(200_000):
+            names["table"] = {**dict(list(names["table"].items())[-5:]), str(each): each}  # type: ignore[attr-defined]
+            names["row"].append(each)  # type: ignore[attr-defined]
+            if over.is_set():
+                return
+        over.set()
+
+    thread = threading.Thread(target=change)
+    thread.start()
+    while not over.is_set():
+        watched.changes()
+        if len(names["row"]) > 20_000:  # type: ignore[arg-type]
+            over.set()
+    thread.join()
+
+
+def test_a_person_gives_only_variables_of_the_program_another_value() -> None:
+    watched, names = watch(score=0)
+    names["wait"] = wait = object()
+    watched.put("score", "ten")
+    watched.put("wait", 1)
+    assert names["score"] == "ten"
+    assert names["wait"] is wait
+
+
+def test_a_strange_line_is_no_value() -> None:
+    assert VariableValue.from_json([1]) is None
+    told = VariableValue.from_json(
+        {"id": 5, "kind": "dance", "items": "x", "length": "y", "text": "z" * 10**6}
+    )
+    assert told == VariableValue("5", "other", "z" * (LONGEST_TEXT + 1))
+
+
+def test_a_program_knows_the_variables_of_its_behaviour_those_that_nothing_uses_too() -> None:
+    saved = workspace(
+        started(block("variables_set", VAR={"id": "score"}, VALUE=number(3)), write(get("score"))),
+        variables=("score", "unused"),
+    )
+    program = compile_behaviour(saved, [])
+    assert program.variables == (Variable("score", "score", "score"), Variable("unused", "unused", ""))
+    assert Program.from_json(json.loads(json.dumps(program.to_json()))).variables == program.variables

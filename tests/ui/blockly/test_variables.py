@@ -1,0 +1,138 @@
+"""Variables in the page: their cards with values, their drop-down, and edits that the window asks for."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+
+from app.blocks import editor_definitions
+from app.blocks.runtime.variables import brief
+from app.ui.blockly.view import BlocklyView
+from tests.blocks.samples import block, get, number, started, workspace, write
+from tests.ui.blockly_person import WAIT_MS, Person, editor
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+SAVED = workspace(
+    started(
+        block("variables_set", "set", VAR={"id": "score"}, VALUE=number(3)),
+        write(get("score") | {"id": "get"}),
+    ),
+    variables=("score", "names"),
+)
+SAVED["blocks"]["blocks"][0] |= {"x": 60, "y": 60}  # type: ignore[index]
+WORDS = "e => [e.children[0].textContent, e.children[1].textContent]"
+CARDS = f"[...document.querySelectorAll('.nepWatch')].map({WORDS})"
+UNKNOWN = "\u2013"
+MENU = "[...document.querySelectorAll('.blocklyMenuItem')].map(e => e.textContent)"
+
+
+@pytest.fixture
+def view(qtbot) -> BlocklyView:
+    return editor(qtbot, editor_definitions(()), 1031, 586)
+
+
+@pytest.fixture
+def them(person) -> Person:
+    return person(state=SAVED)
+
+
+def values(**held: object) -> dict[str, dict[str, object]]:
+    return {id: brief(id, value).to_json() for id, value in held.items()}
+
+
+def test_a_watched_variable_has_a_card_with_its_value_that_is_kept_in_the_file(qtbot, view, them) -> None:
+    with qtbot.waitSignal(view.values_watched, timeout=WAIT_MS) as watched:
+        view.edit_variable({"do": "watch", "id": "score"})
+    assert watched.args == [("score",)]
+    them.wait_for(CARDS, [["score", UNKNOWN]])
+    view.set_variable_values(values(score=2**64 - 1))
+    them.wait_for(CARDS, [["score", "18446744073709551615"]])
+    view.set_variable_values(values(score=["Ada", "Grace"]))
+    them.wait_for(CARDS, [["score", "2"]])
+    them.wait_for("[...document.querySelectorAll('.nepWatch li')].map(e => e.textContent)", ["Ada", "Grace"])
+    assert them.newest()["nepWatched"] == [{"id": "score"}]
+    them.click(".nepWatch button", 6, 6)
+    them.wait_for(CARDS, [])
+    qtbot.waitUntil(lambda: "nepWatched" not in them.newest(), timeout=WAIT_MS)
+
+
+def test_a_card_is_moved_by_hand_stays_in_the_page_and_comes_back_with_the_file(qtbot, view, them) -> None:
+    view.edit_variable({"do": "watch", "id": "score"})
+    them.wait_for("document.querySelectorAll('.nepWatch').length", 1)
+    them.drag(".nepWatch", QPoint(500, 300))
+    qtbot.waitUntil(lambda: "top" in them.newest()["nepWatched"][0], timeout=WAIT_MS)
+    saved = them.newest()
+    box = them.box(".nepWatch")
+    assert abs(box["top"] - 282) < 12
+    them.drag(".nepWatch", QPoint(3000, -400))
+    after = them.box(".nepWatch")
+    assert after["right"] <= 1031
+    assert after["top"] >= 0
+    view.load(saved)
+    qtbot.waitUntil(lambda: them.box(".nepWatch") == box, timeout=WAIT_MS)
+
+
+def test_the_dropdown_offers_a_new_one_and_leads_to_the_windows_questions(qtbot, view, them) -> None:
+    asked: list[str] = []
+    view.command_wanted.connect(asked.append)
+    them.click("[data-id=get] .blocklyDropdownField")
+    them.wait_for(f"{MENU}.length >= 4")
+    entries = them.ask(MENU)
+    assert entries[:3] == ["names", "score", "New variable"]
+    choose(them, "New variable")
+    qtbot.waitUntil(lambda: asked == ["variable.new"], timeout=WAIT_MS)
+    view.edit_variable({"do": "new", "name": "counter", "list": False})
+    qtbot.waitUntil(lambda: "counter" in str(them.newest()["variables"]), timeout=WAIT_MS)
+    (made,) = [each["id"] for each in them.newest()["variables"] if each["name"] == "counter"]
+    getter = them.tops()[0]["next"]["block"]["next"]["block"]["inputs"]["VALUE"]["block"]
+    assert getter["fields"]["VAR"] == {"id": made}  # the drop-down has it at once
+    them.click("[data-id=get] .blocklyDropdownField")
+    them.wait_for(f"{MENU}.length >= 5")
+    choose(them, next(each for each in them.ask(MENU) if each.startswith("Rename")))
+    qtbot.waitUntil(lambda: asked[1:] == [f"variable.rename:{made}"], timeout=WAIT_MS)
+
+
+def choose(them: Person, words: str) -> None:
+    them.ask("document.querySelector('[data-test=entry]')?.removeAttribute('data-test')")
+    found = (
+        f"[...document.querySelectorAll('.blocklyMenuItem')].find(e => e.textContent.startsWith({words!r}))"
+    )
+    them.ask(f"{found}.setAttribute('data-test', 'entry')")
+    them.click("[data-test=entry]", 30, 8)
+
+
+def test_rename_and_delete_are_one_step_each_that_undo_takes_back(qtbot, view, them) -> None:
+    before = them.newest()
+    view.edit_variable({"do": "rename", "id": "score", "name": "points"})
+    qtbot.waitUntil(lambda: "points" in str(them.newest()["variables"]), timeout=WAIT_MS)
+    view.undo()
+    qtbot.waitUntil(lambda: them.newest() == before, timeout=WAIT_MS)
+    view.edit_variable({"do": "delete", "id": "score"})
+    qtbot.waitUntil(lambda: "score" not in str(them.newest()), timeout=WAIT_MS)
+    (hat,) = them.tops()
+    assert hat["next"]["block"]["type"] == "messages_write"  # moved up to the place of the one that went
+    view.undo()
+    qtbot.waitUntil(
+        lambda: them.newest()["blocks"] == before["blocks"] and len(them.newest()["variables"]) == 2,
+        timeout=WAIT_MS,
+    )
+
+
+def test_the_menu_of_a_block_shows_the_value_of_its_variable(qtbot, view, them) -> None:
+    asked: list[str] = []
+    view.command_wanted.connect(asked.append)
+    them.click("[data-id=set] > .blocklyPath", 10, 8)
+    them.press(Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    them.wait_for(f"{MENU}.some(e => e.startsWith('Show the value of “score”'))")
+    choose(them, "Show the value of “score”")
+    qtbot.waitUntil(lambda: asked == ["variable.watch:score"], timeout=WAIT_MS)
+
+
+def test_only_its_own_commands_reach_the_window(qtbot, view, them) -> None:
+    asked: list[str] = []
+    view.command_wanted.connect(asked.append)
+    view._bridge.command("file.quit")
+    view._bridge.command("variable.new")
+    assert asked == ["variable.new"]

@@ -1,0 +1,135 @@
+"""New, renamed, deleted and found variables: which names can't be, and what the editor is told."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.blocks.model.workspace import parse_workspace
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.commands.variables import uses_of, value_of
+from app.ui.shell.dialogs.name import NameSheet
+from app.ui.shell.main_window import MainWindow
+from tests.blocks.samples import block, get, number, started, workspace, write
+from tests.ui.shell_parts import PlainPanel
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+SAVED = workspace(
+    started(
+        block("variables_set", "set", VAR={"id": "s"}, VALUE=number(3)),
+        block("control_forever", "loop", BODY=[write(get("s") | {"id": "get"})]),
+    ),
+    variables=("s", "n"),
+)
+SAVED["variables"] = [{"id": "s", "name": "Score"}, {"id": "n", "name": "名前"}]
+
+
+@pytest.fixture
+def shown(qtbot, window: MainWindow, commands: Commands) -> MainWindow:
+    window.theme.set_motion("on")
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    commands.run("layout.behaviour")
+    window.session.document.edited(SAVED)
+    return window
+
+
+def editor(window: MainWindow) -> PlainPanel:
+    panel = window.editor()
+    assert isinstance(panel, PlainPanel)
+    return panel
+
+
+def sheet_of(window: MainWindow) -> NameSheet:
+    (sheet,) = window.findChildren(NameSheet)
+    return sheet
+
+
+def typed(sheet: NameSheet, words: str) -> NameSheet:
+    sheet.field.selectAll()
+    QTest.keyClick(sheet.field, Qt.Key.Key_Delete)
+    sheet.field.insert(words)  # QTest has no keys for other scripts
+    sheet.field.textEdited.emit(words)
+    return sheet
+
+
+def test_a_new_variable_is_asked_for_and_made(shown: MainWindow, commands: Commands) -> None:
+    commands.run("variable.new")
+    sheet = sheet_of(shown)
+    assert sheet.heading.text() == "Name of the new variable"
+    assert not sheet.button.isEnabled()
+    typed(sheet, " points ")
+    assert sheet.button.isEnabled()
+    QTest.keyClick(sheet.field, Qt.Key.Key_Return)
+    assert not sheet.isVisible()
+    assert editor(shown).edited == [{"do": "new", "name": "points", "list": False}]
+    commands.run("variable.new_list")
+    assert sheet.heading.text() == "Name of the new list"
+    QTest.keyClick(typed(sheet, "names").field, Qt.Key.Key_Return)
+    assert editor(shown).edited[1] == {"do": "new", "name": "names", "list": True}
+
+
+@pytest.mark.parametrize("name", ["score", "SCORE", "名前"])
+def test_a_used_name_is_said_while_it_is_typed(shown: MainWindow, commands: Commands, name: str) -> None:
+    commands.run("variable.new")
+    sheet = sheet_of(shown)
+    typed(sheet, name)
+    assert sheet.wrong.text() == f"There is a variable “{name}” already. Choose another name."
+    assert not sheet.button.isEnabled()
+    QTest.keyClick(sheet.field, Qt.Key.Key_Return)
+    assert sheet.isVisible()
+    typed(sheet, "x" * 61)
+    assert "60 characters" in sheet.wrong.text()
+    QTest.keyClick(typed(sheet, "").field, Qt.Key.Key_Return)
+    assert sheet.wrong.text() == "A variable needs a name."
+    assert editor(shown).edited == []
+
+
+def test_another_name_may_differ_in_capitals_only(shown: MainWindow, commands: Commands) -> None:
+    commands.run("variable.rename:s")
+    sheet = sheet_of(shown)
+    assert (sheet.heading.text(), sheet.field.text()) == ("Another name for “Score”", "Score")
+    QTest.keyClick(typed(sheet, "score").field, Qt.Key.Key_Return)
+    assert editor(shown).edited == [{"do": "rename", "id": "s", "name": "score"}]
+    commands.run("variable.rename:gone")
+    assert not sheet.isVisible()
+
+
+def test_what_goes_with_a_deleted_variable_is_said_and_can_be_taken_back(
+    shown: MainWindow, commands: Commands
+) -> None:
+    commands.run("variable.delete:s")
+    assert editor(shown).edited == [{"do": "delete", "id": "s"}]
+    assert shown.toast.text == "Deleted “Score” and 2 blocks that used it"
+    shown.toast.button.click()
+    assert editor(shown).edited[1] == {"do": "undo"}
+    commands.run("variable.delete:n")
+    assert shown.toast.text == "Deleted “名前”"
+
+
+def test_each_use_is_shown_in_turn(shown: MainWindow, commands: Commands) -> None:
+    for _ in range(3):
+        commands.run("variable.find:s")
+    assert [edit["id"] for edit in editor(shown).edited] == ["set", "get", "set"]
+    commands.run("variable.find:n")
+    assert len(editor(shown).edited) == 3
+    assert uses_of(parse_workspace(SAVED), "s") == ["set", "get"]
+
+
+def test_a_value_can_be_given_only_while_the_behaviour_runs(shown: MainWindow, commands: Commands) -> None:
+    commands.run("variable.put:s")
+    assert not shown.findChildren(NameSheet)
+
+
+@pytest.mark.parametrize(
+    ("words", "value"),
+    [("3", 3), ("-1", -1), ("2,5", 2.5), (" 7 ", 7), ("true", True), ("", ""), ("Ada", "Ada"),
+     ("1e999", "1e999"), ("nan", "nan"), ("18446744073709551615", 2**64 - 1)],
+)  # fmt: skip
+def test_what_is_typed_is_a_number_where_it_is_one(words: str, value: object) -> None:
+    made = value_of(words)
+    assert made == value
+    assert type(made) is type(value)
