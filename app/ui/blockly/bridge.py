@@ -32,6 +32,7 @@ class BlocklyBridge(QObject):
     command_wanted = Signal(str)  # a command of the window about variables
     values_watched = Signal(str)  # the variables whose values the page shows, as JSON: [id, …]
     sensors_offered = Signal(str)  # the sensors in the open toolbox as JSON: [[robot, sensor], …]
+    wanted = Signal(str)  # what a button of the empty canvas is for: "robot", "examples"
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -92,6 +93,10 @@ class BlocklyBridge(QObject):
     @Slot(str)
     def watches(self, variables: str) -> None:
         self.values_watched.emit(variables)
+
+    @Slot(str)
+    def wants(self, what: str) -> None:
+        self.wanted.emit(what)
 
     @Slot(str)
     def failed(self, sentence: str) -> None:

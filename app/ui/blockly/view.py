@@ -30,6 +30,7 @@ class BlocklyView(BlocklyHost):
     changed = Signal(str, object)  # a tab's key and its newest program (WorkspaceJson), 150 ms after an edit
     history_changed = Signal(bool, bool)  # can undo, can redo: of the shown tab
     block_selected = Signal(str)  # a block's id; "" when nothing is selected
+    wanted = Signal(str)  # a button of the empty canvas was pressed: "robot", "examples"
     sensors_offered = Signal(tuple)  # (robot, sensor) of each one that the open toolbox shows
     command_wanted = Signal(str)  # a command of the window: "variable.rename:ID"
     values_watched = Signal(tuple)  # the variables (ids) whose values the page shows
@@ -41,6 +42,7 @@ class BlocklyView(BlocklyHost):
         self._live: Json = {"values": {}, "old": []}
         self._alarms: Json = {}
         self._values: Json = {}
+        self._first_step: Json | None = None
         self._waiting: dict[int, Callable[[WorkspaceJson], None]] = {}
         self._tokens = 0
         self._bridge.edited.connect(self._edited)
@@ -49,6 +51,7 @@ class BlocklyView(BlocklyHost):
         self._bridge.answered.connect(self._answered)
         self._bridge.command_wanted.connect(self.command_wanted)
         self._bridge.values_watched.connect(lambda text: self.values_watched.emit(_texts(text)))
+        self._bridge.wanted.connect(self.wanted)
         self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(_pairs(text)))
 
     # -- the program ------------------------------------------------------------------------------
@@ -166,6 +169,21 @@ class BlocklyView(BlocklyHost):
             self._alarms = told
             self._tell("alarms", told)
 
+    def set_first_step(self, first: str, robot: bool) -> None:
+        """Say on an empty canvas to drag the block ``first`` there; ``robot``: one is connected."""
+        told: Json = {"first": first, "robot": robot}
+        if told != self._first_step:
+            self._first_step = told
+            self._tell("begin", told)
+
+    def point_at(self, block: str, name: str = "", then: str = "") -> None:
+        """Put a ring round the category that has this type of block, then round the block; "" ends that.
+
+        ``name`` is what people call it, ``then`` the words that say where to put it. It ends by itself when
+        there is one more of them.
+        """
+        self._tell("point", {"block": block, "name": name, "then": then} if block else None)
+
     # -- commands ---------------------------------------------------------------------------------
 
     def undo(self) -> None:
@@ -222,6 +240,7 @@ class BlocklyView(BlocklyHost):
     def _page_came(self) -> None:
         self._tell("definitions", self._definitions)
         self._tell("alarms", self._alarms)
+        self._tell("begin", self._first_step)
         self._tabs.page_gone()
         self._send_tab()
 

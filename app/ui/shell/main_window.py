@@ -139,6 +139,7 @@ class MainWindow(QMainWindow):
         self.status.opened.connect(actions["network.others"].trigger)
         start.virtual_robot.connect(actions["robots.virtual"].trigger)
         start.new_behaviour.connect(actions["file.new"].trigger)
+        start.learn_pressed.connect(actions["help.first_steps"].trigger)
         start.open_pressed.connect(actions["file.open"].trigger)
         start.developer_pressed.connect(actions["layout.developer"].trigger)
         start.example_chosen.connect(files.example)
@@ -215,6 +216,10 @@ class MainWindow(QMainWindow):
     def _go_on_with(self, key: str) -> None:
         self._run(f"tab:{key}")
         self._run("layout.behaviour")
+
+    def show_examples(self) -> None:
+        """Show all examples of the start page, and give the keyboard to the first."""
+        self.start.focus_examples()
 
     def show_recent(self) -> None:
         """Show on the start page which files were opened lately."""

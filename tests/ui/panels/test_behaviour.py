@@ -26,6 +26,7 @@ class Editor(QWidget):
     sensors_offered = Signal(tuple)
     command_wanted = Signal(str)
     values_watched = Signal(tuple)
+    wanted = Signal(str)
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -219,33 +220,35 @@ def test_a_change_of_theme_reaches_the_page(panel, window) -> None:
     assert [call for call in editor(panel).told if call[0] == "set_theme"][-1][2] is True
 
 
-def test_over_an_empty_workspace_without_a_robot_the_virtual_one_is_offered(qtbot, qapp) -> None:
+def test_an_empty_canvas_is_told_its_first_step_and_its_buttons_do_something(qtbot, qapp) -> None:
     window = Window(Session())
     panel = window.make(PANEL, (1032, 600))
     qtbot.addWidget(panel)
     assert isinstance(panel, BehaviourPanel)
     qtbot.addWidget(panel.replaces_title())
-    assert panel.empty.isVisible()
-    assert panel.empty.x() > 196  # beside the toolbox, which stays in reach
-    window.theme.set_text_percent(200)
-    assert panel.empty.x() > 392  # which is as large as the text
-    window.theme.set_text_percent(100)
-    press(button(panel.empty, "Use the virtual robot"))
-    assert window.commands == ["robots.virtual"]
+    assert editor(panel).told[-1] == ("set_first_step", "when started", False)
+    editor(panel).wanted.emit("robot")
+    editor(panel).wanted.emit("examples")
+    assert window.commands == ["robots.virtual", "help.examples"]
     window.session.join(pepper())
     panel.refresh()
-    assert not panel.empty.isVisible()
+    assert [call for call in editor(panel).told if call[0] == "set_first_step"][-1][2] is True
 
 
-def test_the_first_block_takes_the_offer_away(qtbot, qapp) -> None:
-    window = Window(Session())
-    panel = window.make(PANEL)
-    qtbot.addWidget(panel)
-    assert isinstance(panel, BehaviourPanel)
-    qtbot.addWidget(panel.replaces_title())
-    editor(panel).changed.emit("behaviour-1", {"blocks": {"blocks": [{"type": "events_started"}]}})
-    panel.refresh()
-    assert not panel.empty.isVisible()
+def test_who_is_shown_a_block_reads_its_name_and_where_it_goes(panel, window) -> None:
+    panel.set_mode("python")
+    panel.point_at("events_started")
+    assert panel.mode == "blocks"
+    assert editor(panel).told[-1] == ("point_at", "events_started", "when started", "Drag it onto the page")
+    panel.point_at("robot_virtual_pepper_do_say")
+    assert editor(panel).told[-1] == (
+        "point_at",
+        "robot_virtual_pepper_do_say",
+        "say",
+        "Drag it below the other blocks",
+    )
+    panel.point_at("")
+    assert editor(panel).told[-1] == ("point_at", "")
 
 
 def test_showing_a_block_comes_back_from_python(panel) -> None:

@@ -51,7 +51,7 @@ def test_it_offers_a_robot_a_behaviour_and_examples(page: StartPage) -> None:
     seen = words(page)
     for part in ("What would you like to do?", "Use the virtual robot", "New behaviour", "Open an example"):
         assert part in seen
-    assert "Learn" not in seen
+    assert "First steps" in seen
     assert "Find mine" not in seen
     assert "Recent" not in seen
     assert [card.text() for card in page.example_cards] == ["Greeting", "Quiz"]
@@ -66,14 +66,15 @@ def test_what_is_pressed_is_told(qtbot, page: StartPage, tmp_path: Path) -> None
     page.virtual_robot.connect(lambda: told.append("robot"))
     page.new_behaviour.connect(lambda: told.append("new"))
     page.example_chosen.connect(told.append)
+    page.learn_pressed.connect(lambda: told.append("learn"))
     page.developer_pressed.connect(lambda: told.append("developer"))
     for button in page.findChildren(Button):
-        if button.text() in {"Use the virtual robot", "New behaviour"}:
+        if button.text() in {"Use the virtual robot", "New behaviour", "First steps"}:
             QTest.mouseClick(button, Qt.MouseButton.LeftButton)
     QTest.keyClick(page.example_cards[1], Qt.Key.Key_Space)
     (developers,) = [each for each in page.findChildren(LinkButton) if "Developer" in each.text()]
     QTest.mouseClick(developers, Qt.MouseButton.LeftButton)
-    assert told == ["robot", "new", tmp_path / "Quiz.nepb", "developer"]
+    assert told == ["robot", "new", "learn", tmp_path / "Quiz.nepb", "developer"]
 
 
 def test_open_work_stands_first_and_leads_back(page: StartPage) -> None:
@@ -93,6 +94,12 @@ def test_open_work_stands_first_and_leads_back(page: StartPage) -> None:
     assert told == ["b", "a"]
     page.show_open([])
     assert "Open now" not in words(page)
+
+
+def test_help_leads_to_all_examples(page: StartPage) -> None:
+    page.focus_examples()
+    assert page.focusWidget() is page.example_cards[0]
+    assert all(card.isVisible() for card in page.example_cards)
 
 
 def test_open_rows_stay_while_nothing_changed(page: StartPage) -> None:

@@ -5,6 +5,7 @@ import './fields';
 import './focus_after_delete';
 import './mutators';
 import {Clipboard} from './clipboard';
+import {type Begin, EmptyCanvas, Pointer, type Wanted} from './guidance';
 import {HelpCard, focusedBlock, registerHelpMenu} from './help';
 import {iconElement} from './icons';
 import {useClipboard, useOwnKeys} from './keys';
@@ -34,6 +35,7 @@ interface Bridge {
   copied(): Promise<string>;
   command(name: string): void;
   watches(variables: string): void;
+  wants(what: string): void;
 }
 
 declare const QWebChannel: new (transport: unknown, done: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
@@ -46,8 +48,11 @@ class Editor {
   private offered = '[]';
   private watched = '[]';
   private readonly find = new FindBar(() => this.shown.workspace);
+  private readonly pointer = new Pointer(() => this.shown.workspace);
+  private readonly empty: EmptyCanvas;
 
   constructor(private readonly bridge: Bridge) {
+    this.empty = new EmptyCanvas(() => this.shown.workspace, this.pointer, (what) => bridge.wants(what));
     const ofShown = (tab: Tab, tell: () => void) => {
       if (tab === this.tabs?.shown) tell();
     };
@@ -60,6 +65,7 @@ class Editor {
       selected: (tab, id) => ofShown(tab, () => bridge.selected(id)),
       offered: (tab) => ofShown(tab, () => this.tellOffered()),
       watched: (tab) => ofShown(tab, () => this.tellWatched()),
+      made: (tab) => this.empty.watch(tab.workspace),
     });
     new ResizeObserver(() => this.shown.resize()).observe(document.body);
     // A hidden page draws no frames, and Blockly tells of edits only after a frame.
@@ -129,12 +135,15 @@ class Editor {
       if (!this.shown.hasFocus) this.shown.focus();
       void this.clipboard[what]();
     },
+    begin: (it: Begin | null) => it && this.empty.tell(it),
+    point: (it: Wanted | null) => this.pointer.show(it),
   };
 
   private showTab(it: ShownTab): void {
     this.help.close();
     this.tabs.show(it);
     this.find.again();
+    this.empty.lookSoon();
     this.tellOffered();
     this.tellWatched();
   }

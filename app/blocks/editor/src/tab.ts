@@ -22,6 +22,8 @@ export interface TabListener {
   selected(tab: Tab, id: string): void;
   /** Other variables are shown beside the blocks. */
   watched(tab: Tab): void;
+  /** A workspace was made. */
+  made(tab: Tab): void;
   /** Other sensors may be shown in the toolbox. */
   offered(tab: Tab): void;
 }
@@ -73,6 +75,7 @@ export class Tab {
         listener.watched(this);
       },
     });
+    listener.made(this);
   }
 
   /** Shows another program here, with an empty history. */

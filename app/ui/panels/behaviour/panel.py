@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol, cast
 
-from PySide6.QtCore import QPoint, Qt, SignalInstance
-from PySide6.QtGui import QGuiApplication, QResizeEvent
+from PySide6.QtCore import Qt, SignalInstance
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.documents.titles import told_apart
@@ -17,10 +18,9 @@ from app.ui.panels.behaviour.live_values import live_words
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.panels.behaviour.tab import TabFacts
 from app.ui.panels.behaviour.tabs import BehaviourTitle
-from app.ui.panels.no_robot import NoRobot
-from app.ui.widgets import EmptyAction, EmptyState, label
+from app.ui.widgets import label
 from app.ui.widgets.indicators import ROBOT_STATUS
-from nep.i18n import _, lazy
+from nep.i18n import _, lazy, pgettext
 
 if TYPE_CHECKING:
     from app.blocks import Program
@@ -31,11 +31,12 @@ if TYPE_CHECKING:
     from app.core.run.control import Runs
 
 LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed five times a second
-TOOLBOX_WIDTH = 196
-EMPTY_SIZE = (460, 250)
 ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
 WAIT_WORDS = lazy("Getting the blocks ready.")
 WAIT_UNTIL_S = 0.5
+WANTED = {"robot": "robots.virtual", "examples": "help.examples"}
+"""The commands behind the buttons of an empty canvas."""
+_GAP = re.compile(r"\([^()]*\)")  # as the help writes what is filled in: "(robot) say (text)"
 Json = Mapping[str, object]
 
 
@@ -49,6 +50,7 @@ class Editor(Protocol):
     sensors_offered: SignalInstance
     command_wanted: SignalInstance
     values_watched: SignalInstance
+    wanted: SignalInstance
 
     @property
     def is_ready(self) -> bool: ...
@@ -67,6 +69,8 @@ class Editor(Protocol):
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None: ...
     def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None: ...
     def edit_variable(self, edit: Json) -> None: ...
+    def set_first_step(self, first: str, robot: bool) -> None: ...
+    def point_at(self, block: str, name: str = "", then: str = "") -> None: ...
     def undo(self) -> None: ...
     def edit(self, what: str) -> None: ...
     def open_find(self) -> None: ...
@@ -107,15 +111,6 @@ class BehaviourPanel(PanelWidget):
         self._place_column = QVBoxLayout(self._place)
         self._place_column.setContentsMargins(0, 0, 0, 0)
         self.pages = self.show_one_of(self._place, self.program)
-        title = _("No robot is connected")
-        text = _("You can build now and run later. With the virtual robot you can try it at once.")
-        start = EmptyAction(
-            _("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot", primary=True
-        )
-        self.empty = EmptyState(self.theme, "bot", title, text, [start])
-        self._no_robot = NoRobot(self.empty, title, text, [start])
-        self.empty.setParent(self._place)
-        self.empty.hide()
         self.waiting = BlocksWait(self._place)
         self._shown: dict[str, object] = {}
         self._given: dict[str, tuple[int, int]] = {}
@@ -160,7 +155,8 @@ class BehaviourPanel(PanelWidget):
         if self._ticks % LIVE_EVERY == 0:
             self._show_live()
         self.waiting.tell(ready=self.editor.is_ready)
-        self._show_empty()
+        robot = bool(self.session.fleet.connected or self.session.coming)
+        self.editor.set_first_step(pgettext("block", "when started"), robot)
 
     def _show_blocks(self, editor: Editor) -> None:
         """Let the editor show the current behaviour, and forget those that were closed."""
@@ -198,6 +194,7 @@ class BehaviourPanel(PanelWidget):
         editor.sensors_offered.connect(self._offer)
         editor.command_wanted.connect(self.context.run)
         editor.values_watched.connect(self._watch_variables)
+        editor.wanted.connect(lambda what: self.context.run(WANTED[what]))
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
         if isinstance(editor, QWidget):
             had_focus = self.hasFocus()
@@ -249,34 +246,9 @@ class BehaviourPanel(PanelWidget):
             words, old = live_words(self.session.fleet, sensors)
             self.editor.set_live_values(words, old)
 
-    def _show_empty(self) -> None:
-        """Over the empty workspace, while there is no robot to build for."""
-        building = self.mode == "blocks" and self.editor is not None and self.editor.is_ready
-        wanted = building and not self.session.fleet.connected and not self.session.document.has_blocks
-        if wanted != self.empty.isVisibleTo(self._place):
-            self.empty.setVisible(wanted)
-        if wanted:
-            self._no_robot.tell(self.session.coming)
-            self._place_empty()
-
-    def _place_empty(self) -> None:
-        toolbox = TOOLBOX_WIDTH * self.theme.text_percent // 100
-        width = min(EMPTY_SIZE[0], self._place.width() - toolbox - 16)
-        left = toolbox + (self._place.width() - toolbox - width) // 2
-        self.empty.resize(width, EMPTY_SIZE[1])
-        self.empty.move(QPoint(left, max(0, (self._place.height() - EMPTY_SIZE[1]) // 2)))
-        self.empty.raise_()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        if self.empty.isVisibleTo(self._place):
-            self._place_empty()
-
     def theme_changed(self) -> None:
         if self.editor is not None:
             self.editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
-        if self.empty.isVisibleTo(self._place):
-            self._place_empty()
 
     # -- what a person does -------------------------------------------------------------------------------
 
@@ -324,6 +296,22 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.setFocus(Qt.FocusReason.ShortcutFocusReason)
             (self.editor.open_search if to_add else self.editor.open_find)()
+
+    def point_at(self, block: str) -> None:
+        """Show a person where the block of this type is that comes next, and where it goes; "" ends that."""
+        if self.editor is None:
+            return
+        if not block:
+            self.editor.point_at("")
+            return
+        self.set_mode("blocks")
+        help_of = self.session.documents.definitions().get("help")
+        found = help_of.get(block) if isinstance(help_of, Mapping) else None
+        title = str(found.get("title", "")) if isinstance(found, Mapping) else ""
+        name = " ".join(_GAP.sub(" ", title).split())
+        begins = block.startswith("events_") or "_when_" in block
+        then = _("Drag it onto the page") if begins else _("Drag it below the other blocks")
+        self.editor.point_at(block, name, then)
 
     def show_block(self, block: str) -> None:
         """Show the blocks, and this one in the middle."""

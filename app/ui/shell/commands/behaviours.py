@@ -65,6 +65,14 @@ class SupportsFindBlocks(Protocol):
         """Ask for the words: of blocks in the behaviour, or of blocks to add."""
 
 
+@runtime_checkable
+class SupportsPointAt(Protocol):
+    """A panel that can show where a block is that comes next."""
+
+    def point_at(self, block: str) -> None:
+        """Put a ring round the block of this type in the toolbox; "" for none."""
+
+
 @dataclass(frozen=True, slots=True)
 class TabPlace:
     """A tab, by its document's key, and the place it is to have, from 0."""
@@ -188,6 +196,16 @@ class BehaviourCommands:
         editor = self._shell.editor()
         if isinstance(editor, SupportsShowBlock):
             editor.show_block(block)
+
+    def point_at(self, block: str) -> bool:
+        """Show where the block of this type is that comes next; "-" ends that."""
+        shows = block != "-"
+        if shows:
+            bring_into_view(self._shell)
+        editor = self._shell.editor()
+        if isinstance(editor, SupportsPointAt):
+            editor.point_at(block if shows else "")
+        return isinstance(editor, SupportsPointAt)
 
     def find_blocks(self, *, to_add: bool) -> None:
         """Ask for the words of blocks in the behaviour, or of blocks to add."""

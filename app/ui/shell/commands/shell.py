@@ -65,6 +65,9 @@ class Shell(Protocol):
     def show_start(self) -> None:
         """Show the start page."""
 
+    def show_examples(self) -> None:
+        """Show all examples of the start page, and give the keyboard to the first."""
+
     def show_recent(self) -> None:
         """Show on the start page which files were opened lately."""
 

@@ -20,6 +20,7 @@ from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.shell import START, Shell
 from app.ui.shell.dialogs.about import AboutSheet
 from app.ui.shell.documents import DocumentController
+from app.ui.shell.hint_ring import HintRing
 from app.ui.theme.system import Preference
 from app.ui.theme.theme import Mode
 from app.ui.widgets.lists.fuzzy import Entry
@@ -61,6 +62,7 @@ class ViewCommands:
         self._shortcut_sheet: shortcuts.ShortcutSheet | None = None
         self._name_sheet: name_sheet.NameSheet | None = None
         self._settings_sheet: settings_sheet.SettingsSheet | None = None
+        self._ring: HintRing | None = None
 
     def use(self, actions: Actions, entries: PaletteEntries) -> None:
         """Keep the keys and marks of these actions up to date; the palette offers these entries."""
@@ -265,6 +267,23 @@ class ViewCommands:
         self._shell.state.keep_theme(self._shell.theme)
 
     # -- help -------------------------------------------------------------------------------------
+
+    def first_steps(self) -> None:
+        """Show the card with the first steps beside the blocks."""
+        self.show_layout("behaviour")
+        self._shell.open_panel("behaviour")
+        self._shell.open_panel("first_steps")
+
+    def examples(self) -> None:
+        """Show all examples, on the start page."""
+        self.start_page()
+        self._shell.show_examples()
+
+    def point_at(self, command: str) -> bool:
+        """Put a ring round the button that does this command; False when none can be seen."""
+        if self._ring is None:
+            self._ring = HintRing(self._shell.theme, self._shell.surface)
+        return self._ring.point_at(command)
 
     def open_doctor(self) -> None:
         """Look at the connection, and show what is found."""

@@ -44,7 +44,8 @@ class Layout:
 
     ``title`` is marked with `lazy`. ``homes`` tells beside which panel another one opens, as a tab; the rest
     open beside the last panel. ``brings`` tells which panel comes with another one when that is opened; it is
-    ``later``: at first its row is not there.
+    ``later``: at first its row is not there. ``taller`` is the least height of the place of a panel while it
+    is open.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Layout:
     folds: tuple[Fold, ...]
     homes: Mapping[str, str]
     brings: Mapping[str, str] = field(default_factory=dict)
+    taller: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def later(self) -> frozenset[str]:
@@ -87,9 +89,11 @@ BEHAVIOUR = Layout(
         "alerts": "problems",
         "nodes": "problems",
         "image": "camera",
+        "first_steps": "camera",
         "health": "sensors",
     },
     {"robots": "health"},
+    {"first_steps": 400},
 )
 DEVELOPER = Layout(
     "developer",

@@ -53,7 +53,13 @@ def fit(
             dock = _first(docks, [name for name in names if name not in folded])
             if dock is not None and not any(dock in bench.tabifiedDockWidgets(b) for b in before):
                 before.append(dock)
-                there.append((dock, height, set(names) <= layout.later))
+                shared = [dock, *bench.tabifiedDockWidgets(dock)]
+                tall = [
+                    least
+                    for each, least in layout.taller.items()
+                    if docks.get(each) in shared and not docks[each].isHidden()
+                ]
+                there.append((dock, max([height, *tall]), set(names) <= layout.later))
         if there:
             columns.append((column, there))
     if not columns:

@@ -134,6 +134,8 @@ class Workbench(QMainWindow):
         dock.dockLocationChanged.connect(self._tabs_soon)
         dock.topLevelChanged.connect(self._tabs_soon)
         dock.visibilityChanged.connect(self._tabs_soon)
+        if name in self._layout.taller:
+            dock.visibilityChanged.connect(lambda: self._size_timer.start(0))
         self.docks[name] = dock
         return dock
 

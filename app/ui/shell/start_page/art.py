@@ -1,4 +1,4 @@
-"""The pictures of the start page, all painted: the robot in its room, an empty page with a first block."""
+"""The pictures of the start page, all painted: the robot in its room, a first block, checked steps."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
 from app.ui.shell.start_page.preview import block_path, paint_grid
+from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _, pgettext
@@ -117,3 +118,39 @@ class EmptyPageArt(Art):
         painter.setPen(QPen(self._theme.colour("panel"), 1.2))
         painter.setBrush(self._theme.colour("text"))
         painter.drawPolygon(arrow)
+
+
+class StepsArt(Art):
+    """Two steps that are done, and the next one."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme)
+        self.setAccessibleName(_("Three steps, two of them done"))
+
+    def picture(self, painter: QPainter, area: QRectF) -> None:
+        theme = self._theme
+        painter.fillRect(area, theme.colour("workspace"))
+        font, strong = theme.font("body"), theme.font("body")
+        strong.setWeight(strong.Weight.DemiBold)
+        start, say = pgettext("block", "when started"), pgettext("robot", "say")
+        words = (
+            _("Put “{block}” below “{start}”").format(block=say, start=start),
+            _("Press Run and listen"),
+            _("Make it turn"),
+        )
+        side, left = 20.0, area.left() + 24
+        for place, said in enumerate(words):
+            middle = area.center().y() + (place - 1) * 36
+            mark = QRectF(left, middle - side / 2, side, side)
+            done = place < len(words) - 1
+            if done:
+                paint_icon(painter, mark, "circle-check", theme.colour("ok"))
+            else:
+                paint.box(
+                    painter, mark.adjusted(1, 1, -1, -1), side / 2, None, theme.colour("controlBorder"), 1.5
+                )
+                number = theme.font("caption")
+                paint.words(painter, mark, "3", number, theme.colour("textSecondary"), paint.CENTRE)
+            line = QRectF(mark.right() + 12, middle - 12, area.right() - mark.right() - 24, 24)
+            ink = theme.colour("textSecondary" if done else "text")
+            paint.words(painter, line, said, font if done else strong, ink)

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -24,7 +25,7 @@ from PySide6.QtWidgets import (
 from app.core.documents.examples import ABOUT, NAME
 from app.core.storage.atomic_file import read_whole
 from app.core.storage.settings import RecentFile
-from app.ui.shell.start_page.art import EmptyPageArt, RobotArt
+from app.ui.shell.start_page.art import EmptyPageArt, RobotArt, StepsArt
 from app.ui.shell.start_page.cards import BigCard, DevelopersLine, ExampleCard, RecentRow
 from app.ui.shell.start_page.open_work import OpenWork, OpenWorkList
 from app.ui.shell.start_page.preview import Row, rows
@@ -33,7 +34,7 @@ from app.ui.widgets import Button, label, paint
 from app.ui.widgets.buttons import LinkButton
 from nep.i18n import _, lazy, ngettext, translate
 
-WIDTH = 1080
+WIDTH, MARGIN, CARD_GAP = 1080, 24, 16
 BANNER_ROOM = 40
 """More room above the question, where the page is high enough: a banner that may not move the page covers no
 words there."""
@@ -90,6 +91,7 @@ class StartPage(QWidget):
     new_behaviour = Signal()
     example_chosen = Signal(object)
     file_chosen = Signal(object)
+    learn_pressed = Signal()
     open_pressed = Signal()
     developer_pressed = Signal()
     work_chosen = Signal(str)
@@ -122,12 +124,22 @@ class StartPage(QWidget):
             _("Start with an empty page and the blocks of your robot."),
             [self._new],
         )
+        learn = Button(theme, _("First steps"), size="large")
+        learn.clicked.connect(self.learn_pressed)
+        self.learn_card = BigCard(
+            theme,
+            StepsArt(theme),
+            _("Learn in five minutes"),
+            _("Six steps to a robot that speaks and turns. Each is checked as you go."),
+            [learn],
+        )
         self._shows_all = False
         self._recent_box = QWidget()
         self._open = Button(theme, _("Open a file"), "folder-open", kind="ghost", size="normal")
         self._open.clicked.connect(self.open_pressed)
         self._build(examples)
         theme.changed.connect(self._restyle)
+        theme.changed.connect(self._fit_cards)
         self._restyle()
 
     def _restyle(self) -> None:
@@ -151,10 +163,11 @@ class StartPage(QWidget):
         column.addWidget(label(lead, "lead", role="textSecondary", wrap=True))
         column.addSpacing(24)
         column.addWidget(self.open_work)
-        cards = QHBoxLayout()
-        cards.setSpacing(16)
+        cards = self._cards = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        cards.setSpacing(CARD_GAP)
         cards.addWidget(self.robot_card, 408)
         cards.addWidget(self.new_card, 318)
+        cards.addWidget(self.learn_card, 318)
         column.addLayout(cards)
         column.addSpacing(26)
         self._all = LinkButton(self._theme, all_words(len(examples)), "arrow-right")
@@ -177,11 +190,11 @@ class StartPage(QWidget):
         middle = QWidget()
         middle.setProperty("bare", "true")
         row = QHBoxLayout(middle)
-        row.setContentsMargins(24, 0, 24, 0)
+        row.setContentsMargins(MARGIN, 0, MARGIN, 0)
         row.addStretch(1)
         row.addWidget(content, 1000)
         row.addStretch(1)
-        area = QScrollArea()
+        area = self._area = QScrollArea()
         area.setWidgetResizable(True)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setWidget(middle)
@@ -194,6 +207,25 @@ class StartPage(QWidget):
         whole.setSpacing(0)
         whole.addWidget(area, 1)
         whole.addWidget(line)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit_cards()
+
+    def event(self, event: QEvent) -> bool:
+        done = super().event(event)
+        if event.type() in {QEvent.Type.LayoutRequest, QEvent.Type.FontChange, QEvent.Type.Polish}:
+            self._fit_cards()
+        return done
+
+    def _fit_cards(self) -> None:
+        """Large text in a small window: the cards stand below each other."""
+        cards = (self.robot_card, self.new_card, self.learn_card)
+        needed = sum(card.minimumSizeHint().width() for card in cards) + CARD_GAP * (len(cards) - 1)
+        beside = needed <= min(WIDTH, self.width() - 2 * MARGIN)
+        wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        if self._cards.direction() != wanted:
+            self._cards.setDirection(wanted)
 
     def _head(self, title: QLabel, button: Button | None = None) -> QHBoxLayout:
         row = QHBoxLayout()
@@ -226,6 +258,13 @@ class StartPage(QWidget):
         paint.show_when(self._all, len(self.example_cards) > EXAMPLES_SHOWN)
         words = _("Fewer examples") if shown else all_words(len(self.example_cards))
         self._all.set_word(words, None if shown else "arrow-right")
+
+    def focus_examples(self) -> None:
+        """Show all examples, and give the keyboard to the first."""
+        self.show_all(True)
+        if self.example_cards:
+            self._area.ensureWidgetVisible(self.example_cards[-1])
+            self.example_cards[0].setFocus(Qt.FocusReason.OtherFocusReason)
 
     def show_recent(self, recent: Sequence[RecentFile], now: dt.datetime | None = None) -> None:
         """The files opened lately; without any the section is not there."""

@@ -1,0 +1,264 @@
+"""First steps: a card beside the blocks that shows the next step and checks those that are done."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QAction, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+
+from app.errors import SettingsError
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.first_steps.steps import START, STEPS, Built, Lesson, Now, built_in, shown_by
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, label, paint
+from app.ui.widgets.labels import set_role
+from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from nep.i18n import _, lazy, pgettext
+
+KEPT = "first_steps"
+HINT_AFTER_S = 20.0
+MARK = 22
+ALL_DONE = lazy("First steps done")
+LOOSE = lazy("Drag it up until it snaps below “{start}”.")
+WHAT_NEXT = lazy("You can build, run and stop. An example shows more; each has things to try.")
+
+
+class _Mark(QWidget):
+    """A check mark, or the number of the step in a ring; filled for the one that is next."""
+
+    def __init__(self, theme: Theme, number: int) -> None:
+        super().__init__()
+        self._theme, self._number = theme, number
+        self.state = "later"
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:
+        side = round(self._theme.scaled(MARK))
+        return QSize(side, side)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+        if self.state == "done":
+            paint_icon(painter, rect, "circle-check", theme.colour("ok"))
+        else:
+            following = self.state == "next"
+            fill = theme.colour("accent") if following else None
+            edge = theme.colour("accent" if following else "controlBorder")
+            paint.box(painter, rect, rect.height() / 2, fill, edge, 1.25)
+            ink = theme.colour("onAccent" if following else "textSecondary")
+            paint.words(painter, rect, str(self._number), theme.font("caption"), ink, paint.CENTRE)
+        painter.end()
+
+
+class StepRow(QWidget):
+    """One step; the one that is next has a tint, its hint, and a button."""
+
+    def __init__(self, theme: Theme, number: int, step: Lesson, show_me: Callable[[Lesson], None]) -> None:
+        super().__init__()
+        self._theme, self.step = theme, step
+        self.mark = _Mark(theme, number)
+        self.words = label(spoken(step.text), "bodyLarge", wrap=True)
+        self.hint = label(spoken(step.hint), "body", role="textSecondary", wrap=True)
+        first = step.id == "robot"
+        self.button = Button(theme, spoken(step.text) if first else _("Show me"), size="small")
+        self.button.clicked.connect(lambda: show_me(step))
+        for words in (self.words, self.hint):
+            words.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        help_row = QHBoxLayout()
+        help_row.setSpacing(8)
+        help_row.addWidget(self.hint, 1)
+        help_row.addWidget(self.button, 0, Qt.AlignmentFlag.AlignTop)
+        text = QVBoxLayout()
+        text.setSpacing(4)
+        text.addWidget(self.words)
+        text.addLayout(help_row)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 5, 8, 5)
+        row.setSpacing(10)
+        row.addWidget(self.mark, 0, Qt.AlignmentFlag.AlignTop)
+        row.addLayout(text, 1)
+
+    def show_state(self, state: str) -> None:
+        """Show it as what ``state`` says: done, next or later."""
+        self.mark.state = state
+        paint.show_when(self.hint, state == "next")
+        paint.show_when(self.button, state == "next")
+        set_role(self.words, "textSecondary" if state == "done" else "text")
+        said = {"done": _("{step}: done"), "next": _("{step}: the next step"), "later": "{step}"}[state]
+        self.setAccessibleName(said.format(step=self.words.text()))
+        self.update()
+        self.mark.update()
+
+    def show_hint(self, *, loose: bool) -> None:
+        """Say where the block is, or that it stands ``loose`` on the page and is to be put into its place."""
+        self.hint.setText(spoken(LOOSE if loose else self.step.hint))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        if self.mark.state == "next":
+            painter = QPainter(self)
+            paint.box(
+                painter, QRectF(self.rect()), self._theme.radius("panel"), self._theme.colour("accentTint")
+            )
+            painter.end()
+
+
+def spoken(text: str) -> str:
+    """The words of a step, with the names that its blocks have."""
+    return _(text).format(
+        start=pgettext("block", "when started"), say=pgettext("robot", "say"), turn=pgettext("robot", "turn")
+    )
+
+
+class FirstStepsPanel(PanelWidget):
+    """Six steps to a robot that speaks, turns and stops; which are done is kept between starts."""
+
+    def __init__(self, context: PanelContext, clock: Callable[[], float] = time.monotonic) -> None:
+        """``clock`` gives seconds: a hint comes by itself after twenty."""
+        super().__init__(context, _("First steps"))
+        self._clock = clock
+        kept: object = self.session.settings.get(KEPT, [])
+        known = {step.id for step in STEPS}
+        self.done: frozenset[str] = frozenset(kept if isinstance(kept, list) else ()) & known
+        self._waits_since: tuple[str, float] | None = None
+        self._pointed_for = ""
+        self._edits: object = None
+        self._built: tuple[object, Built] = (None, Built())
+        self.rows = [
+            StepRow(self.theme, number, step, self.show_me) for number, step in enumerate(STEPS, start=1)
+        ]
+        steps = ScrollColumn(_("First steps"), margins=(8, 8, 8, 8), gap=2)
+        for place, row in enumerate(self.rows):
+            steps.column.insertWidget(place, row)
+        self.end = EmptyState(
+            self.theme,
+            "circle-check",
+            _(ALL_DONE),
+            _(WHAT_NEXT),
+            [
+                EmptyAction(_("Open an example"), lambda: context.run("help.examples"), primary=True),
+                EmptyAction(_("Start again"), self.start_again),
+            ],
+        )
+        self.pages: QStackedWidget = self.show_one_of(steps, self.end)
+        self.chip = Chip(self.theme, "", "off")
+        self.chips = [self.chip]
+        self._again = QAction(_("Start again"), self)
+        self._again.triggered.connect(self.start_again)
+        self._show()
+
+    def more_actions(self) -> tuple[QAction, ...]:
+        return (self._again,)
+
+    def following(self) -> Lesson | None:
+        """The step that is next; None when all are done."""
+        return next((step for step in STEPS if step.id not in self.done), None)
+
+    # -- looking ----------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        if self.following() is None:
+            return
+        done = shown_by(self._now(), self.done)
+        if done != self.done:
+            self.done = done
+            self._keep()
+            self._show()
+            if self.following() is None:
+                paint.announce(self, _(ALL_DONE))
+        self._hint_after_a_while()
+
+    def _now(self) -> Now:
+        runs, document = self.session.runs, self.session.document
+        mine = runs.document is document
+        edition = (document.key, document.revision, document.edits, document.mends)
+        if self._built[0] != edition:
+            self._built = (edition, built_in(document.workspace))
+            for row in self.rows:
+                row.show_hint(loose=bool(row.step.takes) and row.step.takes in self._built[1].loose)
+        return Now(
+            can_speak=any(
+                action.name == "say" for link in self.session.fleet.connected for action in link.robot.actions
+            ),
+            built=self._built[1],
+            running=runs.running_blocks if mine else (),
+            stopped=mine and bool(runs.stopped_blocks) and not runs.active,
+        )
+
+    def _hint_after_a_while(self) -> None:
+        """Who does nothing for twenty seconds is shown where to go on, once for each step."""
+        step, now = self.following(), self._clock()
+        seen = (self.session.document.edits, self.session.runs.active)
+        if step is None:
+            return
+        if self._waits_since is None or self._waits_since[0] != step.id or seen != self._edits:
+            if self._waits_since is not None and self._waits_since[0] != step.id and self._pointed_for:
+                self._point_at_nothing()
+            self._waits_since, self._edits = (step.id, now), seen
+        elif now - self._waits_since[1] >= HINT_AFTER_S and self._pointed_for != step.id:
+            if step.id != "robot" and not self.session.runs.active:
+                self.show_me(step)
+            self._pointed_for = step.id
+
+    def _show(self) -> None:
+        step = self.following()
+        for row in self.rows:
+            state = "done" if row.step.id in self.done else "next" if row.step is step else "later"
+            row.show_state(state)
+        count = len(self.done)
+        self.chip.set(
+            _("{done} of {all}").format(done=count, all=len(STEPS)), "ok" if count == len(STEPS) else "off"
+        )
+        self.pages.setCurrentIndex(0 if step is not None else 1)
+
+    def _keep(self) -> None:
+        kept = [step.id for step in STEPS if step.id in self.done]
+        try:
+            self.session.settings.set(KEPT, kept)
+        except SettingsError as error:
+            self.session.console.add("warn", "studio", str(error))
+
+    # -- what a person does -----------------------------------------------------------------------
+
+    def show_me(self, step: Lesson) -> None:
+        """Point at what the step is about."""
+        self._pointed_for = step.id
+        if step.id == "robot":
+            self.context.run("robots.virtual")
+        elif step.takes:
+            self.context.run(f"point.block:{self._type(step.takes)}")
+        else:
+            self.context.run(f"point.button:{step.button}")
+
+    def _type(self, end: str) -> str:
+        """The type of the block with this end that a connected robot has."""
+        if end == START:
+            return START
+        blocks = self.session.documents.definitions().get("blocks")
+        types = [str(each.get("type", "")) for each in blocks] if isinstance(blocks, list) else []
+        return next((kind for kind in types if kind.endswith(end)), end)
+
+    def _point_at_nothing(self) -> None:
+        self._pointed_for = ""
+        self.context.run("point.block:-")
+
+    def start_again(self) -> None:
+        """Begin anew, on a page of its own: nobody's blocks are touched."""
+        self.done = frozenset()
+        self._waits_since = None
+        self._keep()
+        if self.session.document.has_blocks:
+            self.context.run("file.new")
+        self._show()
+
+    def rest(self) -> None:
+        super().rest()
+        if self._pointed_for:
+            self._point_at_nothing()
+
+
+PANEL = Panel("first_steps", lazy("First steps"), "lightbulb", (), FirstStepsPanel)

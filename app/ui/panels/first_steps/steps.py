@@ -1,0 +1,126 @@
+"""The six first steps, and which of them the blocks, the robots and the run show to be done."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from nep.i18n import lazy
+
+START = "events_started"
+SAY, TURN = "_do_say", "_do_turn"
+Script = tuple[tuple[str, str], ...]
+"""(type, id) of each block of a script."""
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """One step: its words, with ``{names}`` of blocks; the words of its hint; what to point at.
+
+    ``takes`` is the end of the type of the block that is to be taken, ``button`` the command of the button
+    that is to be pressed.
+    """
+
+    id: str
+    text: str
+    hint: str
+    takes: str = ""
+    button: str = ""
+
+
+STEPS: tuple[Lesson, ...] = (
+    Lesson("robot", lazy("Use the virtual robot"), lazy("It comes with Studio."), button="robots.virtual"),
+    Lesson("start", lazy("Drag “{start}” onto the page"), lazy("It is in Events, on the left."), takes=START),
+    Lesson("say", lazy("Put “{say}” below it"), lazy("It is in Speech, below the robot."), takes=SAY),
+    Lesson("run", lazy("Press Run and listen"), lazy("It is green, at the top left."), button="run.run"),
+    Lesson("turn", lazy("Put “{turn}” below “{say}”"), lazy("It is in Movement."), takes=TURN),
+    Lesson(
+        "stop",
+        lazy("Press Run, then Stop while it turns"),
+        lazy("Stop is red, at the top right. F12 does the same."),
+        button="run.run",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Built:
+    """What the blocks have below "when started": the ids of blocks that speak, and whether one turns.
+
+    ``loose`` are the ends of types of which only loose blocks are there: below nothing that starts them.
+    """
+
+    started: bool = False
+    says: frozenset[str] = frozenset()
+    turns: bool = False
+    loose: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Now:
+    """What can be seen now. ``running`` are the ids of the blocks that run, ``stopped``: by Stop."""
+
+    can_speak: bool = False
+    built: Built = field(default_factory=Built)
+    running: Collection[str] = ()
+    stopped: bool = False
+
+
+def built_in(workspace: Mapping[str, object]) -> Built:
+    """What these blocks have."""
+    started: list[Script] = []
+    loose: list[Script] = []
+    for top in _tops(workspace):
+        (started if top.get("type") == START else loose).append(tuple(_inside(top)))
+    below = {end for end in (SAY, TURN) if _has(started, end)}
+    return Built(
+        bool(started),
+        frozenset(id for script in started for kind, id in script if kind.endswith(SAY)),
+        TURN in below,
+        frozenset(end for end in (SAY, TURN) if end not in below and _has(loose, end)),
+    )
+
+
+def _has(scripts: Sequence[Script], end: str) -> bool:
+    return any(kind.endswith(end) for script in scripts for kind, _id in script)
+
+
+def shown_by(now: Now, done: Collection[str]) -> frozenset[str]:
+    """The ids of the steps that this shows to be done; what was ``done`` before stays so.
+
+    Stop counts once the program has run with its turn: nobody is told "done" for what they did by chance.
+    """
+    found = set(done)
+    if now.can_speak:
+        found.add("robot")
+    if now.built.started:
+        found.add("start")
+    if now.built.says:
+        found.add("say")
+    if now.built.says & set(now.running):
+        found.add("run")
+    if now.built.turns:
+        found.add("turn")
+    if now.stopped and {"run", "turn"} <= found:
+        found.add("stop")
+    return frozenset(found)
+
+
+def _tops(workspace: Mapping[str, object]) -> list[Mapping[str, object]]:
+    """The first blocks of all scripts."""
+    blocks = workspace.get("blocks")
+    tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
+    return [top for top in tops if isinstance(top, Mapping)] if isinstance(tops, list) else []
+
+
+def _inside(block: Mapping[str, object]) -> Iterator[tuple[str, str]]:
+    """(type, id) of a block, of what it holds, and of what hangs below it: no calls, which nest less deep."""
+    waiting: list[object] = [block]
+    while waiting:
+        each = waiting.pop()
+        if not isinstance(each, Mapping):
+            continue
+        yield str(each.get("type", "")), str(each.get("id", ""))
+        inputs = each.get("inputs")
+        held = inputs.values() if isinstance(inputs, Mapping) else ()
+        waiting += [link.get("block") for link in (*held, each.get("next")) if isinstance(link, Mapping)]

@@ -1,0 +1,97 @@
+"""A ring round a button that a person is shown: until the button or Esc is pressed, or for a while."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt, QTimer
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QWindow
+from PySide6.QtWidgets import QAbstractButton, QWidget
+from shiboken6 import isValid
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+OUT, HALO = 5, 5
+RADIUS = 12
+LOOK_MS = 100
+SHOWN_MS = 15_000
+
+
+class HintRing(QWidget):
+    """Lies over the window and takes no mouse; a button is known by the command that it does."""
+
+    def __init__(self, theme: Theme, window: QWidget) -> None:
+        super().__init__(window)
+        self._theme, self._window = theme, window
+        self.target: QAbstractButton | None = None
+        self._listens_to: QWindow | None = None
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.setAttribute(Qt.WidgetAttribute.WA_NoSystemBackground)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._look = QTimer(self)
+        self._look.setInterval(LOOK_MS)
+        self._look.timeout.connect(self._place)
+        self._end = QTimer(self)
+        self._end.setSingleShot(True)
+        self._end.setInterval(SHOWN_MS)
+        self._end.timeout.connect(self.forget)
+        self.hide()
+
+    def point_at(self, command: str) -> bool:
+        """Ring the button that does this command; False when none can be seen."""
+        self.forget()
+        buttons = self._window.findChildren(QAbstractButton)
+        found = (each for each in buttons if each.isVisible() and each.property("command") == command)
+        self.target = next(found, None)
+        if self.target is None:
+            return False
+        self.target.clicked.connect(self.forget)
+        self._listens_to = self._window.windowHandle()
+        if self._listens_to is not None:
+            self._listens_to.installEventFilter(self)
+        self._place()
+        self._look.start()
+        self._end.start()
+        return True
+
+    def forget(self) -> None:
+        """Point at nothing."""
+        if self.target is not None and isValid(self.target):
+            self.target.clicked.disconnect(self.forget)
+        if self._listens_to is not None and isValid(self._listens_to):
+            self._listens_to.removeEventFilter(self)
+        self._listens_to = None
+        self.target = None
+        self._look.stop()
+        self._end.stop()
+        self.hide()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if (
+            event.type() == QEvent.Type.KeyPress
+            and isinstance(event, QKeyEvent)
+            and event.key() == Qt.Key.Key_Escape
+        ):
+            self.forget()
+        return super().eventFilter(watched, event)
+
+    def _place(self) -> None:
+        target = self.target
+        if target is None or not isValid(target) or not target.isVisible():
+            self.forget()
+            return
+        inset = int(target.property("focusInset") or 0)
+        out = OUT + HALO - inset
+        place = QRect(target.mapTo(self._window, QPoint()), target.size()).adjusted(-out, -out, out, out)
+        if place != self.geometry():
+            self.setGeometry(place)
+        self.show()
+        self.raise_()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter, accent = QPainter(self), self._theme.colour("accent")
+        halo = self._theme.colour("accent")
+        halo.setAlphaF(0.28)
+        rect = QRectF(self.rect())
+        paint.box(painter, rect.adjusted(0.5, 0.5, -0.5, -0.5), RADIUS + HALO, None, halo, HALO)
+        paint.box(painter, rect.adjusted(HALO, HALO, -HALO, -HALO), RADIUS, None, accent, 2)
+        painter.end()

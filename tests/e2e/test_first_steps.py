@@ -1,0 +1,56 @@
+"""Who has never programmed goes the first steps with the mouse: each is checked, and the card says so."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(240)
+CANVAS = ".blocklySvg > .blocklyWorkspace > .blocklyBlockCanvas"
+
+
+def take(studio: Studio, category: str, kind: str, x: float, y: float) -> None:
+    """Drag the first block of that type out of its category, by the middle of its left edge."""
+    studio.open_category(category)
+    studio.drag(f".blocklyFlyout .blocklyDraggable.{kind}", x, y)
+
+
+def hang_below(studio: Studio, category: str, kind: str, above: str) -> None:
+    left, top, _, high = studio.spot(f"{CANVAS} .{above} > .blocklyPath")
+    take(studio, category, kind, left + 14, top + high + 20)
+
+
+def step(studio: Studio, words: str) -> None:
+    studio.find(f"{words}: the next step")
+
+
+def test_six_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -> None:
+    studio.click("First steps")
+    step(studio, "Use the virtual robot")
+    studio.click("Use the virtual robot", kind="Button")
+    step(studio, "Drag “when started” onto the page")
+    studio.click("Show me")
+    until(lambda: studio.page("document.querySelector('.nepRing:not([hidden])') !== null"), "the ring")
+    view = studio.find(kind="QWebEngineView")["rect"]
+    take(studio, "Events", "events_started", view[0] + 480, view[1] + 120)
+    step(studio, "Put “say” below it")
+    hang_below(studio, "Speech", "robot_pepper_do_say", "events_started")
+    step(studio, "Press Run and listen")
+    studio.click("Show me")
+    ring = studio.find(kind="HintRing")["rect"]
+    run = studio.find("Run", kind="RunButton")["rect"]
+    assert ring[0] <= run[0]
+    assert ring[0] + ring[2] >= run[0] + run[2]
+    studio.click("Run", kind="RunButton")
+    until(lambda: not studio.all(kind="HintRing"), "the ring goes with the press")
+    step(studio, "Put “turn” below “say”")
+    hang_below(studio, "Movement", "robot_pepper_do_turn", "robot_pepper_do_say")
+    step(studio, "Press Run, then Stop while it turns")
+    studio.says("Finished")
+    studio.click("Run", kind="RunButton")
+    until(lambda: studio.outlined("running"), "a block runs")
+    studio.screen.key("F12")
+    studio.find("First steps done")
+    studio.says("6 of 6")

@@ -1,0 +1,109 @@
+"""The empty canvas says its first step and takes the block anyway; a ring leads to a block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+
+from app.ui.blockly.view import BlocklyView
+from tests.ui.blockly_person import START, Person
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+SHOWN = "!document.querySelector('.nepBegin').hidden"
+SAID = "document.querySelector('.nepBeginPlace').textContent"
+BUTTONS = "[...document.querySelectorAll('.nepBegin button')].filter(e => !e.hidden).map(e => e.textContent)"
+RING = "document.querySelector('.nepRing:not([hidden])') !== null"
+BUBBLE = "document.querySelector('.nepRingBubble:not([hidden])')?.textContent ?? ''"
+FIRST = ".blocklyFlyout .blocklyDraggable"
+
+
+@pytest.fixture
+def empty(view: BlocklyView, person: Callable[..., Person]) -> Person:
+    view.set_first_step("when started", False)
+    made = person()
+    made.wait_for(SHOWN)
+    return made
+
+
+def middle_of(person: Person, selector: str) -> QPoint:
+    box = person.box(selector)
+    return QPoint(round((box["left"] + box["right"]) / 2), round((box["top"] + box["bottom"]) / 2))
+
+
+def test_the_empty_canvas_says_what_to_drag_and_offers_a_robot_until_there_is_one(
+    empty: Person, view: BlocklyView
+) -> None:
+    assert empty.ask(SAID) == "Drag “when started” here"
+    assert empty.ask(BUTTONS) == ["Use the virtual robot", "Show me", "Open an example"]
+    asked: list[str] = []
+    view.wanted.connect(asked.append)
+    empty.click(".nepBegin button:nth-child(1)", dx=20)
+    empty.click(".nepBegin button:nth-child(3)", dx=20)
+    empty.until(lambda: asked == ["robot", "examples"], "the window hears what was pressed")
+    view.set_first_step("when started", True)
+    empty.wait_for(BUTTONS, ["Show me", "Open an example"])
+
+
+def test_a_block_can_be_dropped_onto_the_words_and_takes_them_away(empty: Person) -> None:
+    empty.open_category("Events")
+    place = middle_of(empty, ".nepBeginPlace")
+    start = empty.hold(FIRST)
+    empty.move(start, place)
+    empty.wait_for("document.querySelector('.nepBegin').className", "nepBegin dragging")
+    assert empty.ask(SHOWN), "the place stays while the block is in the hand"
+    empty.drop(place)
+    empty.wait_for(SHOWN, False)
+    (block,) = empty.tops()
+    assert block["type"] == "events_started"
+    empty.press(Qt.Key.Key_Delete)
+    empty.wait_for(SHOWN)
+    assert empty.tops() == []
+
+
+def test_the_words_are_beside_the_open_blocks(empty: Person) -> None:
+    empty.open_category("Events")
+    flyout = empty.box(".blocklyFlyout")
+    empty.wait_for(
+        f"document.querySelector('.nepBegin').getBoundingClientRect().left >= {flyout['right'] - 2}"
+    )
+
+
+def test_a_behaviour_with_blocks_has_no_such_words(view: BlocklyView, person: Callable[..., Person]) -> None:
+    view.set_first_step("when started", False)
+    made = person(START)
+    made.wait_for("document.querySelectorAll('.blocklyBlockCanvas [data-id=start]').length", 1)
+    made.wait_for(SHOWN, False)
+
+
+def test_show_me_leads_to_the_category_then_to_the_block_and_ends_with_it(empty: Person) -> None:
+    empty.click(".nepBegin button:nth-child(2)", dx=20)
+    empty.wait_for(BUBBLE, "“when started” is in Events")
+    ring, row = empty.box(".nepRing"), empty.box(".blocklyToolboxCategory")
+    assert abs(ring["left"] - row["left"]) < 8
+    assert abs(ring["bottom"] - row["bottom"]) < 8
+    empty.open_category("Events")
+    empty.wait_for(BUBBLE, "Drag it onto the page")
+    empty.drag(FIRST, middle_of(empty, ".nepBeginPlace"))
+    empty.wait_for("document.querySelector('.nepRing') === null")
+    assert len(empty.tops()) == 1
+
+
+def test_escape_and_the_window_take_the_ring_away(empty: Person, view: BlocklyView) -> None:
+    view.point_at("events_started", "when started", "Drag it")
+    empty.wait_for(RING)
+    empty.click(".blocklySvg", 500, 20)
+    empty.press(Qt.Key.Key_Escape)
+    empty.wait_for(RING, False)
+    view.point_at("events_started", "when started", "Drag it")
+    empty.wait_for(RING)
+    view.point_at("")
+    empty.wait_for(RING, False)
+
+
+def test_a_block_that_nobody_has_is_not_ringed(empty: Person, view: BlocklyView) -> None:
+    view.point_at("robot_nobody_do_say", "say", "Drag it")
+    empty.open_category("Events")
+    assert not empty.ask(RING)

@@ -1,0 +1,193 @@
+"""First steps: which are done is read from the blocks and the run, kept, and a hint comes after a while."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from app import resources
+from app.ui.panels.base import Panel
+from app.ui.panels.first_steps.panel import HINT_AFTER_S, KEPT, FirstStepsPanel
+from app.ui.panels.first_steps.steps import SAY, STEPS, TURN, Built, Now, built_in, shown_by
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, press
+from tests.ui.sample_data import pepper
+
+
+def block(kind: str, below: dict | None = None, **inputs: dict) -> dict:
+    made: dict = {"type": kind, "id": kind}
+    if below is not None:
+        made["next"] = {"block": below}
+    if inputs:
+        made["inputs"] = {name: {"block": held} for name, held in inputs.items()}
+    return made
+
+
+def page(*tops: dict) -> dict:
+    return {"blocks": {"blocks": list(tops)}}
+
+
+SAYS, TURNS = "robot_pepper_do_say", "robot_pepper_do_turn"
+
+
+def test_what_hangs_below_when_started_counts_also_inside_of_others() -> None:
+    assert built_in({}) == Built()
+    assert built_in(page(block("events_started"))) == Built(started=True)
+    inside = block("events_started", block("control_repeat", block(TURNS), BODY=block(SAYS)))
+    assert built_in(page(inside)) == Built(True, frozenset({SAYS}), True)
+    loose = page(block("events_started"), block(SAYS))
+    assert built_in(loose) == Built(True, loose=frozenset({SAY})), "it stands on the page, and does not run"
+
+
+def test_strange_files_have_no_steps() -> None:
+    assert built_in({"blocks": 3}) == Built()
+    assert built_in({"blocks": {"blocks": [3, {"type": "events_started", "next": 3, "inputs": 4}]}}) == Built(
+        True
+    )
+
+
+def test_each_step_is_done_by_what_shows_it_and_stays_done() -> None:
+    now, done = Now(), frozenset[str]()
+    for change, step in (
+        ({"can_speak": True}, "robot"),
+        ({"built": Built(started=True)}, "start"),
+        ({"built": Built(True, frozenset({"a"}))}, "say"),
+        ({"running": ("a",)}, "run"),
+        ({"built": Built(True, frozenset({"a"}), True), "running": ()}, "turn"),
+        ({"stopped": True}, "stop"),
+    ):
+        now = replace(now, **change)
+        done, before = shown_by(now, done), done
+        assert done - before == {step}
+    assert shown_by(Now(), done) == done == {step.id for step in STEPS}
+
+
+def test_a_stop_before_anything_ran_teaches_nothing() -> None:
+    built = Built(True, frozenset({"a"}), True)
+    assert "stop" not in shown_by(Now(True, built, stopped=True), ())
+
+
+def test_the_types_of_the_steps_are_those_of_the_shipped_robot() -> None:
+    described = json.loads(resources.path("robots", "pepper.tm.jsonld").read_text("utf-8"))
+    assert {"say", "turn"} <= described["actions"].keys()
+    assert (SAY, TURN) == ("_do_say", "_do_turn")
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session())
+
+
+@pytest.fixture
+def panel(qtbot, window, clock) -> FirstStepsPanel:
+    described = Panel("first_steps", "First steps", "lightbulb", (), lambda it: FirstStepsPanel(it, clock))
+    made = window.make(described, (384, 300))
+    qtbot.addWidget(made)
+    for widget in made.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(made, FirstStepsPanel)
+    return made
+
+
+def names(panel: FirstStepsPanel) -> list[str]:
+    return [row.accessibleName() for row in panel.rows]
+
+
+def build(panel: FirstStepsPanel, *tops: dict) -> None:
+    panel.session.document.edited(page(*tops))
+    panel.refresh()
+
+
+def test_the_next_step_has_its_hint_and_its_button(panel, window) -> None:
+    assert names(panel)[:2] == ["Use the virtual robot: the next step", "Drag “when started” onto the page"]
+    assert panel.rows[0].hint.isVisible()
+    assert not panel.rows[1].hint.isVisible()
+    press(panel.rows[0].button)
+    assert window.commands == ["robots.virtual"]
+    window.session.join(pepper())
+    panel.refresh()
+    assert names(panel)[:2] == [
+        "Use the virtual robot: done",
+        "Drag “when started” onto the page: the next step",
+    ]
+    press(panel.rows[1].button)
+    assert window.commands[-1] == "point.block:events_started"
+    assert panel.chip.text == "1 of 6"
+
+
+def test_show_me_knows_the_block_of_the_robot_that_is_there(panel, window) -> None:
+    window.session.join(pepper())
+    build(panel, block("events_started"))
+    press(panel.rows[2].button)
+    assert window.commands[-1] == "point.block:robot_virtual_pepper_do_say"
+    build(panel, block("events_started", block(SAYS)))
+    press(panel.rows[3].button)
+    assert window.commands[-1] == "point.button:run.run"
+
+
+def test_a_block_that_stands_loose_is_told_where_to_go(panel, window) -> None:
+    window.session.join(pepper())
+    build(panel, block("events_started"))
+    assert panel.rows[2].hint.text() == "It is in Speech, below the robot."
+    build(panel, block("events_started"), block(SAYS))
+    assert panel.rows[2].hint.text() == "Drag it up until it snaps below “when started”."
+    assert "say" not in panel.done
+
+
+def test_what_is_done_is_there_again_at_the_next_start(panel, window, qtbot) -> None:
+    window.session.join(pepper())
+    build(panel, block("events_started"))
+    assert window.session.settings.get(KEPT, []) == ["robot", "start"]
+    again = window.make(Panel("first_steps", "", "", (), FirstStepsPanel))
+    qtbot.addWidget(again)
+    for widget in again.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(again, FirstStepsPanel)
+    assert again.done == {"robot", "start"}
+    window.session.settings.set(KEPT, "nonsense")
+    assert FirstStepsPanel(window.context()).done == frozenset()
+
+
+def test_who_waits_for_twenty_seconds_is_shown_once_where_it_is(panel, window, clock) -> None:
+    window.session.join(pepper())
+    panel.refresh()
+    clock.now = HINT_AFTER_S - 1
+    panel.refresh()
+    assert window.commands == []
+    build(panel, block("control_wait"))  # somebody who builds is not idle
+    clock.now += 2
+    panel.refresh()
+    assert window.commands == []
+    clock.now += HINT_AFTER_S
+    panel.refresh()
+    panel.refresh()
+    assert window.commands == ["point.block:events_started"]
+    build(panel, block("events_started"))
+    assert window.commands[-1] == "point.block:-", "the ring goes with its step"
+
+
+def test_at_the_end_it_says_what_comes_then_and_can_begin_again(panel, window) -> None:
+    panel.done = frozenset(step.id for step in STEPS) - {"robot"}
+    window.session.join(pepper())
+    panel.refresh()
+    assert panel.pages.currentWidget() is panel.end
+    assert panel.chip.text == "6 of 6"
+    build(panel, block("events_started"))
+    panel.start_again()
+    assert window.commands == ["file.new"], "nobody's blocks are touched"
+    assert panel.done == frozenset()
+    assert panel.pages.currentIndex() == 0

@@ -1,0 +1,68 @@
+"""The ring round a button: where the button is, until it is pressed, and never in the mouse's way."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from app.ui.shell.hint_ring import HintRing
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, name_command
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@pytest.fixture
+def place(qtbot: QtBot, theme: Theme) -> QWidget:
+    made = QWidget()
+    made.resize(500, 300)
+    button = Button(theme, "Run")
+    button.setParent(made)
+    button.setGeometry(100, 50, 90, 30)
+    name_command(button, "run.run")
+    qtbot.addWidget(made)
+    made.show()
+    return made
+
+
+@pytest.fixture
+def ring(place: QWidget, theme: Theme) -> HintRing:
+    return HintRing(theme, place)
+
+
+def test_it_surrounds_the_button_and_follows_it(qtbot: QtBot, place: QWidget, ring: HintRing) -> None:
+    assert ring.point_at("run.run")
+    (button,) = place.findChildren(Button)
+    assert ring.geometry().contains(QRect(button.pos(), button.size()))
+    button.move(200, 120)
+    qtbot.waitUntil(lambda: ring.geometry().contains(QRect(QPoint(200, 120), button.size())))
+
+
+def test_the_press_goes_through_and_ends_it(place: QWidget, ring: HintRing) -> None:
+    ring.point_at("run.run")
+    (button,) = place.findChildren(Button)
+    pressed: list[bool] = []
+    button.clicked.connect(lambda: pressed.append(True))
+    assert place.childAt(button.geometry().center()) is button
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert pressed == [True]
+    assert ring.isHidden()
+    assert ring.target is None
+
+
+def test_escape_ends_it_and_so_does_a_button_that_goes(qtbot: QtBot, place: QWidget, ring: HintRing) -> None:
+    ring.point_at("run.run")
+    QTest.keyClick(place.windowHandle(), Qt.Key.Key_Escape)
+    assert ring.isHidden()
+    ring.point_at("run.run")
+    (button,) = place.findChildren(Button)
+    button.hide()
+    qtbot.waitUntil(ring.isHidden)
+
+
+def test_nothing_is_ringed_where_no_such_button_is_seen(place: QWidget, ring: HintRing) -> None:
+    assert not ring.point_at("run.stop")
+    assert ring.isHidden()
