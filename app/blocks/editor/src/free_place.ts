@@ -54,12 +54,13 @@ function* around(wanted: Point): Generator<Point> {
 }
 
 /** The free place nearest to `wanted` that can be seen; when all that can be seen is full, the nearest free one. */
-export function freePlace(wanted: Point, size: {width: number; height: number}, others: Box[], view: Box): Point {
+export function freePlace(wanted: Point, size: {width: number; height: number}, others: Box[], view: Box,
+  gap = GAP): Point {
   let hidden: Point | null = null;
   for (const place of around(wanted)) {
     const box = at(place, size.width, size.height);
     const seen = isSeen(box, view);
-    if ((!seen && hidden) || others.some((other) => overlaps(box, other, GAP))) continue;
+    if ((!seen && hidden) || others.some((other) => overlaps(box, other, gap))) continue;
     if (seen) return place;
     hidden ??= place;
   }

@@ -7,6 +7,7 @@ import {focusedBlock} from './help';
 import {canFold, fold} from './folding';
 import {iconElement} from './icons';
 import {ctrl, keyWords} from './keys';
+import {addCanvasNote, addNote, hasNote, removeNote} from './notes';
 import {registerRemoveMenu} from './remove_menu';
 import {lazy, t} from './words';
 
@@ -16,12 +17,11 @@ const OFF = 'MANUALLY_DISABLED';
 const SWITCH = 'nepSwitch';
 
 const REMOVED = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockHelp', 'commentCreate', 'commentDelete',
-  'commentDuplicate', 'blockDuplicate', 'blockCollapseExpand', 'blockDisable', 'blockDelete'];
+  'commentDuplicate', 'blockDuplicate', 'blockCollapseExpand', 'blockDisable', 'blockDelete', 'blockComment'];
 
 const WORDS: Readonly<Record<string, string>> = {
   CLEAN_UP: lazy('Tidy up'),
-  ADD_COMMENT: lazy('Add a note'),
-  REMOVE_COMMENT: lazy('Remove the note'),
+  WORKSPACE_COMMENT_DEFAULT_TEXT: lazy('Write a note'),
   DELETE_BLOCK: lazy('Delete'),
   DELETE_X_BLOCKS: lazy('Delete %1 blocks'),
   DIALOG_OK: lazy('Use it'),
@@ -36,7 +36,6 @@ const KEPT: Readonly<Record<string, [weight: number, icon: string]>> = {
   undoWorkspace: [20, 'undo-2'],
   redoWorkspace: [21, 'redo-2'],
   cleanWorkspace: [40, 'list-checks'],
-  blockComment: [70, 'sticky-note'],
   workspaceDelete: [99, 'trash-2'],
 };
 
@@ -124,6 +123,10 @@ export function registerMenu(clipboard: Clipboard): void {
     run: (it) => switchOff(it.block!, true)});
   block({id: 'nepOn', weight: 54, icon: 'power', words: t('Switch on'), shortcut: SWITCH,
     when: (it) => own(it) && it.block!.hasDisabledReason(OFF), run: (it) => switchOff(it.block!, false)});
+  block({id: 'nepNote', weight: 70, icon: 'sticky-note', words: t('Add a note'),
+    when: (it) => own(it) && !hasNote(it.block!) && !it.block!.isCollapsed(), run: (it) => addNote(it.block!)});
+  block({id: 'nepNoNote', weight: 70, icon: 'sticky-note', words: t('Remove the note'),
+    when: (it) => own(it) && hasNote(it.block!), run: (it) => removeNote(it.block!)});
   line(ScopeType.BLOCK, 80);
   line(ScopeType.BLOCK, 98);
   block({id: 'nepDelete', weight: 99, icon: 'trash-2', shortcut: names.DELETE,
@@ -145,7 +148,17 @@ export function registerMenu(clipboard: Clipboard): void {
     shortcut: names.PASTE, when: () => true, run: (_it, place) => clipboard.paste(place)});
   line(ScopeType.WORKSPACE, 15);
   line(ScopeType.WORKSPACE, 35);
+  add(ScopeType.WORKSPACE, {id: 'nepNoteHere', weight: 50, icon: 'sticky-note', words: t('Add a note here'),
+    when: () => true, run: (it, place) => it.workspace && addCanvasNote(it.workspace, place)});
   line(ScopeType.WORKSPACE, 98);
+
+  const note = (entry: Entry) => add(ScopeType.COMMENT, entry);
+  note({id: 'nepNoteDuplicate', weight: 10, icon: 'copy-plus', words: t('Duplicate'), shortcut: names.DUPLICATE,
+    when: () => true, run: (it) => clipboard.duplicate(it.comment)});
+  note({id: 'nepNoteCopy', weight: 11, icon: 'copy', words: t('Copy'), shortcut: names.COPY,
+    when: () => true, run: (it) => clipboard.copy(it.comment)});
+  note({id: 'nepNoteDelete', weight: 99, icon: 'trash-2', words: t('Remove the note'), shortcut: names.DELETE,
+    when: () => true, run: (it) => it.comment && step(() => it.comment!.dispose())});
 }
 
 // ---- how a block is

@@ -3,6 +3,7 @@ import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import type {Culling} from './culling';
 import {type BlockState, UNKNOWN_BLOCK, wrapUnknown, wrapWholeStack, unwrapUnknown} from './unknown_blocks';
+import {keepTyped} from './notes';
 import {withDeferredWords} from './blockly_patches';
 
 type Json = Record<string, unknown>;
@@ -89,6 +90,7 @@ export class Program {
 
   /** The newest JSON; tells about it at once when the window does not have it yet. */
   flush(): string {
+    keepTyped();
     window.clearTimeout(this.timer);
     this.timer = 0;
     const json = JSON.stringify(this.save());

@@ -6,6 +6,7 @@ import {Culling} from './culling';
 import {foldOnDoubleClick} from './folding';
 import {Functions} from './functions';
 import {visibleSensors, observeFlyout} from './visible_sensors';
+import {keepNotesReadable} from './notes';
 import {Program, holdsAny} from './program';
 import {RENDERER} from './renderer';
 import {Overlays} from './overlays';
@@ -64,6 +65,7 @@ export class Tab {
     this.overlays = new Overlays(this.workspace);
     this.functions = new Functions(this.workspace);
     foldOnDoubleClick(this.workspace);
+    keepNotesReadable(this.workspace);
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.onFound = () => this.overlays.showLive();
     const flyout = this.workspace.getFlyout();

@@ -1,0 +1,249 @@
+// Notes: sheets of text beside a block, or anywhere on the canvas. They are Blockly's comments and are saved as such;
+// here they get our look, take the keys when they are made, and keep what is typed.
+import * as Blockly from 'blockly/core';
+import {freePlace, inSight, obstacles} from './free_place';
+import {drawIcon} from './icons';
+import {t} from './words';
+
+const {Coordinate, Size} = Blockly.utils;
+const SVG = 'http://www.w3.org/2000/svg';
+const SIGN = 20;
+const HEAD = 26;
+const BORDER = 6;
+const FROM_BLOCK = 26;
+const GAP = 12;
+const FIRST_SIZE = [230, 128] as const;
+const TYPED_MS = 200;
+const FONT = 14;
+/** On the screen no letter is smaller, however far away the canvas is; up to a size that still fits into a sheet. */
+const SMALLEST = 12;
+const LARGEST = 30;
+
+// ---- what is typed
+
+/** Where something was typed that Blockly does not know yet: it asks only when the field is left. */
+const typed = new Set<HTMLTextAreaElement>();
+let telling = 0;
+
+/** Tells Blockly what was typed so far; before anything is saved, and when the person rests. */
+export function keepTyped(): void {
+  window.clearTimeout(telling);
+  for (const area of [...typed]) {
+    typed.delete(area);
+    area.dispatchEvent(new Event('change'));
+  }
+}
+
+document.addEventListener('input', (event) => {
+  const area = event.target;
+  if (!(area instanceof HTMLTextAreaElement) || !area.classList.contains('blocklyCommentText')) return;
+  typed.add(area);
+  window.clearTimeout(telling);
+  telling = window.setTimeout(keepTyped, TYPED_MS);
+}, true);
+
+/** Esc leaves the words of a note on the canvas for the note. Blockly forgets to make it ready for the keys. */
+document.addEventListener('keydown', (event) => {
+  const note = event.key === 'Escape' && event.target instanceof HTMLTextAreaElement ?
+    event.target.closest<SVGElement>('.blocklyComment') : null;
+  const workspace = Blockly.common.getMainWorkspace();
+  const comment = note && workspace.getCommentById(note.dataset['id'] ?? '');
+  if (!(comment instanceof Blockly.comments.RenderedWorkspaceComment)) return;
+  event.stopPropagation();
+  keepTyped();
+  Blockly.getFocusManager().focusNode(comment);
+}, true);
+
+// ---- the sheet of a block
+
+class Sheet extends Blockly.bubbles.TextInputBubble {
+  private buttons: SVGGElement[] | undefined;
+
+  /** A head to take it by, with its buttons; made before the first size is set, which the parent does. */
+  addHead(buttons: [icon: string, words: string, run: () => void][]): void {
+    this.svgRoot.classList.add('nepNote');
+    this.buttons = buttons.map(([icon, words, run]) => {
+      const button = element('g', 'nepNoteButton');
+      button.setAttribute('role', 'button');
+      button.setAttribute('aria-label', words);
+      const title = element('title', '');
+      title.textContent = words;
+      const ground = element('rect', '');
+      for (const [name, value] of [['width', 22], ['height', 22], ['rx', 5]] as const) ground.setAttribute(name, `${value}`);
+      const picture = element('g', '');
+      picture.setAttribute('transform', 'translate(4, 4)');
+      drawIcon(picture, icon, 14);
+      button.append(title, ground, picture);
+      button.addEventListener('pointerdown', (event) => event.stopPropagation());
+      button.addEventListener('click', run);
+      this.svgRoot.append(button);
+      return button as SVGGElement;
+    });
+    this.setSize(this.getSize());
+  }
+
+  override setSize(size: Blockly.utils.Size, relayout = false): void {
+    super.setSize(size, relayout);
+    const {width, height} = this.getSize();
+    const text = this.getEditor().getDom();
+    text.setAttribute('y', `${HEAD}`);
+    text.setAttribute('height', `${Math.max(10, height - HEAD - BORDER)}`);
+    this.buttons?.forEach((button, at) =>
+      button.setAttribute('transform', `translate(${width - 26 - 24 * at}, 3)`));
+  }
+}
+
+/** Blockly's own names of where the sheet is, and of what draws from it to the block. */
+interface Drawn {
+  tail: SVGPathElement;
+  renderTail(): void;
+}
+
+/** A thin line between block and sheet, in the place of a wedge over the block's words. */
+(Sheet.prototype as unknown as Drawn).renderTail = function (this: Drawn) {
+  const sheet = this as unknown as Sheet;
+  const block = (sheet.getOwner() as NoteSign | undefined)?.getSourceBlock();
+  if (!(block instanceof Blockly.BlockSvg)) return;
+  const at = sheet.getRelativeToSurfaceXY();
+  const {left, right, top} = block.getBoundingRectangleWithoutChildren();
+  const middle = top + HEAD / 2 - at.y;
+  const {width} = sheet.getSize();
+  const isRight = at.x >= right;
+  const from = isRight ? right - at.x : at.x + width <= left ? left - at.x : (left + right) / 2 - at.x;
+  const to = isRight ? 0 : at.x + width <= left ? width : width / 2;
+  this.tail.setAttribute('d', `M${from},${middle}L${to},${HEAD / 2}`);
+};
+
+function element(name: string, kind: string): SVGElement {
+  const made = document.createElementNS(SVG, name);
+  if (kind) made.setAttribute('class', kind);
+  return made;
+}
+
+/** The sign on a block that has a note: shows and hides it. */
+class NoteSign extends Blockly.icons.CommentIcon {
+  constructor(block: Blockly.Block) {
+    super(block);
+    this.setBubbleSize(new Size(...FIRST_SIZE));
+  }
+
+  override initView(pressed: (event: PointerEvent) => void): void {
+    if (this.svgRoot) return;
+    super.initView(pressed);
+    const ground = element('rect', '');
+    for (const [name, value] of [['width', SIGN], ['height', SIGN], ['rx', 5]] as const) ground.setAttribute(name, `${value}`);
+    const picture = element('g', '');
+    picture.setAttribute('transform', 'translate(3, 3)');
+    drawIcon(picture, 'sticky-note', SIGN - 6);
+    this.svgRoot!.replaceChildren(ground, picture);
+    this.svgRoot!.classList.add('nepNoteSign');
+  }
+
+  override getSize(): Blockly.utils.Size {
+    return new Size(SIGN, SIGN);
+  }
+
+  override async setBubbleVisible(visible: boolean): Promise<void> {
+    keepTyped();
+    await super.setBubbleVisible(visible);
+  }
+
+  protected override createBubble(): void {
+    const block = this.sourceBlock as Blockly.BlockSvg;
+    const anchor = Coordinate.sum(this.workspaceLocation, new Coordinate(SIGN / 2, SIGN / 2));
+    const sheet = new Sheet(block.workspace, anchor, block.getBoundingRectangleWithoutChildren(), this);
+    (this as unknown as {textInputBubble: Sheet}).textInputBubble = sheet;
+    sheet.getEditor().setParent(block);
+    sheet.setText(this.getText());
+    sheet.setSize(this.getBubbleSize(), true);
+    sheet.addHead([
+      ['x', t('Hide the note'), () => void this.setBubbleVisible(false)],
+      ['trash-2', t('Remove the note'), () => removeNote(block)],
+    ]);
+    sheet.moveDuringDrag(this.getBubbleLocation() ?? placeOf(sheet, block));
+    this.setBubbleLocation(sheet.getRelativeToSurfaceXY());
+    // The first two listeners of Blockly's own kind are added by the parent.
+    sheet.addLocationChangeListener(() => this.onBubbleLocationChange());
+    sheet.setAriaLabelProvider(() => t('Note: {text}', {text: this.getText()}));
+    this.watchKeys(sheet, block);
+  }
+
+  private watchKeys(sheet: Sheet, block: Blockly.BlockSvg): void {
+    const text = sheet.getEditor().getDom();
+    text.addEventListener('keydown', (event) => {
+      if (event.key !== 'Escape') return;
+      event.stopPropagation();
+      keepTyped();
+      Blockly.getFocusManager().focusNode(block);
+    }, true);
+    // A note in which nothing was written would not be saved: it goes when it is left.
+    text.addEventListener('focusout', () => window.setTimeout(() => {
+      keepTyped();
+      if (!text.contains(document.activeElement) && !block.isDeadOrDying() && this.getText() === '') removeNote(block);
+    }));
+  }
+}
+
+/** Beside the block: on no other block of its stack, on no other stack, in sight. */
+function placeOf(sheet: Sheet, block: Blockly.BlockSvg): Blockly.utils.Coordinate {
+  const {workspace} = block;
+  const root = block.getRootBlock();
+  const rows = root.getDescendants(false).filter((each) => !each.outputConnection)
+    .map((each) => each.getBoundingRectangleWithoutChildren());
+  const {right, top} = block.getBoundingRectangle();
+  const wanted = new Coordinate(right + FROM_BLOCK, top);
+  const {width, height} = sheet.getSize();
+  return freePlace(wanted, {width, height}, [...obstacles(workspace, new Set([root])), ...rows], inSight(workspace), GAP);
+}
+
+Blockly.icons.registry.unregister(Blockly.icons.IconType.COMMENT.toString());
+Blockly.icons.registry.register(Blockly.icons.IconType.COMMENT, NoteSign);
+
+function inOneStep(change: () => void): void {
+  const group = Blockly.Events.getGroup();
+  if (!group) Blockly.Events.setGroup(true);
+  change();
+  Blockly.Events.setGroup(group);
+}
+
+export function hasNote(block: Blockly.BlockSvg): boolean {
+  return block.hasIcon(Blockly.icons.IconType.COMMENT);
+}
+
+export function removeNote(block: Blockly.BlockSvg): void {
+  if (hasNote(block)) inOneStep(() => block.setCommentText(null));
+}
+
+/** An open note that has the keys. */
+export async function addNote(block: Blockly.BlockSvg): Promise<void> {
+  inOneStep(() => block.setCommentText(''));
+  const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
+  if (!(sign instanceof NoteSign)) return;
+  await sign.setBubbleVisible(true);
+  const sheet = sign.getBubble();
+  if (sheet instanceof Sheet) Blockly.getFocusManager().focusNode(sheet.getEditor());
+}
+
+/** A note on the canvas itself, at a place of the page. */
+export function addCanvasNote(workspace: Blockly.WorkspaceSvg, place: {x: number; y: number}): void {
+  const at = Blockly.utils.svgMath.screenToWsCoordinates(workspace, new Coordinate(place.x, place.y));
+  inOneStep(() => {
+    const note = new Blockly.comments.RenderedWorkspaceComment(workspace);
+    note.setSize(new Size(...FIRST_SIZE));
+    note.moveTo(at);
+    Blockly.getFocusManager().focusNode(note.view.getEditorFocusableNode());
+  });
+}
+
+/** Lets the words of notes be readable however far away the canvas is. */
+export function keepNotesReadable(workspace: Blockly.WorkspaceSvg): void {
+  let scale = 0;
+  const adapt = () => {
+    if (workspace.scale === scale) return;
+    ({scale} = workspace);
+    const size = Math.min(LARGEST, Math.max(FONT, SMALLEST / scale));
+    workspace.getInjectionDiv().style.setProperty('--nep-noteFont', `${size}px`);
+  };
+  adapt();
+  workspace.addChangeListener((event) => event.type === Blockly.Events.VIEWPORT_CHANGE && adapt());
+}

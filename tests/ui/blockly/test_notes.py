@@ -1,0 +1,152 @@
+"""Notes: they have the keys at once, keep what is typed, stand beside their block and are easy to read."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from app.blocks import editor_definitions
+from app.ui.blockly.view import BlocklyView
+from tests.blocks.samples import robot, workspace
+from tests.ui.blockly.test_block_menu import ROWS, choose, looked_at, program
+from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+WORDS = "Ask Maria first"
+TYPES = "document.activeElement.tagName == 'TEXTAREA'"
+
+
+@pytest.fixture
+def view(qtbot) -> BlocklyView:
+    return editor(qtbot, editor_definitions([robot()]))
+
+
+@pytest.fixture
+def them(view, person) -> Person:
+    made: Person = person(state=program())
+    view.setFocus()
+    made.wait_for("document.hasFocus()")
+    return made
+
+
+def note_of(them: Person, id: str = "first") -> dict:
+    found = [them.tops()[0]]
+    while found[-1].get("id") != id:
+        found.append(found[-1]["next"]["block"])
+    return found[-1].get("icons", {}).get("comment", {})
+
+
+def add_note(them: Person, words: str = WORDS) -> None:
+    choose(them, "first", "Add a note")
+    them.wait_for(TYPES)
+    QTest.keyClicks(them.target, words)
+    them.wait_for("document.activeElement.value", words)
+
+
+def boxes_of_blocks(them: Person) -> list[list[float]]:
+    paths = "[...document.querySelectorAll('.blocklyBlockCanvas .blocklyPath')]"
+    return them.ask(f"{paths}.map(e => (r => [r.left, r.top, r.right, r.bottom])(e.getBoundingClientRect()))")
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_a_new_note_has_the_keys_stands_beside_its_block_and_keeps_what_is_typed(view, them, dark):
+    view.set_theme(TOKENS, dark)
+    add_note(them)
+    looked_at(them, f"note-{'dark' if dark else 'light'}")
+    sheet, room = them.box(".nepNote .blocklyDraggable"), them.box(".blocklySvg")
+    for left, top, right, bottom in boxes_of_blocks(them):
+        beside = sheet["left"] >= right or sheet["right"] <= left
+        assert beside or sheet["top"] >= bottom or sheet["bottom"] <= top
+    assert room["left"] <= sheet["left"] < sheet["right"] <= room["right"]
+    assert room["top"] <= sheet["top"] < sheet["bottom"] <= room["bottom"]
+    assert note_of(them)["text"] == WORDS  # nobody has left the field
+    shown = "getComputedStyle(document.querySelector('.nepNote textarea'))"
+    assert them.ask(f"{shown}.color") != them.ask(f"{shown}.backgroundColor")
+    assert "Inter" in them.ask(f"{shown}.fontFamily")
+
+
+def test_what_is_typed_stays_when_another_tab_comes(qtbot, view, them):
+    view.show_tab("one", them.newest())
+    them.wait_for("!!document.querySelector('.nepTab:not([hidden]) [data-id=first]')")
+    choose(them, "first", "Add a note")
+    them.wait_for(TYPES)
+    QTest.keyClicks(them.target, WORDS)
+    them.wait_for("document.activeElement.value", WORDS)
+    view.show_tab("two", workspace())
+    qtbot.waitUntil(lambda: WORDS in str(view.workspace_of("one")), timeout=WAIT_MS)
+
+
+def test_escape_leaves_the_note_for_its_block_and_undo_takes_it_back(qtbot, view, them):
+    add_note(them)
+    them.press(Qt.Key_Escape)
+    them.wait_for("document.activeElement.closest('[data-id]')?.dataset.id", "first")
+    assert note_of(them)["text"] == WORDS
+    view.undo()
+    qtbot.waitUntil(lambda: not note_of(them).get("text"), timeout=WAIT_MS)
+    view.redo()
+    qtbot.waitUntil(lambda: note_of(them).get("text") == WORDS, timeout=WAIT_MS)
+
+
+def test_a_note_without_a_word_goes_when_it_is_left(qtbot, them):
+    choose(them, "first", "Add a note")
+    them.wait_for(TYPES)
+    them.press(Qt.Key_Escape)
+    them.wait_for("document.querySelector('.nepNoteSign') === null")
+
+
+def test_the_sign_on_the_block_hides_and_shows_the_note(qtbot, them):
+    add_note(them)
+    them.click(".nepNoteSign", dx=8, dy=8)
+    them.wait_for("document.querySelector('.nepNote') === null")
+    assert note_of(them)["text"] == WORDS
+    them.click(".nepNoteSign", dx=8, dy=8)
+    them.wait_for("document.querySelector('.nepNote textarea')?.value", WORDS)
+
+
+def test_a_note_is_dragged_by_its_head_and_follows_its_block(qtbot, them):
+    add_note(them)
+    box = them.box(".nepNote .blocklyDraggable")
+    start = QPoint(round(box["left"] + 60), round(box["top"] + 8))
+    QTest.mouseMove(them.target, start)
+    QTest.mousePress(them.target, Qt.LeftButton, pos=start)
+    them.move(start, start + QPoint(160, 120))
+    them.drop(start + QPoint(160, 120))
+    them.wait_for(
+        "Math.round(document.querySelector('.nepNote .blocklyDraggable').getBoundingClientRect().left)",
+        round(box["left"] + 160),
+    )
+    moved = note_of(them)
+    them.drag("[data-id=start] > .blocklyPath", QPoint(330, 140))
+    qtbot.waitUntil(lambda: note_of(them)["x"] > moved["x"] + 20, timeout=WAIT_MS)
+
+
+def test_a_note_can_be_read_from_afar(view, them):
+    add_note(them)
+    for _ in range(8):
+        view.zoom_out()
+    seen = "(e => parseFloat(getComputedStyle(e).fontSize) * e.getBoundingClientRect().width / e.offsetWidth)"
+    them.wait_for("document.querySelector('.nepNote textarea').getBoundingClientRect().width < 120")
+    assert them.ask(f"{seen}(document.querySelector('.nepNote textarea'))") > 8.5
+
+
+def test_a_note_on_the_canvas_is_saved_and_removed_by_its_menu(qtbot, them):
+    QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(700, 300))
+    them.wait_for("!!document.querySelector('.blocklyContextMenu')")
+    rows = them.ask(ROWS)
+    script = f"document.querySelectorAll('.nepMenuRow')[{rows.index('Add a note here')}]"
+    them.ask(f"{script}.setAttribute('data-test', 'row')")
+    them.click("[data-test=row]")
+    them.wait_for(TYPES)
+    QTest.keyClicks(them.target, WORDS)
+    them.wait_for("document.activeElement.value", WORDS)
+    looked_at(them, "note-canvas")
+    (note,) = them.newest()["workspaceComments"]
+    assert note["text"] == WORDS
+    assert len(them.tops()) == 1
+    them.press(Qt.Key_Escape)
+    them.wait_for("document.activeElement.classList.contains('blocklyComment')")
+    them.press(Qt.Key_Delete)
+    qtbot.waitUntil(lambda: "workspaceComments" not in them.newest(), timeout=WAIT_MS)
