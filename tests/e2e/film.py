@@ -6,6 +6,7 @@ the test's own folder. When a step fails, its picture is kept too, with what was
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import threading
@@ -16,7 +17,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from tests.e2e.person import Person, middle
+from tests.e2e.person import Person, Reaction, middle
 from tests.e2e.waiting import until
 from tests.e2e.x11 import LEFT, Picture, Screen
 
@@ -61,6 +62,7 @@ class Film:
         for old in self.folder.glob("*.png"):
             old.unlink()
         self.pictures: list[Path] = []
+        self.slowest: dict[str, Reaction] = {}
 
     @contextmanager
     def step(self, caption: str) -> Iterator[None]:
@@ -72,6 +74,15 @@ class Film:
             raise
         self._wait_still()
         self._keep(caption, caption)
+        self._measure(caption)
+
+    def _measure(self, caption: str) -> None:
+        """Keeps the slowest answer of a step in ``reactions.json``; `bench` judges it, no test does."""
+        seen = self._studio.reactions()
+        if seen:
+            self.slowest[caption] = max(seen, key=lambda each: each.took_ms)
+        told = {step: each._asdict() for step, each in self.slowest.items()}
+        (self.folder / "reactions.json").write_text(json.dumps(told, indent=1), "utf-8")
 
     def _window(self) -> Sequence[float]:
         left, top, width, height = self._studio.find(kind="MainWindow")["rect"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 from tests.e2e.waiting import until
 from tests.e2e.x11 import Picture, Screen
@@ -11,6 +12,14 @@ from tests.e2e.x11 import Picture, Screen
 STEP_S = 40.0
 RUNNING = (0xFF, 0xB3, 0x00)  # the token "running" of the light theme
 Seen = Mapping[str, object]
+
+
+class Reaction(NamedTuple):
+    """One press, and when its answer was on the screen."""
+
+    where: str
+    what: str
+    took_ms: float
 
 
 def middle(rect: Sequence[float]) -> tuple[float, float]:
@@ -106,6 +115,20 @@ class Person:
         """What a script that only reads finds in the page of the block editor."""
         found = self._ask("script", script=script)
         return json.loads(found) if isinstance(found, str) and found else None
+
+    def reactions(self) -> list[Reaction]:
+        """How long each press took until its answer was on the screen, since the last time this was asked.
+
+        Of the page only what took 16 ms or more: it tells no others.
+        """
+        watch = (
+            "(w => { if (!w.nepReactions) { w.nepReactions = [];"
+            " new PerformanceObserver(list => w.nepReactions.push(...list.getEntries().map(e =>"
+            " [e.name, e.duration]))).observe({type: 'event', durationThreshold: 16, buffered: true}); }"
+            " return w.nepReactions.splice(0); })(window)"
+        )
+        page = [["page", *each] for each in self.page(watch) or []]
+        return [Reaction(*each) for each in (*(self._ask("reactions") or []), *page)]
 
     def spot(self, selector: str) -> list[float]:
         """Where an element of the page is on the screen, once it stands still."""

@@ -10,6 +10,7 @@ import json
 import os
 import sys
 import threading
+import time
 
 CELL_ROLE = 0x0100  # Qt.UserRole: what a cell of our tables shows
 TABLE_ROWS = 200
@@ -57,9 +58,12 @@ def _looker(reply):
 
         def look(self, line: str) -> None:
             request = json.loads(line)
+            reactions.watch()
             try:
                 if request["do"] == "script":
                     _script(request, reply)
+                elif request["do"] == "reactions":
+                    reply(request["n"], reactions.told())
                 else:
                     reply(request["n"], _widgets(application))
             except Exception as error:  # noqa: BLE001  the tests are told, Studio goes on
@@ -68,7 +72,57 @@ def _looker(reply):
     looker = Looker()
     looker.asked.connect(looker.look)
     looker.moveToThread(application.thread())
+    reactions = _reactions(application)
     return looker
+
+
+def _reactions(application):
+    """Measures how long after each press of a key or button the window has answered it on the screen.
+
+    From the time that the X server gave the event (its clock is the monotonic one) until the window has
+    handled it and painted what it asked for. The page of the editor measures its own (Event Timing API).
+    """
+    from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt
+
+    inputs = {QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonRelease, QEvent.Type.KeyPress}
+    painted = QEvent.Type(QEvent.registerEventType())
+
+    class Painted(QEvent):
+        def __init__(self, since_ms: int, what: str) -> None:
+            super().__init__(painted)
+            self.since_ms, self.what = since_ms, what
+
+    class Reactions(QObject):
+        def __init__(self) -> None:
+            super().__init__()
+            self.seen: list[list] = []
+            self.watched: list = []
+
+        def watch(self) -> None:
+            """Watch the windows that are open: an event comes to them first, then to the widgets in them."""
+            for window in application.topLevelWindows():
+                if not any(window is each for each in self.watched):
+                    self.watched.append(window)
+                    window.installEventFilter(self)
+
+        def eventFilter(self, watched, event) -> bool:
+            if event.type() in inputs and event.spontaneous():
+                late = Painted(event.timestamp(), event.type().name)
+                # Asked for after what the handling asks for: a repaint has the same, low priority.
+                QCoreApplication.postEvent(self, late, Qt.EventPriority.LowEventPriority.value - 1)
+            return False
+
+        def customEvent(self, event) -> None:
+            took_ms = time.monotonic() * 1000 % 2**32 - event.since_ms
+            self.seen.append(["window", event.what, round(took_ms, 1)])
+
+        def told(self) -> list[list]:
+            told, self.seen = self.seen, []
+            return told
+
+    reactions = Reactions()
+    reactions.moveToThread(application.thread())
+    return reactions
 
 
 def _script(request, reply) -> None:
