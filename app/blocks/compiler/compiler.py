@@ -7,6 +7,7 @@ import keyword
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from app.blocks.compiler.conflicts import ConflictFinder
 from app.blocks.compiler.loose_ends import LooseEnds
 from app.blocks.compiler.lowering import END, Function, Lowering
 from app.blocks.compiler.problems import ProblemCollector
@@ -135,6 +136,8 @@ class _Compiler:
         ]
         self._notes.check_starts(len(functions))
         self._ends.tell(self._notes, self._workspace)
+        for found in ConflictFinder(self._workspace, self._catalogue, self._shaping.called).conflicts():
+            self._notes.conflict(found)
         body: list[ast.stmt] = [
             *statements("\n".join(f"{name} = 0" for name in self._variables.values()), {}),
             *own,

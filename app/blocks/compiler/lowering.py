@@ -56,6 +56,15 @@ class Lowering:
         """The function that this block defines; None if it is switched off."""
         return self._by_id.get(definition.id)
 
+    def called(self, placed: Placed) -> Function | None:
+        """The function that this block of the ``workspace`` runs; None for one that runs none."""
+        kind = placed.type.partition(":")[0]
+        found = self._called(placed) if kind in (CALL, CALL_RESULT) else None
+        if found is None:
+            return None
+        definitions = (script[0] for script in self.workspace.scripts)
+        return next((replace(found, placed=each) for each in definitions if each.id == found.placed.id), None)
+
     def _called(self, placed: Placed) -> Function | None:
         """By id; a call that came from another behaviour finds a function of the same name."""
         found = self._by_id.get(str(placed.extra.get("function")))

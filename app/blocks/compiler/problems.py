@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from app.blocks.compiler.conflicts import Conflict
 from app.blocks.model.block import Block
 from app.blocks.model.block_text import label, label_of_type, reading
 from app.blocks.model.fields import Field, FieldError, TextField, ValueInput
@@ -22,6 +23,15 @@ _NEEDS = {
     None: lazy("a value"),
 }
 _LITERALS = {"values_number": "NUMBER", "values_text": "TEXT"}
+_PARTS = {
+    "head": lazy("the head"),
+    "arms": lazy("the arms"),
+    "speech": lazy("the voice"),
+    "face": lazy("the face"),
+    "lights": lazy("the lights"),
+    "light": lazy("the light"),
+}
+"""What our robots call their parts; others' parts have the name that their description gives."""
 _STARTER = "events_started"
 
 
@@ -121,6 +131,26 @@ class ProblemCollector:
         subject = f"“{name}”"
         sentence = _("Nothing broadcasts {name}, so this script does not run.").format(name=subject)
         self._note("info", placed, block, subject, sentence)
+
+    def conflict(self, found: Conflict) -> None:
+        """Two scripts that fight for a part of a robot; it stands at the second one's block."""
+        placed, name = found.second.placed, found.second.action.title
+        part = _PARTS.get(found.part)
+        words = _("“{action}” and “{other}” both move {robot} at the same time: one replaces the other.")
+        if part is not None or found.part != "base":
+            words = _(
+                "“{action}” and “{other}” both use {part} of {robot} at the same time: "
+                "one replaces the other."
+            )
+        sentence = words.format(
+            action=found.first.action.title, other=name, robot=found.second.robot,
+            part=_("the {part}").format(part=found.part) if part is None else _(part),
+        )  # fmt: skip
+        self._note(
+            "warning", placed, self._catalogue.blocks.get(placed.type), name, sentence,
+            mend=_("Put one after the other") if found.put else None,
+            mend_action=f"after:{':'.join(found.put)}" if found.put else None,
+        )  # fmt: skip
 
     def wrong_field(self, placed: Placed, block: Block, error: FieldError) -> None:
         """A field with something that its block can't use."""

@@ -22,7 +22,8 @@ def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | No
     ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script that
     nothing starts, ``define:<id>`` makes the function that a block calls, ``begin:list:<id>`` and
     ``begin:number:<id>`` set a variable where the behaviour starts, ``receive:<name>`` makes a script that
-    receives a message.
+    receives a message, ``after:<hat>:<hat>`` hangs the script of the first hat below the end of the second
+    one's.
     """
     verb, _, object_ = action.partition(":")
     made: dict[str, object] = copy.deepcopy(dict(workspace))
@@ -35,11 +36,19 @@ def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | No
         for block in saved_blocks(made):
             if block.get("id") == object_ and block.get("type") in (CALL, CALL_RESULT):
                 return _defined(made, block)
+    return _of_scripts(made, verb, object_)
+
+
+def _of_scripts(made: dict[str, object], verb: str, object_: str) -> dict[str, object] | None:
+    """What makes, begins or joins whole scripts."""
     if verb == "begin":
         kind, _, variable = object_.partition(":")
         return _begun(made, variable, is_list=kind == "list")
     if verb == "receive":
         return _added(made, {"type": "events_received", "fields": {"NAME": object_}})
+    if verb == "after":
+        later, _colon, earlier = object_.partition(":")
+        return _one_after_other(made, later, earlier)
     if verb == "add":
         return _started(made, object_)
     return None
@@ -104,6 +113,23 @@ def _defined(workspace: dict[str, object], call: Mapping[str, object]) -> dict[s
     tops = blocks.get("blocks") if isinstance(blocks, dict) else None
     if isinstance(tops, list):
         tops.append(definition)
+    return workspace
+
+
+def _one_after_other(workspace: dict[str, object], later: str, earlier: str) -> dict[str, object] | None:
+    """The blocks below one hat come below the end of another script; the hat, which starts nothing, goes."""
+    blocks = workspace.get("blocks")
+    tops = blocks.get("blocks") if isinstance(blocks, dict) else None
+    if not isinstance(tops, list):
+        return None
+    by_id = {top.get("id"): top for top in tops if isinstance(top, dict)}
+    moved, end = by_id.get(later), by_id.get(earlier)
+    if moved is None or end is None or moved is end or not isinstance(moved.get("next"), dict):
+        return None
+    while isinstance(below := end.get("next"), dict) and isinstance(below.get("block"), dict):
+        end = below["block"]
+    end["next"] = moved["next"]
+    tops.remove(moved)
     return workspace
 
 

@@ -4,8 +4,8 @@ In, one per line: ``{"do": "start", "program": …, "robots": [descriptions], "o
 "master": …, "name": …, "paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" |
 "stop"}``, ``{"do": "pace", "pace_s": seconds}`` (slow motion), ``{"do": "variable", "python": name, "value":
 …}`` (a person gives it another value), or ``{"do": "robots", "owners": …, "guarded": {topic: [robots]}}``
-when robots came or were started anew. Out: ``{"is": "ready" | "running" | "paused" | "error" | "print" |
-"variables" | "ended", …}``. When its input ends, the program ends, and its robots are told.
+when robots came or were started anew. Out: ``{"is": "ready" | "running" | "paused" | "error" | "warning" |
+"print" | "variables" | "ended", …}``. When its input ends, the program ends, and its robots are told.
 """
 
 from __future__ import annotations
@@ -190,6 +190,7 @@ class Run:
             if error is not None:
                 node.log.error("%s", error.sentence)
                 self._out.send("error", block=error.block, sentence=error.sentence)
+            self._send_replaced()
             self._out.send_printed()
             self._send_variables()
             elapsed_s = round(time.monotonic() - self._began, 3)
@@ -260,6 +261,7 @@ class Run:
             now = runtime.scheduler.snapshot()
             words, warning = saying.says(now.blocks), saying.warns(now.blocks)
             self._out.send_printed()
+            self._send_replaced()
             if (now, words, warning) == before:
                 continue
             before = (now, words, warning)
@@ -270,6 +272,11 @@ class Run:
                 )
             else:
                 self._out.send("running", blocks=now.blocks, says=words)
+
+    def _send_replaced(self) -> None:
+        """Tell which blocks lost their robot to another script since the last sample."""
+        for each in self._runtime.replaced.take_news():
+            self._out.send("warning", block=each.block, sentence=each.sentence, count=each.count)
 
 
 def _table(told: object) -> dict[str, str]:

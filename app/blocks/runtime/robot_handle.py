@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import math
 import re
+import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from app.blocks.runtime import values
@@ -29,6 +32,9 @@ LOOK_S = 0.25
 BEATS_MISSED, SHORTEST_SILENCE_S = 4, 2.0
 HOLD_S = 3.0
 """How long a robot may take to end what a pause takes back; its own kit answers within about a second."""
+MOST_KEPT = 64
+"""Commands that are remembered: a robot answers what it has ended before many others were given."""
+REPLACES = "replace"
 _PLACE = re.compile(r"%([A-Za-z_]\w*)")
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
@@ -78,11 +84,88 @@ def _first(sentences: Mapping[str | None, str], blocks: Sequence[str]) -> str:
     return next((sentences[block] for block in blocks if block in sentences), "")
 
 
+@dataclass(frozen=True, slots=True)
+class Replacement:
+    """A block's command was ended by that of another script; ``count``: so often in this run."""
+
+    block: str
+    sentence: str
+    count: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class _Command:
+    call: RobotCall
+    action: Action
+    block: str | None
+    script: int
+
+
+class Replacements:
+    """Whose command took the place of whose: scripts that fight for a part of a robot.
+
+    The script that lost goes on with its next block (docs/blocks.md), and a person is told. Scripts tell, one
+    at a time; another thread takes what is new.
+    """
+
+    def __init__(self) -> None:
+        self._commands: deque[_Command] = deque(maxlen=MOST_KEPT)
+        self._lock = threading.Lock()
+        self._counts: dict[tuple[str, str], int] = {}
+        self._news: dict[tuple[str, str], Replacement] = {}
+
+    def asked(self, call: RobotCall, action: Action, block: str | None) -> None:
+        """The calling script gave this command, in this block."""
+        self._commands.append(_Command(call, action, block, threading.get_ident()))
+
+    def ended(self, call: RobotCall, *, names_robot: bool) -> None:
+        """The robot has ended this command before it was done, and neither a pause nor a stop wanted that.
+
+        Nothing is told unless a later command of another script took its place. ``names_robot``: the
+        sentence says which robot, because there are several.
+        """
+        loser = next((each for each in self._commands if each.call is call), None)
+        if loser is None or loser.block is None:
+            return
+        later = list(self._commands)[self._commands.index(loser) + 1 :]
+        winner = next((each for each in later if _takes_place(each, loser)), None)
+        if winner is None or winner.script == loser.script:
+            return
+        words = _("“{action}” was replaced by “{other}”")
+        if names_robot:
+            words = _("{robot}: “{action}” was replaced by “{other}”")
+        said = words.format(robot=call.robot, action=loser.action.title, other=winner.action.title)
+        pair = (loser.block, winner.block or winner.action.name)
+        with self._lock:
+            count = self._counts[pair] = self._counts.get(pair, 0) + 1
+            self._news[pair] = Replacement(loser.block, said, count)
+
+    def take_news(self) -> tuple[Replacement, ...]:
+        """What has happened since this was asked last; what happened several times only with its count."""
+        with self._lock:
+            news, self._news = tuple(self._news.values()), {}
+        return news
+
+
+def _takes_place(winner: _Command, loser: _Command) -> bool:
+    return (
+        winner.call.robot == loser.call.robot
+        and winner.action.on_busy == REPLACES
+        and bool(set(winner.action.uses) & set(loser.action.uses))
+    )
+
+
 class ProgramContext(Protocol):
     """What a robot's handle needs of the program that runs."""
 
     scheduler: Scheduler
     saying: StatusText
+    replaced: Replacements
+
+    @property
+    def robot_count(self) -> int:
+        """How many robots the program has."""
+        ...
 
     def described(self, name: str) -> Robot:
         """The description of a robot that is there."""
@@ -174,11 +257,14 @@ class RobotHandle:
         """One command, or several when a pause takes it back and what is left is done afterwards."""
         while True:
             call = self._runtime.linked().invoke(self._name, action.name, input)
+            self._runtime.replaced.asked(call, action, self._runtime.scheduler.block())
             try:
                 self._await(robot, action, call, words)
             except EndScript:  # the program goes on, the robot shall not
                 self._runtime.linked().cancel(call)
                 raise
+            if call.state == "canceled" and not call.held:
+                self._runtime.replaced.ended(call, names_robot=self._runtime.robot_count > 1)
             if not call.held or call.state != "canceled":
                 return call
             self._stay(action, is_unknown(action, input, call))

@@ -18,7 +18,7 @@ from app.blocks.runtime.broadcasts import Broadcasts, Receiver
 from app.blocks.runtime.errors import BehaviourError, explain
 from app.blocks.runtime.link import ProgramLink
 from app.blocks.runtime.pure import calculation, clock, lists, texts
-from app.blocks.runtime.robot_handle import RobotHandle, StatusText
+from app.blocks.runtime.robot_handle import Replacements, RobotHandle, StatusText
 from app.blocks.runtime.scheduler import EndScript, Scheduler, Stopped
 from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
 from app.robots.description.description import Robot
@@ -107,6 +107,7 @@ class Runtime:
         self._timer_from_s = 0.0
         self.scheduler = Scheduler()
         self.saying = StatusText(self.scheduler.block, readings or {})
+        self.replaced = Replacements()
         self._calls = Calls(self.scheduler)
         self._broadcasts = Broadcasts(self.scheduler, self._one_more, self._one_less)
         self.finished = threading.Event()
@@ -389,6 +390,11 @@ class Runtime:
         if name not in self._robots:
             raise BehaviourError(_("{name} is not connected.").format(name=name))
         return self._robots[name]
+
+    @property
+    def robot_count(self) -> int:
+        """How many robots the program has."""
+        return len(self._robots)
 
     def linked(self) -> ProgramLink:
         """The network."""

@@ -23,6 +23,7 @@ from app.core.robots.stop import STOP_TIMEOUT_S as STOP_TIMEOUT_S
 from app.core.robots.stop import RobotStopper
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
 from app.core.run.edits_since_run import EditsSinceRun
+from app.core.run.run_warnings import RunWarnings
 from app.core.run.runner import Runner, RunnerEvent
 from app.core.run.view import (
     STOP_AGAIN,
@@ -117,6 +118,8 @@ class Runs:
         self.running_blocks: tuple[str, ...] = ()
         self.stopped_blocks: tuple[str, ...] = ()
         self.block_errors: Mapping[str, str] = {}
+        self._warnings = RunWarnings(lambda words: self._console.add("warn", self._run.name, words))
+        self._warned_edits = 0
         self.blocks_revision = 0
         self.values: Mapping[str, VariableValue] = {}
         """What the run's variables hold, by their ids; after its end what they held then."""
@@ -130,11 +133,19 @@ class Runs:
         """Whether a program runs or is paused."""
         return self._run.state in {"running", "paused"}
 
+    @property
+    def block_warnings(self) -> Mapping[str, str]:
+        """The blocks at which a person is warned, each with its sentence; also after the run."""
+        return self._warnings.by_block
+
     def tick(self) -> None:
         """Time has gone on, robots may have come or gone, another behaviour may show: `view` is made anew."""
         self._view = None
         if self._run.nothing_in is not None and self._run.nothing_in is not self._documents.current.newest():
             self._run = replace(self._run, nothing_in=None)  # another behaviour shows, or this one was edited
+        if self.block_warnings and self.document is not None and self.document.edits != self._warned_edits:
+            self._warnings.clear()
+            self.blocks_revision += 1
         edited = self.active and self._edits.seen()
         if edited != self._run.edited:
             self._run = replace(self._run, edited=edited)
@@ -332,6 +343,10 @@ class Runs:
                 self._mark(stopped=event.blocks)
             case "error" if self.active:  # a block that Stop interrupts fails, and that is no problem
                 self._on_error(event)
+            case "warning" if self.active and self.document is not None:
+                self._warnings.add(event.blocks[0], event.text, event.count)
+                self._warned_edits = self.document.edits
+                self.blocks_revision += 1
             case "print":
                 self._console.add("info", run.name, event.text)
             case "variables":
@@ -381,6 +396,7 @@ class Runs:
     def _begin(self, wanted: Wanted) -> None:
         document = self.document = wanted.document
         self._alerts.resolve("program")
+        self._warnings.begin()
         self._set_errors({})
         self._mark()
         try:
@@ -455,6 +471,7 @@ class Runs:
         now, elapsed_s = self._clock(), run.elapsed_s
         if self.active:
             elapsed_s = run.elapsed(now)
+            self._warnings.end()
         elif run.state not in {"stopping", "unanswered"}:
             elapsed_s = None
         everybody = tuple(

@@ -22,7 +22,7 @@ from app.errors import RunnerError
 from app.robots.identity import program_of
 from nep.i18n import _, ngettext, number
 
-Kind = Literal["ready", "running", "paused", "error", "print", "variables", "ended"]
+Kind = Literal["ready", "running", "paused", "error", "warning", "print", "variables", "ended"]
 
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
@@ -51,7 +51,8 @@ class RunnerEvent:
     first is the next one), or failed (error). ``says`` is what happens, in words (for paused: the next block
     in words); ``text`` a printed line, what a person should know (paused), an error's sentence, or at the end
     why it did not end well. ``ok``: it ended, and no block failed. ``silent``: robots that did not answer the
-    program's own stop at its end. ``values`` are the variables whose values have changed.
+    program's own stop at its end. ``values`` are the variables whose values have changed. ``count``: a
+    warning was so often so.
     """
 
     kind: Kind
@@ -63,6 +64,7 @@ class RunnerEvent:
     elapsed_s: float | None = None
     silent: tuple[str, ...] = ()
     values: tuple[VariableValue, ...] = ()
+    count: int = 1
 
 
 class Runner:
@@ -327,6 +329,12 @@ class Runner:
             return RunnerEvent(kind, self.run, blocks=blocks, says=says, text=text)
         if kind == "error":
             return RunnerEvent("error", self.run, blocks=first, text=text_of(said, "sentence"), ok=False)
+        if kind == "warning" and first:
+            count = said.get("count")
+            text = text_of(said, "sentence")
+            return RunnerEvent(
+                "warning", self.run, blocks=first, text=text, count=count if isinstance(count, int) else 1
+            )
         if kind == "print":
             return RunnerEvent("print", self.run, text=text_of(said, "text"))
         if kind == "variables":

@@ -135,6 +135,10 @@ class BlocklyView(BlocklyHost):
         """Outline these blocks and put a sentence beside each: id -> sentence."""
         self._show("errors", dict(errors))
 
+    def set_warnings(self, warnings: Mapping[str, str]) -> None:
+        """Put a sentence beside each of these blocks that warns, and is no error: id -> sentence."""
+        self._show("warnings", dict(warnings))
+
     def set_absent(self, ids: Sequence[str]) -> None:
         """Show these blocks grey and dashed: their robot is not connected."""
         self._show("absent", list(ids))

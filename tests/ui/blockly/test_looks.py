@@ -88,6 +88,24 @@ def test_an_error_has_its_sentence_beside_the_block(view, person):
     them.wait_for("document.querySelectorAll('.nepBubble, .nepState').length", 0)
 
 
+def test_a_warning_has_its_sentence_and_no_outline(view, person):
+    them = person(state=PICTURE)
+    view.set_warnings({"say_touch": "“say” was replaced by “turn”"})
+    them.wait_for("document.querySelector('.nepBubble-warning')?.textContent", "“say” was replaced by “turn”")
+    assert them.ask(outlined("error")) == []
+    block = them.box("[data-id=say_touch] > .blocklyPath")
+    bubble = them.box(".nepBubble")
+    assert 0 < bubble["left"] - block["right"] < 30
+    view.highlight(["wave"])
+    them.wait_for(outlined("running"), ["wave"])
+    view.set_errors({"say_touch": "Pepper does not answer."})
+    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper does not answer.")
+    view.set_errors({})
+    them.wait_for("document.querySelector('.nepBubble')?.textContent", "“say” was replaced by “turn”")
+    view.set_warnings({})
+    them.wait_for("document.querySelectorAll('.nepBubble').length", 0)
+
+
 def test_an_error_never_comes_without_its_sentence(view, person):
     them = person(state=PICTURE)
     them.ask(

@@ -85,6 +85,10 @@ class Runner:
         self._blocks, self._says = blocks, says
         self._tell("running", blocks=blocks, says=says)
 
+    def warns(self, block: str, sentence: str, count: int = 1) -> None:
+        """A block lost its robot to another script, so often."""
+        self._tell("warning", blocks=(block,), text=sentence, count=count)
+
     def fails(self, block: str, sentence: str) -> None:
         """A block fails, and with it the program."""
         self._tell("error", blocks=(block,), text=sentence, ok=False)

@@ -109,6 +109,27 @@ def test_what_runs_glows_and_what_failed_says_so_on_its_block(panel, window) -> 
     assert editor(panel).last("set_errors") == {"b2": "“turn left” needs a number."}
 
 
+def test_a_warning_stands_at_its_block_until_the_blocks_are_changed(panel, window) -> None:
+    session = window.session
+    session.runs.run()
+    session.runner.does("b1")
+    session.runner.warns("b2", "“walk” was replaced by “turn”", 12)
+    session.take_over()
+    panel.refresh()
+    said = "“walk” was replaced by “turn” (12 times)"
+    assert editor(panel).last("set_warnings") == {"b2": said}
+    assert editor(panel).last("highlight") == ("b1",), "the winner goes on"
+    assert (session.console.records[-1].level, session.console.records[-1].text) == ("warn", said)
+    session.runs.stop()
+    session.take_over()
+    panel.refresh()
+    assert editor(panel).last("set_warnings") == {"b2": said}, "it stays"
+    session.document.edited({"blocks": {"blocks": [{"type": "x", "id": "b2"}]}})
+    session.tick()
+    panel.refresh()
+    assert editor(panel).last("set_warnings") == {}
+
+
 def test_blocks_of_absent_robots_are_grey(panel, window) -> None:
     assert editor(panel).last("set_absent") == ("b8", "b9")
     window.session.document.absent_blocks = ()

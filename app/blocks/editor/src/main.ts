@@ -116,6 +116,7 @@ class Editor {
     highlight: (ids: string[]) => this.shown.overlays.highlight(ids),
     stopped: (ids: string[]) => this.shown.overlays.markStopped(ids),
     errors: (errors: Record<string, string>) => this.shown.overlays.setErrors(errors),
+    warnings: (warnings: Record<string, string>) => this.shown.overlays.setWarnings(warnings),
     absent: (ids: string[]) => this.shown.overlays.setAbsent(ids),
     values: (values: Record<string, VariableValue>) => this.shown.watched.show(values),
     variable: (it: VariableEdit) => this.shown.editVariable(it),

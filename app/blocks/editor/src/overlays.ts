@@ -1,16 +1,13 @@
 // What the blocks show while a program runs: glow, outlines, sentences, absent robots, live values.
 import * as Blockly from 'blockly/core';
+import {Bubbles, type Said} from './bubbles';
 import {definitionOf, sensorTypes} from './definitions';
 import {FieldLive} from './fields';
 import {seenInPlaceOf} from './folding';
-import {drawIcon} from './icons';
 import {isUnknown} from './unknown_blocks';
 import {type BlockState, pathOf} from './renderer';
 import {t} from './words';
 
-const SVG = 'http://www.w3.org/2000/svg';
-const BUBBLE_WIDTH = 300;
-const GAP = 14;
 const PICTURE_MS = 66;
 
 export class Overlays {
@@ -19,14 +16,15 @@ export class Overlays {
   private resting = 0;
   private stopped = new Set<string>();
   private errors = new Map<string, string>();
+  private warnings = new Map<string, string>();
   private absent = new Set<string>();
   private live = new Map<string, string>();
   private old = new Set<string>();
   private readonly outlined = new Set<string>();
-  private readonly bubbles = new Map<string, SVGGElement>();
-  private placing = 0;
+  private readonly bubbles: Bubbles;
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {
+    this.bubbles = new Bubbles(workspace);
     workspace.addChangeListener((event) => this.onEvent(event));
   }
 
@@ -52,7 +50,13 @@ export class Overlays {
   setErrors(errors: Record<string, string>): void {
     this.errors = new Map(Object.entries(errors));
     this.outline();
-    this.place();
+    this.talk();
+  }
+
+  /** A sentence beside each of these blocks; what they do goes on, so they have no outline. */
+  setWarnings(warnings: Record<string, string>): void {
+    this.warnings = new Map(Object.entries(warnings));
+    this.talk();
   }
 
   setAbsent(ids: string[]): void {
@@ -75,7 +79,9 @@ export class Overlays {
     this.running = new Set();
     this.stopped = new Set();
     this.errors = new Map();
+    this.warnings = new Map();
     this.absent = new Set();
+    this.talk();
     this.restore();
   }
 
@@ -85,7 +91,7 @@ export class Overlays {
     this.outline();
     this.dress();
     this.showLive();
-    this.placeSoon();
+    this.bubbles.placeSoon();
   }
 
   private onEvent(event: Blockly.Events.Abstract): void {
@@ -94,7 +100,7 @@ export class Overlays {
     else if (event.type === Blockly.Events.BLOCK_CHANGE || event.type === Blockly.Events.TOOLBOX_ITEM_SELECT) {
       this.showLive();
     }
-    if (this.bubbles.size) this.placeSoon();
+    this.bubbles.placeSoon();
   }
 
   /** Only blocks whose state differs are touched: this runs 30 times a second. */
@@ -151,70 +157,13 @@ export class Overlays {
     }
   }
 
-  private placeSoon(): void {
-    if (this.placing) return;
-    this.placing = window.requestAnimationFrame(() => {
-      this.placing = 0;
-      this.place();
-    });
+  /** A block that failed says that; what it was warned of before matters less. */
+  private talk(): void {
+    const said = new Map<string, Said>();
+    for (const [id, sentence] of this.warnings) said.set(id, ['warning', sentence]);
+    for (const [id, sentence] of this.errors) said.set(id, ['error', sentence]);
+    this.bubbles.say(said);
   }
-
-  private place(): void {
-    for (const [id, bubble] of this.bubbles) {
-      if (this.errors.get(id) !== bubble.dataset['sentence'] || !this.workspace.getBlockById(id)) {
-        bubble.remove();
-        this.bubbles.delete(id);
-      }
-    }
-    for (const [id, sentence] of this.errors) {
-      const block = this.workspace.getBlockById(id);
-      if (!block) continue;
-      const bubble = this.bubbles.get(id) ?? this.makeBubble(sentence);
-      this.bubbles.set(id, bubble);
-      const seen = seenInPlaceOf(block);
-      const at = seen.getRelativeToSurfaceXY();
-      bubble.setAttribute('transform', `translate(${at.x + seen.width + GAP}, ${at.y + 4})`);
-    }
-  }
-
-  /** An icon and a sentence beside the block, in block units so that it scales with the workspace. */
-  private makeBubble(sentence: string): SVGGElement {
-    const group = document.createElementNS(SVG, 'g');
-    group.setAttribute('class', 'nepBubble');
-    group.setAttribute('role', 'alert');
-    group.dataset['sentence'] = sentence;
-    const frame = document.createElementNS(SVG, 'path');
-    const icon = document.createElementNS(SVG, 'g');
-    drawIcon(icon, 'circle-x', 20);
-    icon.setAttribute('transform', 'translate(12, 10)');
-    const room = document.createElementNS(SVG, 'foreignObject');
-    const words = document.createElement('div');
-    words.className = 'nepBubbleText';
-    words.textContent = sentence;
-    room.append(words);
-    group.append(frame, icon, room);
-    this.workspace.getBubbleCanvas().append(group);
-    const put = (name: string, value: number) => room.setAttribute(name, String(value));
-    put('x', 40);
-    put('y', 10);
-    put('width', BUBBLE_WIDTH - 52);
-    put('height', 400);
-    const scale = this.workspace.getAbsoluteScale();
-    const box = words.getBoundingClientRect();
-    const width = Math.ceil(box.width / scale) + 56;
-    const height = Math.max(20, Math.ceil(box.height / scale)) + 20;
-    put('height', height - 18);
-    put('width', width - 50);
-    frame.setAttribute('d', bubblePath(width, height));
-    return group;
-  }
-}
-
-/** A rounded box with a small tip at its left. */
-function bubblePath(width: number, height: number): string {
-  const w = width - 16;
-  const h = height - 16;
-  return `M8 0h${w}a8 8 0 0 1 8 8v${h}a8 8 0 0 1-8 8h-${w}a8 8 0 0 1-8-8v${-(h - 16)}l-8-8 8-8a8 8 0 0 1 8-8z`;
 }
 
 /** The robot and its sensor that a block reads. */

@@ -274,6 +274,8 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("robot.use", RobotSwap.parse, lambda do, swap: do.robots.use(swap)),
     _about("robot.end_virtual", str, lambda do, robot: do.robots.end_virtual(robot)),
     _about("robot.virtual", str, lambda do, missing: do.robots.start_for(missing)),
-    *map(_fix_blocks, ("limit", "define", "add")),  # what a problem's button does (`app.blocks.fixes.fixes`)
+    *map(
+        _fix_blocks, ("limit", "define", "add", "after")
+    ),  # what a problem's button does (`app.blocks.fixes.fixes`)
 )
 """Asked for as ``id:argument``; a tab goes by its document's key."""

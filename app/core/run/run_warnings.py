@@ -1,0 +1,54 @@
+"""What a program is warned of at its blocks: each warning stands there until the next Run or edit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from nep.i18n import ngettext
+
+
+class RunWarnings:
+    """The newest warning of each block. The Console has it once, then when it was 10, 100, … times so."""
+
+    def __init__(self, log: Callable[[str], object]) -> None:
+        """``log`` puts a warning into the Console."""
+        self._log = log
+        self.by_block: Mapping[str, str] = {}
+        self._counts: dict[tuple[str, str], int] = {}
+        self._logged: dict[tuple[str, str], int] = {}
+
+    def begin(self) -> None:
+        """Another run begins."""
+        self.by_block = {}
+        self._counts, self._logged = {}, {}
+
+    def clear(self) -> None:
+        """The blocks were changed: nothing stands at them any more."""
+        self.by_block = {}
+
+    def add(self, block: str, sentence: str, count: int) -> None:
+        """It was so often so in this run."""
+        key = (block, sentence)
+        self._counts[key] = count
+        self.by_block = {**self.by_block, block: counted(sentence, count)}
+        if count >= 10 * self._logged.get(key, 0) or key not in self._logged:
+            self._tell(key)
+
+    def end(self) -> None:
+        """The run has ended: how often in the end."""
+        for key, count in self._counts.items():
+            if count != self._logged[key]:
+                self._tell(key)
+
+    def _tell(self, key: tuple[str, str]) -> None:
+        self._logged[key] = self._counts[key]
+        self._log(counted(key[1], self._counts[key]))
+
+
+def counted(sentence: str, count: int) -> str:
+    """The sentence, and how often: once is not said."""
+    if count == 1:
+        return sentence
+    return ngettext("{sentence} ({count} time)", "{sentence} ({count} times)", count).format(
+        sentence=sentence, count=count
+    )

@@ -1,0 +1,42 @@
+"""A warning stands at its block; the Console has it once, then at powers of ten, and in the end."""
+
+from __future__ import annotations
+
+from app.core.run.run_warnings import RunWarnings
+
+SAID = "“walk” was replaced by “turn”"
+
+
+def test_it_stands_at_its_block_with_its_count_until_the_next_run() -> None:
+    log: list[str] = []
+    warnings = RunWarnings(log.append)
+    warnings.begin()
+    assert warnings.by_block == {}
+    warnings.add("a", SAID, 1)
+    assert warnings.by_block == {"a": SAID}
+    warnings.add("a", SAID, 12)
+    warnings.add("b", SAID, 1)
+    assert warnings.by_block == {"a": f"{SAID} (12 times)", "b": SAID}
+    warnings.clear()
+    assert warnings.by_block == {}
+    warnings.add("a", SAID, 13)
+    assert warnings.by_block == {"a": f"{SAID} (13 times)"}
+    warnings.begin()
+    assert warnings.by_block == {}
+
+
+def test_a_loop_does_not_flood_the_console() -> None:
+    log: list[str] = []
+    warnings = RunWarnings(log.append)
+    for _run in range(2):
+        warnings.begin()
+        for count in range(1, 124):
+            warnings.add("a", SAID, count)
+        warnings.end()
+        warnings.end()
+        assert log == [SAID, f"{SAID} (10 times)", f"{SAID} (100 times)", f"{SAID} (123 times)"]
+        log.clear()
+    warnings.begin()
+    warnings.add("a", SAID, 1)
+    warnings.end()
+    assert log == [SAID]
