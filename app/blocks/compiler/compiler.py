@@ -124,6 +124,7 @@ class _Compiler:
         self._notes = ProblemCollector(catalogue, workspace)
         self._readings: dict[str, str] = {}
         self._labels: dict[str, str] = {}
+        self._breakpoints: dict[str, None] = {}
         self._uses = _Uses()
         self._ends = LooseEnds()
         self._in_message = False
@@ -160,6 +161,7 @@ class _Compiler:
             readings=self._readings,
             labels=self._labels,
             variables=self._all_variables(),
+            breakpoints=tuple(self._breakpoints),
             problems=self._notes.problems(),
             starts=len(functions),
             absent=self._notes.absent_blocks(),
@@ -297,6 +299,8 @@ class _Compiler:
 
     def _marked(self, made: list[ast.stmt], placed: Placed) -> list[ast.stmt]:
         self._marks[made[0]] = placed.id
+        if placed.pauses:
+            self._breakpoints[placed.id] = None
         return made
 
     # ---- values

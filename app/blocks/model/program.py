@@ -66,6 +66,7 @@ class Program:
     readings: Mapping[str, str] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
     variables: tuple[Variable, ...] = ()
+    breakpoints: tuple[str, ...] = ()  # the blocks before which it pauses
     problems: tuple[Problem, ...] = ()
     starts: int = 0  # how many scripts something can start
     absent: tuple[str, ...] = ()  # the blocks of robots that are not connected, whether they would run or not
@@ -99,6 +100,7 @@ class Program:
             readings=_table(saved["readings"]),
             labels=_table(saved["labels"]),
             variables=_variables(saved.get("variables", ())),
+            breakpoints=_texts(saved.get("breakpoints", ())),
         )
 
 

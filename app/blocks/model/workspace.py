@@ -5,6 +5,7 @@ A file may hold anything. What has not the right form is left out; nothing raise
 
 from __future__ import annotations
 
+import json
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,6 +28,7 @@ class Placed:
     fields: Mapping[str, object] = field(default_factory=dict)
     inputs: Mapping[str, tuple[Placed, ...]] = field(default_factory=dict)
     enabled: bool = True
+    pauses: bool = False  # a person wants the program to pause before it
     shadow: bool = False
     extra: Mapping[str, object] = field(default_factory=dict)  # what the editor keeps of its own shape
     too_deep: bool = False  # something inside was left out because it is nested too deep
@@ -117,10 +119,23 @@ def _block(saved: Mapping[str, object], depth: int, ids: Unique, *, shadow: bool
         fields=dict(fields) if isinstance(fields, Mapping) else {},
         inputs=inputs,
         enabled=is_enabled(saved),
+        pauses=_pauses(saved),
         shadow=shadow,
         extra=dict(extra) if isinstance(extra := saved.get("extraState"), Mapping) else {},
         too_deep=depth >= MAX_DEPTH and bool(connections),
     )
+
+
+def _pauses(saved: Mapping[str, object]) -> bool:
+    """Whether its data, which Blockly keeps as text, say ``{"pause": true}``."""
+    data = saved.get("data")
+    if not isinstance(data, str) or '"pause"' not in data:
+        return False
+    try:
+        told = json.loads(data)
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(told, Mapping) and told.get("pause") is True
 
 
 def is_enabled(saved: Mapping[str, object]) -> bool:

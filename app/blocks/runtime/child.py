@@ -120,6 +120,7 @@ class Run:
         if not isinstance(program, Mapping) or not isinstance(robots, list):
             raise TypeError("a start needs a program and robots")
         self._program = Program.from_json(program)
+        self._breakpoints = frozenset(self._program.breakpoints)
         everybody = tuple(map(parse, robots))
         self._robots: tuple[Robot, ...] = tuple(
             robot for robot in everybody if robot.name in self._program.robots
@@ -232,7 +233,12 @@ class Run:
         self._runtime.start(network, self._robots)
 
     def _step(self, network: Network, block: str) -> None:
-        """A block begins; in slow motion robots do not drive on while it waits for its turn."""
+        """A block begins; in slow motion robots do not drive on while it waits for its turn.
+
+        Before one with a breakpoint everything is held, as a person would pause it.
+        """
+        if block in self._breakpoints and not self._runtime.scheduler.is_paused:
+            self.pause()
         if self._runtime.scheduler.pace_s:
             with network.slow():
                 self._runtime.step(block)

@@ -242,6 +242,11 @@ class Scheduler:
             self._paused = True
             self._wake_all()
 
+    @property
+    def is_paused(self) -> bool:
+        """Whether scripts are held, or one of them makes a step."""
+        return self._paused
+
     def go_on(self) -> None:
         """End the pause."""
         with self._lock:

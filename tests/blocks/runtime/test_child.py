@@ -134,6 +134,26 @@ def test_pause_step_go(running, master):
     assert running.until("ended")["ok"] is True
 
 
+def test_a_breakpoint_pauses_before_its_block_and_going_on_passes_it(running, master):
+    marked = write(text("two")) | {"id": "two", "data": '{"pause": true}'}
+    saved = workspace(started(write(text("one")), marked, write(text("three"))))
+    running.start(saved, master=master.address)
+    assert running.until("paused")["block"] == "two"
+    assert {"is": "print", "text": "one"} in running.said
+    assert {"is": "print", "text": "two"} not in running.said
+    running.order(do="go")
+    assert running.until("ended")["ok"] is True
+    assert {"is": "print", "text": "three"} in running.said
+    assert len([each for each in running.said if each["is"] == "paused"]) == 1
+
+
+@pytest.mark.parametrize("data", ['{"pause": false}', '{"pause": true', "[]", '["pause"]', "pause", 7, None])
+def test_other_data_of_a_block_are_no_breakpoint(data):
+    made = compile_behaviour(workspace(started(write(text("one")) | {"data": data})), [])
+    assert made.breakpoints == ()
+    assert not made.problems
+
+
 def test_the_heartbeat_goes_on_while_paused(running, pepper, master):
     saved = workspace(started(say("Hi")))
     running.start(saved, [pepper.described], master.address, paused=True)

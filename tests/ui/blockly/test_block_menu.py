@@ -153,3 +153,18 @@ def test_a_double_click_beside_the_fields_of_a_small_block_does_nothing(them):
     before = them.newest()
     double_click(them, "first")
     assert them.newest() == before
+
+
+def test_pause_here_marks_the_block_is_kept_in_the_file_and_undone(qtbot, view, them):
+    choose(them, "first", "Pause here")
+    them.wait_for("document.querySelector('.nepPauseMark').parentElement.dataset.id", "first")
+    looked_at(them, "pause")
+    kept = them.newest()
+    assert compile_behaviour(kept, []).breakpoints == ("first",)
+    view.undo()
+    them.wait_for("document.querySelector('.nepPauseMark') === null")
+    assert compile_behaviour(them.newest(), []).breakpoints == ()
+    view.load(kept)
+    them.wait_for("document.querySelectorAll('.nepPauseMark').length", 1)
+    choose(them, "first", "Do not pause here")
+    qtbot.waitUntil(lambda: "data" not in str(them.newest()), timeout=WAIT_MS)

@@ -2,6 +2,7 @@
 // Who adds entries registers them with Blockly and names an icon with `menuIcon`. Weights: 0 to 9 what runs, 10 to 49
 // copying, 50 to 79 how the block is, 80 to 89 parts of it, 90 help, 99 deleting; the canvas has room from 70 on.
 import * as Blockly from 'blockly/core';
+import {canPause, pausesHere, togglePause} from './breakpoints';
 import {type Clipboard} from './clipboard';
 import {focusedBlock} from './help';
 import {canFold, fold} from './folding';
@@ -127,6 +128,9 @@ export function registerMenu(clipboard: Clipboard): void {
     when: (it) => own(it) && !hasNote(it.block!) && !it.block!.isCollapsed(), run: (it) => addNote(it.block!)});
   block({id: 'nepNoNote', weight: 70, icon: 'sticky-note', words: t('Remove the note'),
     when: (it) => own(it) && hasNote(it.block!), run: (it) => removeNote(it.block!)});
+  block({id: 'nepPause', weight: 75, icon: 'circle-pause',
+    words: (it) => it.block && pausesHere(it.block) ? t('Do not pause here') : t('Pause here'),
+    when: (it) => own(it) && canPause(it.block!), run: (it) => togglePause(it.block!)});
   line(ScopeType.BLOCK, 80);
   line(ScopeType.BLOCK, 98);
   block({id: 'nepDelete', weight: 99, icon: 'trash-2', shortcut: names.DELETE,
