@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
+from app.blocks.compiler.stack import Stack
 from app.blocks.fixes.fixes import mend
 from app.blocks.fixes.replace_robot import blocks_of, use_robot
 from app.core.documents.background_worker import BackgroundWorker
@@ -265,6 +266,13 @@ class Document:
             self._compiled = (key, self._compiling()())
             self._compile_s = self._timer() - began
         return self._compiled[1]
+
+    def try_program(self, stack: Stack) -> Program | None:
+        """One stack of the blocks as a program of its own; None when it is not there any more."""
+        made = deep_json.deeply(lambda: stack.workspace(self.workspace))
+        if made is None:
+            return None
+        return _compile(WorkspaceJson.of(made), self._connected, self.absent, self.name)
 
     def newest(self) -> Program | None:
         """The program of the newest edit that is compiled; a long one is compiled beside the window.

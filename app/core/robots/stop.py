@@ -6,6 +6,7 @@ late. One that could not be made is tried again, and its robot is named until it
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 import uuid
@@ -15,6 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from app.core.faults import error_words
 from app.core.robots.stop_report import RobotStop, StopReport
 from app.robots import rize
 from app.robots.description.description import Robot, RobotTopics
@@ -28,11 +30,13 @@ from app.robots.identity import (
     said_of_stop,
 )
 from nep.errors import NepError
-from nep.i18n import _, ngettext
+from nep.i18n import _, lazy, ngettext
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
+_log = logging.getLogger("studio")
 RIZE = "rize"
+NO_NETWORK = lazy("there is no connection to the network yet")
 MOST_TOPICS = 8
 """So many command topics of one robot are kept, of earlier descriptions too."""
 LATE_S = 120.0
@@ -566,3 +570,22 @@ def _untold(line: _Line) -> str:
 
 def _id() -> str:
     return f"stop-{uuid.uuid4().hex[:12]}"
+
+
+def report_of(
+    stopper: RobotStopper | None,
+    names: tuple[str, ...],
+    *,
+    on_late: Callable[[RobotStop], object],
+    on_answer: Callable[[RobotStop], object] | None = None,
+    ends: str | None = None,
+) -> StopReport:
+    """Stop these robots. There is a report whatever happens: without one the run would stay "stopping"."""
+    why = _(NO_NETWORK)
+    if stopper is not None:
+        try:
+            return stopper.stop_all(names, on_answer=on_answer, ends=ends, on_late=on_late)
+        except Exception as error:  # noqa: BLE001  whatever it is: these robots are not proven to stand still
+            _log.exception("can't stop the robots")
+            why = error_words(error)
+    return StopReport((), 0.0).with_asked(names, why)

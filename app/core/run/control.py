@@ -6,21 +6,22 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
+from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Variable
 from app.blocks.runtime.publishing import guarded
 from app.blocks.runtime.variables import VariableValue
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.document import Document
-from app.core.faults import error_words, log_errors
+from app.core.faults import log_errors
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion_permission import wanted_by
 from app.core.robots.stop import STOP_TIMEOUT_S as STOP_TIMEOUT_S
-from app.core.robots.stop import RobotStopper
+from app.core.robots.stop import RobotStopper, report_of
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
 from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.run_warnings import RunWarnings
@@ -38,14 +39,14 @@ from app.core.run.view import (
     view_of,
 )
 from app.core.run.view import unanswered_words as unanswered_words_of
+from app.core.run.wanted import Wanted
 from app.errors import AppError
 from app.robots.description.description import Robot
-from nep.i18n import _, lazy
+from nep.i18n import _
 
 PRESSED_TWICE_S = 0.5
 """Two presses of Run within this time are one: a double click."""
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
-NO_NETWORK = lazy("there is no connection to the network yet")
 
 _log = logging.getLogger("studio")
 
@@ -55,14 +56,6 @@ class RunNetwork(Protocol):
 
     address: str
     stopper: RobotStopper | None
-
-
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """What a person wants to be run: a behaviour; ``paused`` before its first block."""
-
-    document: Document
-    paused: bool = False
 
 
 class OpenBehaviours(Protocol):
@@ -101,6 +94,9 @@ class Runs:
         self.document: Document | None = None  # which the run belongs to: its blocks glow, fail and stop
         self.pace_s = 0.0
         self._runner: Runner | None = None
+        self._unit = ""  # of the value that is tried
+        self._now: Wanted | None = None  # what runs, or ran last
+        self.tried_value: tuple[str, str] | None = None  # a block that was tried, and the value it had
         self._next: Wanted | None = None  # once what runs has been stopped, proven
         self._edits = EditsSinceRun()
         self._used: tuple[str, ...] = ()
@@ -175,8 +171,15 @@ class Runs:
 
     def restart(self) -> None:
         """Run anew, as its blocks are now, the behaviour that runs or is paused."""
-        if self.active and self.document is not None:
-            self._want(Wanted(self.document))
+        if self.active and self._now is not None:
+            self._want(replace(self._now, paused=False))
+
+    def try_stack(self, stack: Stack) -> None:
+        """Run one stack of the behaviour that shows, at once; what runs is stopped first."""
+        wanted, run = Wanted(self._documents.current, stack=stack), self._run
+        again = self.active and self._now == wanted
+        if not again or self._clock() - run.started_s >= PRESSED_TWICE_S:
+            self._want(wanted)
 
     def concerns(self, document: Document) -> bool:
         """Whether this behaviour runs, or is to run once what runs has been stopped."""
@@ -252,7 +255,7 @@ class Runs:
         self._fleet.told_to_stop([name])
 
         def stop_it() -> None:
-            post(OneStopped(_asked(stopper, (name,), on_late=lambda late: post(LateAnswer(None, late)))))
+            post(OneStopped(report_of(stopper, (name,), on_late=lambda late: post(LateAnswer(None, late)))))
 
         threading.Thread(target=stop_it, name="studio-stop-one", daemon=True).start()
 
@@ -348,7 +351,7 @@ class Runs:
                 self._warned_edits = self.document.edits
                 self.blocks_revision += 1
             case "print":
-                self._console.add("info", run.name, event.text)
+                self._on_print(event)
             case "variables":
                 self._show_values({**self.values, **{value.id: value for value in event.values}})
             case "ended":
@@ -394,14 +397,17 @@ class Runs:
     # -- inside ------------------------------------------------------------------------------------------
 
     def _begin(self, wanted: Wanted) -> None:
-        document = self.document = wanted.document
+        document, self._now, self.tried_value = wanted.document, wanted, None
+        self.document = document
         self._alerts.resolve("program")
         self._warnings.begin()
         self._set_errors({})
         self._mark()
         try:
-            program = document.program()
-            wrong = {p.block_id: p.sentence for p in program.problems if p.severity == "error" and p.block_id}
+            program = wanted.program()
+            if program is None:
+                return
+            wrong = wanted.problems(program)
             if wrong:
                 self._set_errors(wrong)
                 return
@@ -433,17 +439,27 @@ class Runs:
         self._variables = {variable.id: variable for variable in program.variables}
         self._show_values({})
         self._console.leave_out(runner.pid)
-        self._edits.ran(document, program)
+        self._edits.ran(document if wanted.stack is None else None, program)
+        trying, self._unit = wanted.words(program), wanted.unit(program, used)
         last = self._run.last_words
-        self._run = RunState(
-            "running", self._documents.title(document), started_s=self._clock(), last_words=last
-        )
-        self._console.add("info", self._run.name, _("started"))
+        title = self._documents.title(document)
+        self._run = RunState("running", title, started_s=self._clock(), last_words=last, trying=trying)
+        said = _("trying “{block}”").format(block=trying) if trying else _("started")
+        self._console.add("info", self._run.name, said)
 
     def _begin_now(self, wanted: Wanted) -> None:
         """A person has answered that the robots may move; nothing else was begun meanwhile."""
         if self._run.state in {"ready", "proven"}:
             self._begin(wanted)
+
+    def _on_print(self, event: RunnerEvent) -> None:
+        """A line of the program; of a value that is tried it is what a person wants to know."""
+        if self._now is None or self._now.stack is None or not self._now.gives_value:
+            self._console.add("info", self._run.name, event.text)
+            return
+        words = f"{event.text} {self._unit}".strip() if event.text else _("not known yet")
+        self.tried_value = (self._now.stack.id, words)
+        self._run = replace(self._run, value=words)
 
     def _on_error(self, event: RunnerEvent) -> None:
         self._console.add("error", self._run.name, event.text)
@@ -531,7 +547,7 @@ class Runs:
             with log_errors("end the program"):
                 runner.stop()
         self._post_event(
-            StopDone(number, _asked(stopper, names, on_answer=answered, ends=ends, on_late=late))
+            StopDone(number, report_of(stopper, names, on_answer=answered, ends=ends, on_late=late))
         )
 
     def _tell_person(self, report: StopReport, origin: str) -> None:
@@ -570,22 +586,3 @@ class Runs:
     def _mark(self, running: tuple[str, ...] = (), stopped: tuple[str, ...] = ()) -> None:
         self.running_blocks, self.stopped_blocks = running, stopped
         self.blocks_revision += 1
-
-
-def _asked(
-    stopper: RobotStopper | None,
-    names: tuple[str, ...],
-    *,
-    on_late: Callable[[RobotStop], object],
-    on_answer: Callable[[RobotStop], object] | None = None,
-    ends: str | None = None,
-) -> StopReport:
-    """Stop these robots. There is a report whatever happens: without one the run would stay "stopping"."""
-    why = _(NO_NETWORK)
-    if stopper is not None:
-        try:
-            return stopper.stop_all(names, on_answer=on_answer, ends=ends, on_late=on_late)
-        except Exception as error:  # noqa: BLE001  whatever it is: these robots are not proven to stand still
-            _log.exception("can't stop the robots")
-            why = error_words(error)
-    return StopReport((), 0.0).with_asked(names, why)

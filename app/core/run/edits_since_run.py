@@ -30,9 +30,10 @@ class EditsSinceRun:
         self._looked: Program | None = None
         self._differs = False
 
-    def ran(self, document: RunDocument, program: Program) -> None:
-        """This program of this behaviour runs now."""
-        self._document, self._edits, self._ran = document, document.edits, program.runnable
+    def ran(self, document: RunDocument | None, program: Program) -> None:
+        """This program of this behaviour runs now; None: edits are no matter of what runs."""
+        self._document, self._ran = document, program.runnable
+        self._edits = 0 if document is None else document.edits
         self._looked, self._differs = program, False
 
     def seen(self) -> bool:

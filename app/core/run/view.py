@@ -26,6 +26,7 @@ class RunState:
     know before a paused program goes on. Times are monotonic seconds; the program's clock stands while it is
     paused (``held_s``, ``pause_began_s``). ``again``: the stop before this one is not proven. ``restarts``:
     something is run as soon as this stop is proven. ``edited``: the behaviour is not what runs any more.
+    ``trying``: the words of the block that is tried alone, ``value`` what it gave.
     """
 
     state: str = "ready"
@@ -41,6 +42,8 @@ class RunState:
     again: bool = False
     restarts: bool = False
     edited: bool = False
+    trying: str = ""
+    value: str | None = None
     asked: tuple[str, ...] = ()
     answered: tuple[RobotStop, ...] = ()
     report: StopReport | None = None
@@ -108,7 +111,26 @@ def view_of(
     not show, so the title names it, and Run is of the one that shows.
     """
     view = replace(_view(run, connected, coming, now), slow=slow)
+    if run.trying:
+        return _tried(view, run)
     return _named(view, run, now) if elsewhere and run.name and run.state != "ready" else view
+
+
+def _tried(view: RunView, run: RunState) -> RunView:
+    """The same for a block that is tried alone; Run is of the whole behaviour."""
+    if view.state == "running":
+        title = _("Trying “{block}”").format(block=run.trying)
+        return replace(view, title=title, compact=title, run_word=RUN, edited=False)
+    if view.state == "proven":
+        words = _("“{block}” stopped by a problem") if run.errors else _("“{block}” was stopped")
+        detail = view.detail
+        if run.finished:
+            words = _("Tried “{block}”")
+            detail = _("It came to its end") if run.value is None else run.value
+        title = words.format(block=run.trying)
+        compact = view.compact if view.result else title
+        return replace(view, title=title, detail=detail, compact=compact)
+    return view
 
 
 def _named(view: RunView, run: RunState, now: float) -> RunView:

@@ -28,6 +28,7 @@ class BlocklyBridge(QObject):
     block_chosen = Signal(str)
     answered = Signal(int, str)  # token of a flush, workspace as JSON
     went_wrong = Signal(str)
+    try_asked = Signal(str)  # a stack to be tried, as JSON
     block_focused = Signal(bool)  # whether the keys go to a block
     command_wanted = Signal(str)  # a command of the window about variables
     values_watched = Signal(str)  # the variables whose values the page shows, as JSON: [id, …]
@@ -67,6 +68,10 @@ class BlocklyBridge(QObject):
     def flushed(self, token: int, workspace: str) -> None:
         self.answered.emit(token, workspace)
 
+    @Slot(str)
+    def tries(self, stack: str) -> None:
+        self.try_asked.emit(stack)
+
     @Slot(bool)
     def on_block(self, has: bool) -> None:
         self.block_focused.emit(has)
@@ -86,6 +91,7 @@ class BlocklyBridge(QObject):
         text = QGuiApplication.clipboard().text()
         return text if text.startswith(COPIED) and len(text) <= MOST_COPIED else ""
 
+    @Slot(str)
     def command(self, name: str) -> None:
         if name.startswith("variable."):
             self.command_wanted.emit(name)

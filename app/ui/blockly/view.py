@@ -31,6 +31,7 @@ class BlocklyView(BlocklyHost):
     history_changed = Signal(bool, bool)  # can undo, can redo: of the shown tab
     block_selected = Signal(str)  # a block's id; "" when nothing is selected
     wanted = Signal(str)  # a button of the empty canvas was pressed: "robot", "examples"
+    try_asked = Signal(str)  # a stack to be tried at once, as JSON (`app.blocks.compiler.stack`)
     sensors_offered = Signal(tuple)  # (robot, sensor) of each one that the open toolbox shows
     command_wanted = Signal(str)  # a command of the window: "variable.rename:ID"
     values_watched = Signal(tuple)  # the variables (ids) whose values the page shows
@@ -52,6 +53,7 @@ class BlocklyView(BlocklyHost):
         self._bridge.command_wanted.connect(self.command_wanted)
         self._bridge.values_watched.connect(lambda text: self.values_watched.emit(_texts(text)))
         self._bridge.wanted.connect(self.wanted)
+        self._bridge.try_asked.connect(self.try_asked)
         self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(_pairs(text)))
 
     # -- the program ------------------------------------------------------------------------------
@@ -138,6 +140,10 @@ class BlocklyView(BlocklyHost):
     def set_warnings(self, warnings: Mapping[str, str]) -> None:
         """Put a sentence beside each of these blocks that warns, and is no error: id -> sentence."""
         self._show("warnings", dict(warnings))
+
+    def show_value(self, id: str, words: str) -> None:
+        """Say beside a block, also one of the open toolbox, what its value is, until the next press."""
+        self._tell("value", [id, words])
 
     def set_absent(self, ids: Sequence[str]) -> None:
         """Show these blocks grey and dashed: their robot is not connected."""

@@ -81,7 +81,7 @@ def test_with_keys_a_grey_value_goes_out_of_a_list_in_a_gap(view, person):
     view.show_block("a")
     them.wait_for(FOCUSED, "a")
     before = them.newest()
-    them.press(Qt.Key_Return, Qt.ControlModifier)
+    them.press(Qt.Key_F10, Qt.ShiftModifier)
     choose(them, "Take item 1 out")
     them.until(lambda: written(in_the_gap(them)) == ["b", "c"], "the first one is gone")
     assert in_the_gap(them)["inputs"]["ITEM0"]["block"]["id"] == "b"

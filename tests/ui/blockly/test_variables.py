@@ -124,7 +124,7 @@ def test_the_menu_of_a_block_shows_the_value_of_its_variable(qtbot, view, them) 
     asked: list[str] = []
     view.command_wanted.connect(asked.append)
     them.click("[data-id=set] > .blocklyPath", 10, 8)
-    them.press(Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    them.press(Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
     them.wait_for(f"{MENU}.some(e => e.startsWith('Show the value of “score”'))")
     choose(them, "Show the value of “score”")
     qtbot.waitUntil(lambda: asked == ["variable.watch:score"], timeout=WAIT_MS)

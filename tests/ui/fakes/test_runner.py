@@ -12,6 +12,7 @@ from typing import Protocol
 import pytest
 
 from app.blocks import compile_behaviour
+from app.blocks.compiler.stack import Stack
 from app.core.run.runner import Runner, RunnerEvent
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -257,6 +258,46 @@ def test_edits_while_it_runs_say_that_they_apply_later_until_they_are_undone(run
     assert not says()
     runs.stop()
     tick_until(run.session, lambda: runs.view().state == "proven")
+
+
+def test_a_stack_is_tried_alone_and_never_beside_another_program(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(endless())
+    runs.run()
+    run.works("c")
+    first = runs._runner
+    runs.try_stack(Stack("c"))
+    assert runs._runner is first, "what runs is stopped first"
+    tick_until(run.session, lambda: runs.active)
+    assert runs._runner is not first
+    view = runs.view()
+    assert (view.title, view.run_word, view.can_restart) == ("Trying “change by”", "Run", True)
+    run.session.document.edited(workspace())
+    runs.tick()
+    assert not runs.view().edited, "edits are no matter of a try"
+    run.ends()
+    tick_until(run.session, lambda: runs.view().state == "proven")
+    view = runs.view()
+    assert (view.title, view.detail) == ("Tried “change by”", "It came to its end")
+
+
+def test_stop_ends_a_try(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(endless())
+    runs.try_stack(Stack("loop"))
+    run.works("c")
+    runs.stop()
+    tick_until(run.session, lambda: runs.view().state == "proven")
+    assert runs.view().title == "“repeat forever” was stopped"
+    assert runs.stopped_blocks == ("c",)
+
+
+def test_a_gap_of_what_is_tried_is_told_on_its_block(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(workspace(started(block("control_wait_until", "gap"))))
+    runs.try_stack(Stack("gap"))
+    assert not runs.active
+    assert "needs a condition" in runs.block_errors["gap"]
 
 
 def test_what_is_told_of_a_program_and_its_state(run: Run) -> None:

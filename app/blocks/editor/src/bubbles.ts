@@ -1,15 +1,15 @@
-// Sentences beside blocks: what failed, what a person is warned of, what a value is.
+// Sentences beside blocks: what failed, what a person is warned of.
 import * as Blockly from 'blockly/core';
 import {seenInPlaceOf} from './folding';
 import {drawIcon} from './icons';
 
-export type BubbleKind = 'error' | 'warning' | 'value';
+export type BubbleKind = 'error' | 'warning';
 export type Said = readonly [kind: BubbleKind, sentence: string];
 
 const SVG = 'http://www.w3.org/2000/svg';
 const BUBBLE_WIDTH = 300;
 const GAP = 14;
-const ICONS: Readonly<Record<BubbleKind, string | null>> = {error: 'circle-x', warning: 'triangle-alert', value: null};
+const ICONS: Readonly<Record<BubbleKind, string>> = {error: 'circle-x', warning: 'triangle-alert'};
 
 /** One bubble a block, at its right, in block units so that it scales with the workspace. */
 export class Bubbles {
@@ -58,33 +58,27 @@ export class Bubbles {
     group.setAttribute('role', kind === 'error' ? 'alert' : 'status');
     group.dataset['said'] = `${kind} ${sentence}`;
     const frame = document.createElementNS(SVG, 'path');
-    group.append(frame);
-    const name = ICONS[kind];
-    const left = name ? 40 : 14;
-    if (name) {
-      const icon = document.createElementNS(SVG, 'g');
-      drawIcon(icon, name, 20);
-      icon.setAttribute('transform', 'translate(12, 10)');
-      group.append(icon);
-    }
+    const icon = document.createElementNS(SVG, 'g');
+    drawIcon(icon, ICONS[kind], 20);
+    icon.setAttribute('transform', 'translate(12, 10)');
     const room = document.createElementNS(SVG, 'foreignObject');
     const words = document.createElement('div');
     words.className = 'nepBubbleText';
     words.textContent = sentence;
     room.append(words);
-    group.append(room);
+    group.append(frame, icon, room);
     this.workspace.getBubbleCanvas().append(group);
     const put = (attribute: string, value: number) => room.setAttribute(attribute, String(value));
-    put('x', left);
+    put('x', 40);
     put('y', 10);
     put('width', BUBBLE_WIDTH - 52);
     put('height', 400);
     const scale = this.workspace.getAbsoluteScale();
     const box = words.getBoundingClientRect();
-    const width = Math.ceil(box.width / scale) + left + 16;
+    const width = Math.ceil(box.width / scale) + 56;
     const height = Math.max(20, Math.ceil(box.height / scale)) + 20;
     put('height', height - 18);
-    put('width', width - left - 10);
+    put('width', width - 50);
     frame.setAttribute('d', bubblePath(width, height));
     return group;
   }

@@ -34,6 +34,8 @@ const KEYS: Readonly<Record<string, Keys>> = {
   // In the toolbox, where these are asked before the two above.
   [names.NEXT_HEADING]: [alt(KeyCodes.DOWN)],
   [names.PREVIOUS_HEADING]: [alt(KeyCodes.UP)],
+  // Ctrl+Enter runs from the block that has the keyboard (`tries.ts`).
+  [names.MENU]: [registry.createSerializedKey(KeyCodes.F10, [KeyCodes.SHIFT]), KeyCodes.CONTEXT_MENU],
   [names.INFORMATION]: [alt(KeyCodes.I)],
   [names.EXTENDED_INFORMATION]: [alt(KeyCodes.I, KeyCodes.SHIFT)],
 };

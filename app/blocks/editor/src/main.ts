@@ -18,6 +18,7 @@ import {type Tokens, useTokens} from './tokens';
 import {type Alarm, showAlarms} from './toolbox';
 import {type VariableEdit, askWindow, registerVariableMenu} from './variable_edits';
 import type {VariableValue} from './watched_values';
+import {TryAnswer, registerTries} from './tries';
 import {t, useWords} from './words';
 
 interface Bridge {
@@ -36,6 +37,7 @@ interface Bridge {
   command(name: string): void;
   watches(variables: string): void;
   wants(what: string): void;
+  tries(stack: string): void;
 }
 
 declare const QWebChannel: new (transport: unknown, done: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
@@ -45,6 +47,7 @@ class Editor {
   private readonly tabs: Tabs;
   private readonly help = new HelpCard();
   private readonly clipboard: Clipboard;
+  private readonly answer = new TryAnswer();
   private offered = '[]';
   private watched = '[]';
   private readonly find = new FindBar(() => this.shown.workspace);
@@ -71,6 +74,7 @@ class Editor {
     // A hidden page draws no frames, and Blockly tells of edits only after a frame.
     document.addEventListener('visibilitychange', () => document.hidden && this.shown.program.flush());
     this.makeZoomButtons();
+    registerTries((what) => bridge.tries(JSON.stringify(what)));
     registerHelpMenu((block) => this.help.show(block));
     this.clipboard = new Clipboard({write: (text) => bridge.copy(text), read: () => bridge.copied()});
     useClipboard(this.clipboard);
@@ -115,7 +119,8 @@ class Editor {
     close: (key: string) => this.tabs.close(key),
     highlight: (ids: string[]) => this.shown.overlays.highlight(ids),
     stopped: (ids: string[]) => this.shown.overlays.markStopped(ids),
-    errors: (errors: Record<string, string>) => this.shown.overlays.setErrors(errors),
+    errors: (errors: Record<string, string>) => this.setErrors(errors),
+    value: ([id, words]: [string, string]) => this.sayBeside(id, words, false),
     warnings: (warnings: Record<string, string>) => this.shown.overlays.setWarnings(warnings),
     absent: (ids: string[]) => this.shown.overlays.setAbsent(ids),
     values: (values: Record<string, VariableValue>) => this.shown.watched.show(values),
@@ -139,6 +144,20 @@ class Editor {
     begin: (it: Begin | null) => it && this.empty.tell(it),
     point: (it: Wanted | null) => this.pointer.show(it),
   };
+
+  /** A block of the toolbox that was tried says so, too. */
+  private setErrors(errors: Record<string, string>): void {
+    this.shown.overlays.setErrors(errors);
+    for (const [id, sentence] of Object.entries(errors)) {
+      if (!this.shown.workspace.getBlockById(id)) this.sayBeside(id, sentence, true);
+    }
+  }
+
+  private sayBeside(id: string, words: string, isError: boolean): void {
+    const {workspace} = this.shown;
+    const block = workspace.getBlockById(id) ?? workspace.getFlyout()?.getWorkspace().getBlockById(id);
+    if (block instanceof Blockly.BlockSvg) this.answer.say(block, words, isError);
+  }
 
   private showTab(it: ShownTab): void {
     this.help.close();

@@ -121,7 +121,9 @@ export class Overlays {
   }
 
   private setState(id: string, state: BlockState | null): void {
-    const block = this.workspace.getBlockById(id);
+    // A block of the toolbox that is tried glows as well.
+    const block = this.workspace.getBlockById(id) ??
+      this.workspace.getFlyout()?.getWorkspace().getBlockById(id) as Blockly.BlockSvg | undefined;
     if (block) pathOf(block)?.setState(state);
     if (state && block) this.outlined.add(id);
     else this.outlined.delete(id);

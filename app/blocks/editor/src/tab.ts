@@ -14,6 +14,7 @@ import {makeTheme} from './theme';
 import {Toolbox} from './toolbox';
 import {type VariableEdit, editVariable, registerVariableButtons} from './variable_edits';
 import {WatchedValues} from './watched_values';
+import {TryHandle} from './tries';
 
 const SCALE = 0.8;
 
@@ -66,6 +67,7 @@ export class Tab {
     this.functions = new Functions(this.workspace);
     foldOnDoubleClick(this.workspace);
     keepNotesReadable(this.workspace);
+    new TryHandle(this.workspace);
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.onFound = () => this.overlays.showLive();
     const flyout = this.workspace.getFlyout();

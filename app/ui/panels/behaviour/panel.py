@@ -51,6 +51,7 @@ class Editor(Protocol):
     command_wanted: SignalInstance
     values_watched: SignalInstance
     wanted: SignalInstance
+    try_asked: SignalInstance
 
     @property
     def is_ready(self) -> bool: ...
@@ -65,6 +66,7 @@ class Editor(Protocol):
     def mark_stopped(self, ids: Sequence[str]) -> None: ...
     def set_errors(self, errors: Mapping[str, str]) -> None: ...
     def set_warnings(self, warnings: Mapping[str, str]) -> None: ...
+    def show_value(self, id: str, words: str) -> None: ...
     def set_absent(self, ids: Sequence[str]) -> None: ...
     def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None: ...
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None: ...
@@ -146,6 +148,8 @@ class BehaviourPanel(PanelWidget):
             self.editor.mark_stopped(runs.stopped_blocks if mine else ())
             self.editor.set_errors(runs.block_errors if mine else {})
             self.editor.set_warnings(runs.block_warnings if mine else {})
+        if self._new("tried", runs.tried_value) and runs.tried_value is not None and mine:
+            self.editor.show_value(*runs.tried_value)
         alarms = alarms_of(self.session.fleet.links)
         if self._new("alarms", alarms):
             self.editor.set_alarms(alarms)
@@ -197,6 +201,7 @@ class BehaviourPanel(PanelWidget):
         editor.command_wanted.connect(self.context.run)
         editor.values_watched.connect(self._watch_variables)
         editor.wanted.connect(lambda what: self.context.run(WANTED[what]))
+        editor.try_asked.connect(lambda stack: self.context.run(f"try:{stack}"))
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
         if isinstance(editor, QWidget):
             had_focus = self.hasFocus()

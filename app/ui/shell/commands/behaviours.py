@@ -6,9 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from app.blocks.compiler.stack import Stack
 from app.core.documents.document import Document
 from app.core.documents.journal import Unsaved
 from app.core.session import Session
+from app.core.storage import deep_json
 from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
 from app.ui.shell.commands.shell import Shell
@@ -87,6 +89,11 @@ class TabPlace:
         return cls(key, int(place))
 
 
+def read_stack(text: str) -> Stack:
+    """What the editor's page says is to be tried, as JSON; ValueError when it is none."""
+    return Stack.from_json(deep_json.loads(text))
+
+
 def bring_into_view(shell: Shell) -> None:
     """The blocks, in front of whatever shares their place."""
     shell.show_layout("behaviour")
@@ -109,6 +116,10 @@ class BehaviourCommands:
             runs.go_on()
         else:
             self._files.with_newest(runs.run)
+
+    def try_stack(self, stack: Stack) -> None:
+        """Run one stack alone, with the editor's newest edit."""
+        self._files.with_newest(lambda: self._session.runs.try_stack(stack))
 
     def restart(self) -> None:
         """Run anew what runs, with the editor's newest edit."""

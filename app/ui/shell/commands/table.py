@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from app.core.session import Session
 from app.ui.shell.actions.command import ArgumentCommand, Command
-from app.ui.shell.commands.behaviours import BehaviourCommands, TabPlace
+from app.ui.shell.commands.behaviours import BehaviourCommands, TabPlace, read_stack
 from app.ui.shell.commands.freeze import freezable
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
 from app.ui.shell.commands.shell import START, Shell
@@ -257,6 +257,7 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("inspect", str, lambda do, topic: do.view.inspect(topic)),
     _about("key", str, lambda do, key: do.view.press(key)),
     _about("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
+    _about("try", read_stack, lambda do, stack: do.behaviours.try_stack(stack)),
     _about("block", str, lambda do, block: do.behaviours.show_block(block)),
     _about("variable.rename", str, lambda do, id: do.variables.ask_other_name(id)),
     _about("variable.delete", str, lambda do, id: do.variables.delete(id)),
@@ -275,7 +276,7 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("robot.end_virtual", str, lambda do, robot: do.robots.end_virtual(robot)),
     _about("robot.virtual", str, lambda do, missing: do.robots.start_for(missing)),
     *map(
-        _fix_blocks, ("limit", "define", "add", "after")
+        _fix_blocks, ("limit", "define", "add", "after", "begin", "receive")
     ),  # what a problem's button does (`app.blocks.fixes.fixes`)
 )
 """Asked for as ``id:argument``; a tab goes by its document's key."""

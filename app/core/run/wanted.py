@@ -1,0 +1,75 @@
+"""What a person wants to be run: a behaviour, or one stack of it that is tried alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from app.blocks.compiler.stack import SHOW, Stack
+from app.blocks.model.program import Program
+from app.core.documents.document import Document
+from app.core.documents.problems import CONNECT
+from app.robots.description.description import Robot
+from app.robots.description.inputs import pretty_unit
+from nep.i18n import _
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A behaviour, or one ``stack`` of it; ``paused``: it stands before its first block."""
+
+    document: Document
+    paused: bool = False
+    stack: Stack | None = None
+
+    def program(self) -> Program | None:
+        """What runs then; None when there is no such stack any more."""
+        return self.document.program() if self.stack is None else self.document.try_program(self.stack)
+
+    @property
+    def gives_value(self) -> bool:
+        """Whether it is a value, which the program writes."""
+        return self.stack is not None and self.stack.is_value
+
+    def unit(self, program: Program, robots: Iterable[Robot]) -> str:
+        """The unit of a sensor's value that is tried; "" for any other value."""
+        if (
+            self.stack is None
+            or len(program.sensors) != 1
+            or "_get_" not in self.stack.type_in(self.document.workspace)
+        ):
+            return ""
+        name, part = program.sensors[0]
+        sensors = (robot.sensor(part) for robot in robots if robot.name == name)
+        sensor = next((each for each in sensors if each is not None), None)
+        if sensor is None or sensor.kind == "object":
+            return ""
+        return pretty_unit(sensor.unit) or ""
+
+    def problems(self, program: Program) -> dict[str, str]:
+        """Why it can't run, by block; a whole behaviour runs without the robots that are not there."""
+        wrong = {each.block_id: each.sentence for each in program.problems if each.severity == "error"}
+        found = {block: sentence for block, sentence in wrong.items() if block}
+        if self.stack is None or found:
+            return {block: sentence for block, sentence in found.items() if block != SHOW}
+        return _absent(program, self.stack)
+
+    def words(self, program: Program) -> str:
+        """The words of the block that is tried; "" for a whole behaviour."""
+        if self.stack is None:
+            return ""
+        labels: Mapping[str, str] = program.labels
+        return labels.get(self.stack.id) or next(
+            (words for block, words in labels.items() if block != SHOW), program.name
+        )
+
+
+def _absent(program: Program, stack: Stack) -> dict[str, str]:
+    """What is said of a block whose robot is not there: nothing would happen."""
+    if stack.id not in program.absent:
+        return {}
+    mends = (each.mend_action or "" for each in program.problems if each.block_id == stack.id)
+    robot = next((mend.removeprefix(CONNECT) for mend in mends if mend.startswith(CONNECT)), "")
+    if not robot:
+        return {stack.id: _("Its robot is not connected, so it can't be tried.")}
+    return {stack.id: _("{robot} is not connected, so it can't be tried.").format(robot=robot)}

@@ -1,0 +1,84 @@
+"""One stack as a program of its own: under a start, with the functions and variables of its behaviour."""
+
+from __future__ import annotations
+
+import copy
+
+import pytest
+
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.compiler.stack import SHOW, Stack
+from app.blocks.model.program import Program
+from tests.blocks.fakes import play
+from tests.blocks.samples import block, call, define, get, number, robot, say, stack, started, text, workspace
+
+BATTERY = block("robot_pepper_get_battery", "bat", ROBOT="Pepper")
+
+
+def behaviour() -> dict[str, object]:
+    """A start with three blocks, a script of an event, and a function."""
+    chain = stack(say("one") | {"id": "1"}, say("two") | {"id": "2"}, call("f", id="3"))
+    loop = block("control_forever", "loop", BODY=[say("in") | {"id": "in"}])
+    touched = block("robot_pepper_when_touched", "hat", ROBOT="Pepper", PLACE="head", below=loop)
+    return workspace(started(chain), touched, define("f", "greet", (), say("hello")), variables=("n",))
+
+
+def program(tried: Stack) -> Program:
+    before = behaviour()
+    kept = copy.deepcopy(before)
+    made = tried.workspace(before)
+    assert before == kept
+    assert made is not None
+    return compile_behaviour(made, [robot()])
+
+
+@pytest.mark.parametrize(
+    ("tried", "says"),
+    [
+        (Stack("2"), ["two", "hello"]),
+        (Stack("1"), ["one", "two", "hello"]),
+        (Stack("3"), ["hello"]),
+        (Stack("in"), ["in"]),
+        (Stack("x", state=say("new") | {"id": "x"}), ["new"]),
+    ],
+    ids=["and all below", "the first", "a function", "inside another", "of the toolbox"],
+)
+def test_a_block_and_all_below_it_run(tried: Stack, says: list[str]) -> None:
+    made = tried.workspace(behaviour())
+    assert made is not None
+    link = play(made).link
+    assert [given["text"] for _robot, _action, given in link.invoked] == says
+    assert program(tried).starts == 1
+
+
+def test_of_a_hat_the_blocks_below_it_run() -> None:
+    made = program(Stack("hat", "hat"))
+    assert "when_touched" not in made.source
+    assert "on_start" in made.source
+    assert Stack("hat", "hat", started() | {"id": "hat"}).workspace(behaviour()) is None, "nothing is below"
+
+
+def test_the_blocks_keep_their_ids_for_the_glow_and_errors() -> None:
+    assert "step('2')" in program(Stack("2")).runnable
+    assert "step('1')" not in program(Stack("2")).runnable
+
+
+def test_a_value_is_written() -> None:
+    made = Stack("bat", "value", BATTERY).workspace(behaviour())
+    assert made is not None
+    assert SHOW in compile_behaviour(made, [robot()]).runnable
+    sum_ = block("values_arithmetic", "sum", A=number(2), SIGN="+", B=get("n"))
+    made = Stack("sum", "value", sum_).workspace(behaviour())
+    assert made is not None
+    assert play(made).lines == ["2"]
+
+
+def test_a_block_that_has_gone_is_no_program() -> None:
+    assert Stack("nowhere").workspace(behaviour()) is None
+    assert Stack("nowhere").workspace({}) is None
+
+
+def test_what_the_page_tells() -> None:
+    assert Stack.from_json({"id": "a", "kind": "value"}) == Stack("a", "value")
+    assert Stack.from_json({"id": "a", "kind": "stack", "state": text("x")}).state is not None
+    assert Stack.from_json("nonsense").workspace(behaviour()) is None

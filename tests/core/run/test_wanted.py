@@ -1,0 +1,58 @@
+"""What is wanted to run: a behaviour, or one stack, which says at once why it can't be tried."""
+
+from __future__ import annotations
+
+from app.blocks.compiler.stack import Stack
+from app.core.documents.document import Document
+from app.core.run.wanted import Wanted
+from tests.blocks.samples import block, robot, say, started, workspace
+
+
+def document(*connected: str) -> Document:
+    made = Document()
+    made.set_connected([robot("Pepper"), robot("Ada")])
+    gap = block("control_wait_until", "gap")
+    made.edited(workspace(started(say("Hi") | {"id": "hi"}, say("Hi", "Ada") | {"id": "ada"}, gap)))
+    made.set_connected([robot(name) for name in connected])
+    return made
+
+
+def test_a_behaviour_is_wanted_whole() -> None:
+    wanted = Wanted(document("Pepper"))
+    program = wanted.program()
+    assert program is wanted.document.program()
+    assert program is not None
+    assert list(wanted.problems(program)) == ["gap"], "robots that are missing are skipped"
+    assert wanted.words(program) == ""
+    assert not wanted.gives_value
+
+
+def test_a_stack_is_named_by_its_first_block() -> None:
+    wanted = Wanted(document("Pepper", "Ada"), stack=Stack("ada"))
+    program = wanted.program()
+    assert program is not None
+    assert wanted.words(program) == "say"
+    assert "needs a condition" in wanted.problems(program)["gap"]
+
+
+def test_a_block_of_a_robot_that_is_away_says_so() -> None:
+    wanted = Wanted(document("Pepper"), stack=Stack("ada", state=say("Hi", "Ada") | {"id": "ada"}))
+    program = wanted.program()
+    assert program is not None
+    assert wanted.problems(program) == {"ada": "Ada is not connected, so it can't be tried."}
+
+
+def test_a_value_is_named_as_itself() -> None:
+    battery = block("robot_pepper_get_battery", "bat", ROBOT="Pepper")
+    wanted = Wanted(document("Pepper"), stack=Stack("bat", "value", battery))
+    program = wanted.program()
+    assert program is not None
+    assert wanted.gives_value
+    assert wanted.unit(program, [robot("Pepper")]) == "%"
+    assert wanted.unit(program, []) == ""
+    assert wanted.problems(program) == {}
+    assert wanted.words(program) == "battery"
+
+
+def test_a_stack_that_has_gone_is_no_program() -> None:
+    assert Wanted(document("Pepper"), stack=Stack("nowhere")).program() is None

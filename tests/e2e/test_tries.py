@@ -1,0 +1,59 @@
+"""Trying blocks on the robot at once: from the toolbox, from a stack, and the value of a sensor."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.behaviours import say, started, turn, write
+from tests.e2e.film import Film
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(240)
+CLOSED = "[...document.querySelectorAll('.blocklyFlyout')].every(e => e.style.display === 'none')"
+ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTryAnswer'))"
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_person_tries_blocks_before_any_program(
+    start: Callable[..., Studio], tmp_path: Path, theme: str
+) -> None:
+    path = write(tmp_path / "Tries.nepb", started(say("First", {**turn(20), "id": "turn"})))
+    studio = start(str(path), "--theme", theme)
+    film = Film(studio, f"tries-{theme}", tmp_path)
+    studio.choose("Robots", "Use the virtual Pepper")
+    studio.says("Pepper ready", 40)
+    studio.spot("[data-id=turn]")
+    before = studio.blocks()
+    with film.step("A click on a block of the toolbox lets the robot do it"):
+        studio.open_category("Movement")
+        studio.point(".blocklyFlyout .robot_pepper_do_turn > .blocklyPath", dx=10, dy=10)
+        studio.says("Trying “turn”")
+        until(lambda: studio.page("!!document.querySelector('.blocklyFlyout .nepState-running')"), "it glows")
+    studio.says("Tried “turn”")
+    assert studio.blocks() == before, "nothing is added to the program"
+    with film.step("A click on a sensor shows its value"):
+        studio.open_category("Sensors")
+        studio.point(".blocklyFlyout .robot_pepper_get_battery > .blocklyPath", dx=10, dy=10)
+        value = str(until(lambda: studio.page(ANSWER), "its value is shown"))
+        assert re.fullmatch(r"\d+ %", value)
+        studio.says(value)
+    with film.step("The round button runs from the selected block on"):
+        left, top, width, height = studio.spot(".blocklySvg")
+        studio.screen.click(left + width - 120, top + height / 2)  # the toolbox closes
+        until(lambda: studio.page(CLOSED), "the toolbox is closed")
+        studio.point("[data-id=turn] > .blocklyPath", dx=12, dy=12)
+        studio.point(".nepTryHandle", dx=10, dy=10)
+        studio.says("Trying “turn”")
+        until(lambda: "turn" in studio.outlined("running"), "the real block glows")
+        assert "say First" not in studio.outlined("running")
+    studio.says("Tried “turn”")
+    studio.point("[data-id='say First'] > .blocklyPath", dx=12, dy=12)
+    studio.screen.key("Return", ["Ctrl"])
+    studio.says("Trying “say”")
+    studio.screen.key("F12")
+    studio.says("“say” was stopped")

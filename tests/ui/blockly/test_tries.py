@@ -1,0 +1,81 @@
+"""Trying blocks: a click in the toolbox, the round button and Ctrl+Enter ask; values are shown beside."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from PySide6.QtCore import Qt
+
+from tests.ui.blockly_person import PICTURE, START, WAIT_MS
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+HANDLE = ".nepTab:not([hidden]) .nepTryHandle"
+ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTryAnswer'))"
+
+
+@pytest.fixture
+def asked(view) -> list[dict]:
+    """What was to be tried."""
+    made: list[dict] = []
+    view.try_asked.connect(lambda text: made.append(json.loads(text)))
+    return made
+
+
+def test_a_click_in_the_toolbox_tries_the_block_and_adds_nothing(qtbot, view, person, asked):
+    them = person(START)
+    them.open_category("Control")
+    them.click(".blocklyFlyout .control_wait > .blocklyPath", dx=8, dy=8)
+    qtbot.waitUntil(lambda: bool(asked), timeout=WAIT_MS)
+    (what,) = asked
+    assert (what["kind"], what["state"]["type"], what["state"]["id"]) == ("stack", "control_wait", what["id"])
+    assert what["state"]["inputs"]["SECONDS"]["shadow"]["fields"] == {"NUMBER": 1}
+    assert them.tops() == [START]
+    view.highlight([what["id"]])
+    them.wait_for("!!document.querySelector('.blocklyFlyout .nepState-running')")
+    view.set_errors({what["id"]: "“wait” needs a number."})
+    them.wait_for(ANSWER, "“wait” needs a number.")
+
+
+def test_dragging_out_of_the_toolbox_tries_nothing(qtbot, view, person, asked):
+    them = person(START)
+    them.open_category("Control")
+    start = them.hold(".blocklyFlyout .control_wait")
+    end = start.__class__(700, 300)
+    them.move(start, end)
+    them.drop(end)
+    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
+    assert asked == []
+
+
+def test_the_round_button_tries_the_selected_block(qtbot, view, person, asked):
+    them = person(state=PICTURE)
+    them.wait_for(f"document.querySelectorAll('{HANDLE}').length", 0)
+    them.click("[data-id=wave] > .blocklyPath", dx=10, dy=10)
+    handle, block = them.box(HANDLE), them.box("[data-id=wave] > .blocklyPath")
+    assert handle["right"] <= block["left"] + 2
+    assert block["top"] - 4 < handle["top"] < block["bottom"]
+    them.click(HANDLE, dx=10, dy=10)
+    qtbot.waitUntil(lambda: asked == [{"id": "wave", "kind": "stack"}], timeout=WAIT_MS)
+    assert them.ask("document.querySelector('.blocklySelected')?.dataset.id") == "wave", "it stays selected"
+    them.press(Qt.Key_Return, Qt.ControlModifier)
+    qtbot.waitUntil(lambda: len(asked) == 2, timeout=WAIT_MS)
+    assert asked[1] == asked[0]
+
+
+def test_a_hat_runs_what_is_below_it(qtbot, view, person, asked):
+    them = person(START)
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    them.click(HANDLE, dx=10, dy=10)
+    qtbot.waitUntil(lambda: asked == [{"id": "start", "kind": "hat"}], timeout=WAIT_MS)
+
+
+def test_a_value_is_shown_beside_its_block_until_the_next_press(qtbot, view, person):
+    them = person(state=PICTURE)
+    view.show_value("wave", "84 %")
+    them.wait_for(ANSWER, "84 %")
+    answer, block = them.box(".nepTryAnswer"), them.box("[data-id=wave] > .blocklyPath")
+    assert 0 < answer["left"] - block["right"] < 30
+    them.press(Qt.Key_Shift)
+    them.wait_for(ANSWER, False)
