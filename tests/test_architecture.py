@@ -47,7 +47,6 @@ EARNED = {
     "app.core.run.edits_since_run": "pure, and tested alone",
     "app.core.run.run_warnings": "pure, and tested alone",
     "app.ui.panels.registry": "a seam: panels, ours and those of plug-ins, are found through it",
-    "app.ui.shell.dialogs.about": "one of a list: the sheets; tested alone",
     "app.ui.widgets.inputs.switch": "one of a list: the widgets; two use it through their face",
 }
 

@@ -235,7 +235,7 @@ def test_a_sheet_closes_with_esc_and_when_the_person_goes_elsewhere(
     field = QLineEdit()
     place.layout().addWidget(field)
     for leave in (lambda: QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape), field.setFocus):
-        sheet = AboutSheet(theme, place)
+        sheet = AboutSheet(theme, place, print)
         sheet.open()
         assert sheet.isVisible()
         assert place.rect().contains(sheet.geometry())

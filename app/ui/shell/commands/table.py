@@ -232,6 +232,7 @@ COMMANDS: tuple[C, ...] = (
     C("network.others", lazy("Let other computers connect"), lambda do: do.robots.ask_about_others(),
       "Robots", icon="wifi", above=True),
     C("help.first_steps", lazy("First steps"), lambda do: do.view.first_steps(), "Help", icon="lightbulb"),
+    C("help.guide", lazy("Guide"), lambda do: do.view.open_guide(), "Help", icon="book-open"),
     C("help.examples", lazy("Examples"), lambda do: do.view.examples(), "Help", icon="blocks"),
     C("help.shortcuts", lazy("Keyboard shortcuts"), lambda do: do.view.open_shortcuts(), "Help", ("F1",),
       "keyboard"),

@@ -5,12 +5,14 @@ Everything that opens over the window is made when it is first asked for, so tha
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QAction, QDesktopServices
 
+from app import resources
 from app.core.faults import log_folder
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
@@ -24,14 +26,15 @@ from app.ui.shell.hint_ring import HintRing
 from app.ui.theme.system import Preference
 from app.ui.theme.theme import Mode
 from app.ui.widgets.lists.fuzzy import Entry
-from nep.i18n import _
+from nep.i18n import _, language
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    from app.ui.shell.dialogs import command_palette, shortcuts
+    from app.ui.shell.dialogs import command_palette, guide, shortcuts
     from app.ui.shell.dialogs import name as name_sheet
     from app.ui.shell.dialogs import settings as settings_sheet
 else:
+    guide = lazy_module("app.ui.shell.dialogs.guide")
     command_palette, name_sheet = (
         lazy_module("app.ui.shell.dialogs.command_palette"),
         lazy_module("app.ui.shell.dialogs.name"),
@@ -63,6 +66,7 @@ class ViewCommands:
         self._name_sheet: name_sheet.NameSheet | None = None
         self._settings_sheet: settings_sheet.SettingsSheet | None = None
         self._ring: HintRing | None = None
+        self._guide: guide.GuideSheet | None = None
 
     def use(self, actions: Actions, entries: PaletteEntries) -> None:
         """Keep the keys and marks of these actions up to date; the palette offers these entries."""
@@ -274,6 +278,16 @@ class ViewCommands:
         self._shell.open_panel("behaviour")
         self._shell.open_panel("first_steps")
 
+    def open_guide(self) -> None:
+        """Open the guide at the page where it was left."""
+        if self._guide is None:
+            shell = self._shell
+            self._guide = guide.GuideSheet(shell.theme, shell.surface, self._guide_pages)
+        self._guide.open()
+
+    def _guide_pages(self) -> Sequence[guide.GuidePage]:
+        return guide.read_pages(resources.folder() / "guide", language(), self.shortcuts.first)
+
     def examples(self) -> None:
         """Show all examples, on the start page."""
         self.start_page()
@@ -306,7 +320,7 @@ class ViewCommands:
 
     def about(self) -> None:
         """Say what this program is."""
-        AboutSheet(self._shell.theme, self._shell.surface).open()
+        AboutSheet(self._shell.theme, self._shell.surface, self._shell.say).open()
 
 
 def _wish(action: QAction) -> Preference:

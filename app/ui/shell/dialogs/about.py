@@ -1,14 +1,19 @@
-"""What Studio is: a small sheet over the window. Esc closes it."""
+"""What Studio is: its version, licences, and what it runs on, to copy. Esc closes it."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+import platform
+from collections.abc import Callable
+
+from PySide6.QtCore import QSize, Qt, qVersion
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
-from app.ui.widgets import IconButton, label
+from app.ui.widgets import Button, IconButton, label
 from nep.i18n import _, lazy
+from nep.version import __version__
 
 TITLE = "NEP Studio"
 LINES = (
@@ -16,7 +21,18 @@ LINES = (
     lazy("NEP Studio is free software (MIT licence)."),
     lazy("Inter and JetBrains Mono: SIL Open Font License 1.1. Icons: Lucide, ISC licence."),
 )
-WIDE = 420
+WIDE = 460
+
+
+def versions() -> tuple[tuple[str, str], ...]:
+    """What it is made of and runs on: (name, version). Names of programs are the same in every language."""
+    return (
+        ("NEP Studio", __version__),
+        ("nep", __version__),
+        ("Python", platform.python_version()),
+        ("Qt", qVersion() or ""),
+        (_("System"), f"{platform.system()} {platform.release()} ({platform.machine()})"),
+    )
 
 
 class AboutSheet(Overlay):
@@ -24,11 +40,13 @@ class AboutSheet(Overlay):
 
     top = 96
 
-    def __init__(self, theme: Theme, window: QWidget) -> None:
+    def __init__(self, theme: Theme, window: QWidget, say: Callable[[str], object]) -> None:
+        """``say`` is told that the versions were copied."""
         super().__init__(theme, window, TITLE)
+        self._say = say
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 16, 20, 18)
-        column.setSpacing(10)
+        column.setSpacing(12)
         head = QHBoxLayout()
         head.addWidget(label(TITLE, "heading", wrap=True), 1)
         self._close = IconButton(theme, "x", _("Close"), "Esc")
@@ -40,8 +58,29 @@ class AboutSheet(Overlay):
         for words in LINES:
             lines.addWidget(label(_(words), "body", role="textSecondary", wrap=True))
         column.addLayout(lines)
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(16)
+        grid.setVerticalSpacing(4)
+        grid.setColumnStretch(1, 1)
+        for row, (name, version) in enumerate(versions()):
+            grid.addWidget(label(name, "body", role="textSecondary"), row, 0, Qt.AlignmentFlag.AlignTop)
+            said = label(version, "body", wrap=True)
+            said.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            grid.addWidget(said, row, 1)
+        column.addLayout(grid)
+        self.copy = Button(theme, _("Copy the versions"), "copy", size="form")
+        self.copy.clicked.connect(self._copy)
+        foot = QHBoxLayout()
+        foot.addWidget(self.copy)
+        foot.addStretch(1)
+        column.addLayout(foot)
         self.closed.connect(self.deleteLater)
         self.closed.connect(self._scrim.deleteLater)
+
+    def _copy(self) -> None:
+        text = "\n".join(f"{name}: {version}" for name, version in versions())
+        QGuiApplication.clipboard().setText(text)
+        self._say(_("Copied the versions"))
 
     def first(self) -> QWidget:
         return self._close

@@ -1,0 +1,236 @@
+"""The guide: pages about Studio, inside Studio, in the person's language; found by their words.
+
+The pages are Markdown in ``resources/guide``, a folder each language. ``{key:run.stop}`` in them becomes
+the keys of a command as they are now.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
+from PySide6.QtGui import (
+    QFont,
+    QKeyEvent,
+    QPalette,
+    QTextBlock,
+    QTextBlockFormat,
+    QTextCursor,
+    QTextDocument,
+    QTextFrameFormat,
+    QTextTable,
+)
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
+    QTextBrowser,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.core.storage.atomic_file import read_whole
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.text.numbers import spoken_key
+from app.ui.theme.theme import Theme
+from app.ui.widgets import IconButton, SearchField, label, paint
+from nep.i18n import ENGLISH, _, ngettext
+
+WIDE, HIGH, LIST_WIDE = 920, 640, 220
+LINE_PERCENT = 115.0
+_KEY = re.compile(r"\{key:([a-z_.]+)\}")
+_MARKS = re.compile(r"[*#|`_-]+")
+
+
+@dataclass(frozen=True)
+class GuidePage:
+    """One page: its heading, and its Markdown."""
+
+    title: str
+    text: str
+
+    def has(self, words: str) -> bool:
+        """Whether all of these words are in it, in any order."""
+        said = _MARKS.sub(" ", self.text).casefold()
+        return all(word in said for word in words.casefold().split())
+
+
+def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tuple[GuidePage, ...]:
+    """The pages in this language, or in English where nobody has translated one, by the order of their files.
+
+    ``key_of`` gives the first key of a command; "" for none.
+    """
+    made = []
+    for path in sorted((folder / ENGLISH).glob("*.md")):
+        translated = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0] / path.name
+        text = read_whole(translated if translated.is_file() else path).decode("utf-8")
+        text = _KEY.sub(lambda found: f"**{spoken_key(key_of(found[1])) or '-'}**", text)
+        title = text.partition("\n")[0].lstrip("# ")
+        made.append(GuidePage(title, text))
+    return tuple(made)
+
+
+class GuideSheet(Overlay):
+    """The list of pages with its search at the left, the page at the right; it stays where it was left."""
+
+    top = 64
+
+    def __init__(self, theme: Theme, window: QWidget, pages: Callable[[], Sequence[GuidePage]]) -> None:
+        """``pages`` are read at each opening: keys may have changed."""
+        super().__init__(theme, window, _("Guide"))
+        self._read = pages
+        self._pages: tuple[GuidePage, ...] = ()
+        self.search = SearchField(theme, _("Find in the guide"))
+        self.search.textChanged.connect(self._filter)
+        self.search.installEventFilter(self)
+        self.list = QListWidget()
+        self.list.setAccessibleName(_("Pages of the guide"))
+        self.list.setProperty("raised", "true")
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.list.installEventFilter(self)
+        self.list.currentRowChanged.connect(self._show_page)
+        self.none = label(_("No page has these words."), "body", role="textSecondary", wrap=True)
+        self.page = QTextBrowser()
+        self.page.setFrameShape(QFrame.Shape.NoFrame)
+        self.page.setProperty("bare", "true")
+        self.page.setOpenLinks(False)
+        self.page.setAccessibleName(_("The page"))
+        self._lay_out()
+        theme.changed.connect(self._again)
+
+    def _lay_out(self) -> None:
+        close = IconButton(self.theme, "x", _("Close"), "Esc")
+        close.clicked.connect(self.shut)
+        head = QHBoxLayout()
+        head.addWidget(label(_("Guide"), "heading"))
+        head.addStretch(1)
+        head.addWidget(close)
+        left = QVBoxLayout()
+        left.setSpacing(8)
+        left.addWidget(self.search)
+        left.addWidget(self.none)
+        left.addWidget(self.list, 1)
+        sides = QHBoxLayout()
+        sides.setSpacing(18)
+        self._left = QWidget()
+        left.setContentsMargins(0, 0, 0, 0)
+        self._left.setLayout(left)
+        sides.addWidget(self._left)
+        sides.addWidget(self.page, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(20, 14, 20, 18)
+        column.setSpacing(12)
+        column.addLayout(head)
+        column.addLayout(sides, 1)
+
+    def first(self) -> QWidget:
+        return self.list
+
+    def wanted_size(self, room: QSize) -> QSize:
+        scaled = self.theme.scaled
+        return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
+
+    def open(self) -> None:
+        place = max(0, self.list.currentRow())
+        self._pages = tuple(self._read())
+        self.search.clear()
+        self._filter("")
+        self.list.setCurrentRow(place)
+        super().open()
+
+    @property
+    def shown(self) -> tuple[GuidePage, ...]:
+        """The pages in the list: those that have the words of the search."""
+        return tuple(page for page in self._pages if page.has(self.search.text()))
+
+    def _filter(self, words: str) -> None:
+        self.list.blockSignals(True)
+        self.list.clear()
+        self._left.setFixedWidth(round(self.theme.scaled(LIST_WIDE)))
+        for page in self.shown:
+            item = QListWidgetItem(page.title)
+            item.setSizeHint(QSize(0, round(self.theme.scaled(self.theme.size("row", "comfortable")))))
+            self.list.addItem(item)
+        self.list.blockSignals(False)
+        count = self.list.count()
+        paint.show_when(self.none, count == 0)
+        if words:
+            paint.announce(self, ngettext("{count} page", "{count} pages", count).format(count=count))
+        if count:
+            self.list.setCurrentRow(0)
+            self._show_page(0)
+
+    def _show_page(self, row: int) -> None:
+        if not 0 <= row < len(self.shown):
+            return
+        theme, document = self.theme, self.page.document()
+        palette = self.page.palette()
+        palette.setColor(QPalette.ColorRole.Base, theme.colour("raised"))
+        palette.setColor(QPalette.ColorRole.Text, theme.colour("text"))
+        self.page.setPalette(palette)
+        self.page.setStyleSheet(f"background: {theme.colour('raised').name()};")
+        document.setDefaultFont(theme.font("bodyLarge"))
+        document.setDocumentMargin(4)
+        self.page.setMarkdown(self.shown[row].text)
+        for frame in document.rootFrame().childFrames():
+            if isinstance(frame, QTextTable):
+                self._line(frame)
+        self._set_text(document)
+        found = self.search.text().split()
+        if found:
+            self.page.find(found[0])
+        else:
+            self.page.verticalScrollBar().setValue(0)
+
+    def _set_text(self, document: QTextDocument) -> None:
+        """Room between paragraphs; what is emphasised is semibold, never italic."""
+        cursor = QTextCursor(document)
+        block = document.begin()
+        while block.isValid():
+            cursor.setPosition(block.position())
+            if cursor.currentTable() is None:
+                look = block.blockFormat()
+                heading = look.headingLevel()
+                look.setBottomMargin(self.theme.scaled(4 if block.textList() is not None else 10))
+                look.setTopMargin(self.theme.scaled(12 if heading > 1 else 0))
+                look.setLineHeight(LINE_PERCENT, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
+                cursor.setBlockFormat(look)
+            for part in [each.fragment() for each in cast("Iterable[QTextBlock.iterator]", block)]:
+                if part.charFormat().fontItalic():
+                    strong = part.charFormat()
+                    strong.setFontItalic(False)
+                    strong.setFontWeight(QFont.Weight.DemiBold)
+                    cursor.setPosition(part.position())
+                    cursor.setPosition(part.position() + part.length(), QTextCursor.MoveMode.KeepAnchor)
+                    cursor.setCharFormat(strong)
+            block = block.next()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """From the list to the field by "/", from the field to the list by Down."""
+        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
+            if watched is self.list and event.text() == "/":
+                self.search.setFocus(Qt.FocusReason.ShortcutFocusReason)
+                return True
+            if watched is self.search and event.key() == Qt.Key.Key_Down:
+                self.list.setFocus(Qt.FocusReason.ShortcutFocusReason)
+                return True
+        return super().eventFilter(watched, event)
+
+    def _line(self, table: QTextTable) -> None:
+        """Lines between rows, room in the cells, and the whole width."""
+        look = table.format().toTableFormat()
+        look.setBorderStyle(QTextFrameFormat.BorderStyle.BorderStyle_Solid)
+        look.setBorderBrush(self.theme.colour("border"))
+        look.setBorderCollapse(True)
+        look.setBorder(1)
+        look.setCellPadding(7)
+        table.setFormat(look)
+
+    def _again(self) -> None:
+        if self.isVisible():
+            self._filter(self.search.text())
