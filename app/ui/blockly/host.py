@@ -21,7 +21,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app import resources
 from app.ui.blockly.bridge import BlocklyBridge, Json
 from app.ui.blockly.scheme import PAGE, SCHEME, RequestBlocker, SchemeHandler, register_scheme
-from app.ui.widgets.keyboard import proxy_of
+from app.ui.widgets.keyboard import keyboard_leads, proxy_of
 from nep import i18n
 
 _log = logging.getLogger(__name__)
@@ -168,6 +168,8 @@ class BlocklyHost(QWidget):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ChildAdded:
             self._watch_keys()
+        if event.type() == QEvent.Type.FocusIn and keyboard_leads():
+            self._tell("keyboard", None)
         overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
         if overrides and _is_help(cast("QKeyEvent", event)):
             event.accept()  # on a block, F1 is for the block: the window's own F1 does not get it then

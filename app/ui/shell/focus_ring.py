@@ -1,4 +1,4 @@
-"""The focus ring: 2 px wide, 2 px outside the control, only when the keyboard led there.
+"""The focus ring: 2 px wide, 2 px outside the control, only while the keyboard is used.
 
 Style sheets cannot move an outline outwards, so one small overlay follows the widget that has the focus.
 Qt's QFocusFrame does not serve: it becomes a child of the scroll area around the widget and is deleted with
@@ -7,8 +7,10 @@ it, and its distance is the style's, one for all widgets.
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt
-from PySide6.QtGui import QGuiApplication, QPainter, QPaintEvent, QWindow
+from typing import cast
+
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt, QTimer
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QPainter, QPaintEvent, QWindow
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractScrollArea,
@@ -23,18 +25,27 @@ from shiboken6 import isValid
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.keyboard import keyboard_leads, set_keyboard_leads
 
 _MOVES = frozenset(
     {QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide, QEvent.Type.ParentChange}
 )
-_PRESSES = frozenset({QEvent.Type.KeyPress, QEvent.Type.MouseButtonPress, QEvent.Type.TouchBegin})
+_PRESSES = frozenset({QEvent.Type.MouseButtonPress, QEvent.Type.TouchBegin, QEvent.Type.TabletPress})
+_Key = Qt.Key
+_LEADING = frozenset(
+    {
+        _Key.Key_Tab, _Key.Key_Backtab, _Key.Key_F6, _Key.Key_Home, _Key.Key_End, _Key.Key_PageUp,
+        _Key.Key_PageDown, _Key.Key_Left, _Key.Key_Right, _Key.Key_Up, _Key.Key_Down,
+    }
+)  # fmt: skip
+"""Keys that move the focus; whoever types, or presses Ctrl+S, may use the mouse for everything else."""
 
 
 class FocusRing(QWidget):
     """One ring for a window and the panels that float over it; ``focusRadius`` tells a widget's corners.
 
-    Whether the keyboard led somewhere is told by the newest key or mouse button: Qt's reason of a focus says
-    "Tab" too when a widget with the focus is hidden and the next one gets it.
+    Whether the keyboard is used is told by the newest key that moves the focus, or mouse button: Qt's reason
+    of a focus says "Tab" too when a widget with the focus is hidden and the next one gets it.
 
     Widgets with the property ``ownFocus`` (and tables and trees) draw their focus themselves; ``focusInset``
     is the margin between a widget's edge and what it paints.
@@ -44,7 +55,7 @@ class FocusRing(QWidget):
         super().__init__(window)
         self._theme = theme
         self._home = self._window = window
-        self._by_mouse = False
+        set_keyboard_leads(False)
         self._target: QWidget | None = None
         self._chain: list[QWidget] = []
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
@@ -71,7 +82,7 @@ class FocusRing(QWidget):
 
     def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
         pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
-        if pressed or self._by_mouse or new is None or not self._rings(new):
+        if pressed or not keyboard_leads() or new is None or not self._rings(new):
             self._follow(None)
             return
         if new.window() is not self._window:
@@ -110,14 +121,21 @@ class FocusRing(QWidget):
         kind = event.type()
         if isinstance(watched, QWindow):
             if kind in _PRESSES:
-                self._by_mouse = kind != QEvent.Type.KeyPress
-                if self._by_mouse:
-                    self._follow(None)
+                set_keyboard_leads(False)
+                self._follow(None)
+            elif kind == QEvent.Type.KeyPress and _leads(cast("QKeyEvent", event)) and not keyboard_leads():
+                set_keyboard_leads(True)
+                QTimer.singleShot(0, self, self._ring_here)  # the key may move the focus first
         elif kind == QEvent.Type.Show and watched is self._home:
             self._window_changed(self._home.windowHandle())
         elif kind in _MOVES:
             self._place()
         return super().eventFilter(watched, event)
+
+    def _ring_here(self) -> None:
+        """Ring what has the focus already."""
+        if self._target is None:
+            self._focus_changed(None, QApplication.focusWidget())
 
     def _place(self) -> None:
         target = self._target
@@ -154,3 +172,9 @@ class FocusRing(QWidget):
         painter = QPainter(self)
         paint.box(painter, QRectF(self.rect()), outside, None, self._theme.colour("focus"), width)
         painter.end()
+
+
+def _leads(event: QKeyEvent) -> bool:
+    """Whether a key moves the focus: Tab, the arrows, F6, and Ctrl+1 to Ctrl+9, which go to a panel."""
+    to_panel = _Key.Key_1 <= event.key() <= _Key.Key_9
+    return event.key() in _LEADING or (to_panel and event.modifiers() == Qt.KeyboardModifier.ControlModifier)

@@ -13,7 +13,9 @@ from collections.abc import Iterator
 
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
+
+_LEADS = "keyboardLeads"
 
 
 def is_plain(event: QKeyEvent) -> bool:
@@ -27,6 +29,19 @@ def is_plain(event: QKeyEvent) -> bool:
 def is_pressed_key(key: int) -> bool:
     """Whether a key presses what has the focus."""
     return key in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}
+
+
+def keyboard_leads() -> bool:
+    """Whether the keyboard led to where the focus is: only then it is ringed."""
+    application = QApplication.instance()
+    return bool(application is not None and application.property(_LEADS))
+
+
+def set_keyboard_leads(leads: bool) -> None:
+    """A key that moves the focus was pressed, or a button of the mouse."""
+    application = QApplication.instance()
+    if application is not None:
+        application.setProperty(_LEADS, leads)
 
 
 def following(widget: QWidget, *, forward: bool = True) -> QWidget:

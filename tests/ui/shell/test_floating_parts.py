@@ -132,6 +132,7 @@ def test_the_ring_is_two_pixels_outside_and_follows(qtbot, place: QWidget, theme
     place.layout().addWidget(first)
     place.layout().addWidget(second)
     QTest.qWait(1)
+    QTest.keyClick(place.windowHandle(), Qt.Key.Key_Tab)
     second.setFocus(Qt.FocusReason.TabFocusReason)
     qtbot.waitUntil(lambda: ring.target is second)
     assert ring.isVisible()
@@ -155,8 +156,31 @@ def test_the_mouse_makes_no_ring(qtbot, place: QWidget, theme: Theme) -> None:
     assert field.hasFocus()
     assert not ring.isVisible()
     QTest.mouseRelease(field, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
-    QTest.keyClick(field, Qt.Key.Key_Tab)
+    QTest.keyClick(place.windowHandle(), Qt.Key.Key_Tab)
     qtbot.waitUntil(lambda: ring.target is other)
+
+
+@pytest.mark.parametrize("key", ["Tab", "Backtab", "Right", "Down", "F6", "Home"])
+def test_the_first_key_that_moves_the_focus_shows_the_ring(
+    qtbot, place: QWidget, theme: Theme, key: str
+) -> None:
+    ring = FocusRing(theme, place)
+    buttons = [Button(theme, word) for word in ("One", "Two")]
+    for button in buttons:
+        place.layout().addWidget(button)
+    QTest.qWait(1)
+    buttons[0].setFocus()  # as a page does that begins, or a dialog that closes
+    assert not ring.isVisible()
+    for other in (Qt.Key.Key_A, Qt.Key.Key_Shift, Qt.Key.Key_Escape, Qt.Key.Key_F12):
+        QTest.keyClick(place.windowHandle(), other)
+        QTest.qWait(1)
+        assert not ring.isVisible()
+    QTest.keyClick(place.windowHandle(), Qt.Key[f"Key_{key}"])
+    qtbot.waitUntil(ring.isVisible)
+    assert ring.target in buttons
+    at = buttons[1].mapTo(place, buttons[1].rect().center())
+    QTest.mouseClick(place.windowHandle(), Qt.MouseButton.LeftButton, pos=at)
+    assert not ring.isVisible()
 
 
 def test_after_the_mouse_a_hidden_widget_hands_on_no_ring(qtbot, place: QWidget, theme: Theme) -> None:
@@ -170,7 +194,7 @@ def test_after_the_mouse_a_hidden_widget_hands_on_no_ring(qtbot, place: QWidget,
     second.hide()  # Qt moves the focus on and calls it a Tab
     qtbot.waitUntil(first.hasFocus)
     assert ring.target is None
-    QTest.keyClick(place.windowHandle(), Qt.Key.Key_Shift)
+    QTest.keyClick(place.windowHandle(), Qt.Key.Key_Home)
     first.clearFocus()
     first.setFocus()
     assert ring.target is first
@@ -204,8 +228,10 @@ def test_the_ring_ends_where_a_scrolled_place_ends(qtbot, place: QWidget, theme:
     area.setWidget(inside)
     place.layout().addWidget(area)
     QTest.qWait(1)
+    QTest.keyClick(place.windowHandle(), Qt.Key.Key_Tab)
     button.setFocus(Qt.FocusReason.TabFocusReason)
     QTest.qWait(1)
+    assert ring.target is button
     area.verticalScrollBar().setValue(0)
     QTest.qWait(1)
     assert not ring.isVisible()
@@ -215,6 +241,8 @@ def test_a_ring_outlives_its_widget(qtbot, place: QWidget, theme: Theme) -> None
     ring = FocusRing(theme, place)
     button = Button(theme, "Brief")
     place.layout().addWidget(button)
+    QTest.qWait(1)
+    QTest.keyClick(place.windowHandle(), Qt.Key.Key_Tab)
     button.setFocus(Qt.FocusReason.TabFocusReason)
     qtbot.waitUntil(lambda: ring.target is button)
     button.deleteLater()

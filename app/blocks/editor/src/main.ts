@@ -11,6 +11,7 @@ import {iconElement} from './icons';
 import {useClipboard, useOwnKeys} from './keys';
 import {registerMenu, trimMenu} from './menu';
 import {FindBar} from './search';
+import {followModality, setKeyboardLed} from './modality';
 import {type Tab} from './tab';
 import {type Definitions, type ShownTab, Tabs} from './tabs';
 import {setCssVariables} from './theme';
@@ -136,6 +137,7 @@ class Editor {
     show: (id: string) => this.shown.reveal(id),
     help: () => this.help.show(focusedBlock()),
     find: () => this.find.open(),
+    keyboard: () => setKeyboardLed(true),
     search: () => this.shown.search(),
     edit: (what: 'copy' | 'cut' | 'paste' | 'duplicate') => {
       if (!this.shown.hasFocus) this.shown.focus();
@@ -238,6 +240,7 @@ async function start(bridge: Bridge): Promise<void> {
   // Blockly measures text once; the font has to be there before.
   await Promise.allSettled([document.fonts.load('600 15px Inter'), document.fonts.load('500 14px Inter')]);
   const editor = new Editor(bridge);
+  followModality();
   bridge.told.connect((name, payload) => {
     try {
       editor.receive(name, payload);

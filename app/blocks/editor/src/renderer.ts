@@ -45,8 +45,41 @@ export class StatePath extends Blockly.zelos.PathObject {
     return super.addConnectionHighlight(connection, ...shape);
   }
 
+  /** The style of the block around this one; '' for none. Blocks below each other lie in the same. */
+  private around = '';
+  private selection: SVGGElement | null = null;
+
+  override applyColour(block: Blockly.BlockSvg): void {
+    super.applyColour(block);
+    const parent = block.getParent();
+    const above = parent && pathOf(parent);
+    const around = !parent ? '' : parent.getNextBlock() === block ? above?.around ?? '' : parent.getStyleName();
+    // Only the first of a script has another parent when it goes elsewhere; those below it go with it.
+    let next: Blockly.BlockSvg | null = block;
+    for (let path: StatePath | null = this; next && path; next = next.getNextBlock(), path = next && pathOf(next)) {
+      if (next !== block && path.around === around) break;
+      path.lieIn(around, next);
+    }
+  }
+
+  /** A block in one of its own colour gets a light edge. */
+  private lieIn(around: string, block: Blockly.BlockSvg): void {
+    this.around = around;
+    this.setClass_('nepInside', around !== '' && !block.isShadow() && around === block.getStyleName());
+  }
+
+  /** Two tones, of which one is seen on any block and the other on any canvas. */
+  override updateSelected(enable: boolean): void {
+    this.setClass_('blocklySelected', enable);
+    if (enable === (this.selection !== null)) return;
+    this.selection?.remove();
+    this.selection = enable ? this.group('nepSelection', 'nepSelected', [7, 3]) : null;
+    if (this.selection) this.svgRoot.append(this.selection);
+  }
+
   override setPath(path: string): void {
     super.setPath(path);
+    this.selection?.querySelectorAll('path').forEach((each) => each.setAttribute('d', path));
     for (const mark of this.marks) mark.querySelectorAll('path').forEach((each) => each.setAttribute('d', path));
   }
 
@@ -69,11 +102,16 @@ export class StatePath extends Blockly.zelos.PathObject {
   }
 
   private mark(name: string, pathName: string, widths: number[]): SVGGElement {
+    const group = this.group(name, pathName, widths);
+    this.marks.push(group);
+    return group;
+  }
+
+  private group(name: string, pathName: string, widths: number[]): SVGGElement {
     const group = document.createElementNS(SVG, 'g');
     group.setAttribute('class', name);
     group.setAttribute('aria-hidden', 'true');
     group.append(...widths.map((width) => this.copy(pathName, width)));
-    this.marks.push(group);
     return group;
   }
 
