@@ -44,6 +44,7 @@ from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
 from app.core.robots.launcher import VIRTUAL_ROBOTS, Launcher, LaunchFailed, VirtualProcesses
+from app.core.robots.room import SessionRoom
 from app.core.robots.stop import RobotStopper, StopTarget
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
 from app.core.run.control import Runs
@@ -97,6 +98,7 @@ class Session:
         modules = VIRTUAL_ROBOTS.values()
         processes = VirtualProcesses(modules, lambda: self.launcher.process_ids)
         self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)
+        self.room = SessionRoom(self.settings, self._watches, self.source.submit, clock, clock_ns)
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
@@ -220,6 +222,7 @@ class Session:
             ("keep which robots were here", partial(self.last_robots.keep, self.launcher)),
             ("end the behaviours", self.documents.end),
             ("end the robots", self.fleet.close),
+            ("keep the room", self.room.close),
             ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),
             ("end the pictures", self.images.close),
             ("end the doctor", self.doctor.close),
@@ -258,6 +261,9 @@ class Session:
             self.traffic.add(drained.batches, now)
         with self.guarded(lazy("take over what robots say")):
             self.fleet.add(drained.batches)
+        with self.guarded(lazy("take over what is said of the room")):
+            self.room.add_messages(drained.batches)
+            self.room.tick()
         with self.guarded(lazy("check messages")):
             found = self._checks.take()
             self._health.look({topic: what for topic, what in found.items() if self._watches.watched(topic)})
@@ -332,6 +338,7 @@ class Session:
         self.topics.update(view, now)
         self.nodes.update(view, now)
         self.fleet.update(view)
+        self.room.update(view)
         for note in self.fleet.take_notes():
             self.console.add("warn", "robots", note)
         if self.stopper is not None:

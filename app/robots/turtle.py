@@ -17,9 +17,11 @@ from app.robots.driver.call import Clock, Link, MonotonicClock
 from app.robots.driver.process import main as drive
 from app.robots.virtual.camera import Camera
 from app.robots.virtual.lens import Lens
-from app.robots.virtual.simulation import Beat, happen, surroundings, told_event
+from app.robots.virtual.room import Other
+from app.robots.virtual.shared_room import SharedRoom
+from app.robots.virtual.simulation import ITSELF, Beat, happen, surroundings, told_event
 from app.robots.virtual.vision import colours_in
-from app.robots.virtual.wheels import RADIUS, SIDES, WheelBody
+from app.robots.virtual.wheels import HEIGHT, RADIUS, SIDES, WheelBody
 
 BODY_HZ, CAMERA_HZ = 60.0, 15.0
 _STATE_EVERY, _SLOW_EVERY, _CALM_EVERY = 2, 6, 60
@@ -37,9 +39,10 @@ class VirtualWheels:
         self._link, self._clock = link, clock
         self._lock = threading.Lock()
         self._ended = threading.Event()
-        self._start_room = self.body.room
         self._camera = Camera(self.body.room)
         self._seen: set[str] = set()
+        like = Other(link.name, 0.0, 0.0, 0.0, RADIUS, HEIGHT, "turtle")
+        self._shared = SharedRoom(link, clock, self.body, self._lock, like)
         self._stepped_s = clock.now()
         self._threads = [
             threading.Thread(target=self._move, name=f"{link.name} wheels", daemon=True),
@@ -101,6 +104,7 @@ class VirtualWheels:
             for happening in happenings:
                 self._link.happen(happening.event, **happening.data)
             if step % _STATE_EVERY == 0:
+                self._shared.tell()
                 self._link.tell("state", state)
                 self._link.sense("pose", {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]})
             if step % _SLOW_EVERY == 0:
@@ -112,7 +116,9 @@ class VirtualWheels:
     def _advance(self) -> None:
         """Let the body come to the present; the lock is held."""
         now = self._clock.now()
+        self._shared.take_over()
         self.body.step(min(max(0.0, now - self._stepped_s), _LONGEST_STEP_S))
+        self._shared.follow()
         self._stepped_s = now
 
     def _drawable(self) -> dict[str, object]:
@@ -126,6 +132,7 @@ class VirtualWheels:
             "moving": not body.still,
             "bumped": body.bumped,
             "radius": RADIUS,
+            "held": body.held,
             **surroundings(body.room),
         }
 
@@ -149,10 +156,15 @@ class VirtualWheels:
         """A person moves things of its room, or puts all back."""
         moved, x, y = change.get("move"), change.get("x"), change.get("y")
         with self._lock:
+            if isinstance(change.get("hold"), bool):
+                self.body.hold(held=change["hold"] is True)
             if isinstance(moved, str) and isinstance(x, (int, float)) and isinstance(y, (int, float)):
-                self.body.room = self.body.room.moved(moved, float(x), float(y))
+                if moved == ITSELF:
+                    self.body.carry(float(x), float(y))
+                else:
+                    self._shared.move(moved, float(x), float(y))
             if change.get("reset") is True:
-                self.body.reset(self._start_room)
+                self.body.reset(self._shared.put_back())
         if isinstance(change.get("happen"), str):
             event, data = told_event(change)
             if event == "bump" and data.get("side") in SIDES:

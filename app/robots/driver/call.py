@@ -70,6 +70,11 @@ class Link(Protocol):
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
         """Let people act on a virtual robot's world; `changed` is called with each message."""
 
+    def share(
+        self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
+    ) -> Callable[[Mapping[str, object]], None]:
+        """Join a topic that several robots share: `changed` gets each message; what is returned publishes."""
+
     def run(self, work: Awaitable[object]) -> object:
         """Run a coroutine in the robot's event loop, where its ``async def`` actions run, and wait for it."""
 

@@ -206,6 +206,17 @@ class Driver:
             topic_of(self.name, "world"), "json", lambda payload, _publisher: changed(as_part(payload))
         )
 
+    def share(
+        self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
+    ) -> Callable[[Mapping[str, object]], None]:
+        """Join a topic that several robots share: `changed` gets each message, in the network's thread.
+
+        What is returned publishes one; after `close` it does nothing.
+        """
+        self._open(topic, latched=latched)
+        self._subscribe(topic, "json", lambda payload, _publisher: changed(as_part(payload)))
+        return partial(self._publish, topic)
+
     def _done(self, result: object, call: Call | None = None, *, within_s: float | None = None) -> object:
         """What one of the robot's functions returned; that of an ``async def`` is run now, in its loop."""
         return self._loop.run(result, call, within_s=within_s) if inspect.isawaitable(result) else result

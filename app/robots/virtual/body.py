@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from app.robots.virtual.motion import Joint, Motion, Wave
 from app.robots.virtual.room import Room
 
-RADIUS = 0.27
+RADIUS, HEIGHT = 0.27, 1.2
 EYE_HEIGHT = 1.12
 START = (-0.5, 0.0, 0.0)
 START_PITCH = 8.0
@@ -78,6 +78,8 @@ class Body:
     touched: dict[str, float] = field(default_factory=dict)
     """Where hands are now, and for how many seconds they have been there."""
     heard: str = ""
+    held: bool = False
+    """Whether a person holds it up: its base does not move."""
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _base: Motion | None = field(default=None, repr=False)
     _turning: bool = field(default=False, repr=False)
@@ -146,8 +148,9 @@ class Body:
         if self._base is not None:
             self._base.block()
         self._base = None
-        self.room = room
-        self.x, self.y, self.theta_deg = START
+        self.room, self.held = room, False
+        self.x, self.y = room.nearest_free(*START[:2], RADIUS)
+        self.theta_deg = START[2]
         self.eyes, self.shoulders = EYES, SHOULDERS
         self.touched = dict.fromkeys(self.touched, TOUCH_LEAST_S)
         for place in sorted(self.touched):
@@ -206,6 +209,23 @@ class Body:
                 del self.touched[place]
                 self.happenings.append(BodyEvent("released", {"place": place}))
 
+    def hold(self, *, held: bool) -> None:
+        """A person takes it up, or puts it down: what it was doing goes on there."""
+        self.held = held
+
+    def carry(self, x: float, y: float) -> None:
+        """A person puts it there, if nothing is in the way; at walls it stops."""
+        place = self.room.inside(x, y, RADIUS)
+        for x_to, y_to in (place, (place[0], self.y), (self.x, place[1])):
+            if self.room.free(x_to, y_to, RADIUS, (self.x, self.y)):
+                self.place(x_to, y_to)
+                return
+
+    def place(self, x: float, y: float) -> None:
+        """It stands there from now on."""
+        self.x, self.y = x, y
+        self.room = self.room.pushed_ball(x, y, RADIUS)
+
     def hear(self, word: str) -> None:
         """Somebody said something."""
         self.heard = word
@@ -221,7 +241,7 @@ class Body:
             self._step(dt)
 
     def _step(self, dt: float) -> None:
-        if self._base is not None:
+        if self._base is not None and not (self.held and self._base.hold()):
             self._roll(self._base, dt)
         for wave in self._waves:
             wave.step()
@@ -243,7 +263,7 @@ class Body:
         elif way:
             x = self.x + way * math.cos(math.radians(self.theta_deg))
             y = self.y + way * math.sin(math.radians(self.theta_deg))
-            if self.room.free(x, y, RADIUS):
+            if self.room.free(x, y, RADIUS, (self.x, self.y)):
                 self.x, self.y = x, y
                 self.room = self.room.pushed_ball(x, y, RADIUS)
             else:

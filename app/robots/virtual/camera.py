@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import cache
+from typing import TypeAlias
 
 import cv2
 import numpy as np
@@ -11,7 +13,7 @@ from app.robots.virtual import scenery
 from app.robots.virtual.body import EYE_HEIGHT, Body
 from app.robots.virtual.canvas import Canvas, Picture
 from app.robots.virtual.lens import Lens, Matrix
-from app.robots.virtual.room import WALLS, Ball, Box, Person, Room
+from app.robots.virtual.room import WALLS, Ball, Box, Marker, Other, Person, Room
 
 EYE_FORWARD = 0.09
 _BOOKS = ("#b5594e", "#4e79b8", "#d7a94a", "#5f8f63", "#8a6aa8", "#d4d0c8")
@@ -33,9 +35,9 @@ class Camera:
         self._ceiling = scenery.ceiling()
         self._walls = {side: scenery.wall(room, side) for side in WALLS}
         self._shadow = scenery.shadow()
-        self._marker = scenery.marker(room.marker.id)
+        self._marker, self._ball = cache(scenery.marker), cache(scenery.ball)
         self._person = scenery.person()
-        self._ball = scenery.ball(room.ball.colour)
+        self._robot = cache(scenery.robot)
         self._light = _vignette(320, 240)
 
     def picture(self, room: Room, lens: Lens) -> Picture:
@@ -47,10 +49,12 @@ class Camera:
         for thing in sorted(ahead, key=lambda one: -_away(one, lens)):
             if isinstance(thing, Box):
                 _furniture(canvas, thing)
-            elif isinstance(thing, Person):
-                self._stand(canvas, thing)
-            else:
+            elif isinstance(thing, Ball):
                 self._roll(canvas, thing)
+            elif isinstance(thing, Marker):
+                self._stand_marker(canvas, thing)
+            else:
+                self._stand(canvas, thing)
         if canvas.picture.shape == self._light.shape:
             cv2.multiply(canvas.picture, self._light, dst=canvas.picture, scale=1 / 255)
         return canvas.picture
@@ -64,26 +68,41 @@ class Camera:
         canvas.put(self._walls["south"], (x1, y0, top), (-wide, 0, 0), (0, 0, -top))
         canvas.put(self._walls["east"], (x1, y1, top), (0, -deep, 0), (0, 0, -top))
         canvas.put(self._walls["west"], (x0, y0, top), (0, deep, 0), (0, 0, -top))
-        card = room.marker
+        for card in room.markers:
+            if card.facing_deg is not None:
+                facing = math.radians(card.facing_deg)
+                self._card(canvas, card, np.array([-math.sin(facing), math.cos(facing), 0.0]))
+
+    def _card(self, canvas: Canvas, card: Marker, across: Matrix) -> None:
         half = card.size * scenery.MARKER_RIM / 2
-        facing = math.radians(card.facing_deg)
-        across = np.array([-math.sin(facing), math.cos(facing), 0.0])
         corner = np.array([card.x, card.y, card.z + half]) - across * half
-        canvas.put(self._marker, corner.tolist(), (across * 2 * half).tolist(), (0, 0, -2 * half))
+        canvas.put(self._marker(card.id), corner.tolist(), (across * 2 * half).tolist(), (0, 0, -2 * half))
+
+    def _stand_marker(self, canvas: Canvas, card: Marker) -> None:
+        """A card on a thin post, turned to the camera."""
+        _block(canvas, (card.x, card.y, 0.0), (0.03, 0.03, card.z), "#6b6f7a")
+        self._card(canvas, card, looking_across(canvas.lens, card.x, card.y))
 
     def _shadows(self, canvas: Canvas, room: Room) -> None:
-        spots = [(room.ball.x, room.ball.y, room.ball.radius * 1.5, room.ball.radius * 1.5)]
-        spots += [(room.person.x, room.person.y, 0.34, 0.34)]
+        spots = [(ball.x, ball.y, ball.radius * 1.5, ball.radius * 1.5) for ball in room.balls]
+        spots += [(person.x, person.y, 0.34, 0.34) for person in room.people]
+        spots += [(other.x, other.y, other.radius * 1.4, other.radius * 1.4) for other in room.others]
         spots += [(box.x, box.y, box.width * 0.72, box.depth * 0.72) for box in room.boxes]
         for x, y, wide, deep in spots:
             canvas.put(self._shadow, (x - wide, y - deep, 0), (2 * wide, 0, 0), (0, 2 * deep, 0))
 
-    def _stand(self, canvas: Canvas, person: Person) -> None:
-        """The person's picture, turned to the camera."""
-        across = looking_across(canvas.lens, person.x, person.y)
-        wide = person.height * scenery.FIGURE_WIDTH
-        corner = np.array([person.x, person.y, person.height]) - across * wide / 2
-        canvas.put(self._person, corner.tolist(), (across * wide).tolist(), (0, 0, -person.height))
+    def _stand(self, canvas: Canvas, one: Person | Other) -> None:
+        """The picture of a person or another robot, turned to the camera."""
+        across = looking_across(canvas.lens, one.x, one.y)
+        if isinstance(one, Person):
+            picture, wide = self._person, one.height * scenery.FIGURE_WIDTH
+        else:
+            picture, wide = (
+                self._robot(one.figure == "turtle", faces=_faces(one, canvas.lens)),
+                one.radius * 2.6,
+            )
+        corner = np.array([one.x, one.y, one.height]) - across * wide / 2
+        canvas.put(picture, corner.tolist(), (across * wide).tolist(), (0, 0, -one.height))
 
     def _roll(self, canvas: Canvas, ball: Ball) -> None:
         """The ball's picture, square to the line of sight."""
@@ -94,18 +113,29 @@ class Camera:
         down = np.cross(sight, across)
         corner = middle - (across + down) * ball.radius
         canvas.put(
-            self._ball,
+            self._ball(ball.colour),
             corner.tolist(),
             (across * 2 * ball.radius).tolist(),
             (down * 2 * ball.radius).tolist(),
         )
 
 
-def _things(room: Room) -> list[Box | Person | Ball]:
-    return [*room.boxes, room.person, room.ball]
+_Upright: TypeAlias = Box | Person | Ball | Marker | Other
 
 
-def _ahead(thing: Box | Person | Ball, lens: Lens) -> bool:
+def _things(room: Room) -> list[_Upright]:
+    stands = [card for card in room.markers if card.facing_deg is None]
+    return [*room.boxes, *room.people, *room.balls, *stands, *room.others]
+
+
+def _faces(other: Other, lens: Lens) -> bool:
+    """Whether a robot looks towards the camera."""
+    to_x, to_y = lens.place[0] - other.x, lens.place[1] - other.y
+    theta = math.radians(other.theta_deg)
+    return to_x * math.cos(theta) + to_y * math.sin(theta) > 0
+
+
+def _ahead(thing: _Upright, lens: Lens) -> bool:
     """False when all of a thing is behind the camera."""
     half = math.hypot(thing.width, thing.depth) / 2 if isinstance(thing, Box) else 0.5
     forward = lens.rotation[2]
@@ -114,7 +144,7 @@ def _ahead(thing: Box | Person | Ball, lens: Lens) -> bool:
     return bool(along > -half * flat - abs(float(forward[2])) * 2.0)
 
 
-def _away(thing: Box | Person | Ball, lens: Lens) -> float:
+def _away(thing: _Upright, lens: Lens) -> float:
     return math.hypot(thing.x - lens.place[0], thing.y - lens.place[1])
 
 

@@ -57,6 +57,11 @@ class Motion:
         self.done = True
         self._velocity = 0.0
 
+    def hold(self) -> bool:
+        """Stand still now and go on later; False when it is to end, which it may."""
+        self._velocity = 0.0
+        return not self._halting
+
     def step(self, dt: float) -> float:
         """The way made in the next `dt` seconds, with its sign."""
         if self.done:

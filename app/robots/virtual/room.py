@@ -6,9 +6,12 @@ Metres; x grows east, y north, z up; angles in degrees, 0 is east, counter-clock
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias, TypeVar
 
+T = TypeVar("T")
+_NEAR_WALL, _BEFORE_WALL = 0.3, 0.01
 Wall = Literal["north", "south", "east", "west"]
 WALLS: tuple[Wall, ...] = ("north", "south", "east", "west")
 
@@ -35,6 +38,7 @@ class Box:
     width: float
     depth: float
     height: float
+    name: str = ""
 
     def distance_to(self, x: float, y: float) -> float:
         """From a point on the floor to the nearest side; 0 inside."""
@@ -87,19 +91,39 @@ class Person:
 
 @dataclass(frozen=True)
 class Marker:
-    """An ArUco card (dictionary 4x4, 50) on a wall; ``size`` is the printed square, without its white rim."""
+    """An ArUco card (dictionary 4x4, 50); ``size`` is the printed square, without its white rim.
+
+    On a wall it faces a direction; one that stands in the room (None) is seen from everywhere.
+    """
 
     id: int
     x: float
     y: float
     z: float
     size: float
-    facing_deg: float
+    facing_deg: float | None
 
     @property
     def name(self) -> str:
         """What the robot calls it."""
         return f"marker {self.id}"
+
+
+@dataclass(frozen=True)
+class Other:
+    """Another robot in the room, upright and round; it stops this one and is seen by it."""
+
+    name: str
+    x: float
+    y: float
+    theta_deg: float
+    radius: float
+    height: float
+    figure: str = "pepper"
+
+
+Thing: TypeAlias = Ball | Person | Marker | Box
+_Round: TypeAlias = Person | Other
 
 
 @dataclass(frozen=True)
@@ -119,33 +143,76 @@ class Room:
         Opening("picture", "west", 1.45, 0.85, 1.25, 0.62),
     )
     boxes: tuple[Box, ...] = (
-        Box("table", -1.45, 1.7, 0.7, 1.1, 0.72),
-        Box("shelf", 0.35, -2.28, 1.1, 0.36, 1.35),
+        Box("table", -1.45, 1.7, 0.7, 1.1, 0.72, "table"),
+        Box("shelf", 0.35, -2.28, 1.1, 0.36, 1.35, "shelf"),
     )
-    ball: Ball = field(default_factory=lambda: Ball("ball", 1.95, -0.78, 0.15))
-    person: Person = field(default_factory=lambda: Person("Aiko", 0.88, 0.1, 1.24))
-    marker: Marker = field(default_factory=lambda: Marker(7, 1.0, 2.49, 1.15, 0.36, -90.0))
+    balls: tuple[Ball, ...] = (Ball("ball", 1.95, -0.78, 0.15),)
+    people: tuple[Person, ...] = (Person("Aiko", 0.88, 0.1, 1.24),)
+    markers: tuple[Marker, ...] = (Marker(7, 1.0, 2.49, 1.15, 0.36, -90.0),)
+    others: tuple[Other, ...] = ()
 
-    def free(self, x: float, y: float, radius: float) -> bool:
-        """Is there place for something round on the floor? The ball does not count, it rolls away."""
+    @property
+    def things(self) -> tuple[Thing, ...]:
+        """Everything that a person can move; each has a name of its own."""
+        return (*self.balls, *self.people, *self.markers, *self.boxes)
+
+    def thing(self, name: str) -> Thing | None:
+        """The thing of that name, or the first of that kind: ``ball 2``, ``ball``, ``person``, ``face``."""
+        named = next((thing for thing in self.things if thing.name == name), None)
+        kinds: dict[str, Sequence[Thing]] = {
+            "ball": self.balls,
+            "person": self.people,
+            "face": self.people,
+            "marker": self.markers,
+        }
+        return named or next(iter(kinds.get(name, ())), None)
+
+    def free(self, x: float, y: float, radius: float, before: tuple[float, float] | None = None) -> bool:
+        """Is there place for something round on the floor? Balls do not count, they roll away.
+
+        Who stood at ``before`` and touched somebody there may go away from them, wherever both came from.
+        """
         if not (
             self.x_min + radius <= x <= self.x_max - radius
             and self.y_min + radius <= y <= self.y_max - radius
         ):
             return False
-        if math.hypot(x - self.person.x, y - self.person.y) < radius + self.person.radius:
-            return False
-        return all(box.distance_to(x, y) >= radius for box in self.boxes)
+        rounds: tuple[_Round, ...] = (*self.people, *self.others)
+        for each in rounds:
+            gap = math.hypot(x - each.x, y - each.y)
+            if gap < radius + each.radius and (
+                before is None or gap <= math.hypot(before[0] - each.x, before[1] - each.y)
+            ):
+                return False
+        return all(
+            box.distance_to(x, y) >= radius
+            or (before is not None and box.distance_to(x, y) > box.distance_to(*before))
+            for box in self.boxes
+        )
+
+    def nearest_free(self, x: float, y: float, radius: float) -> tuple[float, float]:
+        """The free place nearest to a point; the point itself where there is none at all."""
+        x, y = self.inside(x, y, radius)
+        for away in range(60):
+            for turn in range(1 if away == 0 else 16):
+                angle = math.tau * turn / 16
+                place = self.inside(
+                    x + 0.08 * away * math.cos(angle), y + 0.08 * away * math.sin(angle), radius
+                )
+                if self.free(*place, radius):
+                    return place
+        return x, y
 
     def distance_ahead(self, x: float, y: float, theta_deg: float) -> float:
-        """From a point to the nearest wall, person or piece of furniture in a direction."""
+        """From a point to the nearest wall, person, robot or piece of furniture in a direction."""
         dx, dy = math.cos(math.radians(theta_deg)), math.sin(math.radians(theta_deg))
-        hits = [self._to_walls(x, y, dx, dy), _to_circle(x, y, dx, dy, self.person)]
+        rounds: tuple[_Round, ...] = (*self.people, *self.others)
+        hits = [self._to_walls(x, y, dx, dy), *(_to_circle(x, y, dx, dy, each) for each in rounds)]
         hits += [_to_box(x, y, dx, dy, box) for box in self.boxes]
         return min(hits)
 
     def hidden(self, eye: tuple[float, float, float], target: tuple[float, float, float]) -> bool:
-        """True when a piece of furniture stands between two points."""
+        """True when a piece of furniture or a robot stands between two points."""
         ex, ey, ez = eye
         dx, dy, dz = target[0] - ex, target[1] - ey, target[2] - ez
         length = math.hypot(dx, dy)
@@ -155,33 +222,70 @@ class Room:
             hit = _to_box(ex, ey, dx / length, dy / length, box)
             if hit < length and ez + dz * hit / length < box.height:
                 return True
+        for other in self.others:
+            hit = _to_circle(ex, ey, dx / length, dy / length, other)
+            if hit < length and ez + dz * hit / length < other.height:
+                return True
         return False
 
     def moved(self, name: str, x: float, y: float) -> Room:
-        """The room with the ball or the person elsewhere, kept inside the walls; else the same."""
-        if name in {"ball", self.ball.name}:
-            place = self._inside(x, y, self.ball.radius)
-            return replace(self, ball=replace(self.ball, x=place[0], y=place[1]))
-        if name in {"person", "face", self.person.name}:
-            place = self._inside(x, y, self.person.radius)
-            return replace(self, person=replace(self.person, x=place[0], y=place[1]))
+        """The room with a thing elsewhere, kept inside the walls; the same when there is no such thing.
+
+        A marker that comes near a wall hangs on it.
+        """
+        thing = self.thing(name)
+        match thing:
+            case Ball():
+                at = self.inside(x, y, thing.radius)
+                moved = replace(thing, x=at[0], y=at[1])
+                return replace(self, balls=_exchanged(self.balls, thing, moved))
+            case Person():
+                at = self.inside(x, y, thing.radius)
+                stands = replace(thing, x=at[0], y=at[1])
+                return replace(self, people=_exchanged(self.people, thing, stands))
+            case Box():
+                at = self.inside(x, y, thing.width / 2, thing.depth / 2)
+                put = replace(thing, x=at[0], y=at[1])
+                return replace(self, boxes=_exchanged(self.boxes, thing, put))
+            case Marker():
+                return replace(self, markers=_exchanged(self.markers, thing, self._hung(thing, x, y)))
         return self
 
     def pushed_ball(self, x: float, y: float, radius: float) -> Room:
-        """The room after something round at (x, y) pushed the ball out of its place."""
-        away_x, away_y = self.ball.x - x, self.ball.y - y
-        gap = math.hypot(away_x, away_y)
-        reach = radius + self.ball.radius
-        if gap >= reach:
-            return self
-        if gap < 1e-6:
-            away_x, away_y, gap = 1.0, 0.0, 1.0
-        return self.moved("ball", x + away_x / gap * reach, y + away_y / gap * reach)
+        """The room after something round at (x, y) pushed balls out of its place."""
+        room = self
+        for ball in self.balls:
+            away_x, away_y = ball.x - x, ball.y - y
+            gap = math.hypot(away_x, away_y)
+            reach = radius + ball.radius
+            if gap >= reach:
+                continue
+            if gap < 1e-6:
+                away_x, away_y, gap = 1.0, 0.0, 1.0
+            room = room.moved(ball.name, x + away_x / gap * reach, y + away_y / gap * reach)
+        return room
 
-    def _inside(self, x: float, y: float, radius: float) -> tuple[float, float]:
+    def _hung(self, card: Marker, x: float, y: float) -> Marker:
+        half = card.size / 2
+        x, y = self.inside(x, y, _BEFORE_WALL)
+        walls = (
+            (x - self.x_min, 0.0, (self.x_min + _BEFORE_WALL, y)),
+            (self.x_max - x, 180.0, (self.x_max - _BEFORE_WALL, y)),
+            (y - self.y_min, 90.0, (x, self.y_min + _BEFORE_WALL)),
+            (self.y_max - y, -90.0, (x, self.y_max - _BEFORE_WALL)),
+        )
+        away, facing, place = min(walls)
+        if away > _NEAR_WALL:
+            x, y = self.inside(x, y, half)
+            return replace(card, x=x, y=y, facing_deg=None)
+        return replace(card, x=place[0], y=place[1], facing_deg=facing)
+
+    def inside(self, x: float, y: float, half: float, deep: float | None = None) -> tuple[float, float]:
+        """The place nearest to a point where something so large (m to each side) is inside the walls."""
+        deep = half if deep is None else deep
         return (
-            min(max(x, self.x_min + radius), self.x_max - radius),
-            min(max(y, self.y_min + radius), self.y_max - radius),
+            min(max(x, self.x_min + half), self.x_max - half),
+            min(max(y, self.y_min + deep), self.y_max - deep),
         )
 
     def _to_walls(self, x: float, y: float, dx: float, dy: float) -> float:
@@ -193,12 +297,16 @@ class Room:
         return max(0.0, min(hits))
 
 
-def _to_circle(x: float, y: float, dx: float, dy: float, person: Person) -> float:
-    along = (person.x - x) * dx + (person.y - y) * dy
-    aside = abs((person.x - x) * dy - (person.y - y) * dx)
-    if along <= 0 or aside > person.radius:
+def _exchanged(things: tuple[T, ...], old: T, new: T) -> tuple[T, ...]:
+    return tuple(new if thing is old else thing for thing in things)
+
+
+def _to_circle(x: float, y: float, dx: float, dy: float, round_one: _Round) -> float:
+    along = (round_one.x - x) * dx + (round_one.y - y) * dy
+    aside = abs((round_one.x - x) * dy - (round_one.y - y) * dx)
+    if along <= 0 or aside > round_one.radius:
         return math.inf
-    return max(0.0, along - math.sqrt(person.radius**2 - aside**2))
+    return max(0.0, along - math.sqrt(round_one.radius**2 - aside**2))
 
 
 def _to_box(x: float, y: float, dx: float, dy: float, box: Box) -> float:

@@ -267,6 +267,48 @@ def _head(paint: _Paint) -> None:
     paint.arc((0.5, 0.154), (0.085, 0.024), "#a8493f", (18, 162))
 
 
+def robot(small: bool, *, faces: bool) -> Texture:
+    """Another robot: the large white one or the small green one on wheels, from its front or its back."""
+    paint = _Paint(*(FIGURE if not small else (400, 300)))
+    (_small_robot if small else _large_robot)(paint, faces=faces)
+    return Texture(paint.done())
+
+
+def _large_robot(paint: _Paint, *, faces: bool) -> None:
+    paint.shape([(0.3, 0.55), (0.7, 0.55), (0.86, 0.97), (0.14, 0.97)], "#e9edf4")
+    paint.oval((0.5, 0.965), (0.36, 0.03), "#c8ccd8")
+    for side in (-1, 1):
+        shoulder, hand = 0.5 + side * 0.33, 0.5 + side * 0.4
+        paint.shape(
+            [(shoulder - 0.06, 0.33), (shoulder + 0.06, 0.33), (hand + 0.05, 0.6), (hand - 0.05, 0.6)],
+            "#dfe4ee",
+        )
+        paint.oval((hand, 0.61), (0.065, 0.032), "#f3f5fa")
+    paint.oval((0.5, 0.43), (0.31, 0.15), "#f7f8fb")
+    paint.oval((0.5, 0.155), (0.36, 0.155), "#f4f6fa")
+    if not faces:
+        paint.shape([(0.36, 0.36), (0.64, 0.36), (0.64, 0.5), (0.36, 0.5)], "#d9dee8")
+        return
+    paint.shape([(0.33, 0.36), (0.67, 0.36), (0.67, 0.48), (0.33, 0.48)], "#20232e")
+    for x in (0.37, 0.63):
+        paint.oval((x, 0.16), (0.1, 0.045), "#1b1e2a")
+        paint.oval((x, 0.16), (0.07, 0.032), "#8fc3e6")
+        paint.oval((x, 0.16), (0.035, 0.016), "#1b1e2a")
+    paint.arc((0.5, 0.21), (0.1, 0.03), "#4e5566", (20, 160))
+
+
+def _small_robot(paint: _Paint, *, faces: bool) -> None:
+    for x in (0.1, 0.9):
+        paint.oval((x, 0.78), (0.07, 0.2), "#2b2d33")
+    paint.shape([(0.1, 0.5), (0.9, 0.5), (0.9, 0.88), (0.1, 0.88)], "#5a7f76")
+    paint.oval((0.5, 0.88), (0.4, 0.1), "#5a7f76")
+    paint.oval((0.5, 0.5), (0.4, 0.13), "#7d9f95")
+    paint.shape([(0.46, 0.2), (0.54, 0.2), (0.54, 0.5), (0.46, 0.5)], "#c8ccd8")
+    paint.shape([(0.34, 0.06), (0.66, 0.06), (0.66, 0.28), (0.34, 0.28)], "#e9edf4")
+    if faces:
+        paint.oval((0.5, 0.17), (0.08, 0.09), "#1b1e2a")
+
+
 def ball(colour: str) -> Texture:
     """A shining ball; its edge is the picture's."""
     side = 128

@@ -10,9 +10,11 @@ import cv2
 
 from app.errors import RobotValueError
 from app.robots.driver.call import Clock, Link
-from app.robots.virtual.body import Body, BodyEvent
+from app.robots.virtual.body import HEIGHT, RADIUS, Body, BodyEvent
 from app.robots.virtual.camera import Camera, lens_of
-from app.robots.virtual.room import Room
+from app.robots.virtual.room import Ball, Other, Person, Room, Thing
+from app.robots.virtual.room_map import kind_of
+from app.robots.virtual.shared_room import SharedRoom
 from app.robots.virtual.vision import Detection, ObjectDetector, message
 
 BODY_HZ = 30.0
@@ -24,6 +26,8 @@ _LONGEST_STEP_S = 0.25  # after a suspended computer the world goes on from wher
 _SMALL_STEP_S = 0.004  # while a stop waits for the body to stand still
 _LOST_AFTER_S = 0.5
 _STOP_S = 2.0
+ITSELF = "robot"
+"""What a person moves who takes the robot itself."""
 PLACES = ("head", "left_hand", "right_hand")
 _log = logging.getLogger(__name__)
 
@@ -36,8 +40,9 @@ class Simulation:
         self.changed = threading.Condition()  # guards the body; notified after each step
         self.seen: Mapping[str, list[Detection]] = {}
         self._link, self._clock = link, clock
-        self._start_room = body.room
         self._camera, self._eyes = Camera(body.room), ObjectDetector()
+        like = Other(link.name, body.x, body.y, body.theta_deg, RADIUS, HEIGHT)
+        self._shared = SharedRoom(link, clock, body, self.changed, like)
         self._ended = threading.Event()
         self._stepped_s = clock.now()
         self._face: str | None = None
@@ -73,7 +78,9 @@ class Simulation:
     def _advance(self) -> None:
         """Let the body come to the present; the lock is held."""
         now = self._clock.now()
+        self._shared.take_over()
         self.body.step(min(max(0.0, now - self._stepped_s), _LONGEST_STEP_S))
+        self._shared.follow()
         self._stepped_s = now
 
     # ---- moving -----------------------------------------------------------------------------------
@@ -88,6 +95,7 @@ class Simulation:
                 self.body.happenings.clear()
                 self.changed.notify_all()
             self.tell(happenings, step)
+            self._shared.tell()
 
     def tell(self, happenings: list[BodyEvent], step: int) -> None:
         """Publish what happened, the drawing, and the sensors whose turn it is."""
@@ -163,12 +171,17 @@ class Simulation:
         with self.changed:
             if place in PLACES:
                 self.body.touch(str(place), down=change.get("down") is not False)
+            if isinstance(change.get("hold"), bool):
+                self.body.hold(held=change["hold"] is True)
             if isinstance(moved, str) and isinstance(x, (int, float)) and isinstance(y, (int, float)):
-                self.body.room = self.body.room.moved(moved, float(x), float(y))
+                if moved == ITSELF:
+                    self.body.carry(float(x), float(y))
+                else:
+                    self._shared.move(moved, float(x), float(y))
             if isinstance(word, str) and word.strip():
                 self.body.hear(word.strip())
             if change.get("reset") is True:
-                self.body.reset(self._start_room)
+                self.body.reset(self._shared.put_back())
         if isinstance(change.get("happen"), str):
             self._let_happen(change)
 
@@ -183,9 +196,12 @@ class Simulation:
                 for down in (True, False):
                     self.body.touch(str(data["place"]), down=down)
                 return
-        happen(
-            self._link, event, {**({"name": self.body.room.person.name} if "face" in event else {}), **data}
-        )
+        happen(self._link, event, {**self._made_up(event), **data})
+
+    def _made_up(self, event: str) -> dict[str, object]:
+        """What belongs to an event that a person lets happen and does not say."""
+        people = self.body.room.people
+        return {"name": people[0].name if people else "Aiko"} if "face" in event else {}
 
 
 class Beat:
@@ -236,6 +252,7 @@ def drawable(body: Body) -> dict[str, object]:
         **{f"elbow_{side}_deg": round(joint.angle, 1) for side, joint in body.elbows.items()},
         "moving": not body.still,
         "touched": sorted(body.touched),
+        "held": body.held,
         **surroundings(body.room),
     }
 
@@ -245,6 +262,7 @@ def surroundings(room: Room) -> dict[str, object]:
     return {
         "objects": _objects(room),
         "room": {
+            "shared": True,
             "x_min": room.x_min,
             "x_max": room.x_max,
             "y_min": room.y_min,
@@ -256,10 +274,15 @@ def surroundings(room: Room) -> dict[str, object]:
 
 
 def _objects(room: Room) -> list[dict[str, object]]:
-    ball, person, card = room.ball, room.person, room.marker
     return [
-        {"kind": "ball", "z": ball.z, **vars(ball)},
-        {"kind": "person", "face_z": person.face_z, **vars(person)},
-        {"kind": "marker", "name": card.name, **vars(card)},
-        *({**vars(box), "name": box.kind} for box in room.boxes),
+        {"kind": kind_of(thing), "name": thing.name, **_more(thing), **vars(thing)} for thing in room.things
     ]
+
+
+def _more(thing: Thing) -> dict[str, object]:
+    match thing:
+        case Ball():
+            return {"z": thing.z}
+        case Person():
+            return {"face_z": thing.face_z}
+    return {}

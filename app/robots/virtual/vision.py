@@ -96,8 +96,8 @@ class ObjectDetector:
 
     def faces(self, room: Room, lens: Lens) -> list[Detection]:
         """People who look at the camera."""
-        found = _face(room, room.person, lens)
-        return [] if found is None else [found]
+        found = [_face(room, person, lens) for person in room.people]
+        return sorted((each for each in found if each is not None), key=lambda one: -one.box[2] * one.box[3])
 
 
 def _face(room: Room, person: Person, lens: Lens) -> Detection | None:

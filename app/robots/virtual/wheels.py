@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from app.robots.virtual.body import BodyEvent
 from app.robots.virtual.room import Room
 
-RADIUS = 0.17
+RADIUS, HEIGHT = 0.17, 0.34
 START = (-0.9, -0.9, 35.0)
 LIGHT = "#35c26b"
 FULL_RANGE = 4.0
@@ -38,6 +38,8 @@ class WheelBody:
     bumped: str = ""
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _wanted: tuple[float, float] = (0.0, 0.0)
+    held: bool = False
+    """Whether a person holds it up: it does not move."""
     _pressed_s: float = 0.0
 
     def drive(self, speed: float, turn_speed: float) -> None:
@@ -64,7 +66,25 @@ class WheelBody:
     def reset(self, room: Room) -> None:
         """Back to the start, in this room."""
         self.room, self._wanted, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
-        (self.x, self.y, self.theta_deg), self.light, self.bumped = START, LIGHT, ""
+        self.x, self.y = room.nearest_free(*START[:2], RADIUS)
+        self.theta_deg, self.light, self.bumped, self.held = START[2], LIGHT, "", False
+
+    def hold(self, *, held: bool) -> None:
+        """A person takes it up, or puts it down: what it was asked to do goes on there."""
+        self.held = held
+
+    def carry(self, x: float, y: float) -> None:
+        """A person puts it there, if nothing is in the way; at walls it stops."""
+        place = self.room.inside(x, y, RADIUS)
+        for x_to, y_to in (place, (place[0], self.y), (self.x, place[1])):
+            if self.room.free(x_to, y_to, RADIUS, (self.x, self.y)):
+                self.place(x_to, y_to)
+                return
+
+    def place(self, x: float, y: float) -> None:
+        """It stands there from now on."""
+        self.x, self.y = x, y
+        self.room = self.room.pushed_ball(x, y, RADIUS)
 
     def step(self, seconds: float) -> None:
         """Let time pass, in small steps so that nothing is driven through."""
@@ -74,7 +94,7 @@ class WheelBody:
             self._step(dt)
 
     def _step(self, dt: float) -> None:
-        speed, turn_speed = self._wanted
+        speed, turn_speed = (0.0, 0.0) if self.held else self._wanted
         self.speed = _towards(self.speed, speed, ACCELERATION * dt, BRAKING * dt)
         self.turn_speed = _towards(self.turn_speed, turn_speed, TURNING * dt, TURN_BRAKING * dt)
         if self._pressed_s > 0.0:
@@ -89,7 +109,7 @@ class WheelBody:
     def _roll(self, way: float) -> None:
         x = self.x + way * math.cos(math.radians(self.theta_deg))
         y = self.y + way * math.sin(math.radians(self.theta_deg))
-        if self.room.free(x, y, RADIUS):
+        if self.room.free(x, y, RADIUS, (self.x, self.y)):
             self.x, self.y = x, y
             self.bumped = self.bumped if self._pressed_s > 0.0 else ""
             self.room = self.room.pushed_ball(x, y, RADIUS)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPen, QPixmap
@@ -15,6 +17,7 @@ from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.robot_drawing.turtle import TOP, paint_turtle
 
 TURTLE = "turtle"
+Others: TypeAlias = Sequence[tuple[str, RobotState]]
 
 # What a preview shows while no robot has told its state.
 PREVIEW = RobotState(
@@ -24,8 +27,23 @@ PREVIEW = RobotState(
 )
 
 
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """What is under the mouse, and what the keyboard has chosen; both as `RobotDrawing.part_at` says."""
+
+    hovered: str | None = None
+    chosen: str | None = None
+    ink: QColor = field(default_factory=lambda: QColor("#3F7CB3"))
+
+
+NO_MARKS = Marks()
+
+
 class RobotDrawing:
-    """Paints `RobotState`s; keeps the room's picture of the last size, so a moment costs little."""
+    """Paints `RobotState`s; keeps the room's picture of the last size, so a moment costs little.
+
+    The first robot is what the picture is about; ``others`` are in the same room, each with its name.
+    """
 
     def __init__(self, font: QFont | None = None) -> None:
         """``font`` is the speech bubble's."""
@@ -33,8 +51,17 @@ class RobotDrawing:
         self._room: QPixmap | None = None
         self._room_key: tuple[float, float, float, bool] | None = None
 
-    def paint(self, painter: QPainter, area: QRectF, state: RobotState, *, dark: bool = False) -> None:
-        """Fill ``area`` with the robot of this moment."""
+    def paint(
+        self,
+        painter: QPainter,
+        area: QRectF,
+        state: RobotState,
+        others: Others = (),
+        *,
+        marks: Marks = NO_MARKS,
+        dark: bool = False,
+    ) -> None:
+        """Fill ``area`` with the robots of this moment."""
         stage = Stage(area, state.room)
         painter.save()
         painter.setClipRect(area)
@@ -42,58 +69,80 @@ class RobotDrawing:
         self._paint_room(painter, stage, dark)
         painter.translate(stage.origin)
         painter.scale(stage.scale, stage.scale)
-        robot = stage.spot(state.x, state.y)
-        things = _placed(stage, state)
-        _paint_reach(painter, robot, state)
-        for spot, thing in _in_order(things, robot):
-            if thing is not None:
-                paint_thing(painter, thing, spot, self._font)
-                continue
-            painter.save()
-            painter.translate(robot.u, robot.v)
-            painter.scale(robot.scale, robot.scale)
-            (paint_turtle if state.figure == TURTLE else paint_figure)(painter, state)
-            painter.restore()
-        if state.speech:
-            high = TOP.y() if state.figure == TURTLE else HEAD.y()
-            head = replace(robot, v=robot.v + high * robot.scale)
-            paint_bubble(painter, stage.bounds(), head, state, self._font)
+        figures = _figures(stage, state, others)
+        _paint_reach(painter, figures[0].spot, state)
+        drawn: list[tuple[Spot, Thing | Figure]] = [*_placed(stage, state)]
+        drawn += [(figure.spot, figure) for figure in reversed(figures)]
+        for spot, one in sorted(drawn, key=lambda pair: pair[0].v):
+            if isinstance(one, Thing):
+                paint_thing(painter, one, spot, self._font)
+            else:
+                _paint_figure(painter, one)
+        self._mark(painter, stage, state, others, marks)
+        for figure in figures:
+            if figure.state.speech:
+                high = TOP.y() if figure.state.figure == TURTLE else HEAD.y()
+                head = replace(figure.spot, v=figure.spot.v + high * figure.spot.scale)
+                paint_bubble(painter, stage.bounds(), head, figure.state, self._font)
         painter.restore()
         if dark:
             painter.fillRect(area, QColor(0, 0, 12, 34))
 
-    def part_at(self, point: QPointF, area: QRectF, state: RobotState) -> str | None:
-        """What is at a pixel: ``head``, ``left_hand``, ``right_hand``, an object's name, or None."""
+    def part_at(self, point: QPointF, area: QRectF, state: RobotState, others: Others = ()) -> str | None:
+        """What is at a pixel: ``head``, ``left_hand``, ``body``, an object's name, ``Turtle/body``, or None.
+
+        What can be touched goes before things, and things before what stands behind them.
+        """
         stage = Stage(area, state.room)
         unit = stage.unit(point)
-        robot = stage.spot(state.x, state.y)
-        own = (unit - QPointF(robot.u, robot.v)) / robot.scale
-        part = _part_at(own, state) if state.figure != TURTLE else None
-        if part is not None:
-            return part
+        figures = sorted(_figures(stage, state, others), key=lambda figure: -figure.spot.v)
+        for figure in figures:
+            part = _part_at(figure.own(unit), figure.state)
+            if part is not None:
+                return figure.named(part)
         for spot, thing in reversed(_placed(stage, state)):
             if thing_area(thing, spot).adjusted(-3, -3, 3, 3).contains(unit):
                 return thing.name or thing.kind
-        return None
+        return next((each.named("body") for each in figures if each.area.contains(unit)), None)
 
     def floor_at(self, point: QPointF, area: QRectF, state: RobotState) -> tuple[float, float]:
         """The place of the floor (m) that is seen at a pixel."""
         return Stage(area, state.room).floor(point)
 
-    def place_of(self, part: str, area: QRectF, state: RobotState) -> QPointF | None:
+    def pixel_of(self, x: float, y: float, area: QRectF, state: RobotState) -> QPointF:
+        """The pixel at which a place of the floor (m) is seen."""
+        stage = Stage(area, state.room)
+        spot = stage.spot(x, y)
+        return stage.origin + QPointF(spot.u, spot.v) * stage.scale
+
+    def place_of(self, part: str, area: QRectF, state: RobotState, others: Others = ()) -> QPointF | None:
         """The pixel in the middle of a part, as `part_at` names it; None when there is none."""
         stage = Stage(area, state.room)
-        robot = stage.spot(state.x, state.y)
-        own = {f"{limb.side}_hand": limb.hand for limb in limbs(state)} | {"head": HEAD}
-        own = {"body": TOP} if state.figure == TURTLE else own
-        if part in own:
-            unit = QPointF(robot.u, robot.v) + own[part] * robot.scale
-            return stage.origin + unit * stage.scale
+        for figure in _figures(stage, state, others):
+            small = figure.state.figure == TURTLE
+            own = {} if small else {f"{limb.side}_hand": limb.hand for limb in limbs(figure.state)}
+            own |= {"body": TOP} if small else {"head": HEAD, "body": QPointF(0, -50)}
+            for name, place in own.items():
+                if part == figure.named(name):
+                    unit = QPointF(figure.spot.u, figure.spot.v) + place * figure.spot.scale
+                    return stage.origin + unit * stage.scale
         for spot, thing in _placed(stage, state):
             if part in {thing.name, thing.kind}:
-                centre = thing_area(thing, spot).center()
-                return stage.origin + centre * stage.scale
+                return stage.origin + thing_area(thing, spot).center() * stage.scale
         return None
+
+    def _mark(self, p: QPainter, stage: Stage, state: RobotState, others: Others, marks: Marks) -> None:
+        """Draw a line around what the mouse is on, and a stronger one around what the keyboard chose."""
+        areas = {figure.named("body"): figure.area for figure in _figures(stage, state, others)}
+        for spot, thing in _placed(stage, state):
+            areas[thing.name or thing.kind] = thing_area(thing, spot)
+        for part, width in ((marks.hovered, 1.4), (marks.chosen, 2.4)):
+            area = areas.get(part or "")
+            if area is not None:
+                p.setBrush(Qt.BrushStyle.NoBrush)
+                for ink, wide in ((QColor("#FFFFFF"), width + 1.6), (marks.ink, width)):
+                    p.setPen(QPen(ink, wide))
+                    p.drawRoundedRect(area.adjusted(-4, -4, 4, 4), 6, 6)
 
     def _paint_room(self, painter: QPainter, stage: Stage, dark: bool) -> None:
         area = stage.area
@@ -127,11 +176,47 @@ def _placed(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
     return sorted(placed, key=lambda pair: pair[0].v)
 
 
-def _in_order(things: list[tuple[Spot, Thing]], robot: Spot) -> list[tuple[Spot, Thing | None]]:
-    """What is far first; the robot between what is behind and before it."""
-    behind: list[tuple[Spot, Thing | None]] = [pair for pair in things if pair[0].v <= robot.v]
-    before: list[tuple[Spot, Thing | None]] = [pair for pair in things if pair[0].v > robot.v]
-    return [*behind, (robot, None), *before]
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A robot where it stands; ``name`` is empty for the one that the picture is about."""
+
+    name: str
+    state: RobotState
+    spot: Spot
+
+    def named(self, part: str) -> str:
+        """A part of this robot, as `RobotDrawing.part_at` names it."""
+        return f"{self.name}/{part}" if self.name else part
+
+    def own(self, unit: QPointF) -> QPointF:
+        """A point of the stage in the figure's own units."""
+        return (unit - QPointF(self.spot.u, self.spot.v)) / self.spot.scale
+
+    @property
+    def area(self) -> QRectF:
+        """What it covers, in units of the stage."""
+        large = QRectF(-42, -187, 84, 195) if self.state.figure != TURTLE else QRectF(-42, -62, 84, 78)
+        scale = self.spot.scale
+        return QRectF(
+            self.spot.u + large.x() * scale,
+            self.spot.v + large.y() * scale,
+            large.width() * scale,
+            large.height() * scale,
+        )
+
+
+def _figures(stage: Stage, state: RobotState, others: Others) -> list[Figure]:
+    found = [("", state), *others]
+    return [Figure(name, each, stage.spot(each.x, each.y)) for name, each in found]
+
+
+def _paint_figure(p: QPainter, figure: Figure) -> None:
+    p.save()
+    lifted = 9.0 if figure.state.held else 0.0
+    p.translate(figure.spot.u, figure.spot.v - lifted)
+    p.scale(figure.spot.scale, figure.spot.scale)
+    (paint_turtle if figure.state.figure == TURTLE else paint_figure)(p, figure.state)
+    p.restore()
 
 
 def _paint_reach(painter: QPainter, robot: Spot, state: RobotState) -> None:
@@ -148,7 +233,9 @@ def _paint_reach(painter: QPainter, robot: Spot, state: RobotState) -> None:
 
 
 def _part_at(own: QPointF, state: RobotState) -> str | None:
-    """The part of the large figure at a point of its own."""
+    """The part of the large figure at a point of its own; the small one has none to touch."""
+    if state.figure == TURTLE:
+        return None
     for limb in limbs(state):
         if _near(own, limb.hand, 11.0):
             return f"{limb.side}_hand"

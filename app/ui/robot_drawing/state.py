@@ -39,7 +39,8 @@ class RobotState:
     ``x``, ``y`` in m, ``theta_deg`` 0 looks along x, at the person, and grows to the robot's left. Head yaw
     grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
     ``figure`` is how it looks, ``pepper`` or ``turtle``; ``bumped`` is the side that touches something,
-    ``spoken`` how much of its words it has said (0 to 1).
+    ``spoken`` how much of its words it has said (0 to 1). ``held`` says that a person holds it up, ``shared``
+    that its room is the one that all virtual robots share.
     """
 
     x: float = 0.0
@@ -58,6 +59,8 @@ class RobotState:
     touched: tuple[str, ...] = ()
     figure: str = "pepper"
     bumped: str = ""
+    held: bool = False
+    shared: bool = False
     objects: tuple[Thing, ...] = ()
     room: RoomBounds = field(default_factory=RoomBounds)
 
@@ -82,6 +85,8 @@ class RobotState:
             figure=str(data.get("figure") or "pepper"),
             bumped=str(data.get("bumped") or ""),
             touched=_touched(data.get("touched", data.get("touch"))),
+            held=data.get("held") is True,
+            shared=_is_shared(data.get("room")),
             objects=_things(data.get("objects")),
             room=_room(data.get("room")),
         )
@@ -126,6 +131,10 @@ def _thing(one: Mapping[str, object]) -> Thing:
         size_m=_number(size) if size is not None else None,
         height_m=_number(one.get("height")) if one.get("height") is not None else None,
     )
+
+
+def _is_shared(room: object) -> bool:
+    return isinstance(room, Mapping) and room.get("shared") is True
 
 
 def _room(value: object) -> RoomBounds:

@@ -6,7 +6,7 @@ import base64
 import binascii
 from collections.abc import Callable, Mapping
 
-from PySide6.QtCore import QByteArray, QSize
+from PySide6.QtCore import QByteArray, QSize, Qt
 from PySide6.QtWidgets import QMainWindow
 
 from app.core.storage.settings import Settings
@@ -59,7 +59,10 @@ class WindowState:
             data = base64.b64decode(text, validate=True)
         except (binascii.Error, ValueError):
             return False
-        return bool(data) and window.restoreGeometry(QByteArray(data))
+        placed = bool(data) and window.restoreGeometry(QByteArray(data))
+        if window.isFullScreen():  # only the large room fills the screen, and it is not there at a start
+            window.setWindowState(window.windowState() & ~Qt.WindowState.WindowFullScreen)
+        return placed
 
     def keep_place(self, window: QMainWindow) -> None:
         """Keep where the window is."""

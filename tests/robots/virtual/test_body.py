@@ -54,8 +54,8 @@ def test_it_stops_before_the_person_and_says_that_it_bumped():
     motion = body.walk(2.0, 0.35)
     run(body, lambda: motion.done)
     assert motion.blocked
-    gap = math.hypot(body.x - body.room.person.x, body.y - body.room.person.y)
-    assert gap >= RADIUS + body.room.person.radius
+    gap = math.hypot(body.x - body.room.people[0].x, body.y - body.room.people[0].y)
+    assert gap >= RADIUS + body.room.people[0].radius
     assert events(body) == [("bumped", {"side": "front"})]
     assert body.distance < 0.05
     assert body.still

@@ -51,7 +51,7 @@ def test_the_ball_is_found_where_it_lies(camera, eyes, place):
     body = Body(room=Room().moved("person", -2.0, -2.0).moved("ball", *place))
     lens = lens_of(body)
     (found,) = eyes.balls(camera.picture(body.room, lens))
-    ball = body.room.ball
+    ball = body.room.balls[0]
     seen = lens.to_camera(np.array([[ball.x, ball.y, ball.z]]))
     expected = lens.to_pixels(seen)[0]
     assert found.middle == pytest.approx(tuple(expected), abs=2.5)
@@ -76,7 +76,7 @@ def test_the_marker_is_read(camera, eyes, theta):
     body = Body(theta_deg=theta)
     lens = lens_of(body)
     (found,) = eyes.markers(camera.picture(body.room, lens))
-    card = body.room.marker
+    card = body.room.markers[0]
     expected = lens.to_pixels(lens.to_camera(np.array([[card.x, card.y, card.z]])))[0]
     assert found.name == "marker 7"
     assert found.middle == pytest.approx(tuple(expected), abs=3)
@@ -107,7 +107,7 @@ def test_a_face_counts_only_when_it_can_be_seen(eyes):
     assert not seen(Body(theta_deg=30.5))  # at the edge, most of it outside
     hidden = Body(room=Room().moved("person", 0.35, -2.4), theta_deg=-75.0)
     tall = hidden.room.boxes[1]
-    assert tall.height > hidden.room.person.face_z
+    assert tall.height > hidden.room.people[0].face_z
     assert not seen(hidden)
 
 

@@ -10,14 +10,14 @@ from app.robots.virtual.room import Room
 def test_the_robot_fits_where_nothing_stands():
     room = Room()
     assert room.free(-0.5, 0.0, 0.27)
-    assert not room.free(room.person.x + 0.3, room.person.y, 0.27)
+    assert not room.free(room.people[0].x + 0.3, room.people[0].y, 0.27)
     assert not room.free(room.boxes[0].x, room.boxes[0].y, 0.1)
     assert not room.free(room.x_max - 0.2, 0.0, 0.27)
 
 
 def test_a_ray_ends_at_the_first_thing():
     room = Room().moved("Aiko", 1.0, 0.0)
-    assert room.distance_ahead(-0.5, 0.0, 0.0) == pytest.approx(1.5 - room.person.radius)
+    assert room.distance_ahead(-0.5, 0.0, 0.0) == pytest.approx(1.5 - room.people[0].radius)
     assert room.distance_ahead(-0.5, 0.0, 180.0) == pytest.approx(2.0)
     table = room.boxes[0]
     south = table.y - table.depth / 2
@@ -27,18 +27,18 @@ def test_a_ray_ends_at_the_first_thing():
 
 def test_things_are_moved_by_name_and_stay_inside():
     room = Room()
-    assert (room.moved("ball", 1, 1).ball.x, room.moved("ball", 1, 1).ball.y) == (1, 1)
-    assert room.moved("Aiko", 99, -99).person.x == room.x_max - room.person.radius
-    assert room.moved("person", 1, 1).person.y == 1
+    assert (room.moved("ball", 1, 1).balls[0].x, room.moved("ball", 1, 1).balls[0].y) == (1, 1)
+    assert room.moved("Aiko", 99, -99).people[0].x == room.x_max - room.people[0].radius
+    assert room.moved("person", 1, 1).people[0].y == 1
     assert room.moved("piano", 1, 1) == room
 
 
 def test_a_ball_is_pushed_away():
     room = Room().moved("ball", 0.0, 0.0)
     pushed = room.pushed_ball(-0.3, 0.0, 0.27)
-    assert pushed.ball.x == pytest.approx(-0.3 + 0.27 + room.ball.radius)
+    assert pushed.balls[0].x == pytest.approx(-0.3 + 0.27 + room.balls[0].radius)
     assert room.pushed_ball(-1.0, 0.0, 0.27) is room
-    assert room.pushed_ball(0.0, 0.0, 0.27).ball.x == pytest.approx(0.42)
+    assert room.pushed_ball(0.0, 0.0, 0.27).balls[0].x == pytest.approx(0.42)
 
 
 def test_furniture_hides_what_is_low_behind_it():

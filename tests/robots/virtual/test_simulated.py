@@ -230,7 +230,7 @@ def test_pictures_come_while_somebody_looks(node, pepper):
 def test_a_seed_puts_things_elsewhere_the_same_each_time():
     assert room_of(5) == room_of(5)
     assert room_of(5) != room_of(6)
-    assert room_of(None).ball.x == 1.95
+    assert room_of(None).balls[0].x == 1.95
 
 
 def test_reset(pepper):

@@ -78,10 +78,10 @@ def test_it_stops_at_what_it_bumps_into_and_says_with_which_side(start, speed, s
 
 def test_it_pushes_the_ball_and_measures_what_is_ahead() -> None:
     body = WheelBody(x=1.2, y=-0.78, theta_deg=0.0)
-    ball = body.room.ball.x
+    ball = body.room.balls[0].x
     body.drive(0.5, 0.0)
     body.step(1.8)
-    assert body.room.ball.x > ball + 0.1
+    assert body.room.balls[0].x > ball + 0.1
     assert near(body.distance, body.room.x_max - body.x - RADIUS, 0.01)
 
 

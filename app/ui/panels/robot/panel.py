@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.robots.awaited import awaited_values
+from app.errors import RobotUnknownError
 from app.robots.description.description import Event
+from app.robots.virtual.room import Ball, Box, Room
+from app.robots.virtual.room_map import kind_of
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.no_robot import NoRobot
 from app.ui.panels.one_robot_panel import OneRobotPanel
+from app.ui.panels.robot.large_room import LargeRoom
 from app.ui.panels.robot.room_view import RoomView
 from app.ui.panels.robot.say_bar import SayBar
+from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
 from app.ui.widgets.indicators import ROBOT_STATUS
@@ -23,10 +29,38 @@ from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
+    from app.core.network.watches import Suspendable, Watch
     from app.core.robots.robot_link import RobotLink
 
 STALE_AFTER_S = 2.0
 """A virtual robot tells how it is many times a second, also when it does nothing."""
+
+
+ADDED = {
+    "ball": (lazy("Add a ball"), "circle"),
+    "person": (lazy("Add a person"), "person-standing"),
+    "marker": (lazy("Add a marker"), "qr-code"),
+    "table": (lazy("Add a table"), "lamp-desk"),
+    "shelf": (lazy("Add a shelf"), "library"),
+}
+
+
+def things_of(room: Room) -> tuple[Thing, ...]:
+    """The things of a room as they are drawn."""
+    return tuple(
+        Thing(
+            kind_of(thing), thing.x, thing.y, thing.name,
+            colour=thing.colour if isinstance(thing, Ball) else None,
+            size_m=thing.radius if isinstance(thing, Ball) else None,
+            height_m=thing.height if isinstance(thing, Box) else None,
+        )
+        for thing in room.things
+    )  # fmt: skip
+
+
+def radius_of(robot: RobotState) -> float:
+    """How much place a robot takes, in m."""
+    return 0.17 if robot.figure == "turtle" else 0.27
 
 
 class RobotPanel(OneRobotPanel):
@@ -38,20 +72,41 @@ class RobotPanel(OneRobotPanel):
         self._told_s = 0.0
         self.chip = Chip(self.theme)
         self.reset = IconButton(self.theme, "rotate-cw", _("Put the robot and its room back"), size=30)
-        self.reset.clicked.connect(lambda: self._change({"reset": True}))
+        self.reset.clicked.connect(self._put_back)
         self.reset.setVisible(False)
         self.choose = IconButton(self.theme, "chevron-down", _("Choose a robot"), size=26)
         self.choose.setProperty("place", "start")
         self.choose.clicked.connect(self._show_menu)
         self.choose.setVisible(False)
         self.chips = [self.choose, self.chip]
-        self.header = [self.reset]
+        self.add = IconButton(self.theme, "plus", _("Add something to the room"), size=30)
+        self.add.clicked.connect(lambda: self._show_room_menu("", None))
+        self.add.setVisible(False)
+        self.large = IconButton(self.theme, "maximize-2", _("Large room"), size=30)
+        self.large.clicked.connect(self.enlarge)
+        self.large.setVisible(False)
+        self.header = [self.add, self.reset, self.large]
+        self._make_stage()
+        title = _("No robot is connected")
+        text = _("With the virtual robot you can try everything at once.")
+        start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
+        self.empty = EmptyState(self.theme, "bot", title, text, [start])
+        self._no_robot = NoRobot(self.empty, title, text, [start])
+        self.pages = self.show_one_of(self.empty, self.stage)
+
+    def _make_stage(self) -> None:
+        """The drawing and what is below it."""
         self.view = RoomView(self.theme)
-        self.view.setAccessibleName(_("The robot in its room"))
-        self.view.touched.connect(lambda part, down: self._change({"touch": part, "down": down}))
-        self.view.moved.connect(
-            lambda what, x, y: self._change({"move": what, "x": round(x, 3), "y": round(y, 3)})
+        view = self.view
+        view.touched.connect(lambda name, part, down: self._change({"touch": part, "down": down}, name))
+        view.moved.connect(self._move)
+        view.carried.connect(
+            lambda name, x, y: self._change({"move": "robot", "x": round(x, 3), "y": round(y, 3)}, name)
         )
+        view.held.connect(lambda name, on: self._change({"hold": on}, name))
+        view.removed.connect(self.session.room.remove)
+        view.menu_wanted.connect(self._show_room_menu)
+        view.enlarged.connect(self.enlarge)
         self.say = SayBar(self.theme, self._awaited)
         self.say.said.connect(lambda words: self._change({"say": words}))
         self.say.happened.connect(self._change)
@@ -61,13 +116,10 @@ class RobotPanel(OneRobotPanel):
         column.setSpacing(0)
         column.addWidget(self.view, 1)
         column.addWidget(self.say)
-        self.stage = stage
-        title = _("No robot is connected")
-        text = _("With the virtual robot you can try everything at once.")
-        start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
-        self.empty = EmptyState(self.theme, "bot", title, text, [start])
-        self._no_robot = NoRobot(self.empty, title, text, [start])
-        self.pages = self.show_one_of(self.empty, self.stage)
+        self.stage, self._column = stage, column
+        self._large: LargeRoom | None = None
+        self._things: tuple[int, tuple[Thing, ...]] = (-1, ())
+        self._looks: dict[str, Watch] = {}
 
     def fleet_changed(self) -> None:
         self.choose.setVisible(bool(self.session.fleet.links))
@@ -81,9 +133,10 @@ class RobotPanel(OneRobotPanel):
             now = time.monotonic()
             if link.drawing is not self._told:
                 self._told, self._told_s = link.drawing, now
-            self.view.show_state(link.drawing)
+            self._show_room(link)
             self.view.set_stale(not link.connected or link.mute or now - self._told_s > STALE_AFTER_S)
-            self.pages.setCurrentWidget(self.stage)
+            if self._large is None:
+                self.pages.setCurrentWidget(self.stage)
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
@@ -103,7 +156,8 @@ class RobotPanel(OneRobotPanel):
 
     def show_robot(self, link: RobotLink) -> None:
         self.set_title(link.name)
-        self.reset.setVisible(link.virtual)
+        for button in (self.reset, self.add, self.large):
+            button.setVisible(link.virtual)
         self.say.show_robot(link.robot)
         self._say_nothing(link)
 
@@ -126,9 +180,122 @@ class RobotPanel(OneRobotPanel):
         documents = [shown, *(each for each in self.session.documents if each is not shown)]
         return awaited_values((each.workspace for each in documents), link.robot, event, name)
 
-    def _change(self, change: Mapping[str, object]) -> None:
-        if self._robot:
-            self.session.fleet.world(self._robot, change)
+    # -- the room -----------------------------------------------------------------------------------
+
+    def _show_room(self, link: RobotLink) -> None:
+        """Draw the robot, the others in its room, and the room's things."""
+        drawing = link.drawing or {}
+        if not RobotState.parse(drawing).shared:
+            self.view.show_state(drawing)
+            return
+        room = self.session.room
+        if self._things[0] != room.revision:
+            self._things = (room.revision, things_of(room.room))
+        others = [
+            (other.name, other.drawing)
+            for other in self._others(link)
+            if other.drawing is not None and not other.mute and RobotState.parse(other.drawing).shared
+        ]
+        self.view.show_state(drawing, others, self._things[1])
+
+    def _others(self, link: RobotLink) -> list[RobotLink]:
+        """The other virtual robots that are there; each is watched while the panel shows."""
+        fleet = self.session.fleet
+        there = [each for each in fleet.connected if each.virtual and each.name != link.name]
+        names = {each.name for each in there}
+        for name in self._looks.keys() - names:
+            self._looks.pop(name).close()
+        for name in names - self._looks.keys():
+            self._looks[name] = fleet.look_at(name)
+        return there
+
+    def _move(self, name: str, x: float, y: float) -> None:
+        if self.view.state.shared:
+            states = [self.view.state, *(state for _name, state in self.view.others)]
+            robots = {str(at): (each.x, each.y, radius_of(each)) for at, each in enumerate(states)}
+            self.session.room.move(name, x, y, robots)
+        else:
+            self._change({"move": name, "x": round(x, 3), "y": round(y, 3)})
+
+    def _put_back(self) -> None:
+        """The robots and everything in their room are where they were at first."""
+        self.session.room.put_back()
+        for name in ("", *(name for name, _state in self.view.others)):
+            self._change({"reset": True}, name)
+
+    def _show_room_menu(self, thing: str, place: QPoint | None) -> None:
+        """What a person adds to the room, or takes away."""
+        menu = Menu(self.theme, self)
+        if thing:
+            words = plain.entry(_("Remove {thing}").format(thing=thing))
+            action = menu.addAction(self.theme.icon("trash-2"), words)
+            action.triggered.connect(lambda: self.session.room.remove(thing))
+            menu.addSeparator()
+        if self.view.state.shared:
+            for kind, (words, icon) in ADDED.items():
+                action = menu.addAction(self.theme.icon(icon), _(words))
+                action.triggered.connect(lambda _on=False, kind=kind: self._add(kind))
+            menu.addSeparator()
+        menu.addAction(self.theme.icon("rotate-cw"), _("Put the room back")).triggered.connect(self._put_back)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        if place is None:
+            drop_below(menu, self.add)
+        else:
+            menu.popup(place)
+
+    def _add(self, kind: str) -> None:
+        """Put one more thing where there is place, in front of the first robot."""
+        state = self.view.state
+        room = self.session.room.room
+        radius = {"ball": 0.3, "person": 0.4, "marker": 0.3}.get(kind, 0.8)
+        x, y = room.nearest_free(state.x + 1.0, state.y + 0.9, radius)
+        name = self.session.room.add(kind, x, y)
+        if name is None:
+            self.context.toast(_("There is no more place for that in the room"))
+        else:
+            self.view.chosen = name
+
+    # -- a larger room ----------------------------------------------------------------------------
+
+    def enlarge(self) -> None:
+        """Show the room over the middle of the window, or in its place again."""
+        if self._large is not None:
+            self._large.shut()
+            return
+        self._large = LargeRoom(self.theme, self, self.stage)
+        self._large.closed.connect(self._give_back)
+        self.large.set_icon("minimize-2")
+
+    def fill_screen(self) -> None:
+        """Show the room as large as the screen, with the run bar above it; or in its place again."""
+        if self._large is not None and self._large.filled:
+            self._large.shut()
+            return
+        if self._large is None:
+            self.enlarge()
+        if self._large is not None:
+            self._large.fill_screen()
+
+    def _give_back(self) -> None:
+        self._large = None
+        self.pages.insertWidget(1, self.stage)
+        self.pages.setCurrentWidget(self.stage)
+        self.large.set_icon("maximize-2")
+        self.view.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _change(self, change: Mapping[str, object], robot: str = "") -> None:
+        if robot or self._robot:
+            with suppress(RobotUnknownError):
+                self.session.fleet.world(robot or self._robot, change)
+
+    def looks(self) -> Iterable[Suspendable | None]:
+        return (*super().looks(), *self._looks.values())
+
+    def shut(self) -> None:
+        super().shut()
+        for watch in self._looks.values():
+            watch.close()
+        self._looks.clear()
 
     def wake(self) -> None:
         if self._watch is not None and self._watch.resting:

@@ -1,118 +1,275 @@
-"""The drawing of a robot in its room, under the mouse and the keyboard."""
+"""The drawing of the robots in their room, under the mouse and the keyboard."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QContextMenuEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.ui.robot_drawing.scene import RobotDrawing
-from app.ui.robot_drawing.state import RobotState
+from app.ui.robot_drawing.scene import Marks, RobotDrawing
+from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
-from app.ui.widgets.keyboard import is_plain
 from nep.i18n import _
 
 TOUCHABLE = ("head", "left_hand", "right_hand")
+BODY = "body"
+"""The part by which a robot is taken up."""
 STALE = QColor(90, 90, 90, 150)
 KEYS = {Qt.Key.Key_H: "head", Qt.Key.Key_L: "left_hand", Qt.Key.Key_R: "right_hand"}
+ARROWS = {
+    Qt.Key.Key_Up: (-1, 0),
+    Qt.Key.Key_Down: (1, 0),
+    Qt.Key.Key_Left: (0, -1),
+    Qt.Key.Key_Right: (0, 1),
+}
+STEP_M, SMALL_STEP_M = 0.1, 0.02
+DRAG_FROM_PX = 4
+
+
+def split(part: str) -> tuple[str, str]:
+    """The robot's name (empty for the one the picture is about) and its part: ``Turtle/body``."""
+    name, _slash, of = part.rpartition("/")
+    return name, of
 
 
 class RoomView(QWidget):
-    """The drawing. A press on head or hands touches them; the ball and people can be dragged."""
+    """The drawing. A press on head or hands touches them; robots and things are dragged over the floor.
 
-    touched = Signal(str, bool)  # part, down
-    moved = Signal(str, float, float)  # what, x, y in m
+    With the keyboard Tab goes from one to the next, arrows move it, Delete takes a thing away.
+    """
+
+    touched = Signal(str, str, bool)  # robot (empty: the shown one), part, down
+    moved = Signal(str, float, float)  # thing, x, y in m
+    carried = Signal(str, float, float)  # robot, x, y in m
+    held = Signal(str, bool)  # robot, taken up or put down
+    removed = Signal(str)  # thing
+    menu_wanted = Signal(str, QPoint)  # thing or empty, where on the screen
+    enlarged = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
         self._drawing = RobotDrawing(theme.font("label"))
-        self._data: Mapping[str, object] | None = None
+        self._data: object = None
         self.state = RobotState()
+        self.others: Sequence[tuple[str, RobotState]] = ()
         self.stale = False
         self._pressed: str | None = None
+        self._pressed_at = QPointF()
+        self._offset = QPointF()
+        self._dragging = False
+        self._hovered: str | None = None
+        self.chosen: str | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(160, 120)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setToolTip(plain.tip(_("Press its head or a hand to touch it; drag the ball")))
+        self.setAccessibleName(_("The robots in their room"))
+        self.setToolTip(
+            plain.tip(
+                _("Press a head or a hand to touch it; drag robots and things; double click for a large room")
+            )
+        )
         theme.changed.connect(self.update)
 
-    def show_state(self, data: Mapping[str, object]) -> None:
-        """Draw this state; the same one again costs nothing."""
-        if data is self._data:
+    # -- what it shows ----------------------------------------------------------------------------
+
+    def show_state(
+        self,
+        data: Mapping[str, object],
+        others: Sequence[tuple[str, Mapping[str, object]]] = (),
+        things: tuple[Thing, ...] | None = None,
+    ) -> None:
+        """Draw this state, other robots, and the room's things (None: those of the state).
+
+        The same again costs nothing.
+        """
+        told = (id(data), [(name, id(each)) for name, each in others], things)
+        if told == self._data:
             return
-        self._data = data
+        self._data = told
+        self._kept = (data, others)  # so that no other message gets their identity
         state = RobotState.parse(data)
-        if state != self.state:
-            self.state = state
-            self.setAccessibleDescription("" if self.stale else state.speech or "")
+        if things is not None:
+            state = replace(state, objects=things)
+        parsed = [(name, RobotState.parse(each)) for name, each in others]
+        if (state, parsed) != (self.state, self.others):
+            self.state, self.others = state, parsed
+            self.setAccessibleDescription(self._described())
             self.update()
 
     def set_stale(self, stale: bool) -> None:
         """Whether it has not told for a while how it is: grey, and what it said is not said any more."""
         if stale != self.stale:
             self.stale = stale
-            self.setAccessibleDescription("" if stale else self.state.speech or "")
+            self.setAccessibleDescription(self._described())
             self.update()
+
+    def _described(self) -> str:
+        return "" if self.stale else self.state.speech or ""
 
     def sizeHint(self) -> QSize:
         return QSize(382, 286)
 
     def place_of(self, part: str) -> QPointF | None:
         """Where a part is in the view; for tests and tools."""
-        return self._drawing.place_of(part, QRectF(self.rect()), self.state)
+        return self._drawing.place_of(part, QRectF(self.rect()), self.state, self.others)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         state = replace(self.state, speech=None, moving=False) if self.stale else self.state
-        self._drawing.paint(painter, QRectF(self.rect()), state, dark=self._theme.dark)
+        chosen = self.chosen if self.hasFocus() else None
+        marks = Marks(self._hovered, chosen, self._theme.colour("focus"))
+        area = QRectF(self.rect())
+        self._drawing.paint(painter, area, state, self.others, marks=marks, dark=self._theme.dark)
         if self.stale:
             painter.fillRect(self.rect(), STALE)
         painter.end()
 
-    def _at(self, position: QPointF) -> str | None:
-        return self._drawing.part_at(position, QRectF(self.rect()), self.state)
+    # -- what is where ----------------------------------------------------------------------------
 
-    def _movable(self, part: str | None) -> bool:
-        return any(
-            part in {thing.name, thing.kind} and thing.kind in {"ball", "person"}
-            for thing in self.state.objects
-        )
+    def _at(self, position: QPointF) -> str | None:
+        return self._drawing.part_at(position, QRectF(self.rect()), self.state, self.others)
+
+    def _thing(self, part: str | None) -> Thing | None:
+        found = (thing for thing in self.state.objects if part in {thing.name, thing.kind})
+        return next(found, None) if part else None
+
+    def _robot(self, part: str | None) -> RobotState | None:
+        """The robot whose body a part is."""
+        name, of = split(part or "")
+        return ({"": self.state} | dict(self.others)).get(name) if of == BODY else None
+
+    def _where(self, part: str | None) -> tuple[float, float] | None:
+        """The place (m) of what can be moved."""
+        found = self._robot(part) or self._thing(part)
+        movable = found is not None and (isinstance(found, RobotState) or self._movable(found))
+        return (found.x, found.y) if found is not None and movable else None
+
+    def _movable(self, thing: Thing) -> bool:
+        return self.state.shared or thing.kind in {"ball", "person"}
+
+    def choices(self) -> list[str]:
+        """What the keyboard goes through: the robots, then the things."""
+        robots = [BODY, *(f"{name}/{BODY}" for name, _state in self.others)]
+        return [*robots, *(thing.name for thing in self.state.objects if thing.name and self._movable(thing))]
+
+    # -- the mouse --------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self._pressed = self._at(event.position()) if event.button() == Qt.MouseButton.LeftButton else None
-        if self._pressed in TOUCHABLE:
-            self.touched.emit(self._pressed, True)
+        self._pressed_at, self._dragging = event.position(), False
+        where = self._where(self._pressed)
+        if self._pressed is not None and split(self._pressed)[1] in TOUCHABLE:
+            self.touched.emit(*split(self._pressed), True)
+        elif where is not None:
+            self.chosen = self._pressed
+            self.update()
+            foot = self._drawing.pixel_of(*where, QRectF(self.rect()), self.state)
+            self._offset = foot - event.position()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._pressed is not None and self._movable(self._pressed):
-            x, y = self._drawing.floor_at(event.position(), QRectF(self.rect()), self.state)
-            self.moved.emit(self._pressed, x, y)
-        elif self._pressed is None:
+        if self._pressed is None:
             part = self._at(event.position())
-            hand = Qt.CursorShape.PointingHandCursor if part in TOUCHABLE else Qt.CursorShape.OpenHandCursor
-            self.setCursor(hand if part in TOUCHABLE or self._movable(part) else Qt.CursorShape.ArrowCursor)
+            self._hover(part)
+        elif self._where(self._pressed) is not None:
+            self._drag(event.position())
 
-    def mouseReleaseEvent(self, _event: QMouseEvent) -> None:
-        if self._pressed in TOUCHABLE:
-            self.touched.emit(self._pressed, False)
-        self._pressed = None
+    def _hover(self, part: str | None) -> None:
+        touchable = part is not None and split(part)[1] in TOUCHABLE
+        movable = self._where(part) is not None
+        shape = Qt.CursorShape.PointingHandCursor if touchable else Qt.CursorShape.OpenHandCursor
+        self.setCursor(shape if touchable or movable else Qt.CursorShape.ArrowCursor)
+        hovered = part if movable else None
+        if hovered != self._hovered:
+            self._hovered = hovered
+            self.update()
+
+    def _drag(self, position: QPointF) -> None:
+        if not self._dragging:
+            if (position - self._pressed_at).manhattanLength() < DRAG_FROM_PX:
+                return
+            self._dragging = True
+            self.setCursor(Qt.CursorShape.ClosedHandCursor)
+            if self._robot(self._pressed) is not None:
+                self.held.emit(split(self._pressed or "")[0], True)
+        area = QRectF(self.rect())
+        self._move(self._pressed or "", *self._drawing.floor_at(position + self._offset, area, self.state))
+
+    def _move(self, part: str, x: float, y: float) -> None:
+        if self._robot(part) is not None:
+            self.carried.emit(split(part)[0], x, y)
+        else:
+            self.moved.emit(part, x, y)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        pressed, self._pressed = self._pressed, None
+        if pressed is not None and split(pressed)[1] in TOUCHABLE:
+            self.touched.emit(*split(pressed), False)
+        elif self._dragging and self._robot(pressed) is not None:
+            self.held.emit(split(pressed or "")[0], False)
+        self._dragging = False
+        self._hover(self._at(event.position()))
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        part = self._at(event.position())
+        if part is not None and split(part)[1] in TOUCHABLE:
+            self.mousePressEvent(event)  # two quick taps
+        elif event.button() == Qt.MouseButton.LeftButton:
+            self.enlarged.emit()
+
+    def leaveEvent(self, _event: object) -> None:
+        if self._pressed is None:
+            self._hover(None)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        if event.reason() == QContextMenuEvent.Reason.Mouse:
+            part, place = self._at(QPointF(event.pos())), event.globalPos()
+        else:
+            part = self.chosen
+            place = self.mapToGlobal((self.place_of(part or "") or QPointF(self.rect().center())).toPoint())
+        thing = self._thing(part)
+        self.menu_wanted.emit(thing.name if thing is not None and self._movable(thing) else "", place)
+
+    # -- the keyboard -----------------------------------------------------------------------------
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        choices = self.choices()
+        at = choices.index(self.chosen) if self.chosen in choices else -1 if forward else len(choices)
+        at += 1 if forward else -1
+        if 0 <= at < len(choices):
+            self.chosen = choices[at]
+            self.update()
+            return True
+        self.chosen = None
+        self.update()
+        return super().focusNextPrevChild(forward)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        self._key(event, down=True)
+        key, where = Qt.Key(event.key()), self._where(self.chosen)
+        if key in ARROWS and where is not None and self.chosen is not None:
+            small = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+            step = SMALL_STEP_M if small else STEP_M
+            ahead, aside = ARROWS[key]
+            self._move(self.chosen, where[0] + ahead * step, where[1] + aside * step)
+        elif key in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self._thing(self.chosen) is not None:
+            self.removed.emit(self.chosen)
+        else:
+            self._key(event, down=True)
 
     def keyReleaseEvent(self, event: QKeyEvent) -> None:
         self._key(event, down=False)
 
     def _key(self, event: QKeyEvent, *, down: bool) -> None:
-        part = KEYS.get(Qt.Key(event.key())) if is_plain(event) else None
+        nothing_held = not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+        part = KEYS.get(Qt.Key(event.key())) if nothing_held else None
         if part is None:
             event.ignore()
         elif not event.isAutoRepeat():
-            self.touched.emit(part, down)
+            name = split(self.chosen or "")[0]
+            self.touched.emit(name, part, down)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 from app.core.robots.launcher import VIRTUAL_ROBOTS
 from app.core.session import Session
@@ -26,6 +27,14 @@ class RobotSwap:
         """Of ``MISSING:OTHER``."""
         missing, _colon, other = text.partition(":")
         return cls(missing, other)
+
+
+@runtime_checkable
+class FillsScreen(Protocol):
+    """A panel whose content can fill the screen."""
+
+    def fill_screen(self) -> None:
+        """Fill the screen, or not any more."""
 
 
 class RobotCommands:
@@ -66,6 +75,12 @@ class RobotCommands:
         for each in names:
             launcher.stop_virtual_robot(each)
         return bool(names)
+
+    def room_in_full_screen(self) -> None:
+        """Show the virtual robots' room as large as the screen, or in its panel again."""
+        dock = self._shell.open_panel("robot")
+        if dock is not None and isinstance(dock.panel, FillsScreen):
+            dock.panel.fill_screen()
 
     # -- robots that are missing ------------------------------------------------------------------
 

@@ -98,6 +98,11 @@ def _no_recent(do: Handlers) -> str:
     return "" if do.session.settings.recent_known else _("The list is empty")
 
 
+def _no_room(do: Handlers) -> str:
+    there = any(link.virtual for link in do.session.fleet.connected)
+    return "" if there else _("No virtual robot is there")
+
+
 def _no_virtual_robot(do: Handlers) -> str:
     return "" if do.session.launcher.wanted else _("No virtual robot was started here")
 
@@ -222,6 +227,8 @@ COMMANDS: tuple[C, ...] = (
       icon="bot"),
     C("robots.end_virtual", lazy("Put the virtual robots away"), lambda do: do.robots.end_virtual(), "Robots",
       why_not=_no_virtual_robot),
+    C("robots.room", lazy("Room in full screen"), lambda do: do.robots.room_in_full_screen(), "Robots",
+      ("F11",), "fullscreen", why_not=_no_room),
     # unlike "robots.virtual" it stays in the layout that shows
     C("robots.start", lazy("Start the virtual Pepper"), lambda do: do.robots.start_pepper(), in_palette=False,
       in_shortcuts=False),

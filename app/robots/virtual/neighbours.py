@@ -1,0 +1,77 @@
+"""The other virtual robots in the room, as they tell where they are; and this one, as it tells them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+
+from app.robots.driver.call import Clock
+from app.robots.virtual.room import Other
+
+GONE_AFTER_S = 1.5
+"""Who has not told for so long where it is has ended."""
+CALM_S = 0.2
+"""Who stands still tells where it is as often as this."""
+MOST = 12
+
+
+class Neighbours:
+    """Who else is in the room. The owner holds a lock around every call."""
+
+    def __init__(self, name: str, clock: Clock, began_ns: int | None = None) -> None:
+        """``name`` is this robot's; who began earlier keeps its place when two stand in one."""
+        self._name, self._clock = name, clock
+        self.began_ns = time.time_ns() if began_ns is None else began_ns
+        self._seen: dict[str, tuple[Other, float, int]] = {}
+        self._told: Other | None = None
+        self._told_s = -math.inf
+
+    def hear(self, message: Mapping[str, object]) -> None:
+        """A robot tells where it is; what is damaged, or this one's own, is left out."""
+        other = _parsed(message)
+        if other is None or other.name == self._name:
+            return
+        if other.name not in self._seen and len(self._seen) >= MOST:
+            return
+        began = message.get("began_ns")
+        self._seen[other.name] = (other, self._clock.now(), began if isinstance(began, int) else 0)
+
+    def others(self) -> tuple[Other, ...]:
+        """Those who are there now."""
+        since = self._clock.now() - GONE_AFTER_S
+        self._seen = {name: seen for name, seen in self._seen.items() if seen[1] >= since}
+        return tuple(other for other, _at, _began in self._seen.values())
+
+    def makes_way(self, x: float, y: float, radius: float) -> bool:
+        """Whether this robot stands where another one stood before it came."""
+        return any(
+            math.hypot(other.x - x, other.y - y) < other.radius + radius
+            and (began, other.name) < (self.began_ns, self._name)
+            for other, _at, began in self._seen.values()
+        )
+
+    def tell(self, me: Other, publish: Callable[[Mapping[str, object]], None]) -> None:
+        """Tell the others where this one is: at once when that has changed, else now and then."""
+        now = self._clock.now()
+        if me != self._told or now - self._told_s >= CALM_S:
+            self._told, self._told_s = me, now
+            publish(
+                {
+                    "robot": me.name,
+                    **{k: v for k, v in vars(me).items() if k != "name"},
+                    "began_ns": self.began_ns,
+                }
+            )
+
+
+def _parsed(message: Mapping[str, object]) -> Other | None:
+    name, figure = message.get("robot"), message.get("figure")
+    numbers = [message.get(key) for key in ("x", "y", "theta_deg", "radius", "height")]
+    if not isinstance(name, str) or not 0 < len(name) < 200 or not isinstance(figure, str):
+        return None
+    if not all(isinstance(n, (int, float)) and math.isfinite(n) and abs(n) < 1000 for n in numbers):
+        return None
+    x, y, theta, radius, height = (float(n) for n in numbers)  # type: ignore[arg-type]
+    good = 0.0 < radius < 1.0 and 0.0 < height < 3.0
+    return Other(name, x, y, theta, radius, height, figure) if good else None

@@ -1,0 +1,96 @@
+"""The room over the middle of the window, below the run bar: Stop stays in sight and works."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QVBoxLayout, QWidget
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, label
+from nep.i18n import _
+
+
+class LargeRoom(QWidget):
+    """Covers the panels of the window and holds the stage, until Esc, its button or a double click."""
+
+    closed = Signal()
+
+    def __init__(self, theme: Theme, panel: QWidget, stage: QWidget) -> None:
+        """``panel`` is in the window whose middle is covered; ``stage`` is what is shown."""
+        over = _middle_of(panel)
+        super().__init__(over)
+        self._theme, self._over = theme, over
+        self.filled = False
+        self.setAccessibleName(_("Large room"))
+        self.screen_button = Button(theme, _("Full screen"), "fullscreen", size="small")
+        self.screen_button.clicked.connect(self.fill_screen)
+        self.back = Button(theme, _("Back to the panels"), "minimize-2", size="small")
+        self.back.clicked.connect(self.shut)
+        row = QHBoxLayout()
+        row.setContentsMargins(10, 6, 10, 6)
+        row.addWidget(label(_("Room"), "title"))
+        row.addStretch(1)
+        row.addWidget(self.screen_button)
+        row.addWidget(self.back)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(row)
+        column.addWidget(stage, 1)
+        over.installEventFilter(self)
+        self._top = over.window()  # Esc comes there from the run bar, too, when nobody else wanted it
+        self._top.installEventFilter(self)
+        self.setGeometry(over.rect())
+        stage.show()
+        self.show()
+        self.raise_()
+        stage.setFocus(Qt.FocusReason.OtherFocusReason)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def fill_screen(self) -> None:
+        """Let the whole window fill the screen, or not any more."""
+        window = self.window()
+        self.filled = not self.filled
+        window.setWindowState(window.windowState() ^ Qt.WindowState.WindowFullScreen)
+        self.screen_button.set_word(_("Leave full screen") if self.filled else _("Full screen"))
+
+    def shut(self) -> None:
+        """Give the stage back; the window is as it was."""
+        if self.filled:
+            self.fill_screen()
+        self._over.removeEventFilter(self)
+        self._top.removeEventFilter(self)
+        self.hide()
+        self.closed.emit()
+        self.deleteLater()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if watched is self._over and event.type() == QEvent.Type.Resize:
+            self.setGeometry(self._over.rect())
+        if watched is self._top and isinstance(event, QKeyEvent) and self.isVisible():
+            pressed = event.type() == QEvent.Type.KeyPress
+            if pressed and event.key() == Qt.Key.Key_Escape:
+                self.shut()
+                return True
+        return super().eventFilter(watched, event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.shut()
+        else:
+            super().keyPressEvent(event)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), self._theme.colour("panel"))
+        painter.end()
+
+
+def _middle_of(panel: QWidget) -> QWidget:
+    """The workbench around a panel, else the window that it is in."""
+    around = panel.parentWidget()
+    while around is not None and not isinstance(around, QMainWindow):
+        around = around.parentWidget()
+    return around if around is not None else panel.window()

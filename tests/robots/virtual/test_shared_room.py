@@ -1,0 +1,229 @@
+"""Several virtual robots in one room: they see, meet and avoid each other; each has a process of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+import nep
+from app.robots.driver.driver import Driver
+from app.robots.simulated import ROBOT as PEPPER
+from app.robots.turtle import ROBOT as TURTLE
+from app.robots.virtual.body import RADIUS, Body
+from app.robots.virtual.camera import Camera, lens_of
+from app.robots.virtual.neighbours import GONE_AFTER_S, Neighbours
+from app.robots.virtual.room import Other, Room
+from app.robots.virtual.room_map import TOPIC, RoomMap
+from app.robots.virtual.wheels import WheelBody
+from tests.robots.conftest import Ears, FakeClock, eventually
+
+OTHER = Other("Turtle", 0.6, 0.0, 180.0, 0.17, 0.34, "turtle")
+
+
+def with_other(room: Room, other: Other = OTHER) -> Room:
+    return replace(room.moved("Aiko", 2.5, 2.0), others=(other,))
+
+
+# ---- one body ---------------------------------------------------------------------------------------
+
+
+def test_a_robot_stops_before_another_one_and_its_distance_sees_it() -> None:
+    body = Body(room=with_other(Room()))
+    assert body.distance == pytest.approx(1.1 - RADIUS - OTHER.radius, abs=0.01)
+    motion = body.walk(2.0, 0.35)
+    while not motion.done:
+        body.step(0.1)
+    assert motion.blocked
+    assert body.x <= OTHER.x - OTHER.radius - RADIUS + 0.01
+    away = body.walk(-0.3, 0.3)
+    while not away.done:
+        body.step(0.1)
+    assert not away.blocked
+
+
+def test_one_that_stands_in_another_may_leave_it() -> None:
+    body = WheelBody(room=with_other(Room()), x=0.65, y=0.0, theta_deg=0.0)
+    body.drive(0.3, 0.0)
+    body.step(1.0)
+    assert body.x > 0.85
+    body = WheelBody(room=with_other(Room()), x=0.65, y=0.0, theta_deg=180.0)
+    body.drive(0.3, 0.0)
+    body.step(1.0)
+    assert body.x == 0.65
+
+
+def test_the_camera_sees_the_other_robots() -> None:
+    body = Body()
+    camera = Camera(body.room)
+    empty = replace(with_other(Room()), others=())
+    alone = camera.picture(empty, lens_of(body)).astype(int)
+    for other in (replace(OTHER, x=1.5), Other("Ada", 1.5, 0.0, 180.0, 0.27, 1.2)):
+        seen = camera.picture(with_other(Room(), other), lens_of(body)).astype(int)
+        assert (abs(seen - alone).max(axis=2) > 30).mean() > 0.01
+    hidden = Other("Ada", 0.2, 0.0, 180.0, 0.27, 1.2)
+    assert with_other(Room(), hidden).hidden((-0.5, 0.0, 1.1), (1.5, 0.0, 0.9))
+
+
+# ---- held by a person -----------------------------------------------------------------------------
+
+
+def test_one_that_is_held_stands_still_and_goes_on_when_it_is_put_down() -> None:
+    body = Body(theta_deg=180.0)
+    motion = body.walk(0.5, 0.3)
+    body.step(0.5)
+    body.hold(held=True)
+    x = body.x
+    body.step(2.0)
+    assert (body.x, motion.done) == (x, False)
+    body.carry(0.0, -1.0)
+    body.hold(held=False)
+    body.step(5.0)
+    assert motion.done
+    assert motion.moved == pytest.approx(0.5, abs=0.01)
+    assert body.y == -1.0
+
+
+def test_a_stop_ends_what_one_does_that_is_held() -> None:
+    body = Body(theta_deg=180.0)
+    motion = body.walk(0.5, 0.3)
+    body.step(0.5)
+    body.hold(held=True)
+    body.halt()
+    body.step(0.2)
+    assert motion.done
+    assert body.still
+
+
+@pytest.mark.parametrize("body", [Body(), WheelBody()], ids=["pepper", "turtle"])
+def test_a_robot_is_carried_to_walls_and_furniture_and_not_into_them(body) -> None:
+    body.carry(99.0, 0.6)
+    assert body.room.x_max - 0.3 < body.x < body.room.x_max
+    before = (body.x, body.y)
+    table = body.room.thing("table")
+    body.carry(table.x, table.y)
+    assert body.room.free(body.x, body.y, 0.1)
+    assert (body.x, body.y) != (table.x, table.y), before
+
+
+# ---- who is there ------------------------------------------------------------------------------------
+
+
+def test_who_tells_nothing_any_more_is_gone() -> None:
+    time = FakeClock()
+    seen = Neighbours("Pepper", time, began_ns=5)
+    told: list[dict[str, object]] = []
+    Neighbours("Turtle", time, began_ns=1).tell(OTHER, lambda message: told.append(dict(message)))
+    seen.hear(told[0])
+    assert seen.others() == (OTHER,)
+    for damaged in ({}, {**told[0], "x": "far"}, {**told[0], "radius": 50}, {**told[0], "robot": "Pepper"}):
+        seen.hear(damaged)
+    assert seen.others() == (OTHER,)
+    time.advance(GONE_AFTER_S + 0.1)
+    assert seen.others() == ()
+
+
+def test_the_one_that_came_later_makes_way() -> None:
+    time = FakeClock()
+    first, second = Neighbours("A", time, began_ns=1), Neighbours("B", time, began_ns=2)
+    first.tell(Other("A", 0, 0, 0, 0.27, 1.2), second.hear)
+    second.tell(Other("B", 0, 0.1, 0, 0.27, 1.2), first.hear)
+    assert (first.makes_way(0, 0, 0.27), second.makes_way(0, 0.1, 0.27)) == (False, True)
+
+
+# ---- over the network ----------------------------------------------------------------------------------
+
+
+class Robots:
+    """Virtual robots on one network, each with a node of its own."""
+
+    def __init__(self) -> None:
+        self._open: list[Driver | nep.Node] = []
+        self.person = self._node("person")
+        self.room = self.person.new_pub(TOPIC, "json", latched=True)
+
+    def _node(self, name: str) -> nep.Node:
+        self._open.append(nep.node(name, "memory"))
+        return self._open[-1]
+
+    def start(self, kind, name: str) -> Ears:
+        ears = Ears(self.person, name)
+        ears.listen("state")
+        ears.listen("distance")
+        driver = Driver(kind, name, self._node(name))
+        self._open.append(driver)
+        driver.start()
+        eventually(lambda: ears.heard["state"])
+        return ears
+
+    def close(self) -> None:
+        for each in reversed(self._open):
+            each.close()
+
+
+@pytest.fixture
+def robots() -> Iterator[Robots]:
+    made = Robots()
+    yield made
+    made.close()
+
+
+def place(ears: Ears, name: str) -> tuple[float, float]:
+    """Where a robot has a thing now."""
+    things = ears.heard["state"][-1]["objects"]
+    return next(((t["x"], t["y"]) for t in things if t["name"] == name), (99.0, 99.0))
+
+
+def test_what_a_person_moves_moves_for_all_also_for_one_that_starts_later(robots: Robots) -> None:
+    pepper = robots.start(PEPPER, "Pepper")
+    here = RoomMap()
+    here.move("ball", 0.3, -1.5)
+    here.add("person", 1.8, 1.8)
+    here.remove("shelf")
+    robots.room.publish(here.message())
+    eventually(lambda: place(pepper, "ball") == (0.3, -1.5))
+    turtle = robots.start(TURTLE, "Turtle")
+    for ears in (pepper, turtle):
+        eventually(lambda ears=ears: place(ears, "ball") == (0.3, -1.5))
+        eventually(lambda ears=ears: place(ears, "Ben") == (1.8, 1.8))
+        eventually(lambda ears=ears: place(ears, "shelf") == (99.0, 99.0))
+
+
+def test_what_one_robot_pushes_is_elsewhere_for_the_other(robots: Robots) -> None:
+    here = RoomMap()
+    here.move("ball", -0.5, -0.62)  # ahead of the small robot
+    robots.room.publish(here.message())
+    pepper, turtle = robots.start(PEPPER, "Pepper"), robots.start(TURTLE, "Turtle")
+    eventually(lambda: place(pepper, "ball") == place(turtle, "ball") == (-0.5, -0.62))
+    turtle.invoke("1", "move", distance=0.3)
+    assert turtle.final("1")["state"] == "succeeded"
+    eventually(lambda: place(turtle, "ball")[0] > -0.45)
+    eventually(lambda: place(pepper, "ball") == place(turtle, "ball"))
+
+
+def test_the_distance_of_one_sees_the_other_until_that_has_ended(robots: Robots) -> None:
+    here = RoomMap()
+    here.remove("Aiko")
+    robots.room.publish(here.message())
+    pepper = robots.start(PEPPER, "Pepper")
+    eventually(lambda: pepper.heard["distance"] and pepper.heard["distance"][-1]["value"] > 3.0)
+    turtle = robots.start(TURTLE, "Turtle")
+    world = robots.person.new_pub("/Turtle/world", "json")
+    eventually(lambda: world.subscribers)
+    world.publish({"move": "robot", "x": 0.5, "y": 0.0})
+    eventually(lambda: pepper.heard["distance"][-1]["value"] < 0.7)
+    assert turtle.heard["state"][-1]["held"] is False
+    robots._open.pop().close()
+    eventually(lambda: pepper.heard["distance"][-1]["value"] > 3.0)
+
+
+def test_two_of_a_kind_do_not_stand_in_each_other(robots: Robots) -> None:
+    first, second = robots.start(PEPPER, "Ada"), robots.start(PEPPER, "Bob")
+
+    def gap() -> float:
+        one, two = first.heard["state"][-1], second.heard["state"][-1]
+        return ((one["x"] - two["x"]) ** 2 + (one["y"] - two["y"]) ** 2) ** 0.5
+
+    eventually(lambda: gap() >= 2 * RADIUS)
+    assert (first.heard["state"][-1]["x"], first.heard["state"][-1]["y"]) == (-0.5, 0.0)
