@@ -43,7 +43,6 @@ EARNED = {
     "nep.cli.doctor": "one of a list: the commands of nep",
     "nep.cli.interrupts": "imported before all else of a command, under the guard of its caller",
     "nep.masters.rates": "pure, and tested alone",
-    "app.core.documents.saved_tabs": "tested alone, with settings and documents that are its own",
     "app.core.run.edits_since_run": "pure, and tested alone",
     "app.core.run.run_warnings": "pure, and tested alone",
     "app.ui.panels.registry": "a seam: panels, ours and those of plug-ins, are found through it",

@@ -26,6 +26,7 @@ NAMES = (
     "studio_topics",
     "studio_start",
     "blocks_editor",
+    "studio_tabs",
 )
 ASKED = ("soak", "ways")
 """These run only when they are asked for: one takes a quarter of an hour, the other times nothing."""

@@ -196,6 +196,8 @@ class Session:
     def _check(self, now: float) -> None:
         """What is looked at once a second."""
         self._faults.check()
+        with self.guarded(lazy("keep which tabs are open")):
+            self.tabs.follow()
         with self.guarded(lazy("check what was started here")):
             self.launcher.check()
             self.last_robots.keep(self.launcher)

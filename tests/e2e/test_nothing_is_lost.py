@@ -12,9 +12,11 @@ import nep
 from tests.e2e.behaviours import forever, say, started, turn, write
 from tests.e2e.programs import Program
 from tests.e2e.studio import Studio
+from tests.e2e.test_tabs import shown, tabs
 from tests.e2e.waiting import until
 
 pytestmark = pytest.mark.timeout(240)
+WAITS = "!!document.querySelector('.nepTab:not([hidden]) .blocklyBlockCanvas > .control_wait')"
 PEER = str(Path(__file__).parent / "peer.py")
 
 
@@ -22,6 +24,22 @@ PEER = str(Path(__file__).parent / "peer.py")
 def publisher(address: str) -> Iterator[Program]:
     with Program(PEER, "publish", "/count") as program:
         yield program
+
+
+def delete_the_script(studio: Studio) -> None:
+    studio.point(".nepTab:not([hidden]) [data-id=started] > .blocklyPath", dy=30)
+    studio.screen.key("Delete")
+
+
+def add_a_block(studio: Studio) -> None:
+    """By the keyboard: find it in the toolbox of the tab that shows."""
+    studio.choose("Edit", "Find a block to add")
+    until(lambda: studio.page("document.activeElement.type") == "search", "the keys go to the field")
+    studio.screen.type("wait")
+    studio.spot(".nepTab:not([hidden]) .blocklyFlyout .control_wait")
+    studio.screen.key("Return")
+    studio.spot(".nepTab:not([hidden]) .blocklyDragging")
+    studio.screen.key("Return")
 
 
 def sleeping(process: psutil.Process) -> bool:
@@ -62,6 +80,39 @@ def test_work_is_offered_again_after_kill_9(start: Callable[..., Studio], tmp_pa
 
     fourth = start()
     fourth.find(kind="StartPage")
+
+
+def test_after_kill_9_the_tab_that_was_worked_on_shows_and_all_stand_in_their_order(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
+    files = [write(tmp_path / f"{name}.nepb", started(say(name))) for name in ("One", "Two", "Three")]
+    studio = start(*map(str, files))
+    until(lambda: tabs(studio) == ["One", "Two", "Three"], "the files are open", 30)
+    until(lambda: "say Three" in shown(studio), "the last shows", 30)
+    delete_the_script(studio)
+    until(lambda: tabs(studio)[2] == "Three, not saved", "the third is edited")
+    studio.screen.key("Tab", ["Ctrl"])
+    until(lambda: "say One" in shown(studio), "the first shows")
+    studio.screen.key("n", ["Ctrl"])
+    until(lambda: tabs(studio) == ["One", "New behaviour", "Two", "Three, not saved"], "a new one")
+    until(lambda: shown(studio) == set(), "it shows")
+    add_a_block(studio)
+    until(lambda: tabs(studio)[1] == "New behaviour, not saved", "the new one is edited")
+    journals = studio.home / "journal"
+    until(lambda: len(list(journals.glob("*.json"))) == 2, "both are kept")
+    until(lambda: '"current": 1' in (studio.home / "settings.json").read_text("utf-8"), "so is the order")
+    studio.kill()
+
+    again = start()
+    again.click("Put it back")
+    order = ["One", "New behaviour, not saved", "Two", "Three, not saved"]
+    until(lambda: tabs(again) == order, "all tabs are back, in their order")
+    until(lambda: again.page(WAITS), "the one that was worked on shows, with its block")
+    again.screen.key("Tab", ["Ctrl", "Shift"])
+    until(lambda: "say One" in shown(again), "what was not edited")
+    again.screen.key("Tab", ["Ctrl", "Shift"])
+    until(lambda: tabs(again) == order and shown(again) == set(), "the third is as it was left")
+    assert again.quit() == 0
 
 
 def test_what_is_thrown_away_is_not_offered_again(start: Callable[..., Studio], tmp_path: Path) -> None:

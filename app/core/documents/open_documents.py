@@ -222,6 +222,27 @@ class Documents:
             self.show(opened[current])
         return taken
 
+    def arrange(self, kept: Mapping[str, object], recovered: Mapping[str, Document]) -> None:
+        """Put unsaved work that was recovered where its tabs were, and show the tab that a person worked on.
+
+        ``recovered`` goes by the names of the journals of then. What was opened since stands behind.
+        """
+        tabs, current = kept.get("tabs"), kept.get("current")
+        found: dict[int, Document] = {}
+        for number, tab in enumerate(tabs if isinstance(tabs, list) else ()):
+            if isinstance(tab, Mapping):
+                path = tab.get("path")
+                document = recovered.get(str(tab.get("journal")))
+                if document is None and isinstance(path, str):
+                    document = self.with_path(Path(path))
+                if document is not None and document not in found.values():
+                    found[number] = document
+        placed = list(found.values())
+        self._open = [*placed, *(each for each in self._open if each not in placed)]
+        if isinstance(current, int) and current in found:
+            self.current = found[current]
+        self.revision += 1
+
     def _come_back(self, path: object, unsaved: Unsaved | None) -> Document | None:
         if unsaved is not None:
             return self.recover(unsaved)

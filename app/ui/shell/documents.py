@@ -32,6 +32,14 @@ class SupportsFlush(Protocol):
         """Call ``done`` once the newest edit is in the document."""
 
 
+@runtime_checkable
+class SupportsShowCurrent(Protocol):
+    """A panel that shows the current behaviour."""
+
+    def show_current(self) -> None:
+        """Show it at once."""
+
+
 class Closed:
     """A tab that was closed: what to say of it, and how its file was before, if it was written over."""
 
@@ -104,13 +112,8 @@ class DocumentController:
         self.with_newest(lambda: self._show(opened))
 
     def recover(self, left: Sequence[Unsaved]) -> None:
-        """Put back what a Studio that died left behind, each in its tab."""
-
-        def put_back() -> None:
-            for unsaved in left:
-                self._documents.recover(unsaved)
-
-        self.with_newest(lambda: self._show(put_back))
+        """Put back what a Studio that died left behind, each in its tab; the one that was worked on shows."""
+        self.with_newest(lambda: self._show(lambda: self._session.tabs.recover(left)))
 
     def close(self, *documents: Document) -> None:
         """Close tabs. Their programs are stopped; unsaved work goes to its file, or where Recent finds it.
@@ -144,9 +147,11 @@ class DocumentController:
         self.with_newest(lambda: self._show(reopened))
 
     def show(self, document: Document) -> None:
-        """Show an open behaviour's tab."""
+        """Show an open behaviour's tab, before the next tick; which tab shows is kept a little later."""
         self._documents.show(document)
-        self._session.tabs.keep()
+        editor = self._editor()
+        if isinstance(editor, SupportsShowCurrent):
+            editor.show_current()
 
     def move(self, document: Document, place: int) -> None:
         """Put a tab to another place."""

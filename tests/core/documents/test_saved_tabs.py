@@ -103,3 +103,52 @@ def test_settings_that_take_nothing_are_told_in_a_sentence(start, tmp_path: Path
     first.tabs.keep(ended_well=True)
     assert len(first.complaints) == 1
     assert first.complaints[0].startswith("settings can't be kept in ")
+
+
+def test_after_a_crash_all_tabs_stand_in_their_order_and_the_one_that_was_worked_on_shows(start) -> None:
+    first = start()
+    for name in "AB":
+        write_file(first.folder / f"{name}.nepb", BehaviourFile(name, STARTED, {}))
+    assert first.come_back() == []
+    first.documents.open(first.folder / "A.nepb")
+    first.documents.new().edited(OTHER)
+    first.documents.open(first.folder / "B.nepb").edited(OTHER)
+    middle = first.documents.neighbour(-1)
+    first.documents.show(middle)
+    first.tabs.follow()
+    assert names(first.documents) == ["A", "New behaviour", "B"]
+    assert all_kept(first.documents)
+    as_if_dead(first.journals)
+
+    second = start()
+    left = second.come_back()
+    assert names(second.documents) == ["A", "B"], "files are open; a person is asked for what was not saved"
+    second.tabs.recover(left)
+    assert names(second.documents) == ["A", "New behaviour", "B"]
+    assert [each.dirty for each in second.documents] == [False, True, True]
+    assert second.documents.current.name == "New behaviour"
+
+
+def test_the_tab_of_a_new_behaviour_comes_back_from_its_first_block_on(start) -> None:
+    first = start()
+    assert first.come_back() == []
+    blank = first.documents.current
+    first.tabs.follow()
+    blank.edited(OTHER)
+    first.tabs.edited(blank, was_blank=True)
+    kept = Settings(first.folder).get("tabs", {})
+    assert [tab["journal"] for tab in kept["tabs"]] == [blank.journal]
+
+
+def test_who_only_looks_at_another_tab_does_not_wait_for_the_disk(start) -> None:
+    first = start()
+    first.work()
+    made = first.documents.new()
+    made.edited(OTHER)
+    first.tabs.follow()
+    before = Settings(first.folder).get("tabs", {})
+    assert before["current"] == 1
+    first.documents.show(first.documents.neighbour(-1))
+    assert Settings(first.folder).get("tabs", {}) == before
+    first.tabs.follow()
+    assert Settings(first.folder).get("tabs", {})["current"] == 0

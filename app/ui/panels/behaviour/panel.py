@@ -164,6 +164,14 @@ class BehaviourPanel(PanelWidget):
         robot = bool(self.session.fleet.connected or self.session.coming)
         self.editor.set_first_step(pgettext("block", "when started"), robot)
 
+    def show_current(self) -> None:
+        """Show another tab at once: a person who pressed on it does not wait for the next tick."""
+        if self.editor is not None and self.editor.is_ready:
+            self._bar.tabs.show_tabs(
+                tab_facts(self.session.documents, self.session.runs), self.session.document.key
+            )
+            self._show_blocks(self.editor)
+
     def _show_blocks(self, editor: Editor) -> None:
         """Let the editor show the current behaviour, and forget those that were closed."""
         document = self.session.document
@@ -329,7 +337,9 @@ class BehaviourPanel(PanelWidget):
     def _edited(self, key: str, workspace: WorkspaceJson) -> None:
         document = self.session.documents.with_key(key)
         if document is not None:
+            was_blank = document.blank
             document.edited(workspace)
+            self.session.tabs.edited(document, was_blank=was_blank)
 
     def _history(self, can_undo: bool, can_redo: bool) -> None:
         self._bar.undo.setEnabled(can_undo)
