@@ -33,7 +33,7 @@ def outlined(name: str) -> str:
     return f"[...document.querySelectorAll('.nepState-{name}')].map(e => e.parentElement.dataset.id)"
 
 
-def editor(qtbot, definitions: dict, width: int = 1300, height: int = 700) -> BlocklyView:
+def editor(qtbot, definitions: dict, width: int = 1180, height: int = 700) -> BlocklyView:
     """A block editor of that size with these blocks, not shown yet."""
     made = BlocklyView()
     qtbot.addWidget(made)

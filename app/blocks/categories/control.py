@@ -55,6 +55,7 @@ CATEGORY = Category(
             tooltip="Runs the blocks inside that many times.",
             python="for _ in repeat(%TIMES):\n    %BODY",
             arguments=(ValueInput("TIMES", "Number", 3), _BODY),
+            words=("loop", "for", "again", "count", "iterate"),
         ),
         Block(
             type="control_forever",

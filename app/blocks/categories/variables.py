@@ -12,6 +12,7 @@ CATEGORY = Category(
     style="variables",
     icon="variable",
     order=40,
+    dynamic="variables",
     button=("New variable", "CREATE_VARIABLE"),
     blocks=(
         Block(

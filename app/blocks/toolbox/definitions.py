@@ -39,13 +39,19 @@ def editor_definitions(
 
 def _toolbox(catalogue: Catalogue) -> dict[str, object]:
     contents: list[Mapping[str, object]] = [{"kind": "blocksHeading", "name": _("Blocks")}]
-    contents += [_category(each) for each in categories() if each.blocks and not each.within]
     known = (*catalogue.connected.values(), *catalogue.absent.values())
+    groups = {
+        robot.name: [
+            group
+            for category in categories()
+            for group in (category.groups(robot, known) if category.groups else ())
+        ]
+        for robot in catalogue.connected.values()
+    }
+    contents += [_category(each, groups) for each in categories() if each.blocks and not each.within]
     for robot in catalogue.connected.values():
         contents.append(_heading(robot, connected=True))
-        for category in categories():
-            groups = category.groups(robot, known) if category.groups else ()
-            contents += [_group(robot, group) for group in groups]
+        contents += [_group(robot, group) for group in groups[robot.name]]
     contents += [_heading(robot, connected=False) for robot in catalogue.absent.values()]
     return {"kind": "categoryToolbox", "contents": contents}
 
@@ -54,7 +60,7 @@ def _heading(robot: Robot, *, connected: bool) -> dict[str, object]:
     return {"kind": "robotHeading", "name": robot.name, "virtual": robot.virtual, "connected": connected}
 
 
-def _category(category: Category) -> dict[str, object]:
+def _category(category: Category, groups: Mapping[str, Sequence[Group]]) -> dict[str, object]:
     contents: list[Mapping[str, object]] = []
     if category.button is not None:
         words, key = category.button
@@ -64,6 +70,8 @@ def _category(category: Category) -> dict[str, object]:
         if part is not category:
             contents.append({"kind": "label", "text": part.title})
         contents += _shown(part)
+    if any(block.shape == "hat" for block in category.blocks):
+        contents += _hats_of_robots(groups)
     made = _entry(category.name, category.title, category.style, category.icon, contents)
     return made | {"dynamic": category.dynamic} if category.dynamic else made
 
@@ -75,6 +83,16 @@ def _shown(category: Category) -> Iterator[Mapping[str, object]]:
             yield {"kind": "label", "text": category.headings[block.type]}
         if block.in_toolbox:
             yield block.to_toolbox()
+
+
+def _hats_of_robots(groups: Mapping[str, Sequence[Group]]) -> list[Mapping[str, object]]:
+    """What starts a script is looked for in one place: the hats of each robot, with its name above them."""
+    contents: list[Mapping[str, object]] = []
+    for robot, its in groups.items():
+        hats = [_block(entry) for group in its for entry in group.entries if entry.block.shape == "hat"]
+        if hats:
+            contents += [{"kind": "label", "text": robot}, *hats]
+    return contents
 
 
 def _group(robot: Robot, group: Group) -> dict[str, object]:

@@ -130,10 +130,11 @@ _TAKES = {
 }
 _ANY = lazy("any value")
 _MOST_CHOICES = 6
+_UNIT = 3  # letters that a unit has at most
 
 
 def help_of(block: Block) -> dict[str, object]:
-    """``title``, ``does``, ``more``, ``gaps`` as (name, words), ``example``, and ``words`` to find it by."""
+    """``title``, ``name``, ``does``, ``more``, ``gaps`` as (name, words), ``example``; ``words`` find it."""
     gaps = [
         [name_of_gap(block, argument), words]
         for argument in block.arguments
@@ -141,6 +142,7 @@ def help_of(block: Block) -> dict[str, object]:
     ]
     return {
         "title": title(block),
+        "name": name(block),
         "does": block.tooltip,
         "more": block.help,
         "gaps": gaps,
@@ -164,6 +166,18 @@ def title(block: Block) -> str:
         return f"({name_of_gap(block, argument)})"
 
     return " ".join(_HOLE.sub(place, block.text).split())
+
+
+def name(block: Block) -> str:
+    """What a sentence calls it: "walk", "repeat … times"; "" for one of signs alone.
+
+    Without its robot, and without the unit that stands behind its last gap.
+    """
+    words = [part.strip() for part in _HOLE.split(block.text.removeprefix("%ROBOT "))[::2]]
+    if len(words) > 1 and len(words[-1]) <= _UNIT:
+        words[-1] = ""
+    told = re.sub(r"\s*…[\s…]*", " … ", "…".join(words)).strip().removesuffix(" …")
+    return told if sum(letter.isalpha() for letter in told) >= _UNIT - 1 and told != "…" else ""
 
 
 def name_of_gap(block: Block, argument: Argument) -> str:

@@ -34,6 +34,8 @@ class BlocklyBridge(QObject):
     values_watched = Signal(str)  # the variables whose values the page shows, as JSON: [id, …]
     sensors_offered = Signal(str)  # the sensors in the open toolbox as JSON: [[robot, sensor], …]
     wanted = Signal(str)  # what a button of the empty canvas is for: "robot", "examples"
+    pinned = Signal(bool)  # a person wants the blocks of a category to stay open, or not
+    removed = Signal(int)  # a person has deleted so many blocks at once
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -79,6 +81,14 @@ class BlocklyBridge(QObject):
     @Slot(str)
     def offers(self, sensors: str) -> None:
         self.sensors_offered.emit(sensors)
+
+    @Slot(bool)
+    def pin(self, keeps: bool) -> None:
+        self.pinned.emit(keeps)
+
+    @Slot(int)
+    def deleted(self, count: int) -> None:
+        self.removed.emit(count)
 
     @Slot(str)
     def copy(self, blocks: str) -> None:

@@ -109,6 +109,7 @@ class BlocklyHost(QWidget):
         self._up = False
         self._theme: Json = {}
         self._reduced_motion = False
+        self._pinned: bool | None = None
         self._deaths = 0
         self._had_died = False
         self._up_since = 0.0
@@ -231,6 +232,7 @@ class BlocklyHost(QWidget):
             "language": self._language,
             "words": dict(i18n.editor_words()),
             "reduced": self._reduced_motion,
+            "pinned": self._pinned,
             "theme": self._theme,
         }
 

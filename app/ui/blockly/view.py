@@ -35,6 +35,8 @@ class BlocklyView(BlocklyHost):
     sensors_offered = Signal(tuple)  # (robot, sensor) of each one that the open toolbox shows
     command_wanted = Signal(str)  # a command of the window: "variable.rename:ID"
     values_watched = Signal(tuple)  # the variables (ids) whose values the page shows
+    toolbox_pinned = Signal(bool)  # a person wants the blocks of a category to stay open, or not
+    blocks_deleted = Signal(int)  # a person has deleted so many blocks at once in the shown tab
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
         super().__init__(parent, language or i18n.language())
@@ -54,6 +56,8 @@ class BlocklyView(BlocklyHost):
         self._bridge.values_watched.connect(lambda text: self.values_watched.emit(_texts(text)))
         self._bridge.wanted.connect(self.wanted)
         self._bridge.try_asked.connect(self.try_asked)
+        self._bridge.pinned.connect(self._toolbox_pinned)
+        self._bridge.removed.connect(self.blocks_deleted)
         self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(_pairs(text)))
 
     # -- the program ------------------------------------------------------------------------------
@@ -112,6 +116,11 @@ class BlocklyView(BlocklyHost):
         self._tokens += 1
         self._waiting[self._tokens] = done
         self._bridge.tell("flush", self._tokens)
+
+    def set_toolbox_pinned(self, pinned: bool | None) -> None:
+        """Let the blocks of a category stay open, or close after each use; None: as the room allows."""
+        self._pinned = pinned
+        self._tell("pin", pinned)
 
     def set_definitions(self, definitions: Mapping[str, object]) -> None:
         """Give what `app.blocks.editor_definitions` made. Equal definitions cost nothing.
@@ -200,6 +209,10 @@ class BlocklyView(BlocklyHost):
         """Take back the last edit."""
         self._tell("undo", None)
 
+    def undo_deletion(self) -> None:
+        """Bring back what was deleted last, whatever was done since."""
+        self._tell("undelete", None)
+
     def redo(self) -> None:
         """Do it again."""
         self._tell("redo", None)
@@ -246,6 +259,10 @@ class BlocklyView(BlocklyHost):
         self._tell("show", id)
 
     # -- the page ---------------------------------------------------------------------------------
+
+    def _toolbox_pinned(self, keeps: bool) -> None:
+        self._pinned = keeps
+        self.toolbox_pinned.emit(keeps)
 
     def _page_came(self) -> None:
         self._tell("definitions", self._definitions)

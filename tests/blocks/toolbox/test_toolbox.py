@@ -147,6 +147,23 @@ def test_every_entry_of_the_toolbox_is_defined_and_every_style_is_known():
     assert {definition["style"] for definition in BLOCKS.values()} <= set(DEFINITIONS["styles"])  # type: ignore[arg-type]
 
 
+def test_the_hats_of_each_robot_are_under_events_too_below_its_name():
+    two = editor_definitions([robot("Pepper"), nao()])["toolbox"]["contents"]  # type: ignore[index]
+    (events,) = (item["contents"] for item in two if item.get("name") == "Events")
+    told = [entry.get("text") or entry["type"] for entry in events]
+    at = told.index("Pepper")
+    assert told[0] == "events_started"
+    assert not any(each.startswith("robot_") for each in told[:at])
+    assert told[at + 1 : at + 3] == ["robot_pepper_when_touched", "robot_pepper_when_heard"]
+    assert events[at + 1]["fields"] == {"ROBOT": "Pepper"}
+    assert "robot_nao_when_touched" in told[told.index("NAO") :]
+    (sensors, _nao) = (item["contents"] for item in two if item.get("name") == "Sensors")
+    assert events[at + 1] in sensors
+    assert not any(
+        "text" in entry for item in two if item.get("name") == "Control" for entry in item["contents"]
+    )
+
+
 def test_robots_of_one_model_share_their_blocks():
     two = editor_definitions([robot("Pepper"), robot("Salt")])
     says = [each for each in two["blocks"] if each["type"] == "robot_pepper_do_say"]  # type: ignore[attr-defined]

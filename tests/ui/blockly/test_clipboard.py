@@ -114,7 +114,7 @@ def test_keys_that_are_elsewhere_in_the_window_paste_all_the_same(qtbot, view, t
     column = QVBoxLayout(window)
     column.addWidget(other)
     column.addWidget(view)
-    window.resize(1300, 760)
+    window.resize(1180, 760)
     window.show()
     them.click("[data-id=w] > .blocklyPath")
     them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")

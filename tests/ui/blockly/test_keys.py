@@ -17,7 +17,7 @@ from tests.ui.blockly_person import WAIT_MS, Person, editor
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
-FOUND = (("append", "lists_add"), ("loop", "lists_each"), ("rep fore", "control_forever"))
+FOUND = (("append", "lists_add"), ("loop", "control_repeat"), ("rep fore", "control_forever"))
 PACE_MS = 80
 CARD = "document.querySelector('.nepHelp')?.textContent ?? ''"
 FOCUSED = (
@@ -138,7 +138,7 @@ def test_synonyms_and_parts_of_words_find_blocks_and_nothing_is_said(view, them)
     shown = f"{labels}.map(each => each.textContent.replace(/\\u00a0/g, ' '))"
     for words, block_type in (
         ("append", "lists_add"),
-        ("loop", "lists_each"),
+        ("loop", "control_repeat"),
         ("rep fore", "control_forever"),
     ):
         view.open_search()
@@ -147,7 +147,8 @@ def test_synonyms_and_parts_of_words_find_blocks_and_nothing_is_said(view, them)
         them.wait_for(f"({first}).includes({block_type!r})")
     begin_to_search(them)
     QTest.keyClicks(them.target, "zzz")
-    them.wait_for(shown, ["No block for “zzz”"])
+    them.wait_for(f"({shown})[0]", "No block for “zzz”")
+    assert "turn" in them.ask(f"({shown})[1]")
     press(them, Qt.Key_Escape)
     them.wait_for("getComputedStyle(document.querySelector('.blocklyFlyout')).display", "none")
 

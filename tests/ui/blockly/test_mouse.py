@@ -126,7 +126,7 @@ def test_a_topic_that_is_not_there_yet_can_be_typed(qtbot, view, person):
 def test_a_program_is_made_with_the_keyboard_alone(qtbot, view, person):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
-    them.press(Qt.Key_T)
+    them.press(Qt.Key_B, Qt.ControlModifier)
     them.wait_for("document.activeElement.textContent", "Events")
     them.press(Qt.Key_Down)
     them.wait_for("document.activeElement.textContent", "Control")

@@ -27,6 +27,8 @@ class Editor(QWidget):
     command_wanted = Signal(str)
     values_watched = Signal(tuple)
     wanted = Signal(str)
+    toolbox_pinned = Signal(bool)
+    blocks_deleted = Signal(int)
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -289,3 +291,24 @@ def test_the_program_is_coloured(qtbot, qapp) -> None:
     assert colours == [Theme("light").colour("textTertiary").name()]  # nothing inside a comment
     block = view.document().findBlockByNumber(view.line_with("for _ in range(3)") - 1)
     assert len(block.layout().formats()) == 3  # for, in, 3
+
+
+def test_whether_the_blocks_stay_open_is_kept_for_the_next_start(qtbot, panel, window) -> None:
+    assert editor(panel).last("set_toolbox_pinned") is None
+    editor(panel).toolbox_pinned.emit(False)
+    assert window.session.settings.get("toolbox_pinned", True) is False
+    again = window.make(PANEL, (1032, 600))
+    qtbot.addWidget(again)
+    assert isinstance(again, BehaviourPanel)
+    qtbot.addWidget(again.replaces_title())
+    assert editor(again).last("set_toolbox_pinned") is False
+
+
+@pytest.mark.parametrize(("count", "words"), [(1, "Deleted 1 block"), (4, "Deleted 4 blocks")])
+def test_what_was_deleted_can_be_brought_back_from_the_toast(panel, window, count, words) -> None:
+    editor(panel).blocks_deleted.emit(count)
+    button, run = window.toast_buttons[-1]
+    assert (window.toasts[-1], button) == (words, "Undo")
+    assert run is not None
+    run()
+    assert editor(panel).count("undo_deletion") == 1

@@ -50,6 +50,11 @@ export class FieldButton extends Blockly.FieldImage {
     this.setTooltip(words);
   }
 
+  /** In the flyout it is part of the block: what is dragged out can be changed. */
+  override isClickableInFlyout(): boolean {
+    return false;
+  }
+
   override initView(): void {
     if (!this.fieldGroup_) return;
     this.fieldGroup_.classList.add('nepButton');

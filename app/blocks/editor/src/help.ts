@@ -7,6 +7,8 @@ import {t} from './words';
 
 export interface BlockHelp {
   title: string;
+  /** What a sentence calls the block: “walk”; "" when it is only signs. */
+  name: string;
   does: string;
   more: string;
   gaps: [string, string][];
@@ -94,7 +96,7 @@ export class HelpCard {
 }
 
 function keptHelp(block: Blockly.BlockSvg): BlockHelp {
-  return {title: t('A block that is not known here'), does: String(block.getTooltip()),
+  return {title: t('A block that is not known here'), name: '', does: String(block.getTooltip()),
     more: t('It may belong to a robot that was never seen here, or to a newer Studio. It stays in the file as it is.'),
     gaps: [], example: t('For example: connect the robot whose block it is.'), words: ''};
 }

@@ -6,6 +6,7 @@ import './focus_after_delete';
 import './mutators';
 import {Clipboard} from './clipboard';
 import {type Begin, EmptyCanvas, Pointer, type Wanted} from './guidance';
+import {binButton} from './bin';
 import {HelpCard, focusedBlock, registerHelpMenu} from './help';
 import {iconElement} from './icons';
 import {useClipboard, useOwnKeys} from './keys';
@@ -39,6 +40,8 @@ interface Bridge {
   watches(variables: string): void;
   wants(what: string): void;
   tries(stack: string): void;
+  pin(keeps: boolean): void;
+  deleted(count: number): void;
 }
 
 declare const QWebChannel: new (transport: unknown, done: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
@@ -55,7 +58,7 @@ class Editor {
   private readonly pointer = new Pointer(() => this.shown.workspace);
   private readonly empty: EmptyCanvas;
 
-  constructor(private readonly bridge: Bridge) {
+  constructor(private readonly bridge: Bridge, pinned: boolean | null) {
     this.empty = new EmptyCanvas(() => this.shown.workspace, this.pointer, (what) => bridge.wants(what));
     const ofShown = (tab: Tab, tell: () => void) => {
       if (tab === this.tabs?.shown) tell();
@@ -70,8 +73,15 @@ class Editor {
       offered: (tab) => ofShown(tab, () => this.tellOffered()),
       watched: (tab) => ofShown(tab, () => this.tellWatched()),
       made: (tab) => this.empty.watch(tab.workspace),
+      pinned: (keeps) => {
+        bridge.pin(keeps);
+        this.tabs.setPinned(keeps);
+      },
+      deleted: (tab, count) => ofShown(tab, () => bridge.deleted(count)),
+      binned: (tab) => ofShown(tab, () => this.dressBin()),
     });
-    new ResizeObserver(() => this.shown.resize()).observe(document.body);
+    this.tabs.setPinned(pinned);
+    new ResizeObserver(() => this.tabs.resize()).observe(document.body);
     // A hidden page draws no frames, and Blockly tells of edits only after a frame.
     document.addEventListener('visibilitychange', () => document.hidden && this.shown.program.flush());
     this.makeZoomButtons();
@@ -117,6 +127,7 @@ class Editor {
     motion: (it: {reduced: boolean}) => document.documentElement.classList.toggle('reduced', it.reduced),
     definitions: (it: Definitions) => this.tabs.define(it),
     tab: (it: ShownTab) => this.showTab(it),
+    pin: (pinned: boolean | null) => this.tabs.setPinned(pinned),
     close: (key: string) => this.tabs.close(key),
     highlight: (ids: string[]) => this.shown.overlays.highlight(ids),
     stopped: (ids: string[]) => this.shown.overlays.markStopped(ids),
@@ -131,6 +142,7 @@ class Editor {
     flush: (token: number) => this.bridge.flushed(token, this.shown.program.flush()),
     change: (state: Record<string, unknown>) => this.shown.change(state),
     undo: () => this.shown.program.undo(false),
+    undelete: () => this.shown.bin.undoLast() && this.shown.program.undo(false),
     redo: () => this.shown.program.undo(true),
     zoom: (steps: number) => this.shown.workspace.zoomCenter(steps),
     fit: () => this.shown.fit(),
@@ -166,6 +178,7 @@ class Editor {
     this.tabs.show(it);
     this.find.again();
     this.empty.lookSoon();
+    this.dressBin();
     this.tellOffered();
     this.tellWatched();
   }
@@ -205,7 +218,20 @@ class Editor {
       button.onclick = action;
       box.append(button);
     }
+    const bin = binButton();
+    bin.onclick = (event) => this.shown.bin.toggle(event.detail === 0);
+    box.prepend(bin);
     document.body.append(box);
+    this.dressBin();
+  }
+
+  /** The bin's button says how many deletions wait in it. */
+  private dressBin(): void {
+    const count = this.shown.bin.size;
+    const words = count ? t('Deleted blocks ({count})', {count}) : t('Deleted blocks');
+    binButton().title = words;
+    binButton().setAttribute('aria-label', words);
+    binButton().classList.toggle('nepFull', count > 0);
   }
 }
 
@@ -213,6 +239,7 @@ interface Beginning {
   language: string;
   words: Record<string, string>;
   reduced: boolean;
+  pinned: boolean | null;
   theme: {tokens: Tokens; dark: boolean};
 }
 
@@ -239,7 +266,7 @@ async function start(bridge: Bridge): Promise<void> {
   useOwnKeys();
   // Blockly measures text once; the font has to be there before.
   await Promise.allSettled([document.fonts.load('600 15px Inter'), document.fonts.load('500 14px Inter')]);
-  const editor = new Editor(bridge);
+  const editor = new Editor(bridge, beginning.pinned);
   followModality();
   bridge.told.connect((name, payload) => {
     try {

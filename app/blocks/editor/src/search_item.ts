@@ -77,7 +77,8 @@ export class SearchItem extends Blockly.ToolboxItem {
       return;
     }
     const found = findEntries(this.toolbox.allEntries(), words);
-    const none = [{kind: 'label', text: t('No block for “{words}”', {words: words.trim()})}];
+    const none = [t('No block for “{words}”', {words: words.trim()}), t('Try a simpler word, such as “turn” or “say”,'),
+      t('or look into a category.')].map((text) => ({kind: 'label', text, gap: 8}));
     this.toolbox.showFound(found.length ? found : none);
   }
 

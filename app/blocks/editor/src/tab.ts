@@ -1,10 +1,15 @@
 // One behaviour in the page: a workspace of its own, with its undo, zoom, scroll position and open category.
 import * as Blockly from 'blockly/core';
+import {Bin} from './bin';
 import {CHECKER} from './checker';
 import {FieldChoice} from './choices';
 import {Culling} from './culling';
 import {foldOnDoubleClick} from './folding';
+import {DRAGGER, listenToDrags} from './drag';
 import {Functions} from './functions';
+import {FLYOUT, Flyout, SCALE} from './flyout';
+import {WrongDrops} from './wrong_drop';
+import {Variables} from './variables';
 import {visibleSensors, observeFlyout} from './visible_sensors';
 import {keepNotesReadable} from './notes';
 import {Program, holdsAny} from './program';
@@ -16,8 +21,6 @@ import {type VariableEdit, editVariable, registerVariableButtons} from './variab
 import {WatchedValues} from './watched_values';
 import {TryHandle} from './tries';
 
-const SCALE = 0.8;
-
 export interface TabListener {
   changed(tab: Tab, json: string): void;
   history(tab: Tab, canUndo: boolean, canRedo: boolean): void;
@@ -28,6 +31,12 @@ export interface TabListener {
   made(tab: Tab): void;
   /** Other sensors may be shown in the toolbox. */
   offered(tab: Tab): void;
+  /** A person wants the blocks of a category to stay open, or not. */
+  pinned(keeps: boolean): void;
+  /** A person has deleted so many blocks at once. */
+  deleted(tab: Tab, count: number): void;
+  /** There is another number of deletions in the bin. */
+  binned(tab: Tab): void;
 }
 
 export class Tab {
@@ -35,8 +44,11 @@ export class Tab {
   readonly program: Program;
   readonly overlays: Overlays;
   readonly watched: WatchedValues;
+  readonly bin: Bin;
   private readonly functions: Functions;
+  private readonly variables: Variables;
   private readonly culling: Culling;
+  private readonly wrongDrops: WrongDrops;
   key = '';
   generation = 0;
   private readonly frame = document.createElement('div');
@@ -52,7 +64,9 @@ export class Tab {
     this.workspace = Blockly.inject(this.frame, {
       media: 'media/', renderer: RENDERER, sounds: false, trashcan: false, theme: makeTheme(),
       toolbox: {kind: 'categoryToolbox', contents: []},
-      plugins: {toolbox: Toolbox, [Blockly.registry.Type.CONNECTION_CHECKER.toString()]: CHECKER},
+      plugins: {toolbox: Toolbox, [Blockly.registry.Type.FLYOUTS_VERTICAL_TOOLBOX.toString()]: FLYOUT,
+        [Blockly.registry.Type.BLOCK_DRAGGER.toString()]: DRAGGER,
+        [Blockly.registry.Type.CONNECTION_CHECKER.toString()]: CHECKER},
       grid: {spacing: 28, length: 2, snap: true, colour: 'transparent'},
       move: {scrollbars: true, drag: true, wheel: true},
       zoom: {controls: false, wheel: true, pinch: true, startScale: SCALE, minScale: 0.3, maxScale: 2},
@@ -68,6 +82,13 @@ export class Tab {
     foldOnDoubleClick(this.workspace);
     keepNotesReadable(this.workspace);
     new TryHandle(this.workspace);
+    this.variables = new Variables(this.workspace);
+    this.bin = new Bin(this.workspace, {deleted: (count) => listener.deleted(this, count), changed: () => listener.binned(this)});
+    this.wrongDrops = new WrongDrops(this.workspace);
+    listenToDrags(this.workspace, {
+      overDelete: (mouse) => this.bin.showHint(mouse),
+      letGo: (block, mouse) => this.wrongDrops.explain(block, mouse),
+    });
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.onFound = () => this.overlays.showLive();
     const flyout = this.workspace.getFlyout();
@@ -80,6 +101,7 @@ export class Tab {
       },
     });
     listener.made(this);
+    if (flyout instanceof Flyout) flyout.onPin = (keeps) => listener.pinned(keeps);
   }
 
   /** Shows another program here, with an empty history. */
@@ -87,8 +109,10 @@ export class Tab {
     this.letGo();
     this.program.load(state);
     this.functions.refresh();
+    this.variables.refresh();
     this.generation = generation;
     this.overlays.forget();
+    this.bin.forget();
   }
 
   /** Another program in the place of this one, as an edit that can be undone. */
@@ -96,6 +120,7 @@ export class Tab {
     this.letGo();
     this.program.change(state);
     this.functions.refresh();
+    this.variables.refresh();
     this.overlays.restore();
   }
 
@@ -115,6 +140,12 @@ export class Tab {
     this.culling.lookSoon();
   }
 
+  /** Keeps the blocks of a category open, or not; `closes`: what is open does not stay until the next click. */
+  setPinned(keeps: boolean, closes = false): void {
+    const toolbox = this.workspace.getToolbox();
+    if (toolbox instanceof Toolbox) toolbox.setPinned(keeps, closes);
+  }
+
   /** Tells the newest edits and takes it off the screen; what is told to it meanwhile waits until `show`. */
   hide(): void {
     this.letGo();
@@ -126,6 +157,8 @@ export class Tab {
   dispose(): void {
     this.letGo();
     this.program.dispose();
+    this.bin.dispose();
+    this.wrongDrops.dispose();
     this.workspace.dispose();
     this.frame.remove();
   }
@@ -164,6 +197,7 @@ export class Tab {
       this.program.flush();
       this.program.rebuild();
       this.functions.refresh();
+    this.variables.refresh();
     }
     if (this.themeOutdated || rebuilt) this.overlays.restore();
     const toolbox = this.workspace.getToolbox();

@@ -6,6 +6,8 @@ import {type BlockHelp, useHelp} from './help';
 import {Tab, type TabListener} from './tab';
 
 const BUSY_MS = 60;
+/** A canvas as wide as this has room for the blocks of a category beside it. */
+const WIDE = 1000;
 
 export interface Definitions {
   blocks?: BlockDefinition[];
@@ -28,6 +30,8 @@ export class Tabs {
   shown: Tab;
   private waiting: Definitions | null = null;
   private toolbox: unknown = {contents: []};
+  /** Whether the blocks of a category stay open; null: when there is room. */
+  private pinned: boolean | null = null;
 
   constructor(private readonly place: HTMLElement, private readonly listener: TabListener) {
     this.shown = this.make();
@@ -48,6 +52,23 @@ export class Tabs {
     this.tabs.delete(key);
     if (tab === this.shown) this.turnTo(this.make(), false);
     tab.dispose();
+  }
+
+  /** Keeps the blocks of a category open (true), or not; null: as long as the page is wide. */
+  setPinned(pinned: boolean | null): void {
+    this.pinned = pinned;
+    this.shown.setPinned(this.staysOpen, pinned === null);
+  }
+
+  /** The page has another size. */
+  resize(): void {
+    this.shown.resize();
+    if (this.pinned === null) this.shown.setPinned(this.staysOpen, true);
+  }
+
+  private get staysOpen(): boolean {
+    const toolbox = this.shown.workspace.getMetricsManager().getToolboxMetrics().width;
+    return this.pinned ?? this.place.clientWidth - toolbox >= WIDE;
   }
 
   themeChanged(): void {
@@ -78,6 +99,7 @@ export class Tabs {
     if (keeps) before.hide();
     this.shown = tab;
     tab.show();
+    tab.setPinned(this.staysOpen, true);
     if (hadFocus) tab.focus();
   }
 

@@ -1,5 +1,6 @@
 // The toolbox of the design: tiles with icons, headings, robots.
 import * as Blockly from 'blockly/core';
+import {Flyout} from './flyout';
 import {iconElement, iconName} from './icons';
 import {SEARCH, SearchItem} from './search_item';
 import {t} from './words';
@@ -122,6 +123,8 @@ function withIds(def: Items): Items {
 
 export class Toolbox extends Blockly.Toolbox {
   private shown = '';
+  private lastOpen = '';
+  private showsFound = false;
   /** What each category was made of; Blockly writes into the contents it is given. */
   private made = new Map<string, string>();
   private given: Def[] = [];
@@ -143,19 +146,70 @@ export class Toolbox extends Blockly.Toolbox {
     });
   }
 
-  /** Shows these blocks in place of a category; null closes them. */
-  showFound(entries: unknown[] | null): void {
-    this.clearSelection();
+  /** Whether a category stays open. */
+  private get isPinned(): boolean {
     const flyout = this.getFlyout();
+    return flyout instanceof Flyout && flyout.isPinned;
+  }
+
+  /** Keeps a category open from now on, or lets it close; `closes`: at once. */
+  setPinned(keeps: boolean, closes: boolean): void {
+    const flyout = this.getFlyout();
+    if (!(flyout instanceof Flyout)) return;
+    const before = flyout.isPinned;
+    flyout.setPinned(keeps);
+    if (keeps) this.openLast();
+    else if (before && closes) this.clearSelection();
+    if (before !== keeps) this.workspace_.resize();
+  }
+
+  /** Opens the category that was open last, or the first, when none is open and one has to be. */
+  private openLast(): void {
+    if (!this.isPinned || this.getFlyout()?.isVisible()) return;
+    const items = this.getToolboxItems().filter((item) => item.isSelectable());
+    const last = items.find((item) => item.getId() === this.lastOpen);
+    const item = last ?? items[0];
+    if (item) this.setSelectedItem(item);
+  }
+
+  /** A category that stays open is left only for another. */
+  override clearSelection(): void {
+    if (!this.isPinned) super.clearSelection();
+  }
+
+  override autoHide(onlyClosePopups: boolean): void {
+    const flyout = this.getFlyout();
+    if (!(flyout instanceof Flyout && flyout.hasFocus)) super.autoHide(onlyClosePopups);
+  }
+
+  protected override selectItem_(before: Blockly.ISelectableToolboxItem | null, item: Blockly.ISelectableToolboxItem): void {
+    super.selectItem_(before, item);
+    this.lastOpen = item.getId();
+    this.showsFound = false;
+    this.setTitle(item.getName());
+  }
+
+  private setTitle(words: string): void {
+    const flyout = this.getFlyout();
+    if (flyout instanceof Flyout) flyout.setTitle(words);
+  }
+
+  /** Shows these blocks in place of a category; null shows the category again, or none. */
+  showFound(entries: unknown[] | null): void {
+    if (this.selectedItem_) this.deselectItem_(this.selectedItem_);
+    const flyout = this.getFlyout();
+    this.setTitle(t('Found blocks'));
     if (entries) flyout?.show(entries as Blockly.utils.toolbox.FlyoutItemInfoArray);
     else flyout?.hide();
+    this.openLast();
+    this.showsFound = entries !== null;
     this.onFound();
   }
 
   /** The keys go to the first block that was found; with a key press it is taken at once. */
   enterFound(event: KeyboardEvent | null): void {
     const workspace = this.getFlyout()?.getWorkspace();
-    const first = this.getFlyout()?.isVisible() ? workspace?.getTopBlocks(true)[0] : undefined;
+    const first = this.showsFound && this.getFlyout()?.isVisible() ? workspace?.getTopBlocks(true)[0] : undefined;
     Blockly.keyboardNavigationController.setIsActive(true);
     if (!first) {
       Blockly.getFocusManager().focusTree(this);
@@ -164,7 +218,7 @@ export class Toolbox extends Blockly.Toolbox {
     Blockly.getFocusManager().focusNode(first);
     if (!event) return;
     first.performAction(event);
-    this.getFlyout()?.hide();
+    this.showFound(null);
     for (const item of this.getToolboxItems()) if (item instanceof SearchItem) item.clear();
   }
 
@@ -182,7 +236,9 @@ export class Toolbox extends Blockly.Toolbox {
   refreshDynamic(dynamic: string): void {
     const open = this.selectedItem_;
     if (open && this.given.some((item) => item['dynamic'] === dynamic && item['toolboxitemid'] === open.getId())) {
+      const scroll = this.getFlyout()?.getWorkspace().scrollY ?? 0;
       this.refreshSelection();
+      this.getFlyout()?.getWorkspace().scrollbar?.setY(-scroll);
     }
   }
 
@@ -203,11 +259,15 @@ export class Toolbox extends Blockly.Toolbox {
       this.selectedItem_ = null;
       this.render(items as unknown as Blockly.utils.toolbox.ToolboxInfo);
     }
-    if (!open) return;
+    if (!open) {
+      this.openLast();
+      return;
+    }
     const again = this.getToolboxItemById(open.getId());
     if (!again?.isSelectable()) {
       this.selectedItem_ = null;
       flyout?.hide();
+      this.openLast();
       return;
     }
     const item = again as Blockly.ISelectableToolboxItem;

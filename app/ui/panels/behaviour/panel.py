@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol, cast
 
 from PySide6.QtCore import Qt, SignalInstance
@@ -13,6 +14,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.documents.titles import told_apart
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
+from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.behaviour.live_values import live_words
 from app.ui.panels.behaviour.program_view import ProgramView
@@ -20,7 +22,7 @@ from app.ui.panels.behaviour.tab import TabFacts
 from app.ui.panels.behaviour.tabs import BehaviourTitle
 from app.ui.widgets import label
 from app.ui.widgets.indicators import ROBOT_STATUS
-from nep.i18n import _, lazy, pgettext
+from nep.i18n import _, lazy, ngettext, pgettext
 
 if TYPE_CHECKING:
     from app.blocks import Program
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from app.core.run.control import Runs
 
 LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed five times a second
+PINNED = "toolbox_pinned"
 ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
 WAIT_WORDS = lazy("Getting the blocks ready.")
 WAIT_UNTIL_S = 0.5
@@ -52,9 +55,12 @@ class Editor(Protocol):
     values_watched: SignalInstance
     wanted: SignalInstance
     try_asked: SignalInstance
+    toolbox_pinned: SignalInstance
+    blocks_deleted: SignalInstance
 
     @property
     def is_ready(self) -> bool: ...
+    def set_toolbox_pinned(self, pinned: bool | None) -> None: ...
     def set_definitions(self, definitions: Json) -> None: ...
     def show_tab(self, key: str, workspace: Json) -> None: ...
     def close_tab(self, key: str) -> None: ...
@@ -76,6 +82,7 @@ class Editor(Protocol):
     def point_at(self, block: str, name: str = "", then: str = "") -> None: ...
     def undo(self) -> None: ...
     def edit(self, what: str) -> None: ...
+    def undo_deletion(self) -> None: ...
     def open_find(self) -> None: ...
     def open_search(self) -> None: ...
     def redo(self) -> None: ...
@@ -210,6 +217,10 @@ class BehaviourPanel(PanelWidget):
         editor.values_watched.connect(self._watch_variables)
         editor.wanted.connect(lambda what: self.context.run(WANTED[what]))
         editor.try_asked.connect(lambda stack: self.context.run(f"try:{stack}"))
+        editor.toolbox_pinned.connect(self._keep_pinned)
+        editor.blocks_deleted.connect(lambda count: self._deleted(editor, count))
+        pinned: object = self.session.settings.get(PINNED, None)
+        editor.set_toolbox_pinned(pinned if isinstance(pinned, bool) else None)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
         if isinstance(editor, QWidget):
             had_focus = self.hasFocus()
@@ -252,6 +263,15 @@ class BehaviourPanel(PanelWidget):
                 self.editor.show_block(str(edit.get("id")))
             else:
                 self.editor.edit_variable(edit)
+
+    def _keep_pinned(self, keeps: bool) -> None:
+        """Remember it for the next start; settings that cannot be written are told by the status bar."""
+        with suppress(SettingsError):
+            self.session.settings.set(PINNED, keeps)
+
+    def _deleted(self, editor: Editor, count: int) -> None:
+        words = ngettext("Deleted {count} block", "Deleted {count} blocks", count).format(count=count)
+        self.context.toast(words, _("Undo"), editor.undo_deletion)
 
     def _show_live(self) -> None:
         """What sensor blocks say now: "84 %" on the battery, in the behaviour and in the open toolbox."""

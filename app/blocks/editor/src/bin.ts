@@ -1,0 +1,277 @@
+// What was deleted in a behaviour while it is open: it waits in the bin, newest first, and can be taken back.
+import * as Blockly from 'blockly/core';
+import {Flyout} from './flyout';
+import {iconElement} from './icons';
+import {t} from './words';
+
+const MOST = 50;
+/** Deletions that belong together come within this time. */
+const TOGETHER_MS = 60;
+/** Room for the buttons below the sheet. */
+const FOOT = 64;
+const APART = 40;
+const TRIES = 40;
+
+type State = Blockly.serialization.blocks.State;
+
+/** The bin's own part of the page: a button beside those for the zoom, one for all behaviours. */
+let button: HTMLButtonElement | null = null;
+
+export function binButton(): HTMLButtonElement {
+  if (button) return button;
+  button = document.createElement('button');
+  button.type = 'button';
+  button.className = 'nepBin';
+  button.append(iconElement('trash-2', 18));
+  return button;
+}
+
+/** The button takes blocks that are dropped on it. */
+class BinArea extends Blockly.DeleteArea {
+  override id = 'nepBin';
+
+  override getClientRect(): Blockly.utils.Rect | null {
+    const box = binButton().getBoundingClientRect();
+    return box.width ? new Blockly.utils.Rect(box.top, box.bottom, box.left, box.right) : null;
+  }
+}
+
+/** The sheet with what was deleted, at the right of the canvas. */
+class BinSheet extends Flyout {
+  protected override readonly foot = FOOT;
+  protected override readonly name = 'nepSheet';
+
+  override autoHide(onlyClosePopups: boolean): void {
+    if (!onlyClosePopups) this.hide();
+  }
+
+  protected override makeButton(): HTMLButtonElement {
+    const close = document.createElement('button');
+    close.type = 'button';
+    close.title = t('Close (Esc)');
+    close.setAttribute('aria-label', t('Close the bin'));
+    close.append(iconElement('x', 16));
+    close.onclick = () => this.hide();
+    return close;
+  }
+}
+
+export interface BinListener {
+  /** A person has deleted so many blocks at once. */
+  deleted(count: number): void;
+  /** There is another number of deletions in the bin. */
+  changed(): void;
+}
+
+export class Bin {
+  /** The oldest first. */
+  private entries: State[] = [];
+  /** What was taken out again: deleted once more it comes back here, even by Redo. */
+  private readonly takenBack = new Map<string, State>();
+  private readonly made = new Map<string, string>();
+  private last = {group: '', ids: [] as string[], count: 0};
+  private timer = 0;
+  private sheet: BinSheet | null = null;
+  private readonly area = new BinArea();
+  private readonly hint = document.createElement('div');
+
+  constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly listener: BinListener) {
+    workspace.addChangeListener((event) => this.onEvent(event));
+    workspace.getComponentManager().addComponent({
+      component: this.area, weight: 1,
+      capabilities: [Blockly.ComponentManager.Capability.DELETE_AREA, Blockly.ComponentManager.Capability.DRAG_TARGET],
+    });
+    this.hint.className = 'nepDropHere';
+    this.hint.hidden = true;
+    this.hint.setAttribute('aria-hidden', 'true');
+    const words = document.createElement('span');
+    words.textContent = t('Drop here to delete');
+    this.hint.append(iconElement('trash-2', 40), words);
+    workspace.getInjectionDiv().append(this.hint);
+  }
+
+  get size(): number {
+    return this.entries.length;
+  }
+
+  /** Another program is here. */
+  forget(): void {
+    this.entries = [];
+    this.takenBack.clear();
+    this.made.clear();
+    this.last = {group: '', ids: [], count: 0};
+    this.sheet?.hide();
+    this.listener.changed();
+  }
+
+  dispose(): void {
+    window.clearTimeout(this.timer);
+    if (!this.sheet) return;
+    bins.delete(this.sheet.getWorkspace());
+    this.sheet.dispose();
+  }
+
+  /** Shows over the toolbox, or on the button, that letting go here deletes; null: it does not. */
+  showHint(mouse: Blockly.utils.Coordinate | null): void {
+    const onButton = mouse !== null && this.area.getClientRect()?.contains(mouse.x, mouse.y) === true;
+    this.hint.style.width = `${this.workspace.getMetricsManager().getAbsoluteMetrics().left}px`;
+    this.hint.hidden = mouse === null || onButton;
+    binButton().classList.toggle('nepOver', onButton);
+  }
+
+  /** Opens the sheet, or closes it; `byKey`: the keys go to what was deleted last. */
+  toggle(byKey: boolean): void {
+    const sheet = this.sheet ??= this.makeSheet();
+    if (sheet.isVisible()) {
+      sheet.hide();
+      return;
+    }
+    this.workspace.hideChaff();
+    this.fill(sheet);
+    const first = sheet.getWorkspace().getTopBlocks(true)[0];
+    if (!byKey || !first) return;
+    Blockly.keyboardNavigationController.setIsActive(true);
+    Blockly.getFocusManager().focusNode(first);
+  }
+
+  /** What was deleted last comes back to where it was. */
+  undoLast(): boolean {
+    const stack = this.workspace.getUndoStack();
+    if (stack[stack.length - 1]?.group === this.last.group) return true;  // undo does it
+    for (const id of this.last.ids) this.takeBack(id, true);
+    return false;
+  }
+
+  /** Puts it on the canvas again: at its place (`exactly`), or where it can be seen and covers nothing. */
+  takeBack(id: string, exactly = false): void {
+    const state = this.entries.find((each) => each.id === id);
+    this.sheet?.hide();
+    if (!state) return;
+    const group = Blockly.Events.getGroup();
+    Blockly.Events.setGroup(group || true);
+    try {
+      const block = Blockly.serialization.blocks.append(structuredClone(state), this.workspace,
+        {recordUndo: true}) as Blockly.BlockSvg;
+      if (!exactly) this.place(block);
+      Blockly.getFocusManager().focusNode(block);
+    } finally {
+      Blockly.Events.setGroup(group);
+    }
+  }
+
+  private place(block: Blockly.BlockSvg): void {
+    Blockly.renderManagement.triggerQueuedRenders(this.workspace);
+    const view = this.workspace.getMetricsManager().getViewMetrics(true);
+    const shown = new Blockly.utils.Rect(view.top, view.top + view.height, view.left, view.left + view.width);
+    const {x, y} = block.getRelativeToSurfaceXY();
+    if (!shown.contains(x, y) || !shown.contains(x + APART, y + APART)) {
+      block.moveBy(view.left + APART - x, view.top + APART - y);
+    }
+    const others = this.workspace.getTopBlocks(false).filter((each) => each !== block)
+      .map((each) => each.getBoundingRectangle());
+    for (let number = 0; number < TRIES; number += 1) {
+      const mine = block.getBoundingRectangle();
+      const covered = others.find((each) => each.intersects(mine));
+      if (!covered) break;
+      block.moveBy(0, covered.bottom + APART / 2 - mine.top);
+    }
+    block.snapToGrid();
+    const now = block.getRelativeToSurfaceXY();
+    if (!shown.contains(now.x, now.y)) this.workspace.centerOnBlock(block.id);
+  }
+
+  private makeSheet(): BinSheet {
+    const options = this.workspace.copyOptionsForFlyout();
+    options.toolboxPosition = Blockly.utils.toolbox.Position.RIGHT;
+    const sheet = new BinSheet(options);
+    this.workspace.getParentSvg().after(sheet.createDom('svg'));
+    sheet.init(this.workspace);
+    bins.set(sheet.getWorkspace(), this);
+    return sheet;
+  }
+
+  private fill(sheet: BinSheet): void {
+    sheet.setTitle(t('Deleted blocks'));
+    const none = [t('Nothing was deleted here yet.'), t('Deleted blocks wait here'), t('until the behaviour is closed.')]
+      .map((text) => ({kind: 'label', text}));
+    const all = [...this.entries].reverse().map((state) => {
+      const {x: _x, y: _y, ...rest} = structuredClone(state);
+      return {kind: 'block', ...rest};
+    });
+    sheet.show((all.length ? all : none) as unknown as Blockly.utils.toolbox.FlyoutItemInfoArray);
+    sheet.scrollToStart();
+  }
+
+  private onEvent(event: Blockly.Events.Abstract): void {
+    if (event.type === Blockly.Events.BLOCK_CREATE) this.onCreate(event as Blockly.Events.BlockCreate);
+    else if (event.type === Blockly.Events.BLOCK_DELETE) this.onDelete(event as Blockly.Events.BlockDelete);
+  }
+
+  private onCreate(event: Blockly.Events.BlockCreate): void {
+    if (event.group) this.made.set(event.blockId ?? '', event.group);
+    const at = this.entries.findIndex((each) => each.id === event.blockId);
+    const [entry] = at >= 0 ? this.entries.splice(at, 1) : [];
+    if (!entry) return;
+    this.takenBack.set(entry.id ?? '', entry);
+    this.sheet?.hide();
+    this.listener.changed();
+  }
+
+  private onDelete(event: Blockly.Events.BlockDelete): void {
+    const id = event.blockId ?? '';
+    const state = event.oldJson;
+    if (!state || event.wasShadow || this.workspace.getBlockById(id)) return;
+    const cameBack = this.takenBack.delete(id);
+    // What never was more than a block in the hand is no loss, and an undone addition can be done again.
+    const loss = event.recordUndo && (this.made.get(id) !== event.group || !event.group);
+    this.made.delete(id);
+    if (!loss && !cameBack) return;
+    this.entries.push({...state, id});
+    this.entries.splice(0, this.entries.length - MOST);
+    this.show();
+    if (loss) this.tell(event.group, id, countOf(state));
+  }
+
+  private tell(group: string, id: string, count: number): void {
+    if (group !== this.last.group || !group) this.last = {group, ids: [], count: 0};
+    this.last.ids.push(id);
+    this.last.count += count;
+    window.clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => this.listener.deleted(this.last.count), TOGETHER_MS);
+  }
+
+  private show(): void {
+    this.listener.changed();
+    if (this.sheet?.isVisible()) this.fill(this.sheet);
+  }
+}
+
+/** The bin of each sheet. */
+const bins = new Map<Blockly.WorkspaceSvg, Bin>();
+
+/** How many blocks a person sees in it: the grey values in the gaps are part of what holds them. */
+function countOf(state: State): number {
+  const held = Object.values(state.inputs ?? {}).map((input) => input.block);
+  return [...held, state.next?.block].reduce((sum, each) => sum + (each ? countOf(each) : 0), 1);
+}
+
+/** Enter on a block in the sheet takes it back. */
+const act = Blockly.BlockSvg.prototype.performAction;
+Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, event?: KeyboardEvent) {
+  const bin = bins.get(this.workspace);
+  if (bin) bin.takeBack(this.getRootBlock().id);
+  else act.call(this, event);
+};
+
+/** So does a click. Blockly keeps what a click does to itself. */
+interface Clicks {
+  targetBlock: Blockly.BlockSvg | null;
+  doBlockClick(this: Clicks): void;
+}
+const clicks = Blockly.Gesture.prototype as unknown as Clicks;
+const click = clicks.doBlockClick;
+clicks.doBlockClick = function () {
+  const bin = this.targetBlock && bins.get(this.targetBlock.workspace);
+  if (bin && this.targetBlock) bin.takeBack(this.targetBlock.getRootBlock().id);
+  else click.call(this);
+};

@@ -1,0 +1,105 @@
+// A block in the hand: how near is near, where letting go deletes, and how it leaves the flyout.
+import * as Blockly from 'blockly/core';
+
+/** How near a gap has to be, in pixels of the screen; one that is offered already holds a little further. */
+const NEAR = 28;
+const HOLDS = 36;
+const USUAL = {...Blockly.config};
+
+export interface DragListener {
+  /** Letting go of a block of the canvas here, on the page, would delete it; null: it would not. */
+  overDelete(mouse: Blockly.utils.Coordinate | null): void;
+  /** A block was let go on the canvas and joined nothing; where the mouse was on the page. */
+  letGo(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void;
+}
+
+const listeners = new WeakMap<Blockly.Workspace, DragListener>();
+
+export function listenToDrags(workspace: Blockly.WorkspaceSvg, listener: DragListener): void {
+  listeners.set(workspace, listener);
+}
+
+/** Blockly keeps what a drag would join to itself. */
+interface Strategy {
+  dragStrategy?: {connectionCandidate?: unknown};
+}
+
+class Dragger extends Blockly.dragging.Dragger {
+  /** The zoom of the flyout that the block came from; 0: it was on the canvas. */
+  private readonly cameFrom = this.draggable instanceof Blockly.BlockSvg && this.draggable.workspace.isFlyout ?
+    this.draggable.workspace.scale : 0;
+  private placed = false;
+
+  override onDragStart(event?: PointerEvent | KeyboardEvent): Blockly.IDraggable {
+    const dragged = super.onDragStart(event);
+    this.setRadius();
+    return dragged;
+  }
+
+  override onDrag(event: PointerEvent | KeyboardEvent | undefined, delta: Blockly.utils.Coordinate): void {
+    this.setRadius();
+    if (event instanceof PointerEvent) this.holdWhereHeld(event, delta);
+    super.onDrag(event, delta);
+    if (event instanceof PointerEvent) this.tellDelete(this.wouldDelete(event) ? mouseOf(event) : null);
+  }
+
+  override onDragEnd(event?: PointerEvent | KeyboardEvent): void {
+    const {draggable} = this;
+    const mouse = event instanceof PointerEvent ? mouseOf(event) : null;
+    const joins = Boolean((draggable as unknown as Strategy).dragStrategy?.connectionCandidate);
+    const loose = mouse && !joins && !this.wouldDelete(event as PointerEvent);
+    const group = Blockly.Events.getGroup();
+    super.onDragEnd(event);
+    this.end();
+    if (!loose || !(draggable instanceof Blockly.BlockSvg) || draggable.isDeadOrDying()) return;
+    const before = Blockly.Events.getGroup();
+    Blockly.Events.setGroup(group);  // what follows from the drop is undone with it
+    listeners.get(draggable.workspace)?.letGo(draggable, mouse);
+    Blockly.Events.setGroup(before);
+  }
+
+  override onDragRevert(event?: PointerEvent | KeyboardEvent): void {
+    super.onDragRevert(event);
+    this.end();
+  }
+
+  /** The radius is the screen's, whatever the zoom. */
+  private setRadius(): void {
+    const {scale} = this.draggable.workspace;
+    Blockly.config.snapRadius = NEAR / scale;
+    Blockly.config.connectingSnapRadius = HOLDS / scale;
+  }
+
+  private end(): void {
+    Object.assign(Blockly.config, USUAL);
+    this.tellDelete(null);
+  }
+
+  /** The flyout has a zoom of its own: what is under the mouse there is under it here. */
+  private holdWhereHeld(event: PointerEvent, delta: Blockly.utils.Coordinate): void {
+    if (this.placed || !this.cameFrom || !(this.draggable instanceof Blockly.BlockSvg)) return;
+    this.placed = true;
+    const {workspace} = this.draggable;
+    const corner = Blockly.utils.svgMath.wsToScreenCoordinates(workspace, this.startLoc.clone());  // it scales what it is given
+    const ratio = workspace.scale / this.cameFrom;
+    const shift = (mouse: number, from: number) => (mouse - from) * (1 - ratio) / workspace.scale;
+    this.startLoc = Blockly.utils.Coordinate.sum(this.startLoc, new Blockly.utils.Coordinate(
+      shift(event.clientX - delta.x, corner.x), shift(event.clientY - delta.y, corner.y)));
+  }
+
+  private wouldDelete(event: PointerEvent): boolean {
+    return Blockly.isDeletable(this.draggable) && this.wouldDeleteDraggable(mouseOf(event), this.draggable);
+  }
+
+  /** What comes from the flyout and goes back there was never on the canvas. */
+  private tellDelete(mouse: Blockly.utils.Coordinate | null): void {
+    listeners.get(this.draggable.workspace)?.overDelete(this.cameFrom ? null : mouse);
+  }
+}
+
+function mouseOf(event: PointerEvent): Blockly.utils.Coordinate {
+  return new Blockly.utils.Coordinate(event.clientX, event.clientY);
+}
+
+export const DRAGGER = 'nep';
+Blockly.registry.register(Blockly.registry.Type.BLOCK_DRAGGER, DRAGGER, Dragger);

@@ -1,0 +1,180 @@
+// A block that was let go where it does not fit: why, in a sentence at that place, and out of the way.
+import * as Blockly from 'blockly/core';
+import {helpFor} from './help';
+import {lazy, t} from './words';
+
+const SHOWN_MS = 6000;
+/** How near a gap was meant, in pixels of the screen. */
+const NEAR = 30;
+const ASIDE = 28;
+const EMPTY_GAP = 40;
+
+const TAKES: Readonly<Record<string, string>> = {
+  Number: lazy('a number'),
+  String: lazy('a text'),
+  Boolean: lazy('yes or no'),
+  List: lazy('a list'),
+};
+
+const ANOTHER = lazy('another value');
+
+interface Refusal {
+  /** The block at whose gap, or below which, it was let go. */
+  by: Blockly.BlockSvg;
+  sentence: string;
+  /** Where that is on the canvas. */
+  place: Blockly.utils.Coordinate;
+}
+
+export class WrongDrops {
+  private readonly bubble = document.createElement('div');
+  private timer = 0;
+
+  constructor(private readonly workspace: Blockly.WorkspaceSvg) {
+    this.bubble.className = 'nepWhy';
+    this.bubble.setAttribute('role', 'status');
+    workspace.getInjectionDiv().append(this.bubble);
+    workspace.addChangeListener((event) => {
+      if (event.type === Blockly.Events.VIEWPORT_CHANGE) this.hide();
+    });
+    workspace.getInjectionDiv().addEventListener('pointerdown', () => this.hide(), true);
+  }
+
+  dispose(): void {
+    window.clearTimeout(this.timer);
+  }
+
+  /** Says why it did not join, if it was let go at something; moves it aside when it covers that. */
+  explain(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void {
+    const refusal = this.refusal(block, Blockly.utils.svgMath.screenToWsCoordinates(this.workspace, mouse));
+    if (!refusal) return;
+    const at = Blockly.utils.svgMath.wsToScreenCoordinates(this.workspace, refusal.place);
+    this.say(refusal.sentence, at);
+    this.moveAside(block, refusal.by);
+  }
+
+  hide(): void {
+    if (!this.bubble.textContent) return;
+    window.clearTimeout(this.timer);
+    this.bubble.textContent = '';
+  }
+
+  private say(sentence: string, at: Blockly.utils.Coordinate): void {
+    window.clearTimeout(this.timer);
+    this.bubble.textContent = sentence;
+    const frame = this.workspace.getInjectionDiv().getBoundingClientRect();
+    const {offsetWidth, offsetHeight} = this.bubble;
+    const left = Math.max(12, Math.min(at.x - frame.left, frame.width - offsetWidth - 12));
+    const below = at.y - frame.top + 26;
+    const top = below + offsetHeight + 12 < frame.height ? below : at.y - frame.top - offsetHeight - 26;
+    this.bubble.style.left = `${left}px`;
+    this.bubble.style.top = `${Math.max(12, top)}px`;
+    this.timer = window.setTimeout(() => this.hide(), SHOWN_MS);
+  }
+
+  private moveAside(block: Blockly.BlockSvg, by: Blockly.BlockSvg): void {
+    const mine = block.getBoundingRectangle();
+    const its = by.getBoundingRectangleWithoutChildren();
+    const inputs = by.getHeightWidth();
+    const right = Math.max(its.right, by.getRelativeToSurfaceXY().x + inputs.width);
+    its.right = right;
+    const said = this.bubble.getBoundingClientRect();
+    const corner = (x: number, y: number) =>
+      Blockly.utils.svgMath.screenToWsCoordinates(this.workspace, new Blockly.utils.Coordinate(x, y));
+    const [from, to] = [corner(said.left, said.top), corner(said.right, said.bottom)];
+    const bubble = new Blockly.utils.Rect(from.y, to.y, from.x, to.x);
+    if (mine.intersects(its)) shift(block, right + ASIDE - mine.left, mine);
+    if (mine.intersects(bubble)) shift(block, bubble.right + ASIDE - mine.left, mine);
+  }
+
+  private refusal(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): Refusal | null {
+    const own = new Set(block.getDescendants(false));
+    const near = NEAR / this.workspace.scale;
+    let best: Refusal | null = null;
+    let nearest = Infinity;
+    const look = (distance: number, make: () => Refusal | null) => {
+      if (distance >= nearest) return;
+      const made = make();
+      if (made) [best, nearest] = [made, distance];
+    };
+    const corner = block.getRelativeToSurfaceXY();
+    for (const other of this.workspace.getAllBlocks(false)) {
+      if (own.has(other) || other.isShadow() || other.isInsertionMarker() || other.isCollapsed()) continue;
+      for (const input of other.inputList) {
+        const gap = input.connection as Blockly.RenderedConnection | null;
+        if (!gap || !input.isVisible()) continue;
+        const distance = Math.min(far(corner, gap), inGap(gap, mouse) ? 0 : Infinity);
+        if (distance < near) look(distance, () => atGap(block, other, gap));
+      }
+      const end = below(other);
+      if (end && far(corner, end) < near) look(far(corner, end), () => under(block, other, end));
+    }
+    return best;
+  }
+}
+
+function shift(block: Blockly.BlockSvg, by: number, box: Blockly.utils.Rect): void {
+  block.moveBy(by, 0, ['bump']);
+  box.left += by;
+  box.right += by;
+}
+
+function far(one: {x: number; y: number}, other: {x: number; y: number}): number {
+  return Math.hypot(one.x - other.x, one.y - other.y);
+}
+
+/** Where the next block begins, or would. */
+function below(block: Blockly.BlockSvg): Blockly.utils.Coordinate | null {
+  if (block.outputConnection) return null;
+  const {x, y} = block.getRelativeToSurfaceXY();
+  const {nextConnection} = block;
+  if (nextConnection) return new Blockly.utils.Coordinate(nextConnection.x, nextConnection.y);
+  return new Blockly.utils.Coordinate(x, y + block.getHeightWidth().height);
+}
+
+/** Whether the mouse is in a gap for a value. */
+function inGap(gap: Blockly.RenderedConnection, mouse: Blockly.utils.Coordinate): boolean {
+  if (gap.type !== Blockly.ConnectionType.INPUT_VALUE) return false;
+  const held = gap.targetBlock();
+  if (held && !held.isShadow()) return false;
+  const size = held?.getHeightWidth() ?? {width: EMPTY_GAP, height: EMPTY_GAP};
+  return mouse.x > gap.x && mouse.x < gap.x + size.width && mouse.y > gap.y - 4 && mouse.y < gap.y + size.height;
+}
+
+function atGap(block: Blockly.BlockSvg, other: Blockly.BlockSvg, gap: Blockly.RenderedConnection): Refusal | null {
+  const place = new Blockly.utils.Coordinate(gap.x, gap.y);
+  const name = nameOf(block);
+  if (gap.type === Blockly.ConnectionType.NEXT_STATEMENT) {
+    return block.outputConnection ? {by: other, place, sentence: isValue(name)} : null;
+  }
+  if (!block.outputConnection) {
+    return {by: other, place, sentence: t('“{block}” gives no value, so no gap takes it. Put it below another block.', {block: name})};
+  }
+  const check = gap.getCheck();
+  const gives = block.outputConnection.getCheck();
+  if (!check || !gives || check.some((each) => gives.includes(each))) return null;
+  const kind = check[0] ?? '';
+  const what = t(TAKES[kind] ?? ANOTHER);
+  const owner = helpFor(other.type)?.name;
+  const sentence = owner ? t('“{block}” needs {what} here', {block: owner, what}) : t('This gap takes {what}', {what});
+  return {by: other, place, sentence};
+}
+
+function under(block: Blockly.BlockSvg, other: Blockly.BlockSvg, place: Blockly.utils.Coordinate): Refusal | null {
+  const name = nameOf(block);
+  if (block.outputConnection) return {by: other, place, sentence: isValue(name)};
+  if (!block.previousConnection) {
+    return {by: other, place, sentence: t('“{block}” begins a script, so it stands alone', {block: name})};
+  }
+  if (!other.nextConnection) return {by: other, place, sentence: t('Nothing can follow “{block}”', {block: nameOf(other)})};
+  if (block.nextConnection || !other.getNextBlock()) return null;
+  return {by: other, place, sentence: t('Nothing can follow “{block}”. Put it at the end.', {block: name})};
+}
+
+function isValue(name: string): string {
+  return t('“{block}” is a value. Put it into a gap of another block.', {block: name});
+}
+
+function nameOf(block: Blockly.BlockSvg): string {
+  return helpFor(block.type)?.name || t('this block');
+}

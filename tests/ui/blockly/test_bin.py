@@ -1,0 +1,203 @@
+"""Deleting by dragging, and the bin from which everything can be taken back."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+
+from tests.ui.blockly_person import START, WAIT_MS, Person, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+WAITS = {
+    "type": "control_wait",
+    "id": "one",
+    "x": 84,
+    "y": 224,
+    "next": {"block": {"type": "control_wait", "id": "two"}},
+}
+HINT = "!document.querySelector('.nepDropHere').hidden"
+IN_BIN = (
+    "[...document.querySelectorAll('.nepSheet .blocklyBlockCanvas > .blocklyBlock')].map(e => e.dataset.id)"
+)
+SHEET = "getComputedStyle(document.querySelector('.blocklyFlyout.nepSheet')).display"
+TOOLBOX = QPoint(100, 560)
+
+
+@pytest.fixture
+def them(person) -> Person:
+    return person(state=workspace(START, WAITS))
+
+
+@pytest.fixture
+def told(view) -> list[int]:
+    counts: list[int] = []
+    view.blocks_deleted.connect(counts.append)
+    return counts
+
+
+def ids(them: Person) -> list[str]:
+    return sorted(top["id"] for top in them.tops())
+
+
+def delete_the_hat(them: Person) -> None:
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    them.press(Qt.Key_Delete)
+    them.wait_for("!document.querySelector('[data-id=start]')")
+
+
+def open_bin(them: Person) -> None:
+    them.click(".nepBin")
+    them.wait_for(SHEET, "block")
+
+
+def centre(them: Person, selector: str) -> QPoint:
+    box = them.box(selector)
+    return QPoint(round(box["left"] + box["right"]) // 2, round(box["top"] + box["bottom"]) // 2)
+
+
+def test_a_block_over_the_toolbox_sees_the_bin_and_goes_with_an_offer(qtbot, view, them, told):
+    start = them.hold("[data-id=one] > .blocklyPath")
+    them.move(start, QPoint(500, 300))
+    assert them.ask(HINT) is False
+    them.move(QPoint(500, 300), TOOLBOX)
+    them.wait_for(HINT)
+    assert "Drop here to delete" in them.ask("document.querySelector('.nepDropHere').textContent")
+    assert them.ask("getComputedStyle(document.querySelector('.blocklyDragging')).opacity") == "0.5"
+    them.move(TOOLBOX, QPoint(500, 300))
+    them.wait_for(HINT, False)
+    them.move(QPoint(500, 300), TOOLBOX)
+    them.drop(TOOLBOX)
+    qtbot.waitUntil(lambda: told == [2], timeout=WAIT_MS)
+    assert them.ask(HINT) is False
+    assert ids(them) == ["start"]
+    view.undo_deletion()
+    qtbot.waitUntil(lambda: ids(them) == ["one", "start"], timeout=WAIT_MS)
+
+
+def test_the_open_blocks_delete_as_well(qtbot, view, them, told):
+    view.set_toolbox_pinned(True)
+    them.box(".nepCategory.blocklyFlyout .blocklyBlock")
+    right = them.box(".nepCategory.blocklyFlyout")["right"]
+    end = QPoint(round(right) - 30, 400)
+    start = them.hold("[data-id=one] > .blocklyPath")
+    them.move(start, end)
+    them.wait_for(HINT)
+    them.drop(end)
+    qtbot.waitUntil(lambda: told == [2], timeout=WAIT_MS)
+
+
+def test_a_block_that_goes_back_to_the_toolbox_is_no_deletion(qtbot, view, them, told):
+    them.open_category("Control")
+    start = them.hold(".nepCategory .control_wait")
+    them.move(start, QPoint(600, 300))
+    them.move(QPoint(600, 300), TOOLBOX)
+    them.wait_for("!!document.querySelector('.blocklyDraggingDelete')")
+    assert them.ask(HINT) is False
+    them.drop(TOOLBOX)
+    them.wait_for("!document.querySelector('.blocklyDragging')")
+    open_bin(them)
+    assert them.ask(IN_BIN) == []
+    assert told == []
+
+
+def test_dropping_on_the_bin_deletes_and_the_newest_is_first_in_it(qtbot, view, them, told):
+    delete_the_hat(them)
+    bin_ = centre(them, ".nepBin")
+    start = them.hold("[data-id=one] > .blocklyPath")
+    them.move(start, bin_)
+    them.wait_for("document.querySelector('.nepBin').classList.contains('nepOver')")
+    assert them.ask(HINT) is False
+    them.drop(bin_)
+    qtbot.waitUntil(lambda: told == [1, 2], timeout=WAIT_MS)
+    assert them.ask("document.querySelector('.nepBin').title") == "Deleted blocks (2)"
+    open_bin(them)
+    them.wait_for(IN_BIN, ["one", "start"])
+
+
+def test_a_click_in_the_bin_brings_it_back_to_where_it_can_be_seen(qtbot, view, them, told):
+    start = them.hold("[data-id=one] > .blocklyPath")
+    them.move(start, TOOLBOX)
+    them.drop(TOOLBOX)
+    qtbot.waitUntil(lambda: told == [2], timeout=WAIT_MS)
+    open_bin(them)
+    them.click(".nepSheet [data-id=one] > .blocklyPath")
+    them.wait_for(SHEET, "none")
+    qtbot.waitUntil(lambda: ids(them) == ["one", "start"], timeout=WAIT_MS)
+    box = them.box(".blocklyMainBackground ~ .blocklyWorkspace [data-id=one], [data-id=one] > .blocklyPath")
+    hat = them.box("[data-id=start] > .blocklyPath")
+    assert box["left"] > 196
+    assert box["top"] > hat["bottom"] or box["left"] > hat["right"]
+    open_bin(them)
+    assert them.ask(IN_BIN) == []
+    view.undo()
+    qtbot.waitUntil(lambda: ids(them) == ["start"], timeout=WAIT_MS)
+
+
+def test_dragged_out_of_the_bin_it_is_on_the_canvas(qtbot, them):
+    delete_the_hat(them)
+    open_bin(them)
+    them.drag(".nepSheet [data-id=start] > .blocklyPath", QPoint(500, 400))
+    qtbot.waitUntil(lambda: ids(them) == ["one", "start"], timeout=WAIT_MS)
+    them.wait_for(SHEET, "none")
+
+
+def test_the_bin_works_with_keys_alone(qtbot, them):
+    delete_the_hat(them)
+    them.ask("document.querySelector('.nepBin').focus()")
+    them.press(Qt.Key_Return)
+    them.wait_for("document.activeElement.closest('.nepSheet [data-id=start]') !== null")
+    them.press(Qt.Key_Escape)
+    them.wait_for(SHEET, "none")
+    them.ask("document.querySelector('.nepBin').focus()")
+    them.press(Qt.Key_Return)
+    them.wait_for("document.activeElement.closest('.nepSheet [data-id=start]') !== null")
+    them.press(Qt.Key_Return)
+    qtbot.waitUntil(lambda: ids(them) == ["one", "start"], timeout=WAIT_MS)
+    them.wait_for("document.activeElement.closest('[data-id=start]') !== null")
+
+
+def test_undo_empties_the_bin_and_redo_fills_it_again(qtbot, view, them, told):
+    delete_the_hat(them)
+    full = "document.querySelector('.nepBin').classList.contains('nepFull')"
+    them.wait_for(full)
+    view.undo()
+    them.wait_for(full, False)
+    view.redo()
+    them.wait_for(full)
+    assert told == [1]
+
+
+def test_what_an_undo_takes_away_was_not_deleted(qtbot, view, them, told):
+    them.open_category("Control")
+    them.drag(".nepCategory .control_wait", QPoint(700, 300))
+    qtbot.waitUntil(lambda: len(them.tops()) == 3, timeout=WAIT_MS)
+    view.undo()
+    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
+    open_bin(them)
+    assert (them.ask(IN_BIN), told) == ([], [])
+
+
+def test_what_was_deleted_comes_back_although_other_edits_came_after_it(qtbot, view, them, told):
+    delete_the_hat(them)
+    qtbot.waitUntil(lambda: told == [1], timeout=WAIT_MS)
+    them.drag("[data-id=one] > .blocklyPath", QPoint(700, 400))
+    qtbot.waitUntil(lambda: them.tops()[0]["x"] > 300, timeout=WAIT_MS)
+    view.undo_deletion()
+    qtbot.waitUntil(lambda: ids(them) == ["one", "start"], timeout=WAIT_MS)
+    assert all(top["x"] > 300 for top in them.tops() if top["id"] == "one")
+
+
+def test_the_bin_keeps_the_last_fifty_of_its_own_behaviour(qtbot, view, them):
+    many = [START | {"id": f"s{n}", "x": 60 * (n % 10), "y": 90 * (n // 10)} for n in range(53)]
+    view.show_tab("many", workspace(*many))
+    them.wait_for("!!document.querySelector('[data-id=s52]')")
+    for number in range(53):
+        view.show_block(f"s{number}")
+        them.wait_for(f"document.activeElement.closest('[data-id=s{number}]') !== null")
+        them.press(Qt.Key_Delete)
+        them.wait_for(f"!document.querySelector('[data-id=s{number}]')")
+    assert them.ask("document.querySelector('.nepBin').title") == "Deleted blocks (50)"
+    view.show_tab("other", workspace(START))
+    them.wait_for("document.querySelector('.nepBin').title", "Deleted blocks")

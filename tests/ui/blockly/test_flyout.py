@@ -1,0 +1,192 @@
+"""The blocks of a category: they stay open when that is wanted, are readable, and take what is chosen."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from app.blocks import editor_definitions
+from tests.blocks.samples import nao, robot
+from tests.ui.blockly_person import START, WAIT_MS, Person, editor, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+WIDE, NARROW = 1320, 1000
+SHOWN = "getComputedStyle(document.querySelector('.nepTab:not([hidden]) .nepCategory.blocklyFlyout')).display"
+TITLE = "document.querySelector('.nepCategory.nepFlyoutHead span').textContent"
+PIN = ".nepCategory.nepFlyoutHead button"
+TURN = ".blocklyFlyout .robot_pepper_do_turn"
+CANVAS = QPoint(850, 500)
+
+
+@pytest.fixture
+def opened(qtbot):
+    """A function that shows the start block at a width; a robot whose blocks are wide is connected."""
+
+    def show(width: int, *blocks: dict, pinned: bool | None = None) -> Person:
+        view = editor(qtbot, editor_definitions([robot("Pepper"), nao()]), width, 640)
+        view.set_toolbox_pinned(pinned)
+        view.load(workspace(START, *blocks))
+        with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
+            view.show()
+        them = Person(qtbot, view)
+        them.box(".nepSearch")
+        return them
+
+    return show
+
+
+def click_canvas(them: Person) -> None:
+    QTest.mouseClick(them.target, Qt.LeftButton, pos=CANVAS)
+
+
+def test_on_a_wide_page_the_first_category_is_open_and_stays(qtbot, opened):
+    them = opened(WIDE)
+    them.box(".blocklyFlyout .events_started")
+    assert them.ask(TITLE) == "Events"
+    click_canvas(them)
+    them.open_category("Movement")
+    them.drag(TURN, CANVAS)
+    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
+    click_canvas(them)
+    assert (them.ask(SHOWN), them.ask(TITLE)) == ("block", "Movement")
+
+
+def test_on_a_narrow_page_it_closes_after_each_use(qtbot, opened):
+    them = opened(NARROW)
+    assert them.ask(SHOWN) == "none"
+    them.open_category("Movement")
+    them.drag(TURN, CANVAS)
+    them.wait_for(SHOWN, "none")
+    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
+
+
+def test_it_opens_and_closes_by_itself_with_the_width_of_the_page(opened):
+    them = opened(NARROW)
+    them.view.resize(WIDE, 640)
+    them.wait_for(SHOWN, "block")
+    them.view.resize(NARROW, 640)
+    them.wait_for(SHOWN, "none")
+
+
+def test_the_pin_is_a_choice_that_is_told_and_kept_whatever_the_width(qtbot, opened):
+    them = opened(WIDE)
+    with qtbot.waitSignal(them.view.toolbox_pinned, timeout=WAIT_MS) as told:
+        them.click(PIN)
+    assert told.args == [False]
+    them.wait_for(SHOWN, "block")
+    click_canvas(them)
+    them.wait_for(SHOWN, "none")
+    them.open_category("Control")
+    with qtbot.waitSignal(them.view.toolbox_pinned, timeout=WAIT_MS) as told:
+        them.click(PIN)
+    assert told.args == [True]
+    them.view.resize(NARROW, 640)
+    click_canvas(them)
+    assert them.ask(SHOWN) == "block"
+
+
+def test_what_was_chosen_at_the_last_start_counts(opened):
+    assert opened(WIDE, pinned=False).ask(SHOWN) == "none"
+    them = opened(NARROW, pinned=True)
+    them.wait_for(SHOWN, "block")
+
+
+def test_everything_is_shown_beside_the_open_blocks(opened):
+    far = {"type": "events_started", "id": "far", "x": 1500, "y": 900}
+    them = opened(WIDE, far)
+    right = them.box(".blocklyFlyout")["right"]
+    assert them.box("[data-id=start] > .blocklyPath")["left"] > right
+    them.view.zoom_to_fit()
+    them.wait_for("document.querySelector('[data-id=far]').getBoundingClientRect().right < innerWidth")
+    assert them.box("[data-id=start] > .blocklyPath")["left"] > right
+
+
+def test_the_blocks_are_as_large_at_any_zoom_and_come_out_under_the_mouse(opened):
+    them = opened(WIDE)
+    them.open_category("Movement")
+    before = them.box(f"{TURN} > .blocklyPath")
+    them.view.zoom_out()
+    them.view.zoom_out()
+    start = "document.querySelector('[data-id=start]').getBoundingClientRect().height"
+    full = them.ask(start)
+    them.view.zoom_out()
+    them.wait_for(f"{start} < {full}")
+    assert them.box(f"{TURN} > .blocklyPath") == before
+    held = them.hold(f"{TURN} > .blocklyPath")
+    them.move(held, CANVAS)
+    shape = "document.querySelector('.blocklyDragging > .blocklyPath')"
+    them.wait_for(f"{shape}.getBoundingClientRect().left > 800")
+    box = them.box(".blocklyDragging > .blocklyPath")
+    them.drop(CANVAS)
+    assert box["left"] < CANVAS.x() < box["left"] + 13
+    assert box["top"] < CANVAS.y() < box["bottom"]
+
+
+def test_wide_blocks_are_whole_or_can_be_scrolled_to(opened):
+    them = opened(WIDE)
+    paths = (
+        "[...document.querySelectorAll('.blocklyFlyout .blocklyBlockCanvas > .blocklyBlock')]"
+        ".map(each => each.getBoundingClientRect().right)"
+    )
+    assert max(them.ask(paths)) < them.box(".blocklyFlyout")["right"]
+    them.view.resize(700, 640)
+    them.open_category("Events")
+    them.view.resize(640, 640)
+    them.wait_for("document.querySelector('.blocklyFlyout').getBoundingClientRect().width < 640 * .46 + 26")
+    wide = max(them.ask(paths))
+    assert wide > them.box(".blocklyFlyout")["right"]
+    them.ask(
+        "document.querySelector('.blocklyFlyout .events_message').dispatchEvent("
+        "new WheelEvent('wheel', {deltaX: 400, bubbles: true, cancelable: true}))"
+    )
+    them.wait_for(
+        f"Math.max(...{paths}) < document.querySelector('.blocklyFlyout').getBoundingClientRect().right"
+    )
+
+
+@pytest.mark.parametrize("width", [WIDE, NARROW])
+def test_no_scrollbar_of_the_canvas_lies_over_the_blocks(opened, width):
+    them = opened(width)
+    them.open_category("Movement")
+    box = them.box(".blocklyFlyout")
+    over = "document.elementsFromPoint({x}, {y})[0].closest('.blocklyMainWorkspaceScrollbar') !== null"
+    for x in range(round(box["left"]) + 6, round(box["right"]), 20):
+        assert not them.ask(over.format(x=x, y=633))
+
+
+@pytest.mark.parametrize("width", [WIDE, NARROW])
+def test_a_choice_in_the_flyout_is_what_is_dragged_out_next(qtbot, opened, width):
+    them = opened(width)
+    them.open_category("Movement")
+    them.ask(
+        f"[...document.querySelectorAll('{TURN} .blocklyDropdownField')]"
+        ".find(each => each.textContent.includes('left')).setAttribute('data-test', 'way')"
+    )
+    them.click("[data-test=way]", dx=8, dy=10)
+    them.wait_for("document.querySelector('.blocklyDropDownDiv')?.textContent.includes('right')")
+    them.press(Qt.Key_Down)
+    them.press(Qt.Key_Return)
+    them.wait_for(f"document.querySelector('{TURN}').textContent.includes('right')")
+    assert len(them.tops()) == 1
+    them.drag(f"{TURN} > .blocklyPath", CANVAS)
+    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
+    assert them.tops()[1]["fields"]["DIRECTION"] == "right"
+
+
+@pytest.mark.parametrize("width", [WIDE, NARROW])
+def test_a_new_variable_is_offered_at_once(qtbot, opened, width):
+    them = opened(width)
+    them.open_category("Variables")
+    with qtbot.waitSignal(them.view.command_wanted, timeout=WAIT_MS) as asked:
+        them.click(".blocklyFlyoutButton")
+    assert asked.args == ["variable.new"]
+    them.view.edit_variable({"do": "new", "name": "steps"})
+    gets = "[...document.querySelectorAll('.blocklyFlyout .variables_get')].map(e => e.textContent.trim())"
+    them.wait_for(f"{gets}.join().includes('steps')")
+    assert them.ask(SHOWN) == "block"
+    assert "steps" in them.ask("document.querySelector('.blocklyFlyout .variables_set').textContent")
+    them.view.undo()
+    them.wait_for(f"{gets}.join().includes('steps')", False)

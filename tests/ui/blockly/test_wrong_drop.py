@@ -1,0 +1,110 @@
+"""A block that is let go where it does not fit says why; one that fits is caught from afar."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint
+
+from app.blocks import editor_definitions
+from tests.blocks.samples import number, robot
+from tests.ui.blockly_person import START, WAIT_MS, Person, editor, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+SAID = "document.querySelector('.nepWhy').textContent"
+TURN = {
+    "type": "robot_pepper_do_turn",
+    "id": "turn",
+    "x": 56,
+    "y": 196,
+    "inputs": {"ANGLE": {"shadow": number(90) | {"id": "angle"}}},
+}
+EVER = {"type": "control_forever", "id": "ever", "x": 56, "y": 392}
+FACE = {"type": "robot_pepper_get_sees_face", "id": "face", "x": 560, "y": 56}
+BATTERY = {"type": "robot_pepper_get_battery", "id": "battery", "x": 560, "y": 336}
+IF = {"type": "control_if", "id": "if", "x": 56, "y": 616}
+NEAR = 24
+
+
+@pytest.fixture
+def view(qtbot):
+    return editor(qtbot, editor_definitions([robot()]), 1031, 640)
+
+
+@pytest.fixture
+def them(person) -> Person:
+    return person(state=workspace(START, TURN, EVER, FACE, BATTERY, IF))
+
+
+def drop(them: Person, id: str, target: QPoint) -> None:
+    """Let its top left corner go a few pixels from there."""
+    box = them.box(f"[data-id={id}] > .blocklyPath")
+    start = them.hold(f"[data-id={id}] > .blocklyPath")
+    end = target + start - QPoint(round(box["left"]), round(box["top"]))
+    them.move(start, end)
+    them.drop(end)
+
+
+def corner(them: Person, selector: str, side: str = "top") -> QPoint:
+    box = them.box(selector)
+    return QPoint(round(box["left"]), round(box[side]))
+
+
+@pytest.mark.parametrize(
+    ("id", "selector", "side", "words"),
+    [
+        ("face", "[data-id=angle] > .blocklyPath", "top", "“turn … by” needs a number here"),
+        ("battery", "[data-id=if] > .blocklyOutlinePath", "top", "“if” needs yes or no here"),
+        (
+            "ever",
+            "[data-id=angle] > .blocklyPath",
+            "top",
+            "“repeat forever” gives no value, so no gap takes it.",
+        ),
+        ("turn", "[data-id=ever] > .blocklyPath", "bottom", "Nothing can follow “repeat forever”"),
+        ("battery", "[data-id=start] > .blocklyPath", "bottom", "“battery” is a value. Put it into a gap"),
+        ("start", "[data-id=turn] > .blocklyPath", "bottom", "“when started” begins a script"),
+    ],
+)
+def test_a_wrong_drop_says_why_and_uncovers_the_place(qtbot, them, id, selector, side, words):
+    before = them.newest()
+    place = corner(them, selector, side)
+    drop(them, id, place)
+    them.wait_for(f"{SAID}.startsWith({words!r})")
+    assert them.ask("document.querySelector('.nepWhy').getAttribute('role')") == "status"
+    mine = them.box(f"[data-id={id}] > .blocklyPath")
+    assert mine["left"] > place.x() + 20 or mine["top"] > place.y() + 20
+    bubble = them.box(".nepWhy")
+    assert abs(bubble["left"] - place.x()) < 80
+    assert abs(bubble["top"] - place.y()) < 90
+    them.view.undo()
+    qtbot.waitUntil(lambda: them.newest() == before, timeout=WAIT_MS)
+
+
+def test_the_sentence_goes_with_the_next_touch(them):
+    drop(them, "face", corner(them, "[data-id=angle] > .blocklyPath"))
+    them.wait_for(f"{SAID} !== ''")
+    them.click("[data-id=ever] > .blocklyPath")
+    them.wait_for(SAID, "")
+
+
+def test_a_drop_on_the_empty_canvas_says_nothing(qtbot, them):
+    drop(them, "face", QPoint(700, 560))
+    qtbot.waitUntil(lambda: them.ask("document.querySelector('.blocklyDragging')") is None, timeout=WAIT_MS)
+    assert them.ask(SAID) == ""
+
+
+@pytest.mark.parametrize("zooms", [-4, 0, 3])
+def test_a_block_snaps_from_as_far_on_the_screen_at_every_zoom(qtbot, view, them, zooms):
+    for _ in range(abs(zooms)):
+        (view.zoom_in if zooms > 0 else view.zoom_out)()
+    view.show_block("turn")
+    end = corner(them, "[data-id=start] > .blocklyPath", "bottom")
+    drop(them, "turn", end + QPoint(NEAR, 0))
+    qtbot.waitUntil(lambda: nested(them, "start") == "robot_pepper_do_turn", timeout=WAIT_MS)
+
+
+def nested(them: Person, id: str) -> str | None:
+    top = next(each for each in them.tops() if each["id"] == id)
+    return top.get("next", {}).get("block", {}).get("type")
