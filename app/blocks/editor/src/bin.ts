@@ -263,15 +263,9 @@ Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, eve
   else act.call(this, event);
 };
 
-/** So does a click. Blockly keeps what a click does to itself. */
-interface Clicks {
-  targetBlock: Blockly.BlockSvg | null;
-  doBlockClick(this: Clicks): void;
+/** So does a click: whether this block was one in a sheet. */
+export function takeBackClicked(block: Blockly.BlockSvg | null): boolean {
+  const bin = block && bins.get(block.workspace);
+  if (bin) bin.takeBack(block.getRootBlock().id);
+  return Boolean(bin);
 }
-const clicks = Blockly.Gesture.prototype as unknown as Clicks;
-const click = clicks.doBlockClick;
-clicks.doBlockClick = function () {
-  const bin = this.targetBlock && bins.get(this.targetBlock.workspace);
-  if (bin && this.targetBlock) bin.takeBack(this.targetBlock.getRootBlock().id);
-  else click.call(this);
-};

@@ -1,5 +1,6 @@
 // Trying blocks at once, as in Scratch: a click on a block of the toolbox, "Run from here" for one in the behaviour.
 import * as Blockly from 'blockly/core';
+import {takeBackClicked} from './bin';
 import {focusedBlock} from './help';
 import {drawIcon} from './icons';
 import {ctrl} from './keys';
@@ -76,6 +77,7 @@ export function registerTries(tell: Tell): void {
   const click = gestures.doBlockClick;
   // Blockly puts a copy into the program; a person who clicks wants to see what the block does.
   gestures.doBlockClick = function (this: Clicks) {
+    if (takeBackClicked(this.targetBlock)) return;
     const block = this.flyout ? meant(this.targetBlock) : null;
     if (canTry(block)) tryBlock(block);
     else if (!this.flyout) click.call(this);
