@@ -81,8 +81,9 @@ class VirtualPepper(Acting):
     ) -> Mapping[str, object]:
         """Say a text; the words stand in a bubble for as long as they take."""
         with self._life.changed:
-            self.voice = (volume, language)
-            speech = self._life.body.say(text)
+            body = self._life.body
+            body.volume, body.language = volume, language
+            speech = body.say(text)
         try:
             call.feedback(word=speech.word)
             while not call.until(lambda: speech.done, for_s=FEEDBACK_S):

@@ -92,7 +92,6 @@ class Acting(Senses):
 
     def __init__(self, link: Link) -> None:
         self._life = Simulation(Body(room=self.start_room), link, MonotonicClock())
-        self.voice: tuple[int, str] = (60, "en")
         link.on_world(self._life.act)
         self._life.start()
 

@@ -78,6 +78,8 @@ class Body:
     touched: dict[str, float] = field(default_factory=dict)
     """Where hands are now, and for how many seconds they have been there."""
     heard: str = ""
+    volume: int = 60
+    language: str = "en"
     held: bool = False
     """Whether a person holds it up: its base does not move."""
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))

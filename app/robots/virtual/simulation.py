@@ -245,6 +245,8 @@ def drawable(body: Body) -> dict[str, object]:
         "head_pitch_deg": round(body.head_pitch.angle, 1),
         "speech": body.speech,
         "spoken": round(body.spoken, 2),
+        "language": body.language,
+        "volume": body.volume,
         "eyes": body.eyes,
         "shoulders": body.shoulders,
         "emotion": body.emotion,

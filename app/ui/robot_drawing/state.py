@@ -39,8 +39,9 @@ class RobotState:
     ``x``, ``y`` in m, ``theta_deg`` 0 looks along x, at the person, and grows to the robot's left. Head yaw
     grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
     ``figure`` is how it looks, ``pepper`` or ``turtle``; ``bumped`` is the side that touches something,
-    ``spoken`` how much of its words it has said (0 to 1). ``held`` says that a person holds it up, ``shared``
-    that its room is the one that all virtual robots share.
+    ``spoken`` how much of its words it has said (0 to 1), in which
+    ``language`` (a code) and how loudly (``volume``, 0 to 1). ``held`` says that a person holds it up,
+    ``shared`` that its room is the one that all virtual robots share.
     """
 
     x: float = 0.0
@@ -50,6 +51,8 @@ class RobotState:
     head_pitch_deg: float = 0.0
     speech: str | None = None
     spoken: float = 0.0
+    language: str = "en"
+    volume: float = 0.6
     eyes: str = EYES
     shoulders: str = SHOULDERS
     emotion: str = "neutral"
@@ -76,6 +79,8 @@ class RobotState:
             head_pitch_deg=_number(data.get("head_pitch_deg")),
             speech=speech if isinstance(speech, str) and speech.strip() else None,
             spoken=min(1.0, max(0.0, _number(data.get("spoken")))),
+            language=str(data.get("language") or "en"),
+            volume=min(1.0, max(0.0, _number(data.get("volume"), 60.0) / 100)),
             eyes=_colour(data.get("eyes"), EYES),
             shoulders=_colour(data.get("shoulders"), SHOULDERS),
             emotion=str(data.get("emotion") or "neutral"),

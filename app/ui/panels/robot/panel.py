@@ -11,7 +11,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.robots.awaited import awaited_values
-from app.errors import RobotUnknownError
+from app.errors import RobotUnknownError, SettingsError
 from app.robots.description.description import Event
 from app.robots.virtual.room import Ball, Box, Room
 from app.robots.virtual.room_map import kind_of
@@ -21,6 +21,7 @@ from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robot.large_room import LargeRoom
 from app.ui.panels.robot.room_view import RoomView
 from app.ui.panels.robot.say_bar import SayBar
+from app.ui.panels.robot.voice import QtSpeaker, RobotVoices
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from app.core.network.watches import Suspendable, Watch
     from app.core.robots.robot_link import RobotLink
 
+SOUND = "robots_heard"
 STALE_AFTER_S = 2.0
 """A virtual robot tells how it is many times a second, also when it does nothing."""
 
@@ -116,7 +118,12 @@ class RobotPanel(OneRobotPanel):
         column.setSpacing(0)
         column.addWidget(self.view, 1)
         column.addWidget(self.say)
-        self.stage, self._column = stage, column
+        self.stage = stage
+        self.sound = IconButton(self.theme, "volume-2", _("Hear the robots"), size=26)
+        self.sound.clicked.connect(self._switch_sound)
+        self.say.add(self.sound)
+        self._show_sound()
+        self.voices = RobotVoices(QtSpeaker(), lambda: self.session.settings.get(SOUND, True))
         self._large: LargeRoom | None = None
         self._things: tuple[int, tuple[Thing, ...]] = (-1, ())
         self._looks: dict[str, Watch] = {}
@@ -134,6 +141,7 @@ class RobotPanel(OneRobotPanel):
             if link.drawing is not self._told:
                 self._told, self._told_s = link.drawing, now
             self._show_room(link)
+            self._speak(link)
             self.view.set_stale(not link.connected or link.mute or now - self._told_s > STALE_AFTER_S)
             if self._large is None:
                 self.pages.setCurrentWidget(self.stage)
@@ -180,6 +188,17 @@ class RobotPanel(OneRobotPanel):
         documents = [shown, *(each for each in self.session.documents if each is not shown)]
         return awaited_values((each.workspace for each in documents), link.robot, event, name)
 
+    def _switch_sound(self) -> None:
+        """Robots are heard from now on, or not any more; their words stand in their bubbles all the same."""
+        with suppress(SettingsError):
+            self.session.settings.set(SOUND, not self.session.settings.get(SOUND, True))
+        self._show_sound()
+
+    def _show_sound(self) -> None:
+        on = self.session.settings.get(SOUND, True)
+        self.sound.set_icon("volume-2" if on else "volume-x")
+        self.sound.set_name(_("Mute the robots") if on else _("Hear the robots"))
+
     # -- the room -----------------------------------------------------------------------------------
 
     def _show_room(self, link: RobotLink) -> None:
@@ -197,6 +216,12 @@ class RobotPanel(OneRobotPanel):
             if other.drawing is not None and not other.mute and RobotState.parse(other.drawing).shared
         ]
         self.view.show_state(drawing, others, self._things[1])
+
+    def _speak(self, link: RobotLink) -> None:
+        """Let virtual robots be heard that are in the picture, and are there."""
+        heard = {name or link.name: state for name, state in (("", self.view.state), *self.view.others)}
+        there = link.virtual and link.connected and not link.mute
+        self.voices.follow(heard if there else {})
 
     def _others(self, link: RobotLink) -> list[RobotLink]:
         """The other virtual robots that are there; each is watched while the panel shows."""
@@ -293,6 +318,7 @@ class RobotPanel(OneRobotPanel):
 
     def shut(self) -> None:
         super().shut()
+        self.voices.silence()
         for watch in self._looks.values():
             watch.close()
         self._looks.clear()
