@@ -102,19 +102,19 @@ from nep.i18n import _
 from nep.system.streams import prepare_streams
 
 __all__ = [
-    "absolute", "add_item", "arc_cosine", "arc_sine", "arc_tangent", "average_of", "backwards",
-    "broadcast", "broadcast_and_wait", "clear_list", "contains", "copy_of", "cosine", "counting",
-    "e_to_the", "each", "ends_with", "fail", "has_in_it", "has_number", "in_capitals", "in_small_letters",
-    "insert_item", "is_divisible", "is_empty", "is_empty_list", "is_even", "is_known", "is_negative",
-    "is_odd", "is_positive", "is_whole", "item", "join", "join_items", "larger", "largest_of", "length",
-    "letter", "limited", "logarithm", "mapped", "middle_of", "natural_logarithm", "new_list", "newest",
-    "now", "number_in", "on_broadcast", "on_message", "on_start", "on_true", "part", "part_of_list",
-    "part_of_text", "position", "position_in_text", "publish", "random_number", "remove_item", "repeat",
-    "replaced", "reset_timer", "robot", "rounded", "rounded_down", "rounded_to", "rounded_up", "run",
-    "same_words", "seconds_since", "set_item", "shuffled", "sign", "sine", "smaller", "smallest_of",
-    "sorted_down", "sorted_up", "split_text", "square_root", "starts_with", "stop_others", "stop_program",
-    "stop_script", "sum_of", "tangent", "ten_to_the", "timer", "turned_round", "wait", "wait_until",
-    "without_spaces_around", "write",
+    "absolute", "add_item", "answer", "arc_cosine", "arc_sine", "arc_tangent", "ask", "average_of",
+    "backwards", "broadcast", "broadcast_and_wait", "clear_list", "contains", "copy_of", "cosine",
+    "counting", "e_to_the", "each", "ends_with", "fail", "has_in_it", "has_number", "in_capitals",
+    "in_small_letters", "insert_item", "is_divisible", "is_empty", "is_empty_list", "is_even", "is_known",
+    "is_negative", "is_odd", "is_positive", "is_whole", "item", "join", "join_items", "larger",
+    "largest_of", "length", "letter", "limited", "logarithm", "mapped", "middle_of", "natural_logarithm",
+    "new_list", "newest", "now", "number_in", "on_broadcast", "on_message", "on_start", "on_true", "part",
+    "part_of_list", "part_of_text", "position", "position_in_text", "publish", "random_number",
+    "remove_item", "repeat", "replaced", "reset_timer", "robot", "rounded", "rounded_down", "rounded_to",
+    "rounded_up", "run", "same_words", "seconds_since", "set_item", "shuffled", "sign", "sine", "smaller",
+    "smallest_of", "sorted_down", "sorted_up", "split_text", "square_root", "starts_with", "stop_others",
+    "stop_program", "stop_script", "sum_of", "tangent", "ten_to_the", "timer", "turned_round", "wait",
+    "wait_until", "without_spaces_around", "write",
 ]  # fmt: skip
 
 
@@ -124,6 +124,8 @@ def _say(line: str) -> None:
 
 _runtime = Runtime(_say)
 
+answer = _runtime.answer
+ask = _runtime.ask
 broadcast = _runtime.broadcast
 broadcast_and_wait = _runtime.broadcast_and_wait
 fail = _runtime.fail

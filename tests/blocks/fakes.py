@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program
 from app.blocks.runtime.link import RobotCall
+from app.blocks.runtime.questions import ProgramQuestion
 from app.blocks.runtime.runtime import Runtime
 from app.robots.description.description import Robot
 from tests.blocks.samples import robot
@@ -83,12 +84,19 @@ class Play:
     """A program that runs in this process."""
 
     def __init__(
-        self, program: Program, robots: tuple[Robot, ...] = (), link: FakeLink | None = None
+        self,
+        program: Program,
+        robots: tuple[Robot, ...] = (),
+        link: FakeLink | None = None,
+        *,
+        asked: Callable[[ProgramQuestion | None], None] | None = None,
     ) -> None:
         self.program = program
         self.link = link or FakeLink()
         self.lines: list[str] = []
-        self.runtime = Runtime(self.lines.append, labels=program.labels, readings=program.readings)
+        self.runtime = Runtime(
+            self.lines.append, labels=program.labels, readings=program.readings, asked=asked
+        )
         self.robots = robots
         self.steps: list[str] = []
 

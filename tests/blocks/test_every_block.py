@@ -8,6 +8,7 @@ import pytest
 
 from app.blocks.compiler.compiler import COMMANDS, compile_behaviour
 from app.blocks.model.fields import StatementInput, ValueInput
+from app.blocks.runtime.questions import ProgramQuestion
 from app.blocks.toolbox.catalogue import Catalogue, categories
 from tests.blocks.fakes import FakeLink, Play, until
 from tests.blocks.samples import (
@@ -135,6 +136,12 @@ def link() -> FakeLink:
     return made
 
 
+def yes(question: ProgramQuestion | None) -> None:
+    """Answer whatever is asked."""
+    if question is not None:
+        question.answer = "yes"
+
+
 @pytest.mark.parametrize("described", ALL, ids=lambda each: each.type)
 def test_every_block_compiles_and_its_python_runs(described):
     pepper = robot()
@@ -142,7 +149,7 @@ def test_every_block_compiles_and_its_python_runs(described):
     assert not [problem for problem in program.problems if problem.severity != "info"]
     ast.parse(program.source)
     assert "it" in program.readings
-    run = Play(program, (pepper,), link()).start()
+    run = Play(program, (pepper,), link(), asked=yes).start()
     endless = ("control_forever", "control_wait_until", "control_while")
     if described.type in endless or (described.shape == "hat" and described.type != "events_started"):
         run.stop()
@@ -163,6 +170,7 @@ def test_descriptions_are_sound():
         "numbers",
         "texts",
         "sensing",
+        "asking",
         "variables",
         "lists",
         "functions",

@@ -3,9 +3,10 @@
 In, one per line: ``{"do": "start", "program": …, "robots": [descriptions], "owners": {robot: node's id},
 "master": …, "name": …, "paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" |
 "stop"}``, ``{"do": "pace", "pace_s": seconds}`` (slow motion), ``{"do": "variable", "python": name, "value":
-…}`` (a person gives it another value), or ``{"do": "robots", "owners": …, "guarded": {topic: [robots]}}``
-when robots came or were started anew. Out: ``{"is": "ready" | "running" | "paused" | "error" | "warning" |
-"print" | "variables" | "ended", …}``. When its input ends, the program ends, and its robots are told.
+…}`` (a person gives it another value), ``{"do": "answer", "question": number, "text": …}``, or ``{"do":
+"robots", "owners": …, "guarded": {topic: [robots]}}`` when robots came or were started anew. Out: ``{"is":
+"ready" | "running" | "paused" | "error" | "warning" | "print" | "variables" | "ask" | "ended", …}``; question
+0 of "ask" is none any more. When its input ends, the program ends, and its robots are told.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from app.blocks.model.program import Program
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.network import Network
 from app.blocks.runtime.publishing import PublishGuard, guarded
+from app.blocks.runtime.questions import ProgramQuestion
 from app.blocks.runtime.runtime import Runtime
 from app.blocks.runtime.variables import VariableWatch
 from app.errors import AppError
@@ -130,7 +132,9 @@ class Run:
         self._id = str(order.get("id") or f"program-{uuid.uuid4().hex[:8]}")
         self._master = None if order.get("master") is None else str(order["master"])
         self._out = out
-        self._runtime = Runtime(out.print, labels=self._program.labels, readings=self._program.readings)
+        self._runtime = Runtime(
+            out.print, labels=self._program.labels, readings=self._program.readings, asked=self._asked
+        )
         self._network: Network | None = None
         self._variables = VariableWatch({}, ())
         self._began = time.monotonic()
@@ -161,6 +165,19 @@ class Run:
         if self._network is not None:
             self._network.go_on()
         self._runtime.scheduler.go_on()
+
+    def _asked(self, question: ProgramQuestion | None) -> None:
+        """A question is to be shown, or none any more."""
+        if question is None:
+            self._out.send("ask", question=0)
+        else:
+            self._out.send("ask", question=question.id, text=question.text)
+
+    def answer(self, order: Mapping[str, object]) -> None:
+        """Somebody has answered."""
+        question, words = order.get("question"), order.get("text")
+        if isinstance(question, int) and isinstance(words, str):
+            self._runtime.questions.answered(question, words)
 
     def set_pace(self, order: Mapping[str, object]) -> None:
         """Slow motion, or none."""
@@ -333,6 +350,8 @@ def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
             run.know(order)
         elif order.get("do") == "variable":
             run.put(order)
+        elif order.get("do") == "answer":
+            run.answer(order)
         do = obeyed.get(str(order.get("do")))
         if do is not None:
             do()

@@ -18,6 +18,7 @@ from app.blocks.runtime.broadcasts import Broadcasts, Receiver
 from app.blocks.runtime.errors import BehaviourError, explain
 from app.blocks.runtime.link import ProgramLink
 from app.blocks.runtime.pure import calculation, clock, lists, texts
+from app.blocks.runtime.questions import Asked, Questions
 from app.blocks.runtime.robot_handle import Replacements, RobotHandle, StatusText
 from app.blocks.runtime.scheduler import EndScript, Scheduler, Stopped
 from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
@@ -25,9 +26,9 @@ from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
 
 _OWN = (
-    "broadcast", "broadcast_and_wait", "called", "fail", "newest", "number", "on_broadcast", "on_message",
-    "on_start", "on_true", "publish", "reset_timer", "robot", "step", "stop_others", "stop_program", "timer",
-    "value", "wait", "wait_until", "write",
+    "answer", "ask", "broadcast", "broadcast_and_wait", "called", "fail", "newest", "number",
+    "on_broadcast", "on_message", "on_start", "on_true", "publish", "reset_timer", "robot", "step",
+    "stop_others", "stop_program", "timer", "value", "wait", "wait_until", "write",
 )  # fmt: skip
 _PURE = (
     "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
@@ -84,8 +85,9 @@ class Calls:
 class Runtime:
     """A program while it runs.
 
-    `printed` gets each line that the program writes. After `start`, `finished` is set when no script is left
-    or one of them failed; then ``error`` says why.
+    `printed` gets each line that the program writes, `asked` the question that is to be shown; without it
+    nobody can answer. After `start`, `finished` is set when no script is left or one of them failed; then
+    ``error`` says why.
     """
 
     def __init__(
@@ -94,6 +96,7 @@ class Runtime:
         *,
         labels: Mapping[str, str] | None = None,
         readings: Mapping[str, str] | None = None,
+        asked: Asked | None = None,
     ) -> None:
         self._printed = printed
         self._labels = labels or {}
@@ -109,6 +112,7 @@ class Runtime:
         self.saying = StatusText(self.scheduler.block, readings or {})
         self.replaced = Replacements()
         self._calls = Calls(self.scheduler)
+        self.questions = Questions(self.scheduler, asked)
         self._broadcasts = Broadcasts(self.scheduler, self._one_more, self._one_less)
         self.finished = threading.Event()
         self.error: BehaviourError | None = None
@@ -265,6 +269,16 @@ class Runtime:
     def write(self, value: object) -> None:
         """Write a line to the console."""
         self._printed(values.text(value))
+
+    # ---- questions
+
+    def ask(self, question: object) -> None:
+        """Ask the person in front of Studio and wait for the answer."""
+        self.questions.ask(question)
+
+    def answer(self) -> object:
+        """What was answered last; a number when it reads as one, an empty text before the first answer."""
+        return self.questions.answer
 
     # ---- time
 

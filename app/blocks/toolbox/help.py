@@ -55,6 +55,8 @@ EXAMPLES: Mapping[str, str] = {
     "events_broadcast": "For example: when the head is touched, broadcast “start quiz”.",
     "events_broadcast_wait": "For example: broadcast “dance” and wait: all have danced, then say “Bravo”.",
     "control_stop_others": "For example: when the hand is touched, stop the other scripts, say “Enough”.",
+    "asking_ask": "For example: ask “What is your name?” and wait, then say join “Hello ” and answer.",
+    "asking_answer": "For example: if “answer is 7”, say “Right!”.",
     "control_count": "For example: count “number” from 1 to 10 by 1: say “number”.",
     "numbers_function": "For example: square root of 9 gives 3, sin of 90 gives 1.",
     "numbers_round_to": "For example: round 3.14159 to 2 decimal places gives 3.14.",

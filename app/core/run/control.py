@@ -23,6 +23,7 @@ from app.core.robots.motion_permission import wanted_by
 from app.core.robots.stop import STOP_TIMEOUT_S as STOP_TIMEOUT_S
 from app.core.robots.stop import RobotStopper, report_of
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
+from app.core.run.asking import Asking
 from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.run_warnings import RunWarnings
 from app.core.run.runner import Runner, RunnerEvent
@@ -97,6 +98,7 @@ class Runs:
         self._unit = ""  # of the value that is tried
         self._now: Wanted | None = None  # what runs, or ran last
         self.tried_value: tuple[str, str] | None = None  # a block that was tried, and the value it had
+        self.asking = Asking()
         self._next: Wanted | None = None  # once what runs has been stopped, proven
         self._edits = EditsSinceRun()
         self._used: tuple[str, ...] = ()
@@ -329,6 +331,7 @@ class Runs:
         if self._runner is None or event.run != self._runner.run:
             return
         run = self._run
+        self.asking.take(event)
         match event.kind:
             case "running" if run.state in {"running", "paused"}:
                 if event.says and event.says != run.says:
@@ -433,6 +436,7 @@ class Runs:
         except AppError as error:
             self._alerts.put("program", "error", _("The behaviour can't be started."), str(error))
             return
+        self.asking.begin(runner)
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self._wanted, self._told_owners, self._robots_told = asked, owners, self._fleet.revision
         self.kept, self._program_key = frozenset(program.robots), runner.program_key
@@ -483,6 +487,7 @@ class Runs:
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
         """Stop these robots, or all."""
+        self.asking.clear()
         run = self._run
         now, elapsed_s = self._clock(), run.elapsed_s
         if self.active:

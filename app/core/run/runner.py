@@ -22,7 +22,9 @@ from app.errors import RunnerError
 from app.robots.identity import program_of
 from nep.i18n import _, ngettext, number
 
-Kind = Literal["ready", "running", "paused", "error", "warning", "print", "variables", "ended"]
+Kind = Literal[
+    "ready", "running", "paused", "error", "warning", "print", "variables", "ask", "ended"
+]  # fmt: skip
 
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
@@ -50,9 +52,9 @@ class RunnerEvent:
     ``run`` is the number of the runner's program. ``blocks`` run now (kind running), are held (paused; the
     first is the next one), or failed (error). ``says`` is what happens, in words (for paused: the next block
     in words); ``text`` a printed line, what a person should know (paused), an error's sentence, or at the end
-    why it did not end well. ``ok``: it ended, and no block failed. ``silent``: robots that did not answer the
-    program's own stop at its end. ``values`` are the variables whose values have changed. ``count``: a
-    warning was so often so.
+    why it did not end well, or what it asks (ask), whose number is ``question``; 0: it asks nothing any more.
+    ``ok``: it ended, and no block failed. ``silent``: robots that did not answer the program's own stop at
+    its end. ``values`` are the variables whose values have changed. ``count``: a warning was so often so.
     """
 
     kind: Kind
@@ -65,6 +67,7 @@ class RunnerEvent:
     silent: tuple[str, ...] = ()
     values: tuple[VariableValue, ...] = ()
     count: int = 1
+    question: int = 0
 
 
 class Runner:
@@ -176,6 +179,10 @@ class Runner:
         """Run one block of a paused program."""
         self._orders.put({"do": "step"})
 
+    def answer(self, question: int, words: str) -> None:
+        """What a person answers to a question of the program."""
+        self._orders.put({"do": "answer", "question": question, "text": words})
+
     def stop(self) -> None:
         """End the program: it is asked, and killed if it has not ended at once. It is gone within 100 ms.
 
@@ -230,7 +237,7 @@ class Runner:
             elif event.kind == "ended":
                 self._last = event
                 break
-            elif event.kind in ("ready", "variables") or gate.passes():
+            elif event.kind in ("ready", "variables", "ask") or gate.passes():
                 self._tell(event, gate)
         self._left_out(gate.kept_back, output.strange_bytes)
         child.popen.stdout.close()
@@ -335,8 +342,10 @@ class Runner:
             return RunnerEvent(
                 "warning", self.run, blocks=first, text=text, count=count if isinstance(count, int) else 1
             )
-        if kind == "print":
-            return RunnerEvent("print", self.run, text=text_of(said, "text"))
+        if kind in ("print", "ask"):
+            question = said.get("question")
+            asked = question if isinstance(question, int) else 0
+            return RunnerEvent(kind, self.run, text=text_of(said, "text"), question=asked)
         if kind == "variables":
             told = said.get("values")
             made = map(VariableValue.from_json, told if isinstance(told, list) else ())

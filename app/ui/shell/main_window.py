@@ -17,6 +17,7 @@ from app.ui.panels.base import Panel, PanelContext, ShowToast
 from app.ui.shell.bars.app_bar import AppBar, robots_chip
 from app.ui.shell.bars.banner import AlertBanner, BannerSpacer
 from app.ui.shell.bars.developer_tools import DeveloperTools
+from app.ui.shell.bars.question_card import QuestionCard
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
 from app.ui.shell.bars.status_bar import StatusBar, StatusFacts
 from app.ui.shell.bars.toast import Toast
@@ -126,6 +127,7 @@ class MainWindow(QMainWindow):
         self.banner.setParent(middle)  # over the pages, which it does not move
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
+        self.asked = QuestionCard(theme, self, self.session.runs.asking.answer)
         self.question = MotionQuestion(theme, self, self.session.fleet.permission, self.complain)
 
     def _connect(self) -> None:
@@ -362,6 +364,7 @@ class MainWindow(QMainWindow):
         words, status = robots_chip(self.session)
         self.bar.show_robots(words, status)
         self.toast.refresh()
+        self.asked.show_question(self.session.runs.asking.question, held=view.state == "paused")
         if self.showing == START:
             self.bar.stop.show_state(
                 _(view.stop_word), ring=view.state == "stopping", filled=self._may_move()

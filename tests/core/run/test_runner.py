@@ -141,6 +141,19 @@ def test_a_program_runs_and_ends(runner, heard, master):
     assert {event.run for event in heard.events} == {made.run}
 
 
+def test_a_program_asks_and_goes_on_with_the_answer(runner, heard, master):
+    made = runner()
+    asks = block("asking_ask", QUESTION=text("Name? 👍"))
+    made.start(program(asks, write(block("asking_answer"))), [], master.address)
+    asked = heard.until("ask")
+    assert asked.text == "Name? 👍"
+    made.answer(asked.question + 1, "nobody asked this")
+    made.answer(asked.question, "Ada “x”")
+    assert heard.until("ask", question=0)
+    assert heard.until("print").text == "Ada “x”"
+    assert heard.until("ended").ok
+
+
 def test_pause_step_and_go_on(runner, heard, master):
     made = runner()
     first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}

@@ -1,0 +1,82 @@
+"""Questions of a program to the person in front of it: asked one after the other, in the order of asking."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.scheduler import Scheduler
+from app.blocks.runtime.values import text
+from nep.i18n import _
+
+LONGEST_QUESTION = 500
+LONGEST_ANSWER = 10_000
+_NUMBER = re.compile(r"-?(?:0|[1-9]\d{0,14})(?:[.,]\d{1,9})?", re.ASCII)
+
+
+@dataclass
+class ProgramQuestion:
+    """One question; ``answer`` is None until somebody answers."""
+
+    id: int
+    text: str
+    answer: str | None = None
+
+
+Asked = Callable[[ProgramQuestion | None], None]
+"""Is told which question is to be shown now; None when none is."""
+
+
+class Questions:
+    """What scripts ask and a person answers. Scripts ask; an answer comes from another thread."""
+
+    def __init__(self, scheduler: Scheduler, asked: Asked | None) -> None:
+        """`asked` is None where nobody can answer."""
+        self._scheduler, self._asked = scheduler, asked
+        self._lock = threading.Lock()
+        self._ids = itertools.count(1)
+        self._waiting: list[ProgramQuestion] = []
+        self.answer: str | int | float = ""
+
+    def ask(self, words: object) -> None:
+        """Ask and wait for the answer; BehaviourError where nobody can answer."""
+        if self._asked is None:
+            raise BehaviourError(_("Nobody can answer: the behaviour runs outside of Studio."))
+        question = ProgramQuestion(next(self._ids), text(words)[:LONGEST_QUESTION])
+        self._change(self._waiting.append, question)
+        try:
+            self._scheduler.wait_until(lambda: question.answer is not None, None)
+        finally:  # also when the script ends meanwhile: its question goes
+            self._change(self._waiting.remove, question)
+        self.answer = as_value(question.answer or "")
+
+    def answered(self, id: int, words: str) -> None:
+        """Somebody has answered; what was no question any more is nothing."""
+        with self._lock:
+            for question in self._waiting:
+                if question.id == id:
+                    question.answer = words[:LONGEST_ANSWER]
+
+    def _change(self, change: Callable[[ProgramQuestion], None], question: ProgramQuestion) -> None:
+        """Tell which question is the first now, if that is another one."""
+        with self._lock:
+            before = self._waiting[:1]
+            change(question)
+            if before != self._waiting[:1] and self._asked is not None:
+                self._asked(self._waiting[0] if self._waiting else None)
+
+
+def as_value(words: str) -> str | int | float:
+    """An answer as programs use it: what is typed as a number is one, so it can be counted and compared.
+
+    007 stays a text, and so does a number that is longer than a computer keeps exactly.
+    """
+    plain = words.strip()
+    if not _NUMBER.fullmatch(plain):
+        return words
+    found = float(plain.replace(",", "."))
+    return int(found) if found.is_integer() else found

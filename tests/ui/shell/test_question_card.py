@@ -1,0 +1,134 @@
+"""The card with the question of a running behaviour: keyboard, Enter, Esc, pause; it covers no Stop."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import pytest
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from app.core.run.asking import AskedQuestion, Asking
+from app.core.run.runner import Runner, RunnerEvent
+from app.ui.shell.bars.question_card import QuestionCard
+from app.ui.shell.dialogs.overlay import stops_in
+from app.ui.shell.main_window import MainWindow
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+NAME = AskedQuestion(1, 1, "What is your name?")
+AGE = AskedQuestion(1, 2, "How old are you?")
+
+
+@pytest.fixture
+def card(qtbot, window: MainWindow) -> QuestionCard:
+    """The card of a window that shows; what is answered is in ``said``."""
+    window.show()
+    qtbot.waitExposed(window)
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    return window.asked
+
+
+@pytest.fixture
+def said(card: QuestionCard, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, str]]:
+    got: list[tuple[int, str]] = []
+    monkeypatch.setattr(card, "_answer", lambda question, words: got.append((question.number, words)))
+    return got
+
+
+def test_the_keyboard_goes_to_the_question_and_enter_answers(card, said, window) -> None:
+    before = window.bar.home
+    before.setFocus()
+    card.show_question(NAME, held=False)
+    assert card.isVisible()
+    assert QApplication.focusWidget() is card.field
+    assert card.words.text() == card.field.accessibleName() == "What is your name?"
+    QTest.keyClicks(card.field, "Ada")
+    QTest.keyClick(card.field, Qt.Key.Key_Return)
+    assert said == [(1, "Ada")]
+    card.show_question(None, held=False)
+    assert not card.isVisible()
+
+
+def test_escape_answers_nothing(card, said) -> None:
+    card.show_question(NAME, held=False)
+    QTest.keyClicks(card.field, "Ada")
+    QTest.keyClick(card.field, Qt.Key.Key_Escape)
+    assert said == [(1, "")]
+
+
+def test_the_button_answers_and_the_next_question_begins_empty(card, said) -> None:
+    card.show_question(NAME, held=False)
+    QTest.keyClicks(card.field, "Ada")
+    QTest.mouseClick(card.button, Qt.MouseButton.LeftButton)
+    card.show_question(AGE, held=False)
+    assert (said, card.field.text(), card.words.text()) == ([(1, "Ada")], "", "How old are you?")
+    assert QApplication.focusWidget() is card.field
+
+
+def test_a_tick_takes_nothing_away_that_is_being_typed(card, said) -> None:
+    card.show_question(NAME, held=False)
+    QTest.keyClicks(card.field, "Ad")
+    card.show_question(NAME, held=False)
+    QTest.keyClicks(card.field, "a")
+    assert card.field.text() == "Ada"
+
+
+def test_while_paused_it_is_held(card, said) -> None:
+    card.show_question(NAME, held=False)
+    QTest.keyClicks(card.field, "Ada")
+    card.show_question(NAME, held=True)
+    QTest.keyClicks(card.field, "x")
+    QTest.keyClick(card.field, Qt.Key.Key_Return)
+    assert (said, card.field.text(), card.button.isEnabled()) == ([], "Ada", False)
+    card.show_question(NAME, held=False)
+    QTest.keyClick(card.field, Qt.Key.Key_Return)
+    assert said == [(1, "Ada")]
+
+
+@pytest.mark.parametrize("words", ["", "👍" * 3, "A very long question, " * 20])
+@pytest.mark.parametrize("size", [(1024, 600), (1440, 900)])
+def test_it_stays_inside_the_window_and_covers_no_stop(card, window, words, size) -> None:
+    window.resize(*size)
+    card.show_question(AskedQuestion(1, 1, words), held=False)
+    assert window.rect().contains(card.geometry())
+    assert card.words.text()
+    stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stops_in(window)]
+    assert stops
+    assert not [stop for stop in stops if stop.intersects(card.geometry())]
+
+
+class Answered:
+    """Stands for a runner."""
+
+    def __init__(self, run: int) -> None:
+        self.run = run
+        self.got: list[tuple[int, str]] = []
+
+    def answer(self, question: int, words: str) -> None:
+        self.got.append((question, words))
+
+
+def test_only_the_question_that_is_asked_is_answered_and_once() -> None:
+    asking, runner = Asking(), Answered(4)
+    asking.take(RunnerEvent("ask", 4, text="Nobody runs yet", question=9))
+    assert asking.question is None
+    asking.begin(cast("Runner", runner))
+    asking.take(RunnerEvent("ask", 4, text="Name?", question=1))
+    shown = asking.question
+    assert shown is not None
+    asking.take(RunnerEvent("ask", 4, text="Age?", question=2))
+    asking.answer(shown, "late")
+    assert runner.got == []
+    newest = asking.question
+    assert newest is not None
+    asking.answer(newest, "7")
+    asking.answer(newest, "8")
+    assert (runner.got, asking.question) == ([(2, "7")], None)
+    asking.take(RunnerEvent("ask", 4, question=0))
+    assert asking.question is None
+    asking.take(RunnerEvent("ask", 4, text="Name?", question=3))
+    asking.clear()
+    assert asking.question is None
