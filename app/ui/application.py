@@ -28,7 +28,7 @@ from app.ui.shell.bars.logo import LogoEngine
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.shell.window_state import WindowState, fitting
-from app.ui.startup import interpreter, qt_log, single_instance
+from app.ui.startup import interpreter, portal, qt_log, single_instance
 from app.ui.startup.deferred import DeferredSteps
 from app.ui.startup.file_open import Application, IncomingFiles
 from app.ui.startup.single_instance import StartRequest
@@ -196,6 +196,7 @@ def run(options: Options) -> int:
         return 2
     log = qt_log.listen()
     qt_log.quiet_chromium(os.environ)
+    portal.use_portal(os.environ, sys.platform)
     application = make_application()
     session = Session()
     window = make_window(session, options)

@@ -177,7 +177,7 @@ def save(studio: Studio, film: Film, fingers: Fingers, path: Path) -> None:
         fingers.press("1", ["Alt"])
         until(lambda: len(studio.blocks()) >= 5, "the blocks are there")
         fingers.press("s", ["Ctrl"])
-        studio.find(kind="QFileDialog")
+        studio.find(kind="FileSheet")
         studio.find(kind="QLineEdit", focus=True)
     with film.step("A name and Enter: saved"):
         fingers.press("a", ["Ctrl"])

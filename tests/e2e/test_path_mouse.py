@@ -162,10 +162,10 @@ def save(studio: Studio, film: Film, home: Path) -> None:
         until(lambda: len(studio.blocks()) >= 6, "the blocks are there")
     with film.step("Save asks for a place"):
         studio.choose("File", "Save")
-        studio.find(kind="QFileDialog")
+        studio.find(kind="FileSheet")
     with film.step("Saved"):
-        studio.click("&Save", kind="QPushButton")
-        until(lambda: not studio.all(kind="QFileDialog"), "the dialog is gone")
+        studio.click("Save", kind="Button")
+        until(lambda: not studio.all(kind="FileSheet"), "the dialog is gone")
         path = home / "New behaviour.nepb"
         until(path.exists, lambda: f"{path} is there: {list(home.glob('*'))}")
         until(

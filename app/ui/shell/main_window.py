@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 
@@ -23,6 +25,7 @@ from app.ui.shell.bars.status_bar import StatusBar, StatusFacts
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.shell import START
+from app.ui.shell.dialogs.file_sheet import StudioDialogs
 from app.ui.shell.dialogs.motion_permission import MotionQuestion
 from app.ui.shell.docking.dock import Dock, fitting
 from app.ui.shell.docking.layouts import LAYOUTS, layout_named
@@ -35,6 +38,7 @@ from app.ui.shell.start_page.open_work import open_work
 from app.ui.shell.start_page.page import Example, StartPage
 from app.ui.shell.window_state import WindowState
 from app.ui.startup.interpreter import GcFreezeTimer
+from app.ui.startup.portal import has_system_dialogs
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
 from app.ui.widgets.file_dialogs import FileDialogs, SystemDialogs
@@ -95,7 +99,7 @@ class MainWindow(QMainWindow):
         self.timer.timeout.connect(self._half_tick)
         self.gc_freeze = GcFreezeTimer(self)
         self.panel_focus = PanelFocus(lambda: None if self._shut else self.bench, self)
-        self.commands = Commands(self, session, asks if asks is not None else SystemDialogs(self))
+        self.commands = Commands(self, session, asks if asks is not None else self._file_dialogs())
         self._connect()
         self.show_start()
 
@@ -168,6 +172,11 @@ class MainWindow(QMainWindow):
     def _show_all_alerts(self) -> None:
         self._run("layout.developer")
         self.open_panel("alerts")
+
+    def _file_dialogs(self) -> FileDialogs:
+        if has_system_dialogs(os.environ, sys.platform):
+            return SystemDialogs(self)
+        return StudioDialogs(self.theme, self, self.session.settings)
 
     # -- what its commands may use ----------------------------------------------------------------
 

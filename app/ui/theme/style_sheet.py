@@ -100,6 +100,7 @@ QHeaderView::section {{
     background: {panel}; color: {textTertiary}; border: none; border-bottom: 1px solid {border};
     padding: 4px 6px; font-size: {small_text}px; font-weight: 500;
 }}
+QAbstractItemView[raised="true"] QHeaderView::section {{ background: {raised}; }}
 QTableCornerButton::section {{ background: {panel}; border: none; border-bottom: 1px solid {border}; }}
 QScrollArea {{ background: transparent; border: none; }}
 QScrollArea > QWidget > QWidget[bare="true"] {{ background: transparent; }}

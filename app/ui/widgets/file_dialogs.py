@@ -1,4 +1,4 @@
-"""Which file? The only dialogs that there are ask it; Stop stays free meanwhile."""
+"""Which file? The system's dialogs ask it where they are; Stop stays free meanwhile."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ def show_free(dialog: QFileDialog) -> None:
 
 
 class SystemDialogs:
-    """File dialogs that do not block the window."""
+    """The system's own file dialogs: of Windows, of macOS, of a Linux desktop by its portal.
+
+    The window can be used meanwhile: Stop is pressed there. Keys that are pressed in them never come to us.
+    """
 
     def __init__(self, window: QWidget) -> None:
         self._window = window
@@ -44,17 +47,19 @@ class SystemDialogs:
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog(_("Open a behaviour"), folder, take)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-        show_free(dialog)
+        dialog.show()
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog(_("Save the behaviour"), str(Path(suggestion).parent), take)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(SUFFIX.lstrip("."))
         dialog.selectFile(Path(suggestion).name)
-        show_free(dialog)
+        dialog.show()
 
     def _dialog(self, title: str, folder: str, take: Callable[[Path], None]) -> QFileDialog:
         kind = _("Behaviours")
         dialog = QFileDialog(self._window, title, folder, f"{kind} (*{SUFFIX})")
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setWindowModality(Qt.WindowModality.NonModal)
         dialog.fileSelected.connect(lambda chosen: take(Path(chosen)))
         return dialog

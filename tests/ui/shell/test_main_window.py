@@ -605,17 +605,18 @@ def test_a_panel_that_floats_or_closes_does_not_hand_the_keyboard_on(
     assert focus is None or not any(d.isAncestorOf(focus) for d in bench.docks.values())
 
 
-def test_files_are_asked_for_without_covering_stop(qtbot, window: MainWindow, commands: Commands) -> None:
-    stops: list[str] = []
-    commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
+def test_the_systems_dialogs_leave_the_window_free(qtbot, window: MainWindow, tmp_path: Path) -> None:
     show(qtbot, window)
-    SystemDialogs(window).open("", lambda _path: None)
+    asked: list[Path] = []
+    SystemDialogs(window).save(str(tmp_path / "Dance.nepb"), asked.append)
     dialog = window.findChild(QFileDialog)
     assert dialog is not None
     qtbot.waitUntil(dialog.isVisible)
     assert not dialog.isModal()
-    QTest.keyClick(dialog, Qt.Key.Key_F12)
-    assert stops == ["stop"]
+    assert not dialog.testOption(QFileDialog.Option.DontUseNativeDialog)
+    assert dialog.defaultSuffix() == "nepb"
+    dialog.fileSelected.emit(str(tmp_path / "Dance.nepb"))
+    assert asked == [tmp_path / "Dance.nepb"]
     dialog.close()
 
 

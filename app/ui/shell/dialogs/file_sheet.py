@@ -1,0 +1,533 @@
+"""Which file? Our own sheet over the window: places at the left, what is in the folder, the name below.
+
+Stop stays bright and can be pressed; the sheet stays open meanwhile, so that no name is typed twice.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import os
+import re
+import stat
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QEvent, QObject, QSize, QStandardPaths, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.core.documents.file_format import SUFFIX
+from app.core.storage.settings import RecentFile, Settings, home
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.text import plain
+from app.ui.text.dates import when_words
+from app.ui.text.numbers import size_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, ElidedLabel, IconButton, label, paint
+from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from app.ui.widgets.menus import EditMenu
+from nep.i18n import _, lazy
+
+WIDE, HIGH, PLACES_WIDE, FOLDER_NAME_WIDE = 860, 560, 190, 200
+MOST_ENTRIES = 5000
+NAME, CHANGED, SIZE = range(3)
+REFUSED = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
+RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+"""What one of the systems takes in no name: a file is to open on all of them."""
+LONGEST_NAME = 120
+EMPTY = {
+    False: lazy("No behaviours and no folders are in here."),
+    True: lazy("Nothing is in here yet."),
+}
+"""What is said of an empty folder when a file is to be opened, and when one is to be saved."""
+
+
+@dataclass(frozen=True)
+class FolderPlace:
+    """A folder that people know by a name: "Documents"."""
+
+    name: str
+    icon: str
+    folder: Path
+
+
+@dataclass(frozen=True)
+class FolderEntry:
+    """One file or folder; ``changed_s`` in seconds since 1970, ``size`` in bytes."""
+
+    path: Path
+    is_folder: bool
+    changed_s: float = 0.0
+    size: int = 0
+
+
+def known_places(studio: Path, recent: Iterable[Path]) -> tuple[FolderPlace, ...]:
+    """The person's folders that are there, the one of Studio, and those of files used lately."""
+    kinds = QStandardPaths.StandardLocation
+    found = [
+        FolderPlace(_("Home"), "house", Path.home()),
+        FolderPlace(_("Desktop"), "monitor", _standard(kinds.DesktopLocation)),
+        FolderPlace(_("Documents"), "file-text", _standard(kinds.DocumentsLocation)),
+        FolderPlace(_("Kept by Studio"), "archive", studio),
+        *(FolderPlace(path.parent.name or str(path.parent), "history", path.parent) for path in recent),
+    ]
+    made: list[FolderPlace] = []
+    for place in found:
+        if place.folder.is_dir() and place.folder not in [each.folder for each in made]:
+            made.append(place)
+    return tuple(made)
+
+
+def _standard(kind: QStandardPaths.StandardLocation) -> Path:
+    return Path(QStandardPaths.writableLocation(kind) or Path.home())
+
+
+def entries_of(folder: Path, suffix: str = SUFFIX) -> tuple[FolderEntry, ...]:
+    """The folders and the files with this ending, without hidden ones. Raises OSError."""
+    made = []
+    with os.scandir(folder) as found:
+        for each in found:
+            if each.name.startswith("."):
+                continue
+            try:
+                facts = each.stat()
+            except OSError:
+                continue  # a link to nothing, or gone since
+            is_folder = stat.S_ISDIR(facts.st_mode)
+            if is_folder or each.name.lower().endswith(suffix):
+                made.append(FolderEntry(Path(each.path), is_folder, facts.st_mtime, facts.st_size))
+            if len(made) == MOST_ENTRIES:
+                break
+    return tuple(made)
+
+
+def name_refusal(name: str) -> str:
+    """Why a file or folder can't be called so, in a sentence; "" when it can."""
+    bad = REFUSED.search(name)
+    if bad:
+        return _("A name can't have “{sign}” in it.").format(sign=bad[0])
+    if name.startswith("."):
+        return _("A name that begins with a full stop hides the file.")
+    if RESERVED.fullmatch(name) or name.endswith((".", " ")):
+        return _("Some computers take no file of this name. Choose another one.")
+    if len(name) > LONGEST_NAME:
+        return _("This name is too long.")
+    return ""
+
+
+def whole_path(typed: str) -> Path | None:
+    """The path that somebody typed instead of a name; None for a name."""
+    path = Path(typed).expanduser() if typed.startswith("~") else Path(typed)
+    return path if path.is_absolute() and path.name else None
+
+
+def free_name(folder: Path, name: str) -> str:
+    """The name, or the first of its numbers that no file there has: "Greeting 2"."""
+    number, made = 2, name
+    while (folder / f"{made}{SUFFIX}").exists():
+        made, number = f"{name} {number}", number + 1
+    return made
+
+
+class _Row(QTreeWidgetItem):
+    """A file or folder; folders stand first, whichever column sorts."""
+
+    def __init__(self, theme: Theme, entry: FolderEntry, now: dt.datetime) -> None:
+        then = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
+        name = entry.path.name if entry.is_folder else entry.path.name[: -len(SUFFIX)]
+        size = "" if entry.is_folder else size_words(entry.size)
+        super().__init__([name, when_words(then, now), size])
+        self.entry = entry
+        self.setIcon(NAME, theme.icon("folder" if entry.is_folder else "blocks", "textSecondary"))
+        self.setTextAlignment(SIZE, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setToolTip(NAME, plain.tip(entry.path.name))
+
+    def __lt__(self, other: QTreeWidgetItem) -> bool:
+        tree = self.treeWidget()
+        if not isinstance(other, _Row) or tree is None:
+            return False
+        down = tree.header().sortIndicatorOrder() == Qt.SortOrder.DescendingOrder
+        if self.entry.is_folder != other.entry.is_folder:
+            return self.entry.is_folder != down
+        column = tree.sortColumn()
+        if column == CHANGED:
+            return self.entry.changed_s < other.entry.changed_s
+        if column == SIZE:
+            return self.entry.size < other.entry.size
+        return self.entry.path.name.casefold() < other.entry.path.name.casefold()
+
+
+class FileSheet(Overlay):
+    """Asks for one file, to open or to save. ``take`` gets it; nothing is told when the person gives up."""
+
+    top = 56
+
+    def __init__(self, theme: Theme, window: QWidget, places: Callable[[], Sequence[FolderPlace]]) -> None:
+        """``places`` are asked for at each opening."""
+        super().__init__(theme, window, _("Files"))
+        self._scrim.pressed.disconnect(self.shut)  # a name that is half typed is not lost by a press beside
+        self._places = places
+        self._take: Callable[[Path], object] = lambda _path: None
+        self.saves = False
+        self.folder = Path.home()
+        self.heading = label("", "heading")
+        self.up = IconButton(theme, "arrow-up", _("To the folder above"), "Alt+Up")
+        self.up.clicked.connect(lambda: self.go_to(self.folder.parent))
+        self.path = ElidedLabel("body", "textSecondary")
+        self.new_folder = Button(theme, _("New folder"), "folder-plus", size="small")
+        self.new_folder.clicked.connect(self._ask_folder)
+        self.folder_name = QLineEdit()
+        self.folder_name.setPlaceholderText(_("Name of the new folder"))
+        self.folder_name.setAccessibleName(_("Name of the new folder"))
+        self.make_folder = Button(theme, _("Make it"), size="small")
+        self.make_folder.clicked.connect(self._make_folder)
+        self.places = ScrollColumn(_("Places"), gap=2)
+        self.list = QTreeWidget()
+        self.name = QLineEdit()
+        self.name.setAccessibleName(_("Name of the file"))
+        self.name.textEdited.connect(lambda _text: self._judge())
+        self.name.returnPressed.connect(self._done)
+        self.folder_name.returnPressed.connect(self._make_folder)
+        for field in (self.name, self.folder_name):
+            field.setProperty("focusRadius", theme.radius("control"))
+            EditMenu(theme, field)
+        self.ending = label(SUFFIX, "bodyLarge", role="textTertiary")
+        self.said = label("", "body", role="textSecondary", wrap=True)
+        self.cancel = Button(theme, _("Cancel"), size="form")
+        self.cancel.clicked.connect(self.shut)
+        self.keep_both = Button(theme, _("Keep both"), size="form")
+        self.keep_both.clicked.connect(self._keep_both)
+        self.done = Button(theme, "", kind="primary", size="form")
+        self.done.clicked.connect(self._done)
+        self._set_up_list()
+        self._lay_out()
+        theme.changed.connect(self._again)
+
+    def _set_up_list(self) -> None:
+        tree = self.list
+        tree.setAccessibleName(_("Files and folders"))
+        tree.setProperty("raised", "true")
+        tree.setFrameShape(QFrame.Shape.NoFrame)
+        tree.setRootIsDecorated(False)
+        tree.setUniformRowHeights(True)
+        tree.setHeaderLabels([_("Name"), _("Changed"), _("Size")])
+        tree.setSortingEnabled(True)
+        tree.sortByColumn(NAME, Qt.SortOrder.AscendingOrder)
+        tree.header().setHighlightSections(False)
+        tree.header().setStretchLastSection(False)
+        tree.header().setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
+        for column in (CHANGED, SIZE):
+            tree.header().setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        tree.itemActivated.connect(self._opened)
+        tree.currentItemChanged.connect(lambda item, _before: self._chose(item))
+        tree.installEventFilter(self)
+
+    def _lay_out(self) -> None:
+        close = IconButton(self.theme, "x", _("Close"), "Esc")
+        close.clicked.connect(self.shut)
+        head = QHBoxLayout()
+        head.addWidget(self.heading, 1)
+        head.addWidget(close)
+        way = QHBoxLayout()
+        way.setSpacing(8)
+        way.addWidget(self.up)
+        way.addWidget(self.path, 1)
+        for widget in (self.folder_name, self.make_folder, self.new_folder):
+            way.addWidget(widget)
+        right = QVBoxLayout()
+        right.setSpacing(8)
+        right.addLayout(way)
+        right.addWidget(self.list, 1)
+        right.addWidget(self.said)
+        self._naming = QWidget()
+        naming = QHBoxLayout(self._naming)
+        naming.setContentsMargins(0, 0, 0, 0)
+        naming.setSpacing(8)
+        naming.addWidget(label(_("Name"), "bodyLarge", role="textSecondary"))
+        naming.addWidget(self.name, 1)
+        naming.addWidget(self.ending)
+        right.addWidget(self._naming)
+        foot = QHBoxLayout()
+        foot.setSpacing(8)
+        foot.addStretch(1)
+        for button in (self.cancel, self.keep_both, self.done):
+            foot.addWidget(button)
+        right.addLayout(foot)
+        middle = QHBoxLayout()
+        middle.setSpacing(16)
+        middle.addWidget(self.places)
+        middle.addLayout(right, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(20, 14, 20, 16)
+        column.setSpacing(12)
+        column.addLayout(head)
+        column.addLayout(middle, 1)
+
+    # -- asking -----------------------------------------------------------------------------------
+
+    def ask_open(self, folder: Path, take: Callable[[Path], object]) -> None:
+        """Which behaviour to open."""
+        self._ask(_("Open a behaviour"), _("Open"), folder, take, saves=False)
+
+    def ask_save(self, suggestion: Path, take: Callable[[Path], object]) -> None:
+        """Where to save, and under which name."""
+        name = suggestion.name.removesuffix(SUFFIX)
+        self.name.setText(REFUSED.sub(" ", name).strip(". ")[:LONGEST_NAME])
+        self._ask(_("Save the behaviour"), _("Save"), suggestion.parent, take, saves=True)
+        self.name.selectAll()
+
+    def _ask(
+        self, question: str, verb: str, folder: Path, take: Callable[[Path], object], *, saves: bool
+    ) -> None:
+        self.saves, self._take, self._verb = saves, take, verb
+        self.heading.setText(question)
+        self.setAccessibleName(question)
+        paint.show_when(self._naming, saves)
+        self._show_folder_field(False)
+        self._show_places()
+        self.go_to(folder if folder.is_dir() else Path.home())
+        self.open()
+
+    def first(self) -> QWidget:
+        return self.name if self.saves else self.list
+
+    def wanted_size(self, room: QSize) -> QSize:
+        scaled = self.theme.scaled
+        return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
+
+    def _focus_changed(self, _old: QWidget | None, _new: QWidget | None) -> None:
+        """It stays open while Stop is pressed."""
+
+    def _show_places(self) -> None:
+        column = self.places.column
+        while column.count() > 1 and (item := column.takeAt(0)) is not None:
+            if (old := item.widget()) is not None:
+                old.deleteLater()
+        for number, place in enumerate(self._places()):
+            button = Button(self.theme, place.name, place.icon, kind="ghost", size="small")
+            button.let_shrink()
+            button.setToolTip(plain.tip(str(place.folder)))
+            button.clicked.connect(lambda _on=False, folder=place.folder: self.go_to(folder))
+            column.insertWidget(number, button)
+        self.places.setFixedWidth(round(self.theme.scaled(PLACES_WIDE)))
+
+    # -- the folder -------------------------------------------------------------------------------
+
+    def go_to(self, folder: Path) -> None:
+        """Show what is in a folder; one that can't be read says why, and the one before stays."""
+        try:
+            found = entries_of(folder)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            self._say(
+                _("“{folder}” can't be opened: {reason}.").format(folder=folder.name, reason=reason), "error"
+            )
+            return
+        before, self.folder = self.folder, folder
+        self.path.setText(str(folder))
+        self.up.setEnabled(folder.parent != folder)
+        now = dt.datetime.now().astimezone()
+        self.list.blockSignals(True)
+        self.list.clear()
+        high = round(self.theme.scaled(self.theme.size("row", "comfortable")))
+        side = round(self.theme.scaled(self.theme.size("icon", "normal")))
+        self.list.setIconSize(QSize(side, side))
+        for entry in found:
+            row = _Row(self.theme, entry, now)
+            row.setSizeHint(NAME, QSize(0, high))
+            self.list.addTopLevelItem(row)
+        self.list.sortItems(self.list.sortColumn(), self.list.header().sortIndicatorOrder())
+        place = next((row for row in self._rows() if row.entry.path == before), None)
+        if place is not None:
+            self.list.setCurrentItem(place)
+        self.list.blockSignals(False)
+        self._judge()
+
+    def _rows(self) -> list[_Row]:
+        rows = (self.list.topLevelItem(number) for number in range(self.list.topLevelItemCount()))
+        return [row for row in rows if isinstance(row, _Row)]
+
+    @property
+    def chosen(self) -> FolderEntry | None:
+        """The file or folder that is chosen in the list."""
+        row = self.list.currentItem()
+        return row.entry if isinstance(row, _Row) else None
+
+    def _chose(self, item: QTreeWidgetItem | None) -> None:
+        if self.saves and isinstance(item, _Row) and not item.entry.is_folder and self.list.hasFocus():
+            self.name.setText(item.text(NAME))
+        self._judge()
+
+    def _opened(self, item: QTreeWidgetItem) -> None:
+        """Return or a double click: into a folder; a file is opened, or its name is taken over."""
+        if isinstance(item, _Row) and item.entry.is_folder:
+            self.go_to(item.entry.path)
+        elif isinstance(item, _Row) and not self.saves:
+            self._answer(item.entry.path)
+        elif isinstance(item, _Row):
+            self.name.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _ask_folder(self) -> None:
+        self._show_folder_field(True)
+        self.folder_name.clear()
+        self.folder_name.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _show_folder_field(self, shown: bool) -> None:
+        """The field for a folder's name in the place of the button that asks for it."""
+        self.folder_name.setMinimumWidth(round(self.theme.scaled(FOLDER_NAME_WIDE)))
+        for widget in (self.folder_name, self.make_folder):
+            paint.show_when(widget, shown and self.saves)
+        paint.show_when(self.new_folder, self.saves and not shown)
+
+    def _make_folder(self) -> None:
+        name = self.folder_name.text().strip()
+        wrong = name_refusal(name) or ("" if name else _("Give the folder a name."))
+        if not wrong and (self.folder / name).exists():
+            wrong = _("“{name}” is there already.").format(name=name)
+        if not wrong:
+            try:
+                (self.folder / name).mkdir()
+            except OSError as error:
+                reason = (error.strerror or str(error)).lower()
+                wrong = _("“{name}” can't be made: {reason}.").format(name=name, reason=reason)
+        if wrong:
+            self._say(wrong, "error")
+            return
+        self._show_folder_field(False)
+        self.go_to(self.folder / name)
+        self.name.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    # -- the answer -------------------------------------------------------------------------------
+
+    @property
+    def target(self) -> Path | None:
+        """The file that is meant now; None while there is none."""
+        if not self.saves:
+            chosen = self.chosen
+            return chosen.path if chosen is not None and not chosen.is_folder else None
+        name = self.name.text().strip()
+        if name.lower().endswith(SUFFIX):
+            name = name[: -len(SUFFIX)]
+        whole = whole_path(name)
+        if whole is not None:
+            return whole.with_name(f"{whole.name}{SUFFIX}") if whole.parent.is_dir() else None
+        return self.folder / f"{name}{SUFFIX}" if name and not name_refusal(name) else None
+
+    def _judge(self) -> None:
+        """Say what would happen, and call the buttons after it."""
+        target = self.target
+        taken = self.saves and target is not None and target.exists()
+        paint.show_when(self.keep_both, taken)
+        self.done.set_word(_("Replace") if taken else self._verb)
+        chosen = self.chosen
+        into = not self.saves and chosen is not None and chosen.is_folder
+        writable = not self.saves or os.access(target.parent if target else self.folder, os.W_OK)
+        self.done.setEnabled((target is not None and writable) or into)
+        wrong = self._wrong() if self.saves else ""
+        if wrong:
+            self._say(wrong, "error")
+        elif not writable:
+            self._say(_("You may not save in this folder. Choose another one."), "error")
+        elif taken and target is not None:
+            name = target.name.removesuffix(SUFFIX)
+            self._say(_("“{name}” is there already. Replace it, or keep both.").format(name=name), "text")
+        elif not self.list.topLevelItemCount():
+            self._say(_(EMPTY[self.saves]), "textSecondary")
+        else:
+            self._say("", "textSecondary")
+
+    def _wrong(self) -> str:
+        name = self.name.text().strip()
+        whole = whole_path(name)
+        if whole is None:
+            return name_refusal(name)
+        return (
+            "" if whole.parent.is_dir() else _("There is no folder “{folder}”.").format(folder=whole.parent)
+        )
+
+    def _say(self, words: str, role: str) -> None:
+        if self.said.text() == words:
+            return
+        self.said.setText(words)
+        self.said.setProperty("role", role)
+        self.said.style().unpolish(self.said)
+        self.said.style().polish(self.said)
+        paint.show_when(self.said, bool(words))
+        if words:
+            paint.announce(self.said, words)
+
+    def _done(self) -> None:
+        target, chosen = self.target, self.chosen
+        if target is not None and self.done.isEnabled():
+            self._answer(target)
+        elif not self.saves and chosen is not None and chosen.is_folder:
+            self.go_to(chosen.path)
+
+    def _keep_both(self) -> None:
+        target = self.target
+        if target is not None:
+            name = free_name(target.parent, target.name.removesuffix(SUFFIX))
+            self._answer(target.with_name(f"{name}{SUFFIX}"))
+
+    def _answer(self, path: Path) -> None:
+        self.shut()
+        self._take(path)
+
+    def _again(self) -> None:
+        if self.isVisible():
+            self._show_places()
+            self.go_to(self.folder)
+
+    # -- keys -------------------------------------------------------------------------------------
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Backspace in the list leads to the folder above."""
+        if (
+            watched is self.list
+            and event.type() == QEvent.Type.KeyPress
+            and isinstance(event, QKeyEvent)
+            and event.key() == Qt.Key.Key_Backspace
+        ):
+            self.go_to(self.folder.parent)
+            return True
+        return super().eventFilter(watched, event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Up and event.modifiers() & Qt.KeyboardModifier.AltModifier:
+            self.go_to(self.folder.parent)
+        super().keyPressEvent(event)
+
+
+class StudioDialogs:
+    """Asks for files by our own sheet, which is made at the first question."""
+
+    def __init__(self, theme: Theme, window: QWidget, settings: Settings) -> None:
+        self._theme, self._window, self._settings = theme, window, settings
+        self._sheet: FileSheet | None = None
+
+    def open(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Which file to open."""
+        self._made().ask_open(Path(folder or Path.home()), take)
+
+    def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
+        """Where to save."""
+        self._made().ask_save(Path(suggestion), take)
+
+    def _made(self) -> FileSheet:
+        if self._sheet is None:
+            self._sheet = FileSheet(self._theme, self._window, self._places)
+        return self._sheet
+
+    def _places(self) -> tuple[FolderPlace, ...]:
+        recent: list[RecentFile] = self._settings.recent
+        return known_places(home() / "kept", [file.path for file in recent])

@@ -1,0 +1,258 @@
+"""Our own file dialog: names, places, folders, what is taken, the keyboard, and Stop meanwhile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.core.session import Session
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.file_sheet import (
+    FileSheet,
+    FolderPlace,
+    entries_of,
+    free_name,
+    known_places,
+    name_refusal,
+)
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button
+from tests.ui.shell_parts import PANELS
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    made = tmp_path / "work"
+    (made / "class 3").mkdir(parents=True)
+    (made / ".hidden").mkdir()
+    for name in ("Greeting.nepb", "a quiz.nepb", "notes.txt", ".secret.nepb"):
+        (made / name).write_text("{}", "utf-8")
+    return made
+
+
+@pytest.fixture
+def sheet(qtbot: QtBot, window: MainWindow, theme: Theme, folder: Path) -> FileSheet:
+    window.show()
+    with qtbot.waitExposed(window):
+        pass
+    theme.set_motion("on")
+    return FileSheet(theme, window, lambda: (FolderPlace("Work", "house", folder),))
+
+
+@pytest.fixture
+def taken() -> list[Path]:
+    return []
+
+
+def rows(sheet: FileSheet) -> list[str]:
+    return [sheet.list.topLevelItem(number).text(0) for number in range(sheet.list.topLevelItemCount())]
+
+
+def typed(sheet: FileSheet, name: str) -> None:
+    sheet.name.selectAll()
+    QTest.keyClicks(sheet.name, name)
+
+
+def test_folders_come_first_and_only_behaviours_are_listed(sheet: FileSheet, folder: Path) -> None:
+    sheet.ask_open(folder, print)
+    assert rows(sheet) == ["class 3", "a quiz", "Greeting"]
+    assert [entry.path.name for entry in entries_of(folder) if entry.is_folder] == ["class 3"]
+    assert not sheet.name.isVisible()
+    sheet.list.sortByColumn(0, Qt.SortOrder.DescendingOrder)
+    assert rows(sheet) == ["class 3", "Greeting", "a quiz"], "folders first, the other way round too"
+
+
+def test_saving_adds_the_ending_that_is_shown(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+    sheet.ask_save(folder / "New behaviour.nepb", taken.append)
+    assert sheet.name.text() == "New behaviour"
+    assert sheet.ending.text() == ".nepb"
+    assert sheet.name.hasFocus()
+    typed(sheet, "Dance")
+    assert sheet.done.text() == "Save"
+    QTest.keyClick(sheet.name, Qt.Key.Key_Return)
+    assert taken == [folder / "Dance.nepb"]
+    assert not sheet.isVisible()
+
+
+def test_an_ending_or_a_whole_path_may_be_typed(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+    sheet.ask_save(folder / "New.nepb", taken.append)
+    typed(sheet, "Dance.nepb")
+    assert sheet.target == folder / "Dance.nepb"
+    typed(sheet, str(folder / "class 3" / "Dance"))
+    assert sheet.target == folder / "class 3" / "Dance.nepb"
+    typed(sheet, str(folder / "nowhere" / "Dance"))
+    assert sheet.target is None
+    assert not sheet.done.isEnabled()
+
+
+def test_a_name_that_is_taken_is_replaced_or_both_are_kept(
+    sheet: FileSheet, folder: Path, taken: list[Path]
+) -> None:
+    sheet.ask_save(folder / "Greeting.nepb", taken.append)
+    assert sheet.done.text() == "Replace"
+    assert sheet.said.text() == "“Greeting” is there already. Replace it, or keep both."
+    QTest.mouseClick(sheet.keep_both, LEFT)
+    assert taken == [folder / "Greeting 2.nepb"]
+    sheet.ask_save(folder / "Greeting.nepb", taken.append)
+    QTest.mouseClick(sheet.done, LEFT)
+    assert taken[1] == folder / "Greeting.nepb"
+    sheet.ask_save(folder / "Greeting.nepb", taken.append)
+    typed(sheet, "Dance")
+    assert not sheet.keep_both.isVisible()
+    assert sheet.done.text() == "Save"
+
+
+def test_numbers_that_are_taken_are_passed_over(folder: Path) -> None:
+    (folder / "Greeting 2.nepb").write_text("", "utf-8")
+    assert free_name(folder, "Greeting") == "Greeting 3"
+    assert free_name(folder, "Dance") == "Dance"
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("a/b", "A name can't have “/” in it."),
+        ("what?", "A name can't have “?” in it."),
+        (".x", "A name that begins with a full stop hides the file."),
+        ("con", "Some computers take no file of this name. Choose another one."),
+        ("ends.", "Some computers take no file of this name. Choose another one."),
+        ("x" * 121, "This name is too long."),
+        ("Ñandú 3", ""),
+        ("", ""),
+    ],
+)
+def test_names_are_refused_in_words(name: str, wrong: str) -> None:
+    assert name_refusal(name) == wrong
+
+
+def test_a_refused_name_can_not_be_saved(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+    sheet.ask_save(folder / "x.nepb", taken.append)
+    typed(sheet, "what?")
+    assert sheet.said.text() == "A name can't have “?” in it."
+    assert not sheet.done.isEnabled()
+    QTest.keyClick(sheet.name, Qt.Key.Key_Return)
+    assert taken == []
+    assert sheet.isVisible()
+
+
+def test_a_folder_is_opened_made_and_left_again(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+    sheet.ask_save(folder / "Dance.nepb", taken.append)
+    QTest.mouseClick(sheet.new_folder, LEFT)
+    QTest.keyClicks(sheet.folder_name, "Class 4")
+    QTest.keyClick(sheet.folder_name, Qt.Key.Key_Return)
+    assert (folder / "Class 4").is_dir()
+    assert sheet.folder == folder / "Class 4"
+    assert sheet.said.text() == "Nothing is in here yet."
+    QTest.mouseClick(sheet.up, LEFT)
+    assert sheet.folder == folder
+    assert sheet.chosen is not None
+    assert sheet.chosen.path.name == "Class 4", "where one came from"
+    QTest.mouseClick(sheet.new_folder, LEFT)
+    QTest.keyClicks(sheet.folder_name, "Class 4")
+    QTest.mouseClick(sheet.make_folder, LEFT)
+    assert sheet.said.text() == "“Class 4” is there already."
+    assert taken == []
+
+
+def test_the_keyboard_opens_a_file_in_a_folder(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+    (folder / "class 3" / "Dance.nepb").write_text("{}", "utf-8")
+    sheet.ask_open(folder, taken.append)
+    assert sheet.list.hasFocus()
+    QTest.keyClick(sheet.list, Qt.Key.Key_Home)
+    QTest.keyClick(sheet.list, Qt.Key.Key_Return)
+    assert sheet.folder == folder / "class 3"
+    QTest.keyClick(sheet.list, Qt.Key.Key_Backspace)
+    assert sheet.folder == folder
+    QTest.keyClick(sheet.list, Qt.Key.Key_Return)
+    QTest.keyClick(sheet.list, Qt.Key.Key_Home)
+    QTest.keyClick(sheet.list, Qt.Key.Key_Return)
+    assert taken == [folder / "class 3" / "Dance.nepb"]
+
+
+def test_return_on_a_file_takes_its_name_and_replaces_nothing(
+    sheet: FileSheet, folder: Path, taken: list[Path]
+) -> None:
+    sheet.ask_save(folder / "Dance.nepb", taken.append)
+    sheet.list.setFocus()
+    QTest.keyClick(sheet.list, Qt.Key.Key_End)
+    QTest.keyClick(sheet.list, Qt.Key.Key_Return)
+    assert (sheet.name.text(), taken) == ("Greeting", [])
+    assert sheet.name.hasFocus()
+
+
+def test_a_folder_that_is_gone_says_so_and_the_one_before_stays(sheet: FileSheet, folder: Path) -> None:
+    sheet.ask_open(folder, print)
+    sheet.go_to(folder / "gone")
+    assert sheet.folder == folder
+    assert sheet.said.text() == "“gone” can't be opened: no such file or directory."
+
+
+def test_places_are_folders_that_are_there_each_once(folder: Path, tmp_path: Path) -> None:
+    found = known_places(
+        tmp_path, [folder / "Greeting.nepb", folder / "b.nepb", tmp_path / "x" / "gone.nepb"]
+    )
+    assert found[0].folder == Path.home()
+    assert [place.name for place in found].count("work") == 1
+    assert all(place.folder.is_dir() for place in found)
+    assert len({place.folder for place in found}) == len(found)
+
+
+def test_stop_works_and_the_sheet_stays(
+    qtbot: QtBot, window: MainWindow, commands: Commands, sheet: FileSheet, folder: Path
+) -> None:
+    stops: list[str] = []
+    commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
+    sheet.ask_save(folder / "Dance.nepb", print)
+    typed(sheet, "Half a na")
+    stop = window.bar.stop
+    assert window.childAt(stop.mapTo(window, stop.rect().center())) is stop
+    QTest.mouseClick(stop, LEFT)
+    QTest.keyClick(sheet.name, Qt.Key.Key_F12)
+    assert stops == ["stop", "stop"]
+    assert sheet.isVisible()
+    QTest.mouseClick(sheet._scrim, LEFT)
+    assert sheet.isVisible(), "a press beside it loses nothing"
+    assert sheet.name.text() == "Half a na"
+    QTest.keyClick(sheet.name, Qt.Key.Key_Escape)
+    assert not sheet.isVisible()
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+def test_columns_are_read_at_every_size_of_text(
+    qtbot: QtBot, sheet: FileSheet, theme: Theme, folder: Path, percent: int
+) -> None:
+    theme.set_text_percent(percent)
+    sheet.ask_open(folder, print)
+    header, metrics = sheet.list.header(), sheet.list.fontMetrics()
+
+    def readable() -> bool:
+        longest = max(metrics.horizontalAdvance(each.text(1)) for each in sheet._rows())
+        return header.sectionSize(1) >= longest and header.sectionSize(0) >= metrics.horizontalAdvance(
+            "Greeting"
+        )
+
+    qtbot.waitUntil(readable)
+    QApplication.processEvents()
+
+
+def test_the_window_asks_with_it(qtbot: QtBot, theme: Theme, session: Session, folder: Path) -> None:
+    session.settings.add_recent(folder / "Greeting.nepb", "Greeting")
+    window = MainWindow(session, theme, PANELS, [])
+    qtbot.addWidget(window)
+    window.show()
+    window.commands.run("file.open")
+    sheet = window.findChild(FileSheet)
+    assert sheet is not None
+    assert sheet.isVisible()
+    assert "work" in [button.text() for button in sheet.places.findChildren(Button)]
+    sheet.shut()
+    window.close()

@@ -1,0 +1,89 @@
+"""The desktop's file dialogs: only where its portal answers, and nothing is asked where there is no bus."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.ui.startup.portal import CHOICE, THEME, has_bus, has_system_dialogs, use_portal
+
+BUS = {"DBUS_SESSION_BUS_ADDRESS": "unix:path=/nowhere"}
+FAKE = """
+import sys
+from PySide6.QtCore import ClassInfo, Property, QCoreApplication, QObject
+from PySide6.QtDBus import QDBusAbstractAdaptor, QDBusConnection
+app = QCoreApplication([])
+@ClassInfo({"D-Bus Interface": "org.freedesktop.portal.FileChooser"})
+class Chooser(QDBusAbstractAdaptor):
+    version = Property(int, lambda self: 3)
+desk = QObject()
+chooser = Chooser(desk)
+bus = QDBusConnection.sessionBus()
+assert bus.registerObject("/org/freedesktop/portal/desktop", desk)
+assert bus.registerService("org.freedesktop.portal.Desktop")
+print("up", flush=True)
+app.exec()
+"""
+ASK = "from app.ui.startup.portal import chooser_answers; print(chooser_answers())"
+BOTH = """
+import subprocess, sys
+def ask():
+    return subprocess.run([sys.executable, "-c", sys.argv[2]], capture_output=True, text=True, check=True)
+before = ask()
+portal = subprocess.Popen([sys.executable, "-c", sys.argv[1]], stdout=subprocess.PIPE, text=True)
+portal.stdout.readline()
+after = ask()
+portal.kill()
+portal.wait()
+print(before.stdout.strip(), after.stdout.strip(), before.stderr, after.stderr)
+"""
+
+
+def chosen(environ: dict[str, str], platform: str, *, answers: bool = True) -> tuple[str, int]:
+    """The theme that is chosen, and how often the bus was asked."""
+    asked = []
+
+    def answer() -> bool:
+        asked.append(1)
+        return answers
+
+    use_portal(environ, platform, answer)
+    return environ.get(CHOICE, ""), len(asked)
+
+
+def test_a_portal_that_answers_is_used_on_linux_only() -> None:
+    assert chosen(dict(BUS), "linux") == (THEME, 1)
+    assert chosen(dict(BUS), "linux", answers=False) == ("", 1)
+    assert chosen(dict(BUS), "win32") == ("", 0)
+    assert chosen(dict(BUS), "darwin") == ("", 0)
+
+
+def test_what_somebody_chose_stays_and_nobody_is_asked() -> None:
+    assert chosen({**BUS, CHOICE: "kde"}, "linux") == ("kde", 0)
+
+
+def test_without_a_bus_nothing_is_asked(tmp_path: Path) -> None:
+    assert chosen({}, "linux") == ("", 0)
+    assert chosen({"XDG_RUNTIME_DIR": str(tmp_path)}, "linux") == ("", 0)
+    (tmp_path / "bus").write_text("")
+    assert not has_bus({"XDG_RUNTIME_DIR": str(tmp_path)}), "a file is no bus"
+
+
+def test_the_systems_dialogs_are_there_on_windows_macos_and_by_the_portal() -> None:
+    assert has_system_dialogs({}, "win32")
+    assert has_system_dialogs({}, "darwin")
+    assert has_system_dialogs({CHOICE: THEME}, "linux")
+    assert not has_system_dialogs({}, "linux")
+
+
+@pytest.mark.skipif(shutil.which("dbus-run-session") is None, reason="needs dbus-run-session (package dbus)")
+def test_a_real_bus_is_asked_and_says_nothing_to_the_person() -> None:
+    environ = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
+    command = ["dbus-run-session", "--", sys.executable, "-c", BOTH, FAKE, ASK]
+    said = subprocess.run(command, capture_output=True, text=True, check=True, env=environ).stdout
+    assert said.split() == ["False", "True"]
