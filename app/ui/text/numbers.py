@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from nep.i18n import _, number, plazy
 
-MAC_KEYS = {"Ctrl": "⌘", "Alt": "⌥", "Shift": "⇧", "Meta": "⌃"}
+MAC_KEYS = {"Meta": "⌃", "Alt": "⌥", "Shift": "⇧", "Ctrl": "⌘"}
 KEYS = {
     "Alt": plazy("key", "Alt"),
     "Backspace": plazy("key", "Backspace"),
@@ -94,15 +94,21 @@ def seconds_words(value_s: float) -> str:
 
 
 def spoken_key(shortcut: str, platform: str = sys.platform) -> str:
-    """A shortcut as it stands on keys: "Ctrl Shift S", "Ctrl +"; on a Mac, where Ctrl is Cmd, "⌘ ⇧ S"."""
-    return _named_keys(re.sub(r"\+(?=.)", " ", shortcut), MAC_KEYS if platform == "darwin" else {})
+    """Shortcuts, by commas, as people write them: "Ctrl+Shift+S"; on a Mac, where Ctrl is Cmd, "⇧⌘S"."""
+    if platform != "darwin":
+        return _named_keys(shortcut, {})
+    return ", ".join(_mac_key(each) for each in shortcut.split(", "))
+
+
+def _mac_key(shortcut: str) -> str:
+    """One shortcut in the signs of a Mac, in the order of its menus."""
+    *held, key = re.split(r"\+(?=.)", shortcut)
+    return "".join(sign for name, sign in MAC_KEYS.items() if name in held) + _named_keys(key, MAC_KEYS)
 
 
 def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
-    """A button's words with its key: "Save (Ctrl+S)"; on a Mac "Save (⌘ S)"."""
-    if not shortcut:
-        return tip
-    return f"{tip} ({spoken_key(shortcut, platform) if platform == 'darwin' else _named_keys(shortcut, {})})"
+    """A button's words with its key: "Save (Ctrl+S)"; on a Mac "Save (⌘S)"."""
+    return f"{tip} ({spoken_key(shortcut, platform)})" if shortcut else tip
 
 
 def _named_keys(shortcut: str, signs: Mapping[str, str]) -> str:

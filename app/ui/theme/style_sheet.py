@@ -62,13 +62,14 @@ QMenuBar::item:selected {{ background: {hover}; color: {text}; }}
 QMenuBar::item:pressed {{ background: {pressed}; color: {text}; }}
 QMenu {{
     background: {raised}; color: {text}; border: 1px solid {borderStrong}; padding: 5px;
-    border-radius: {panel_radius}px;
+    border-radius: {panel_radius}px; menu-scrollable: 1;
 }}
 QMenu::item {{ padding: 6px 22px 6px 33px; border-radius: {small}px; min-width: 150px; }}
 QMenu::item:selected {{ background: {hover}; color: {text}; }}
 QMenu::item:disabled {{ color: {textDisabled}; }}
 QMenu::icon {{ padding-left: 8px; }}
 QMenu::separator {{ height: 1px; background: {border}; margin: 4px 6px; }}
+QMenu::scroller {{ height: 22px; background: transparent; }}
 QMenu::indicator {{ width: 16px; height: 16px; padding-left: 8px; }}
 
 QLineEdit, QPlainTextEdit, QTextEdit {{

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from PySide6.QtCore import QObject, QPoint, QRectF, QSize, Qt
+from PySide6.QtCore import QObject, QPoint, QRect, QRectF, QSize, Qt
 from PySide6.QtGui import (
     QAction,
     QGuiApplication,
@@ -23,12 +23,15 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QLineEdit, QMenu, QPlainTextEdit, QWidget
 
+from app.ui.text.numbers import spoken_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
+from app.ui.widgets.buttons import StopButton
 from app.ui.widgets.paint import RIGHT, box, words
 
 CUT_ON = frozenset({"xcb"})
 MARK, TEXT_LEFT = 15, 33
+SCROLLER = 22  # px, as the style sheet has it
 
 
 def make_round(widget: QWidget) -> None:
@@ -52,6 +55,15 @@ def round_region(size: QSize, radius: float) -> QRegion:
     return QRegion(path.toFillPolygon().toPolygon())
 
 
+def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
+    """Where a menu covers no Stop: left of it, else below it; as it is when the screen has no such room."""
+    if not menu.intersects(stop):
+        return menu
+    left, low = menu.translated(stop.left() - menu.right() - 1, 0), QRect(menu)
+    low.moveTop(stop.bottom() + 1)
+    return next((place for place in (left, low) if screen.contains(place)), menu)
+
+
 class Menu(QMenu):
     """A menu in the design's look: icons and checks in one column, shortcuts quiet at the right."""
 
@@ -63,6 +75,20 @@ class Menu(QMenu):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         cut(self, self._theme.radius("panel"))
+        self._leave_stop()
+
+    def _leave_stop(self) -> None:
+        """Go aside where it would cover a Stop, as Qt may move it where a window is small."""
+        owner = self.parentWidget()
+        while isinstance(owner, QMenu):
+            owner = owner.parentWidget()
+        if owner is None:
+            return
+        screen = self.screen().availableGeometry()
+        for stop in owner.window().findChildren(StopButton):
+            if stop.isVisible():
+                place = QRect(stop.mapToGlobal(QPoint()), stop.size())
+                self.move(beside(self.geometry(), place, screen).topLeft())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -72,11 +98,29 @@ class Menu(QMenu):
         theme, painter = self._theme, QPainter(self)
         rect = QRectF(self.rect())
         box(painter, rect, theme.radius("panel"), theme.colour("raised"), theme.colour("borderStrong"))
-        painter.setClipRect(rect.adjusted(1, 1, -1, -1))
-        for action in self.actions():
-            if action.isVisible():
-                self._paint_action(painter, QRectF(self.actionGeometry(action)), action)
+        shown = [action for action in self.actions() if action.isVisible()]
+        above, below = self._scrolled(shown)
+        inside = rect.adjusted(1, 1 + above * SCROLLER, -1, -1 - below * SCROLLER)
+        for hidden, icon, top in (
+            (above, "chevron-up", 1),
+            (below, "chevron-down", rect.height() - SCROLLER),
+        ):
+            if hidden:
+                square = QRectF((rect.width() - 14) / 2, top + (SCROLLER - 14) / 2, 14, 14)
+                paint_icon(painter, square, icon, theme.colour("textSecondary"))
+        painter.setClipRect(inside)
+        for action in shown:
+            place = QRectF(self.actionGeometry(action))
+            if place.intersects(inside):
+                self._paint_action(painter, place, action)
         painter.end()
+
+    def _scrolled(self, shown: list[QAction]) -> tuple[bool, bool]:
+        """Whether a low screen hides entries above, and below; the mouse there brings them."""
+        if not shown:
+            return False, False
+        first, last = self.actionGeometry(shown[0]), self.actionGeometry(shown[-1])
+        return first.top() < 0, last.bottom() > self.height()
 
     def _paint_action(self, painter: QPainter, place: QRectF, action: QAction) -> None:
         theme = self._theme
@@ -93,7 +137,7 @@ class Menu(QMenu):
             mode = QIcon.Mode.Normal if action.isEnabled() else QIcon.Mode.Disabled
             action.icon().paint(painter, mark.toRect(), Qt.AlignmentFlag.AlignCenter, mode)
         said, _tab, key = action.text().partition("\t")
-        key = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText) or key
+        key = spoken_key(action.shortcut().toString(QKeySequence.SequenceFormat.PortableText)) or key
         ink = theme.colour("text" if action.isEnabled() else "textDisabled")
         inside = place.adjusted(TEXT_LEFT, 0, -12, 0)
         words(painter, inside, re.sub("&(.)", r"\1", said), self.font(), ink)

@@ -355,6 +355,6 @@ def test_a_screen_reader_hears_words_key_and_reason(palette: Palette) -> None:
 
 def test_the_field_in_the_app_bar_opens_it(palette: Palette, window: MainWindow) -> None:
     palette.shut()
-    assert window.bar.search.toolTip() == "Find a command or panel (Ctrl K)"
+    assert window.bar.search.toolTip() == "Find a command or panel (Ctrl+K)"
     QTest.mouseClick(window.bar.search, Qt.MouseButton.LeftButton)
     assert palette.isVisible()

@@ -25,6 +25,7 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.theme.theme import Mode, Theme
 from app.ui.widgets import StopButton
+from app.ui.widgets.menus import beside
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
 from tests.ui.shell_parts import Answers
@@ -138,13 +139,17 @@ def test_every_size_shows_everything_whole(qtbot, window: MainWindow, mode: Mode
     assert not faults, "\n".join(["", *faults])
 
 
+FOLDING = {"robot", "camera", "sensors", "problems"}
+
+
 def tabs_of(bench: Workbench, name: str) -> set[str]:
-    """The panels that are tabs of this one."""
-    return {
+    """The panels of `FOLDING` that are tabs of this one."""
+    there = {
         dock.description.name
         for dock in bench.tabifiedDockWidgets(bench.docks[name])
         if isinstance(dock, Dock)
     }
+    return there & FOLDING
 
 
 def test_panels_fold_into_tabs_step_by_step_and_come_back(qtbot, window: MainWindow) -> None:
@@ -242,3 +247,21 @@ def test_the_app_bar_shortens_its_words_before_its_menus(qtbot, window: MainWind
     settle(qtbot, window)
     assert bar.switch.width() == wide
     assert button.toolTip() == ""
+
+
+SCREEN = QRect(0, 0, 1024, 600)
+STOP = QRect(780, 50, 230, 52)
+
+
+@pytest.mark.parametrize(
+    ("menu", "goes_to"),
+    [
+        (QRect(10, 40, 300, 500), (10, 40)),  # covers nothing: it stays
+        (QRect(700, 40, 300, 500), (480, 40)),  # left of Stop
+        (QRect(60, 60, 900, 300), (60, 102)),  # too wide for that: below it
+        (QRect(0, 0, 1000, 590), (0, 0)),  # there is no such room
+    ],
+)
+def test_a_menu_that_would_cover_stop_goes_aside(menu: QRect, goes_to: tuple[int, int]) -> None:
+    assert beside(menu, STOP, SCREEN).topLeft().toTuple() == goes_to
+    assert beside(menu, STOP, SCREEN).size() == menu.size()

@@ -155,6 +155,8 @@ def whole(qtbot, session: Session, theme: Theme, tmp_path: Path) -> Iterator[tup
         ((1100, 700), 150, True),
         ((1100, 700), 200, False),
         ((1100, 700), 200, True),
+        ((1024, 600), 100, False),
+        ((1024, 600), 200, False),
     ],
 )
 def test_the_window_cuts_no_words(

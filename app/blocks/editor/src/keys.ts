@@ -68,16 +68,18 @@ const NAMES: Readonly<Record<number, string>> = {
   [KeyCodes.DELETE]: lazy('Del'), [KeyCodes.ENTER]: '↵', [KeyCodes.UP]: '↑', [KeyCodes.DOWN]: '↓', [KeyCodes.SLASH]: '/',
 };
 
-/** The first key of a command as menus show it: Ctrl+D. */
+/** The first key of a command as menus show it: Ctrl+D, on a Mac ⌘D. */
 export function keyWords(name: string): string {
   const [key] = registry.getKeyCodesByShortcutName(name);
   if (!key) return '';
   const parts = key.split('+');
   const code = Number(parts.pop());
   const last = NAMES[code];
-  const words = [['Control', t('Ctrl')], ['Meta', '⌘'], ['Alt', t('Alt')], ['Shift', t('Shift')]] as const;
+  const isMac = parts.includes('Meta');
+  const words = isMac ? [['Control', '⌃'], ['Alt', '⌥'], ['Shift', '⇧'], ['Meta', '⌘']] as const :
+    [['Control', t('Ctrl')], ['Alt', t('Alt')], ['Shift', t('Shift')]] as const;
   const held = words.filter(([each]) => parts.includes(each)).map(([, word]) => word);
-  return [...held, last ? t(last) : String.fromCharCode(code)].join('+');
+  return [...held, last ? t(last) : String.fromCharCode(code)].join(isMac ? '' : '+');
 }
 
 /** Copy, cut, paste and duplicate as our clipboard does them. */

@@ -20,7 +20,7 @@ from app.errors import SettingsError
 from app.ui.shell.actions.actions import STOP
 from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.text import plain
-from app.ui.text.numbers import spoken_key
+from app.ui.text.numbers import spoken_key, tip_with_key
 from app.ui.widgets import IconButton
 from nep.i18n import _, lazy
 
@@ -220,5 +220,4 @@ class Shortcuts(QObject):
                 said = _(self.commands[command].tip)
                 if not said or isinstance(widget, IconButton):  # nothing else says what it is
                     said = widget.accessibleName()
-                key = ", ".join(spoken_key(each) for each in self.of(command))
-                widget.setToolTip(plain.tip(f"{said} ({key})" if key else said))
+                widget.setToolTip(plain.tip(tip_with_key(said, ", ".join(self.of(command)))))

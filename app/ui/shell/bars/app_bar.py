@@ -23,7 +23,8 @@ from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _, lazy, ngettext
 
 WIDE, HIGH, LEFT, ICON, GAP = 248, 28, 10, 14, 9
-SPACES = 64  # px between the parts of the bar
+EDGE = 12
+DIRECT = Qt.FindChildOption.FindDirectChildrenOnly
 LEAST_ROOM = 44  # px of the field: less than that for the words, and only icon and key are shown
 CHIP_WORDS = {
     "ready": lazy("{robot} ready"),
@@ -66,6 +67,7 @@ class AppBar(QWidget):
 
     def _build(self) -> None:
         left, right = QWidget(), QWidget()
+        self._halves = (left, right)
         menus = QHBoxLayout(left)
         menus.setContentsMargins(0, 0, 0, 0)
         menus.setSpacing(10)
@@ -102,16 +104,27 @@ class AppBar(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """Where the menus have no room: first the field loses its words, then the switch, then the chip."""
-        switch, chip = self.switch, self.chip
-        switch.set_bare(False)
-        wanted = [widget for widget in (self.search, self.stop) if not widget.isHidden()]
-        fixed = sum(widget.minimumSizeHint().width() for widget in wanted) + SPACES
-        fixed += self.menus.sizeHint().width() + self.height()  # the logo is about as wide as the bar is high
-        words = 0 if switch.isHidden() else switch.sizeHint().width()
-        switch.set_bare(fixed + words + chip.full_width() > self.width())
-        words = 0 if switch.isHidden() else switch.sizeHint().width()
-        chip.set_bare(fixed + words + chip.full_width() > self.width())
+        """Where the menus have no room: the switch loses its words, then the chip, then the field its key."""
+        for bare in range(4):
+            self.switch.set_bare(bare > 0)
+            self.chip.set_bare(bare > 1)
+            self.search.set_bare(bare > 2)
+            if self._needed() <= self.width():
+                return
+
+    def _needed(self) -> int:
+        """The width at which nothing of the bar is shortened more than it is now."""
+        parts = [part for half in self._halves for part in half.findChildren(QWidget, options=DIRECT)]
+        wide = sum(self._least(part) + GAP for part in (self.switch, *parts) if not part.isHidden())
+        return wide + 2 * EDGE
+
+    def _least(self, part: QWidget) -> int:
+        """How narrow a part may be; the menus may not be at all."""
+        if part is self.menus:
+            return 0 if self.native else part.sizeHint().width()
+        if part is self.switch:
+            return part.sizeHint().width()
+        return max(part.minimumSizeHint().width(), part.minimumWidth())
 
     def use(self, actions: Actions) -> None:
         """Let its buttons trigger these."""
@@ -158,7 +171,15 @@ class PaletteField(PaintedButton):
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(theme, _("Find a command or panel"), radius="control", parent=parent)
         self._key = ""
+        self._bare = False
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+
+    def set_bare(self, bare: bool) -> None:
+        """Show only the icon, or the key beside it again, and the words where they have room."""
+        if bare != self._bare:
+            self._bare = bare
+            self.updateGeometry()
+            self.update()
 
     def show_key(self, key: str) -> None:
         """The key that opens the palette now; "" for none."""
@@ -170,7 +191,7 @@ class PaletteField(PaintedButton):
         return self._theme.scaled(ICON)
 
     def _key_room(self) -> float:
-        return paint.key_width(self._theme, self._key) + 7 if self._key else 0.0
+        return paint.key_width(self._theme, self._key) + 7 if self._key and not self._bare else 0.0
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("body")
@@ -195,7 +216,7 @@ class PaletteField(PaintedButton):
         if room >= self._theme.scaled(LEAST_ROOM):
             area = QRectF(left, 0, room, rect.height())
             paint.words(painter, area, self.text(), font, theme.colour("textSecondary"))
-        if self._key:
+        if self._key and not self._bare:
             paint.key_cap(painter, theme, rect.right() - 6, middle, self._key)
 
 

@@ -19,6 +19,7 @@ FREEZE = "view.freeze"
 EVERY = 8  # half ticks
 CHEVRON = 14
 ROOM_PX = 780  # what the whole bar needs at 100 % text
+FREEZE_ROOM_PX = 520  # below that nothing of what a stop brought would be whole beside it
 GAP = 6
 
 
@@ -96,10 +97,11 @@ class DeveloperTools(QObject):
         return False
 
     def _fit(self) -> None:
-        """Large text in a narrow window: layouts and panels are in the View menu."""
+        """Large text in a narrow window: layouts and panels, then Freeze, are in the View menu."""
         room = self._bar.width() >= self._shell.theme.scaled(ROOM_PX)
         for tool in self._wide_only:
             paint.show_when(tool, room)
+        paint.show_when(self.freeze, self._bar.width() >= self._shell.theme.scaled(FREEZE_ROOM_PX))
 
     def follow(self) -> None:
         """Called with every half tick: say what is so, while it can be seen."""

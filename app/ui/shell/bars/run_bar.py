@@ -18,6 +18,7 @@ from nep.i18n import _
 PACES = ("run.full_speed", "run.slow", "run.very_slow")
 ROOM_PX = 960  # what the bar needs at 100 % text
 LEAST_ROOM_PX = 600  # below that even Run is an icon, so that nothing of a stop's result is cut
+LEAST_SENTENCE = 30  # px at 100 % text
 DOT = 10
 HALO = 16
 MARKS = {
@@ -104,10 +105,12 @@ class Sentence(QWidget):
         return QSize(320, round(high))
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(60, self.sizeHint().height())
+        return QSize(0, self.sizeHint().height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
+        if self.width() < theme.scaled(LEAST_SENTENCE):
+            return  # two letters and dots say nothing; its tooltip and a screen reader say all
         painter = QPainter(self)
         bold, plain = self._title_font(), theme.font("body")
         upper, lower = paint.height_of(bold), paint.height_of(plain)
