@@ -26,8 +26,9 @@ from app.core.documents.file_format import (
     write_file,
 )
 from app.core.documents.journal import Journal, Unsaved
+from app.core.documents.rename import path_named, rename_file, why_not
 from app.core.documents.titles import name_of
-from app.core.documents.versions import Stamp, stamp_of
+from app.core.documents.versions import Stamp, follow_file, stamp_of
 from app.core.documents.workspace_json import LONG_CHARACTERS, WorkspaceJson
 from app.core.storage import deep_json
 from app.errors import DescriptionError, DocumentError
@@ -135,6 +136,11 @@ class Document:
         """Open a file as a new, unsaved behaviour of another name. Raises DocumentError."""
         self._replace(replace(read_file(path), name=name), None)
 
+    def duplicate(self, other: Document, name: str) -> None:
+        """Become a new, unsaved behaviour with the blocks of another one."""
+        self._replace(BehaviourFile(name, {}, other.robots, other.others), None)
+        self.edited(other.workspace)
+
     def recover(self, unsaved: Unsaved) -> None:
         """Put back what a crash left behind.
 
@@ -165,6 +171,26 @@ class Document:
         self.saved_at = self._clock()
         self._stamp = stamp_of(target)
         self._discard_journal()
+
+    def rename_to(self, name: str) -> None:
+        """Give it another name, and its file, if it has one. Raises DocumentError; then nothing changed."""
+        wanted = name.strip()
+        problem = why_not(wanted, self.path)
+        if problem:
+            raise DocumentError(self.path, problem)
+        new = path_named(self.path, wanted) if self.path is not None else None
+        if self.path is not None and new is not None and new != self.path:
+            changed = self.changed_outside
+            rename_file(self.path, new)
+            follow_file(self.path, new)
+            self.path = new
+            self._stamp = self._stamp if changed else stamp_of(new)
+        elif self.path is not None and wanted != self.name:
+            self.dirty = True  # in Studio's own folder the name is what the file says
+        self.name = wanted
+        self._compiled = self._asked = None  # a program says whose it is
+        if self.dirty:
+            self._write_journal()
 
     def mend(self, action: str) -> bool:
         """Do what a problem's button says to the blocks; False when the action is no matter of blocks."""

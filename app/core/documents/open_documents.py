@@ -73,6 +73,20 @@ class Documents:
         """Open a file as a new behaviour of another name in a tab. Raises DocumentError."""
         return self._named_apart(self._filled(lambda document: document.copy(path, name)))
 
+    def duplicate(self, document: Document) -> Document:
+        """Open a new behaviour with the same blocks, in the tab beside it."""
+        self.show(document)
+        made = self._made()
+        made.duplicate(document, self._free_name(_("{name} copy").format(name=document.name)))
+        return self._put(made)
+
+    def rename(self, document: Document, name: str) -> None:
+        """Give a behaviour another name, and its file. Raises DocumentError; then nothing changed."""
+        before = document.path
+        document.rename_to(name)
+        self._closed = [document.path if each == before and document.path else each for each in self._closed]
+        self.revision += 1
+
     def recover(self, unsaved: Unsaved) -> Document:
         """Put back unsaved work: into the tab that has its file, else into a tab of its own."""
         there = self.with_path(unsaved.path) if unsaved.path is not None else None

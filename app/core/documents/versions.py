@@ -21,6 +21,7 @@ from app.core.storage.atomic_file import make_private, private_folder, read_whol
 from app.core.storage.settings import data_home, home
 from app.errors import DocumentError
 from nep.i18n import _
+from nep.system.replace_file import replace_file
 
 NAME = "earlier"
 COPIES_KEPT = 300
@@ -108,6 +109,14 @@ def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
     """Versions of other files of that name, the newest first: of a file that was moved here, for example."""
     mark, stem = _mark(path), _plain(path.stem)
     return [each for each in _newest_first(_folder(folder)) if each.mark != mark and each.name == stem]
+
+
+def follow_file(old: Path, new: Path, folder: Path | None = None) -> None:
+    """The versions of a file stay its versions when it has another name; those that can't be moved stay."""
+    for each in reversed(versions_of(old, folder)):
+        copy = free_path(_folder(folder), f"{new.stem}, before", each.replaced_s, f" {_mark(new)}")
+        with contextlib.suppress(OSError):
+            replace_file(each.copy, copy)
 
 
 def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:

@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -118,6 +118,14 @@ class Settings:
         self._values = self._of_others()
         kept = [file for file in self.recent_known if file.path != path]
         self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
+
+    def rename_recent(self, old: Path, new: Path) -> None:
+        """A file has another name: it stays where it was among the recent ones. Raises SettingsError."""
+        old, new = old.resolve(), new.resolve()
+        self._values = self._of_others()
+        kept = [file for file in self.recent_known if file.path != new]
+        named = [replace(file, path=new, name=new.stem) if file.path == old else file for file in kept]
+        self.set_recent(named)
 
     def set_recent(self, files: Sequence[RecentFile]) -> None:
         """Remember these files and no others, newest first. Raises SettingsError."""

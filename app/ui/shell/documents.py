@@ -153,6 +153,30 @@ class DocumentController:
         if isinstance(editor, SupportsShowCurrent):
             editor.show_current()
 
+    def duplicate(self, document: Document) -> None:
+        """Open a new behaviour with the same blocks."""
+        self.with_newest(lambda: self._show(lambda: self._documents.duplicate(document)))
+
+    def rename(self, document: Document, name: str) -> bool:
+        """Give a behaviour another name, and its file; it can be taken back. False when that fails."""
+        before, old = document.name, document.path
+        if name.strip() == before:
+            return True
+        try:
+            self._documents.rename(document, name)
+        except AppError as error:
+            self._complain(words_of(error), "file.save_as", _("Save somewhere else"))
+            return False
+        self._session.tabs.keep()
+        if old is not None and document.path is not None:
+            try:
+                self._session.settings.rename_recent(old, document.path)
+            except SettingsError as error:
+                self._session.console.add("warn", "studio", str(error))
+        words = _("Renamed {name} to {other}").format(name=before, other=document.name)
+        self._say(words, _("Undo"), lambda: self.rename(document, before))
+        return True
+
     def move(self, document: Document, place: int) -> None:
         """Put a tab to another place."""
         self._documents.move(document, place)

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QContextMenuEvent, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QToolTip
 
 from app.ui.panels.behaviour.tab import TabFacts
 from app.ui.panels.behaviour.tabs import BehaviourTabs
@@ -143,7 +143,78 @@ def test_the_menu_of_a_tab_names_what_can_be_done(qtbot, tabs) -> None:
         tabs, QContextMenuEvent(QContextMenuEvent.Reason.Mouse, place, tabs.mapToGlobal(place))
     )
     (menu,) = tabs.findChildren(Menu)
-    assert [action.text() for action in menu.actions()] == ["Save as", "Close", "Close the others"]
-    menu.actions()[1].trigger()
+    words = [action.text() for action in menu.actions() if not action.isSeparator()]
+    assert words == [
+        "Rename\tF2",
+        "Duplicate",
+        "Save",
+        "Save as",
+        "Show the file's folder",
+        "Close",
+        "Close the others",
+    ]
+    by_words = {action.text(): action for action in menu.actions()}
+    assert not by_words["Show the file's folder"].isEnabled(), "it has no file"
+    for each in ("Duplicate", "Close"):
+        by_words[each].trigger()
     menu.close()
-    assert asked == [("tab.close", "b")]
+    assert asked == [("tab.duplicate", "b"), ("tab.close", "b")]
+
+
+# -- another name ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("way", ["double click", "F2", "menu"])
+def test_a_name_is_edited_in_its_place(qtbot, tabs, way: str) -> None:
+    renamed = heard(tabs.renamed)
+    tab = tabs.tabs["a"]
+    if way == "double click":
+        QTest.mouseDClick(tab, Qt.MouseButton.LeftButton, pos=QPoint(14, 14))
+    elif way == "F2":
+        QTest.keyClick(tab, Qt.Key.Key_F2)
+    else:
+        tabs.menu_of("a").actions()[0].trigger()
+    assert tabs.field.selectedText() == "Greeting"
+    assert tabs.field.geometry().contains(tab.geometry().center())
+    QTest.keyClicks(tabs.field, "Hello")
+    QTest.keyClick(tabs.field, Qt.Key.Key_Return)
+    assert renamed == [("a", "Hello")]
+    assert tabs.field is None
+
+
+def test_esc_leaves_the_name_as_it_was(tabs) -> None:
+    renamed = heard(tabs.renamed)
+    QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
+    assert not tabs.add.isVisible(), "nothing lies over the field"
+    QTest.keyClicks(tabs.field, "Hello")
+    QTest.keyClick(tabs.field, Qt.Key.Key_Escape)
+    assert (renamed, tabs.field) == ([], None)
+    assert tabs.add.isVisible()
+
+
+def test_a_name_that_can_not_be_had_says_why_and_stays_to_be_mended(tabs) -> None:
+    renamed = heard(tabs.renamed)
+    tabs.why_not = lambda key, name: f"{key} can't be {name}" if name == "Taken" else ""
+    QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
+    QTest.keyClicks(tabs.field, "Taken")
+    QTest.keyClick(tabs.field, Qt.Key.Key_Return)
+    assert QToolTip.text() != ""
+    assert "a can't be Taken" in QToolTip.text().replace("&#39;", "'").replace("&#x27;", "'")
+    assert tabs.field.property("wrong") == "true"
+    assert renamed == []
+    QTest.keyClicks(tabs.field, "2")
+    assert tabs.field.property("wrong") == ""
+    QTest.keyClick(tabs.field, Qt.Key.Key_Return)
+    assert renamed == [("a", "Taken2")]
+
+
+def test_a_tab_that_goes_takes_its_field_along(tabs) -> None:
+    QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
+    tabs.show_tabs([B, C], "b")
+    assert tabs.field is None
+
+
+def test_the_folder_that_tells_it_apart_is_not_edited(tabs) -> None:
+    tabs.show_tabs([TabFacts("a", "Quiz — class 3", plain_name="Quiz", has_file=True), B], "a")
+    QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
+    assert tabs.field.text() == "Quiz"

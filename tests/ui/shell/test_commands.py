@@ -126,7 +126,7 @@ def test_lists_of_commands_name_commands() -> None:
 def test_the_menu_of_a_tab_names_commands_about_a_tab() -> None:
     source = (Path(app.__file__).parent / "ui" / "panels" / "behaviour" / "tabs.py").read_text("utf-8")
     listed = set(re.findall(r'"(tab\.[a-z_]+)"', source))
-    assert len(listed) == 3
+    assert len(listed) == 6
     assert listed <= ABOUT
 
 

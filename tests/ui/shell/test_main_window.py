@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton, QWidget
 
 from app.core.documents.journal import Journal, left_behind
 from app.core.faults import RepeatFilter
@@ -20,6 +20,7 @@ from app.robots.description.description import parse, td_for
 from app.ui.application import Options, first_steps, layout_left
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.table import COMMANDS
+from app.ui.shell.docking.dock_title import DockTitle
 from app.ui.shell.main_window import MainWindow, Placeholder
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
@@ -285,6 +286,33 @@ def test_panels_that_share_a_place_are_tabs_in_the_title(
     QTest.mouseClick(second, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(bench.docks["alerts"].shown)
     assert not bench.docks["console"].shown()
+
+
+def test_tabs_of_panels_and_a_panels_own_tabs_have_a_row_each(qtbot, window: MainWindow) -> None:
+    """Nobody takes the tab of a panel for one of a file, however narrow the window is."""
+
+    class Own(PlainPanel):
+        def replaces_title(self) -> QWidget:
+            return own
+
+    own = QWidget()
+    own.setMinimumSize(40, 28)
+    show(qtbot, window)
+    bench = window.show_layout("behaviour")
+    plain = bench.docks["behaviour"].panel
+    title = DockTitle(window.theme, Own(plain.context, "Behaviour"), "comfortable")
+    qtbot.addWidget(title)
+    alone = title.sizeHint().height()
+    title.resize(300, alone)
+    title.show()
+    title.set_tabs([("Behaviour", "blocks", True, lambda: None), ("Robots", "bot", False, lambda: None)])
+    assert title.sizeHint().height() > alone
+    title.resize(300, title.sizeHint().height())
+    qtbot.waitUntil(lambda: own.height() >= 28 and title._tabs[0].width() > 20)
+    lowest = max(tab.mapTo(title, tab.rect().bottomLeft()).y() for tab in title._tabs)
+    assert lowest < own.mapTo(title, QPoint()).y()
+    title.set_tabs(())
+    assert title.sizeHint().height() == alone
 
 
 def test_a_panel_opens_beside_its_home(qtbot, window: MainWindow, commands: Commands) -> None:

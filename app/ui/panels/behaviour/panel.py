@@ -12,6 +12,7 @@ from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.core.documents.rename import why_not
 from app.core.documents.titles import told_apart
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import SettingsError
@@ -112,6 +113,8 @@ class BehaviourPanel(PanelWidget):
         tabs.closed.connect(lambda key: context.run(f"tab.close:{key}"))
         tabs.moved.connect(lambda key, place: context.run(f"tab.move:{key}:{place}"))
         tabs.asked.connect(lambda command, key: context.run(f"{command}:{key}"))
+        tabs.renamed.connect(lambda key, name: context.run(f"tab.rename:{key}:{name}"))
+        tabs.why_not = self._why_not_named
         tabs.add.clicked.connect(lambda: context.run("file.new"))
         self.mode = "blocks"
         self.program = ProgramView(self.theme)
@@ -361,6 +364,14 @@ class BehaviourPanel(PanelWidget):
             document.edited(workspace)
             self.session.tabs.edited(document, was_blank=was_blank)
 
+    def rename_tab(self, key: str) -> None:
+        """Let a person edit the name of a tab."""
+        self._bar.tabs.edit(key)
+
+    def _why_not_named(self, key: str, name: str) -> str:
+        document = self.session.documents.with_key(key)
+        return why_not(name, document.path) if document is not None else ""
+
     def _history(self, can_undo: bool, can_redo: bool) -> None:
         self._bar.undo.setEnabled(can_undo)
         self._bar.redo.setEnabled(can_redo)
@@ -425,7 +436,17 @@ def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:
     for document, title in zip(shown, told_apart([(each.name, each.path) for each in shown]), strict=True):
         running = runs.active and runs.document is document
         where = str(document.path) if document.path is not None else _("Not saved in a file yet")
-        found.append(TabFacts(document.key, title, document.dirty, running, f"{title}\n{where}"))
+        found.append(
+            TabFacts(
+                document.key,
+                title,
+                document.dirty,
+                running,
+                f"{title}\n{where}",
+                document.name,
+                document.path is not None,
+            )
+        )
     return found
 
 

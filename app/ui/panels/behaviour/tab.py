@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QFocusEvent,
     QFont,
@@ -12,16 +13,19 @@ from PySide6.QtGui import (
     QMouseEvent,
     QPainter,
 )
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QToolTip, QWidget
 
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
+from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
 LONGEST_NAME = 220
+MOST_LETTERS = 200
+SAID_MS = 20_000
 PADDING = 12
 ICON = 16
 SLOT = 18  # the unsaved dot, or close under the mouse
@@ -36,6 +40,9 @@ class TabFacts:
     dirty: bool = False
     runs: bool = False
     tip: str = ""
+    plain_name: str = ""
+    """Its name alone, which a person edits: without the folder that tells it from another."""
+    has_file: bool = False
 
 
 class BehaviourTab(PaintedButton):
@@ -45,6 +52,7 @@ class BehaviourTab(PaintedButton):
     close_pressed = Signal()
     dragged = Signal(int)
     stepped = Signal(int)
+    rename_wanted = Signal()
 
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(theme, checkable=True, parent=parent)
@@ -144,6 +152,14 @@ class BehaviourTab(PaintedButton):
                 self.chosen.emit()
         event.accept()
 
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton and not self.close_rect().contains(event.position()):
+            self._from = None
+            self.rename_wanted.emit()
+            event.accept()
+        else:
+            self.mousePressEvent(event)
+
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         over = self.close_rect().contains(event.position())
         if over != self._over_close:
@@ -171,6 +187,8 @@ class BehaviourTab(PaintedButton):
         steps = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
         if event.key() in steps:
             self.stepped.emit(steps[Qt.Key(event.key())])
+        elif event.key() == Qt.Key.Key_F2:
+            self.rename_wanted.emit()
         elif event.key() == Qt.Key.Key_Delete:
             self.close_pressed.emit()
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}:
@@ -181,3 +199,74 @@ class BehaviourTab(PaintedButton):
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         self.update()
+
+
+class NameField(QLineEdit):
+    """A tab's name in the making, in the place of the tab: Enter takes it, Esc leaves it as it was.
+
+    A press elsewhere takes it too, unless the behaviour can't be called so; then it stays as it was.
+    """
+
+    taken = Signal(str)
+    left = Signal()
+
+    def __init__(self, theme: Theme, name: str, why_not: Callable[[str], str], parent: QWidget) -> None:
+        """``why_not`` says in a sentence why a name can't be had, "" when it can."""
+        super().__init__(name, parent)
+        self._theme, self._why_not, self._ended = theme, why_not, False
+        self.setAccessibleName(_("Name of the behaviour"))
+        self.setProperty("focusRadius", theme.radius("small"))
+        self.setMaxLength(MOST_LETTERS)
+        self.setFont(theme.font("label"))
+        EditMenu(theme, self)
+        self.textEdited.connect(lambda _text: self._mark(""))
+        self.selectAll()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self._take()
+        elif event.key() == Qt.Key.Key_Escape:
+            self._end()
+        elif event.key() in {Qt.Key.Key_Tab, Qt.Key.Key_F2}:
+            event.accept()
+        else:
+            super().keyPressEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        stays = {Qt.FocusReason.PopupFocusReason, Qt.FocusReason.ActiveWindowFocusReason}
+        if event.reason() in stays:
+            return
+        if self._why_not(self.text()):
+            self._end()
+        else:
+            self._take()
+
+    def _take(self) -> None:
+        problem = self._why_not(self.text())
+        if problem:
+            self._mark(problem)
+        elif not self._ended:
+            self._ended = True
+            self.taken.emit(self.text().strip())
+            self.left.emit()
+
+    def _end(self) -> None:
+        if not self._ended:
+            self._ended = True
+            self.left.emit()
+
+    def _mark(self, problem: str) -> None:
+        """Say below the field what is wrong with the name."""
+        wrong = "true" if problem else ""
+        if self.property("wrong") != wrong:
+            self.setProperty("wrong", wrong)
+            self.style().unpolish(self)
+            self.style().polish(self)
+        self.setAccessibleDescription(problem)
+        if problem:
+            paint.announce(self, problem)
+            below = self.mapToGlobal(QPoint(0, self.height() + 2))
+            QToolTip.showText(below, plain.tip(problem), self, self.rect(), SAID_MS)
+        else:
+            QToolTip.hideText()

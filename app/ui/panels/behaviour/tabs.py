@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QContextMenuEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.ui.panels.behaviour.tab import BehaviourTab, TabFacts
+from app.ui.panels.behaviour.tab import BehaviourTab, NameField, TabFacts
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Segments
 from app.ui.widgets.menus import Menu
@@ -16,6 +16,7 @@ from nep.i18n import _
 
 SHORTEST = 76
 GAP = 4
+NAME_WIDTH = 180  # to edit a name in
 
 
 class BehaviourTabs(QWidget):
@@ -25,6 +26,7 @@ class BehaviourTabs(QWidget):
     closed = Signal(str)
     moved = Signal(str, int)
     asked = Signal(str, str)  # a command of a tab's menu, and the tab's key
+    renamed = Signal(str, str)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -32,6 +34,10 @@ class BehaviourTabs(QWidget):
         self._facts: tuple[TabFacts, ...] = ()
         self._current = ""
         self._left = 0.0
+        self.why_not: Callable[[str, str], str] = lambda _key, _name: ""
+        """Why a tab, by its key, can't have a name; "" when it can."""
+        self.field: NameField | None = None
+        self._edited = ""
         self.tabs: dict[str, BehaviourTab] = {}
         self._room = QWidget(self)  # cuts off what the wheel has moved out of sight
         self.add = IconButton(theme, "plus", _("New behaviour"), "Ctrl+N", parent=self)
@@ -48,6 +54,8 @@ class BehaviourTabs(QWidget):
         had_focus = any(tab.hasFocus() for tab in self.tabs.values())
         for key in self.tabs.keys() - {each.key for each in wanted}:
             gone = self.tabs.pop(key)
+            if self.field is not None and key == self._edited:
+                self._end_edit()
             gone.hide()
             gone.deleteLater()
         moved = current != self._current
@@ -67,8 +75,48 @@ class BehaviourTabs(QWidget):
             tab.close_pressed.connect(lambda: self.closed.emit(key))
             tab.dragged.connect(lambda x: self._drag(key, x))
             tab.stepped.connect(self._step)
+            tab.rename_wanted.connect(lambda: self.edit(key))
             tab.show()
         return self.tabs[key]
+
+    # -- another name -----------------------------------------------------------------------------
+
+    def edit(self, key: str) -> None:
+        """Let a person edit the name of a tab, in its place."""
+        if key not in self.tabs:
+            return
+        self._end_edit()
+        facts = self.tabs[key].facts
+        name = facts.plain_name or facts.name
+        self._edited = key
+        self.field = NameField(self._theme, name, lambda name: self.why_not(key, name), self._room)
+        self.field.taken.connect(lambda name: self.renamed.emit(key, name))
+        self.field.left.connect(self._end_edit)
+        self._place(bring=key == self._current)
+        self.field.show()
+        self.field.raise_()
+        self.field.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _end_edit(self) -> None:
+        field, self.field = self.field, None
+        if field is None:
+            return
+        had_focus = field.hasFocus()
+        field.hide()
+        field.deleteLater()
+        self.add.show()
+        if had_focus and self._edited in self.tabs:
+            self.tabs[self._edited].setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _place_field(self) -> None:
+        self.add.setVisible(self.field is None)  # the field may be where it stands
+        if self.field is None or self._edited not in self.tabs:
+            return
+        tab = self.tabs[self._edited].geometry()
+        width = min(max(tab.width(), round(self._theme.scaled(NAME_WIDTH))), self._room.width())
+        height = max(tab.height(), self.field.sizeHint().height())
+        left = max(0, min(tab.left(), self._room.width() - width))
+        self.field.setGeometry(left, max(0, (self.height() - height) // 2), width, height)
 
     def _step(self, step: int) -> None:
         keys = [each.key for each in self._facts]
@@ -125,6 +173,7 @@ class BehaviourTabs(QWidget):
         side = self.add.sizeHint().height()
         self.add.setGeometry(min(round(x), room + GAP), (self.height() - side) // 2, side, side)
         self.add.raise_()
+        self._place_field()
 
     def _left_for_current(self, widths: list[int], room: int) -> float:
         x = 0.0
@@ -157,18 +206,36 @@ class BehaviourTabs(QWidget):
         found = next((key for key, tab in self.tabs.items() if tab.geometry().contains(event.pos())), None)
         if found is None:
             return
+        self.menu_of(found).popup(event.globalPos())
+        event.accept()
+
+    def menu_of(self, key: str) -> Menu:
+        """What can be done with a tab."""
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        for words, command in (
-            (_("Save as"), "tab.save_as"),
-            (_("Close"), "tab.close"),
-            (_("Close the others"), "tab.close_others"),
+        rename = menu.addAction(self._theme.icon("pencil"), f"{_('Rename')}\tF2")
+        rename.triggered.connect(lambda: self.edit(key))
+        for words, icon, command in (
+            (_("Duplicate"), "copy", "tab.duplicate"),
+            (_("Save"), "save", "tab.save"),
+            (_("Save as"), "", "tab.save_as"),
+            (_("Show the file's folder"), "folder-open", "tab.folder"),
+            ("", "", ""),
+            (_("Close"), "x", "tab.close"),
+            (_("Close the others"), "", "tab.close_others"),
         ):
-            menu.addAction(words).triggered.connect(
-                lambda _on=False, command=command: self.asked.emit(command, found)
-            )
-        menu.popup(event.globalPos())
-        event.accept()
+            if not command:
+                menu.addSeparator()
+                continue
+            action = menu.addAction(words)
+            if icon:
+                action.setIcon(self._theme.icon(icon))
+            action.triggered.connect(lambda _on=False, command=command: self.asked.emit(command, key))
+            if command == "tab.folder":
+                action.setEnabled(self.tabs[key].facts.has_file)
+            if command == "tab.close_others":
+                action.setEnabled(len(self.tabs) > 1)
+        return menu
 
 
 class BehaviourTitle(QWidget):

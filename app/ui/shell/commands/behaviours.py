@@ -6,6 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
+
 from app.blocks.compiler.stack import Stack
 from app.core.documents.document import Document
 from app.core.documents.journal import Unsaved
@@ -94,6 +97,28 @@ def read_stack(text: str) -> Stack:
     return Stack.from_json(deep_json.loads(text))
 
 
+@dataclass(frozen=True, slots=True)
+class TabName:
+    """A tab, by its document's key, and the name that it is to have."""
+
+    key: str
+    name: str
+
+    @classmethod
+    def parse(cls, text: str) -> TabName:
+        """Of ``KEY:NAME``."""
+        key, _colon, name = text.partition(":")
+        return cls(key, name)
+
+
+@runtime_checkable
+class SupportsRename(Protocol):
+    """A panel in which a behaviour's name can be edited."""
+
+    def rename_tab(self, key: str) -> None:
+        """Let a person edit the name of the tab of that key."""
+
+
 def bring_into_view(shell: Shell) -> None:
     """The blocks, in front of whatever shares their place."""
     shell.show_layout("behaviour")
@@ -170,6 +195,42 @@ class BehaviourCommands:
             self._files.save_as()
 
         return self._with(key, save_as)
+
+    def rename_current(self) -> None:
+        """Let a person edit the name of the tab that shows."""
+        bring_into_view(self._shell)
+        editor = self._shell.editor()
+        if isinstance(editor, SupportsRename):
+            editor.rename_tab(self._session.document.key)
+
+    def rename_tab(self, to: TabName) -> bool:
+        """Give it another name."""
+        return self._with(to.key, lambda document: self._files.rename(document, to.name))
+
+    def duplicate_tab(self, key: str) -> bool:
+        """Open a copy of it as a new behaviour."""
+        return self._with(key, self._files.duplicate)
+
+    def save_tab(self, key: str) -> bool:
+        """Show it, and save it."""
+
+        def save(document: Document) -> None:
+            self._files.show(document)
+            self._files.save()
+
+        return self._with(key, save)
+
+    def show_folder(self, key: str) -> bool:
+        """Show the folder of its file, as the system shows folders."""
+
+        def show(document: Document) -> None:
+            if document.path is None:
+                return
+            folder = document.path.parent
+            if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+                self._shell.say(_("The file is in {folder}").format(folder=folder))
+
+        return self._with(key, show)
 
     def move_tab(self, to: TabPlace) -> bool:
         """Put it to another place."""

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from app.core.session import Session
 from app.ui.shell.actions.command import ArgumentCommand, Command
-from app.ui.shell.commands.behaviours import BehaviourCommands, TabPlace, read_stack
+from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPlace, read_stack
 from app.ui.shell.commands.freeze import freezable
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
 from app.ui.shell.commands.shell import START, Shell
@@ -138,6 +138,8 @@ COMMANDS: tuple[C, ...] = (
     C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",)),
     C("file.earlier", lazy("Earlier versions"), lambda do: do.behaviours.earlier_versions(), "File"),
     C("tab.close", lazy("Close the behaviour"), lambda do: do.behaviours.close(), "File", ("Ctrl+W",), "x"),
+    C("tab.rename", lazy("Rename the behaviour"), lambda do: do.behaviours.rename_current(), "File", ("F2",),
+      "pencil"),
     C("tab.reopen", lazy("Open the closed one again"), lambda do: do.files.reopen(), "File",
       ("Ctrl+Shift+T",), "history"),
     C("file.forget_recent", lazy("Clear the list of recent files"), lambda do: do.behaviours.forget_recent(),
@@ -278,6 +280,10 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("tab.close", str, lambda do, key: do.behaviours.close_tab(key)),
     _about("tab.close_others", str, lambda do, key: do.behaviours.close_other_tabs(key)),
     _about("tab.save_as", str, lambda do, key: do.behaviours.save_tab_as(key)),
+    _about("tab.rename", TabName.parse, lambda do, to: do.behaviours.rename_tab(to)),
+    _about("tab.duplicate", str, lambda do, key: do.behaviours.duplicate_tab(key)),
+    _about("tab.save", str, lambda do, key: do.behaviours.save_tab(key)),
+    _about("tab.folder", str, lambda do, key: do.behaviours.show_folder(key)),
     _about("tab.move", TabPlace.parse, lambda do, place: do.behaviours.move_tab(place)),
     _about("connect", str, lambda do, robot: do.robots.connect(robot)),
     _about("robot.use", RobotSwap.parse, lambda do, swap: do.robots.use(swap)),

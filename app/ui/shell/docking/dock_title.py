@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui.panels.base import Density, PanelWidget
 from app.ui.text import plain
@@ -120,7 +120,19 @@ class DockTitle(QWidget):
         self._tabs: list[TitleTab] = []
         self.more = IconButton(theme, "ellipsis", _("More about {panel}").format(panel=panel.title()))
         self.more.clicked.connect(lambda: self.menu_wanted.emit(self.more))
-        self._row = QHBoxLayout(self)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        self._shared = QWidget()  # a row of its own for the panels' tabs where the panel has tabs itself
+        self._shared_row = QHBoxLayout(self._shared)
+        self._shared_row.setContentsMargins(5, 1, 6, 1)
+        self._shared_row.setSpacing(8)
+        self._shared_row.addStretch(1)
+        self._shared.hide()
+        column.addWidget(self._shared)
+        own = QWidget()  # not a layout in a layout, which would tell its old size until the next turn
+        self._row = QHBoxLayout(own)
+        column.addWidget(own, 1)
         self._fill()
         panel.title_changed.connect(self.show_title)
         self.show_title()
@@ -147,7 +159,12 @@ class DockTitle(QWidget):
         self._row.addWidget(self.more)
 
     def sizeHint(self) -> QSize:
-        return QSize(120, max(self._least, self._row.sizeHint().height()))
+        return QSize(120, self._shared_height() + max(self._least, self._row.sizeHint().height()))
+
+    def _shared_height(self) -> int:
+        if self._whole is None or not self._tabs:
+            return 0
+        return max(self._least, self._shared_row.sizeHint().height())
 
     def minimumSizeHint(self) -> QSize:
         return QSize(80, self.sizeHint().height())
@@ -167,18 +184,30 @@ class DockTitle(QWidget):
 
     def set_tabs(self, names: Sequence[tuple[str, str, bool, Callable[[], object]]]) -> None:
         """The panels of one place: (name, icon, whether it is this one, how to bring it to the front)."""
+        row = self._tab_row
         for old in self._tabs:
-            self._row.removeWidget(old)
+            row.removeWidget(old)
             old.deleteLater()
         self._tabs = []
         paint.show_when(self.name, not names and self._whole is None)
         for index, (text, icon, chosen, bring) in enumerate(names):
             tab = TitleTab(self._theme, text, icon, chosen)
             tab.clicked.connect(lambda _on=False, bring=bring: bring())
-            self._row.insertWidget(index, tab)
+            row.insertWidget(index, tab)
             self._tabs.append(tab)
-        self._row.setContentsMargins(5 if names else self._left(), 1, self._row.contentsMargins().right(), 1)
+        if self._whole is not None:
+            self._shared.setFixedHeight(self._shared_height())
+            paint.show_when(self._shared, bool(names))
+            self.updateGeometry()
+        else:
+            right = self._row.contentsMargins().right()
+            self._row.setContentsMargins(5 if names else self._left(), 1, right, 1)
         self.fit_tabs()
+
+    @property
+    def _tab_row(self) -> QHBoxLayout:
+        """Where the tabs of panels are: never in the row of a panel's own tabs."""
+        return self._row if self._whole is None else self._shared_row
 
     def fit_tabs(self) -> None:
         """Where the names have no room, that of the panel in front is left, and the icons of the others.
@@ -187,9 +216,10 @@ class DockTitle(QWidget):
         """
         if not self._tabs:
             return
-        margins, others, count = self._row.contentsMargins(), 0, 0
-        for place in range(self._row.count()):
-            item = self._row.itemAt(place)
+        row = self._tab_row
+        margins, others, count = row.contentsMargins(), 0, 0
+        for place in range(row.count()):
+            item = row.itemAt(place)
             widget = item.widget() if item is not None else None
             if widget is not None and not widget.isHidden() and widget not in self._tabs:
                 others += (
@@ -199,7 +229,7 @@ class DockTitle(QWidget):
                 )
                 count += 1
         room = self.width() - margins.left() - margins.right() - others
-        room -= self._row.spacing() * (count + len(self._tabs) - 1)
+        room -= row.spacing() * (count + len(self._tabs) - 1)
         bare = sum(tab.full_width() for tab in self._tabs) > room
         front = room - sum(tab.bare_width() for tab in self._tabs if not tab.isChecked())
         for tab in self._tabs:
@@ -239,4 +269,7 @@ class DockTitle(QWidget):
         tall = rect.adjusted(0, 0, 0, 2 * radius)
         paint.box(painter, tall, radius, theme.colour("panel"), theme.colour("border"))
         paint.hairline(painter, rect, Qt.Edge.BottomEdge, theme.colour("border"))
+        if self._shared_height():
+            above = QRectF(self._shared.geometry())
+            paint.hairline(painter, above, Qt.Edge.BottomEdge, theme.colour("border"))
         painter.end()

@@ -1,0 +1,85 @@
+"""Another name for a behaviour's file: one that every system takes, and never over another file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from app.core.documents.file_format import SUFFIX
+from app.core.documents.titles import name_of
+from app.errors import DocumentError
+from nep.i18n import _
+from nep.system.replace_file import replace_file
+
+NOT_IN_NAMES = '/\\:*?"<>|'
+LONGEST_BYTES = 200
+DEVICES = frozenset(
+    {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in range(1, 10))}
+)
+"""Names that Windows keeps for itself: a file must still open when it is carried there."""
+
+
+def path_named(path: Path, name: str) -> Path:
+    """The file of that name in the same folder; one of Studio's own folder keeps its place."""
+    if name_of(path, "") != path.stem:
+        return path
+    return path.with_name(f"{name}{path.suffix or SUFFIX}")
+
+
+def why_not(name: str, path: Path | None) -> str:
+    """Why a behaviour can't have this name, in a sentence; "" when it can. ``path`` is its file, if any."""
+    wanted = name.strip()
+    if not wanted:
+        return _("A behaviour needs a name.")
+    if path is None:
+        return ""
+    for letter in wanted:
+        if letter in NOT_IN_NAMES or not letter.isprintable():
+            shown = letter if letter.isprintable() else " "
+            return _("A file's name can't have {sign} in it.").format(sign=f"“{shown}”")
+    if wanted.endswith(".") or wanted.startswith("."):
+        return _("A file's name can't begin or end with a full stop.")
+    if wanted.partition(".")[0].lower() in DEVICES:
+        return _("Windows keeps the name “{name}” for itself.").format(name=wanted)
+    if len(wanted.encode("utf-8", "surrogatepass")) > LONGEST_BYTES:
+        return _("That name is too long for a file.")
+    new = path_named(path, wanted)
+    if new != path and os.path.lexists(new) and not _same(new, path):
+        return _("There is a file “{name}” in {folder} already.").format(
+            name=wanted, folder=path.parent.name or path.parent
+        )
+    return ""
+
+
+def rename_file(old: Path, new: Path) -> None:
+    """Give a file another name. Raises DocumentError, and then it has its old one.
+
+    A file that came there meanwhile is not written over: the new name is taken first, by an empty file, which
+    only one program can make. (A hard link would do too, but memory sticks have none.)
+    """
+    try:
+        if not old.is_file():
+            raise FileNotFoundError(2, _("it is not there any more"), str(old))
+        taken = not _same(new, old)
+        if taken:
+            os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+        try:
+            replace_file(old, new)
+        except OSError:
+            if taken:
+                new.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        words = _("{file} can't be renamed ({reason})")
+        reason = error.strerror or str(error)
+        raise DocumentError(
+            old, words.format(file=old.name, reason=reason), _("save it in another place")
+        ) from error
+
+
+def _same(new: Path, old: Path) -> bool:
+    """Whether both are one file, called with other capitals where these do not count."""
+    try:
+        return new.name.casefold() == old.name.casefold() and new.samefile(old)
+    except OSError:
+        return False

@@ -1,0 +1,133 @@
+"""A behaviour gets another name: its file, versions, journal and place among the recent files follow."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.core.documents.document import Document
+from app.core.documents.file_format import BehaviourFile, read_file, write_file
+from app.core.documents.journal import Journal
+from app.core.documents.open_documents import Documents
+from app.core.documents.rename import rename_file, why_not
+from app.core.documents.versions import keep_earlier, versions_of
+from app.core.storage.settings import Settings
+from app.errors import DocumentError
+from tests.core.documents.test_open_documents import OTHER, STARTED
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path / "home"))
+    return tmp_path / "home"
+
+
+@pytest.fixture
+def opened(tmp_path: Path) -> Iterator[Documents]:
+    made = Documents(lambda: Document(lambda: Journal(tmp_path / "journal")))
+    yield made
+    made.end()
+
+
+def file(path: Path) -> Path:
+    write_file(path, BehaviourFile(path.stem, STARTED, {}))
+    return path
+
+
+def test_the_file_has_the_new_name_and_the_same_content(opened: Documents, tmp_path: Path) -> None:
+    old = file(tmp_path / "Greeting.nepb")
+    content = old.read_bytes()
+    document = opened.open(old)
+    opened.rename(document, " Quiz ")
+    assert (document.name, document.path, document.dirty) == ("Quiz", tmp_path / "Quiz.nepb", False)
+    assert not old.exists()
+    assert (tmp_path / "Quiz.nepb").read_bytes() == content
+    assert not document.changed_outside
+    document.save()
+    assert read_file(tmp_path / "Quiz.nepb").name == "Quiz"
+    assert json.loads((tmp_path / "Quiz.nepb").read_text("utf-8"))["name"] == "Quiz"
+
+
+def test_unsaved_work_and_earlier_versions_follow(opened: Documents, tmp_path: Path) -> None:
+    old = file(tmp_path / "Greeting.nepb")
+    document = opened.open(old)
+    keep_earlier(old)
+    document.edited(OTHER)
+    opened.rename(document, "Quiz")
+    assert document.dirty
+    assert document.is_kept
+    journal = json.loads(next((tmp_path / "journal").glob("*.json")).read_text("utf-8"))
+    assert (journal["name"], journal["path"]) == ("Quiz", str(tmp_path / "Quiz.nepb"))
+    assert [each.name for each in versions_of(tmp_path / "Quiz.nepb")] == ["Quiz"]
+    assert versions_of(old) == []
+
+
+def test_one_without_a_file_only_gets_the_name(opened: Documents) -> None:
+    document = opened.new()
+    document.edited(OTHER)
+    opened.rename(document, "Quiz: what?")
+    assert (document.name, document.path) == ("Quiz: what?", None)
+
+
+def test_another_file_is_never_written_over(opened: Documents, tmp_path: Path) -> None:
+    document = opened.open(file(tmp_path / "Greeting.nepb"))
+    other = file(tmp_path / "Quiz.nepb")
+    content = other.read_bytes()
+    with pytest.raises(DocumentError, match="There is a file “Quiz” in "):
+        opened.rename(document, "Quiz")
+    with pytest.raises(DocumentError, match="can't be renamed"):
+        rename_file(tmp_path / "Greeting.nepb", other)  # one that came there just now
+    assert other.read_bytes() == content
+    assert document.path is not None
+    assert document.path.exists()
+    assert document.name == "Greeting"
+
+
+def test_a_file_that_is_gone_can_not_be_renamed_and_leaves_nothing(opened: Documents, tmp_path: Path) -> None:
+    document = opened.open(file(tmp_path / "Greeting.nepb"))
+    (tmp_path / "Greeting.nepb").unlink()
+    with pytest.raises(DocumentError, match="not there any more"):
+        opened.rename(document, "Quiz")
+    assert not (tmp_path / "Quiz.nepb").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("  ", "needs a name"),
+        ("a/b", "“/”"),
+        ("what?", r"“\?”"),
+        ("two\tparts", "“ ”"),
+        (".hidden", "full stop"),
+        ("end.", "full stop"),
+        ("CON", "Windows keeps"),
+        ("nul.txt", "Windows keeps"),
+        ("ä" * 101, "too long"),
+    ],
+)
+def test_names_that_some_system_does_not_take(name: str, words: str, tmp_path: Path) -> None:
+    assert re.search(words, why_not(name, tmp_path / "A.nepb"))
+    assert bool(why_not(name, None)) == (not name.strip()), "without a file any name will do"
+
+
+def test_the_list_of_recent_files_follows_in_its_place(tmp_path: Path) -> None:
+    settings = Settings(tmp_path / "home")
+    first, second = file(tmp_path / "A.nepb"), file(tmp_path / "B.nepb")
+    settings.add_recent(first)
+    settings.add_recent(second)
+    rename_file(first, tmp_path / "C.nepb")
+    settings.rename_recent(first, tmp_path / "C.nepb")
+    assert [each.name for each in settings.recent] == ["B", "C"]
+
+
+def test_a_copy_stands_beside_what_it_was_made_of(opened: Documents, tmp_path: Path) -> None:
+    document = opened.open(file(tmp_path / "Quiz.nepb"))
+    copy = opened.duplicate(document)
+    again = opened.duplicate(document)
+    assert [each.name for each in opened] == ["Quiz", "Quiz copy 2", "Quiz copy"]
+    assert copy.workspace == document.workspace
+    assert (copy.path, copy.dirty, again.dirty) == (None, True, True)

@@ -1,0 +1,45 @@
+"""A tab is renamed where it stands; its file, and the title of the window, follow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.behaviours import say, started, write
+from tests.e2e.person import middle
+from tests.e2e.studio import Studio
+from tests.e2e.test_tabs import tabs
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(170)
+
+
+def test_a_tab_is_renamed_with_its_file_and_back(start: Callable[..., Studio], tmp_path: Path) -> None:
+    old = write(tmp_path / "Greeting.nepb", started(say("One")))
+    taken = write(tmp_path / "Quiz.nepb", started(say("Two")))
+    content = taken.read_bytes()
+    studio = start(str(old))
+    until(lambda: tabs(studio) == ["Greeting"], "the file is open", 30)
+    place = middle(studio.find(kind="BehaviourTab")["rect"])
+    studio.screen.click(*place)
+    studio.find(kind="BehaviourTab", focus=True)  # two presses of one moment are no double click
+    studio.screen.click(*place)
+    field = studio.find(kind="NameField")
+    assert field["text"] == "Greeting"
+    studio.screen.type("Quiz")
+    studio.screen.key("Return")
+    studio.says("There is a file “Quiz” in ")
+    assert taken.read_bytes() == content
+    studio.screen.key("End")
+    studio.screen.type(" for class")
+    studio.screen.key("Return")
+    studio.says("Renamed Greeting to Quiz for class")
+    assert tabs(studio) == ["Quiz for class"]
+    assert not old.exists()
+    assert (tmp_path / "Quiz for class.nepb").exists()
+    studio.click("Undo", kind="Button")
+    until(lambda: tabs(studio) == ["Greeting"], "it has its name again")
+    assert old.exists()
+    assert studio.quit() == 0
