@@ -160,9 +160,14 @@ def test_panels_fold_into_tabs_step_by_step_and_come_back(qtbot, window: MainWin
     assert tabs_of(bench, "robot") == set() == tabs_of(bench, "sensors")
     for percent, size, of_robot, of_sensors in (
         (100, (1100, 800), {"camera"}, set()),
-        (100, (1024, 600), {"camera"}, {"problems"}),
-        (200, (1024, 600), {"camera", "sensors", "problems"}, {"camera", "robot", "problems"}),
-        (100, (1024, 600), {"camera"}, {"problems"}),
+        (100, (1024, 600), {"camera"}, {"problems", "variables"}),
+        (
+            200,
+            (1024, 600),
+            {"camera", "sensors", "problems", "variables"},
+            {"camera", "robot", "problems", "variables"},
+        ),
+        (100, (1024, 600), {"camera"}, {"problems", "variables"}),
         (100, (1440, 900), set(), set()),
     ):
         window.theme.set_text_percent(percent)
@@ -189,7 +194,7 @@ def test_what_is_folded_comes_back_folded_at_the_next_start(qtbot, window: MainW
     again.resize(bench.size())
     again.show()
     assert again.restore(bench.save())
-    qtbot.waitUntil(lambda: tabs_of(again, "sensors") == {"problems"})
+    qtbot.waitUntil(lambda: tabs_of(again, "sensors") == {"problems", "variables"})
     again.resize(1440, 800)
     qtbot.waitUntil(lambda: tabs_of(again, "sensors") == set() == tabs_of(again, "robot"))
     again.shut()
