@@ -32,6 +32,8 @@ WORDS = TableWords(
 FRESH_S = 0.8
 """How long a new value is marked."""
 INDENT = 19
+MANY = 8
+"""So few names are found without a filter."""
 ICONS = {"number": "hash", "text": "quote", "boolean": "toggle-left", "list": "list", "other": "braces"}
 
 
@@ -127,6 +129,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         self.add.clicked.connect(lambda: context.run("variable.new"))
         self.when = label("", "body", role="textSecondary")
         self.header = [self.when, self.filter, self.add]
+        self.table.horizontalHeader().hide()  # a name and its value need no heading, and the panel is low
         self.table.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.table.customContextMenuRequested.connect(self._show_menu)
         column = QVBoxLayout(self)
@@ -182,7 +185,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         self.model.set_rows(
             rows_of(found, self._values, self._opened, self.table.order, fresh=self._fresh, over=over)
         )
-        self.filter.setVisible(len(self._variables) > 0)
+        self.filter.setVisible(len(self._variables) > MANY or bool(words))
         self.when.setText(self._when(over=over))
         self.table.tell_visible_changed()
         self.show_table(bool(found), bool(words))
