@@ -23,7 +23,7 @@ from app.ui.widgets.indicators import StatusIcon
 from app.ui.widgets.keyboard import is_pressed_key
 from app.ui.widgets.labels import BoldInLine
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
-from nep.i18n import _, lazy, ngettext, pgettext
+from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.blocks import Program
@@ -203,7 +203,7 @@ class ProblemsPanel(PanelWidget):
 
     def _count(self, found: tuple[Listed, ...]) -> None:
         if not found:
-            self.chip.set(pgettext("problems", "none"), "ok")
+            self.chip.set(_("No problems"), "ok")
             return
         kinds = [each.severity for each in found]
         worst = next((kind for kind in ("error", "warning") if kind in kinds), "info")

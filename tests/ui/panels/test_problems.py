@@ -70,7 +70,7 @@ def test_with_nothing_to_mend_it_says_so(qtbot, qapp) -> None:
         qtbot.addWidget(widget)
     assert isinstance(panel, ProblemsPanel)
     assert panel.nothing.isVisible()
-    assert (panel.chip.text, panel.chip.status) == ("none", "ok")
+    assert (panel.chip.text, panel.chip.status) == ("No problems", "ok")
 
 
 def test_a_missing_robot_is_one_line_with_the_robots_that_can_do_it(panel, window, monkeypatch) -> None:
