@@ -1,0 +1,62 @@
+"""The sentence beside a block is wholly in sight wherever its block is, at every zoom."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.blocks import editor_definitions
+from app.ui.blockly.view import BlocklyView
+from tests.blocks.samples import block, number
+from tests.ui.blockly_person import WAIT_MS, Person, editor, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+SENTENCE = "“wait” needs a number. Put one into the gap, or delete the block that is in it now."
+TOOLBOX = 196
+
+
+@pytest.fixture
+def view(qtbot) -> BlocklyView:
+    return editor(qtbot, editor_definitions(()), 900, 500)
+
+
+def wait_block(id: str, x: int, y: int) -> dict[str, object]:
+    return block("control_wait", id, SECONDS=number(1)) | {"x": x, "y": y}
+
+
+def shown_beside(
+    qtbot, them: Person, view: BlocklyView, id: str
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Where the bubble and its block are."""
+    view.set_errors({id: SENTENCE})
+    them.wait_for("document.querySelectorAll('.nepBubble').length", 1)
+    return them.box(".nepBubble > path"), them.box(f"[data-id={id}] > .blocklyPath")
+
+
+@pytest.mark.parametrize(("x", "y"), [(20, 20), (760, 20), (760, 540), (20, 540)])
+def test_a_bubble_is_in_sight_beside_its_block(qtbot, view, person, x: int, y: int) -> None:
+    corners = [wait_block("first", 0, 0), wait_block("w", x, y), wait_block("last", 780, 560)]
+    them = person(state=workspace(*corners))
+    bubble, its = shown_beside(qtbot, them, view, "w")
+    assert TOOLBOX < bubble["left"] < bubble["right"] < 900
+    assert 0 <= bubble["top"] < bubble["bottom"] <= 500
+    apart = bubble["left"] >= its["right"] or bubble["top"] >= its["bottom"] or bubble["bottom"] <= its["top"]
+    assert apart, (bubble, its)
+
+
+def test_its_words_can_be_read_from_afar(qtbot, view, person) -> None:
+    them = person(state=workspace(wait_block("w", 20, 20)))
+    near, _its = shown_beside(qtbot, them, view, "w")
+    for _ in range(12):
+        view.zoom_out()
+    them.wait_for("document.querySelector('[data-id=w] > .blocklyPath').getBoundingClientRect().width < 70")
+    far, _its = shown_beside(qtbot, them, view, "w")
+    assert far["right"] - far["left"] > 0.9 * (near["right"] - near["left"])
+
+
+def test_a_block_that_is_scrolled_out_of_sight_takes_its_bubble_along(qtbot, view, person) -> None:
+    them = person(state=workspace(wait_block("w", 0, 0), wait_block("far", 0, 3000)))
+    bubble, _its = shown_beside(qtbot, them, view, "w")
+    view.show_block("far")
+    qtbot.waitUntil(lambda: them.box(".nepBubble > path")["bottom"] < bubble["top"] - 300, timeout=WAIT_MS)
