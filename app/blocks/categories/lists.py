@@ -286,6 +286,8 @@ CATEGORY = Category(
     style="variables",
     icon="list",
     order=45,
+    dynamic="lists",
+    button=("New list", "CREATE_LIST"),
     blocks=(*_MAKING, *_READING, *_WORKING_OUT, *_CHANGING),
     headings={
         "lists_empty": "Make a list",

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from app.blocks import editor_definitions
 from app.blocks.runtime.variables import brief
 from app.ui.blockly.view import BlocklyView
-from tests.blocks.samples import block, get, number, started, workspace, write
+from tests.blocks.samples import block, get, list_of, number, started, workspace, write
 from tests.ui.blockly_person import WAIT_MS, Person, editor
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
@@ -136,3 +136,36 @@ def test_only_its_own_commands_reach_the_window(qtbot, view, them) -> None:
     view._bridge.command("file.quit")
     view._bridge.command("variable.new")
     assert asked == ["variable.new"]
+
+
+def test_a_new_list_is_at_once_what_the_blocks_of_lists_are_about(qtbot, view, them) -> None:
+    asked: list[str] = []
+    view.command_wanted.connect(asked.append)
+    them.open_category("Lists")
+    words = "[...document.querySelectorAll('.blocklyFlyout .blocklyFlyoutButton')].map(e => e.textContent)"
+    assert them.ask(words) == ["New list"]
+    them.click(".blocklyFlyout .blocklyFlyoutButton", 30, 12)
+    qtbot.waitUntil(lambda: asked == ["variable.new_list"], timeout=WAIT_MS)
+    view.edit_variable({"do": "new", "name": "shopping", "list": True})
+    first = "document.querySelector('.blocklyFlyout .blocklyBlock')"
+    them.wait_for(f"{first}?.classList.contains('variables_set')")
+    assert "shopping" in them.ask(f"{first}.textContent")
+    adds = "document.querySelector('.blocklyFlyout .lists_add').textContent"
+    assert "shopping" in them.ask(adds)
+    them.drag(".blocklyFlyout .variables_set", QPoint(760, 330))
+    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
+    made = them.tops()[1]
+    (id,) = [each["id"] for each in them.newest()["variables"] if each["name"] == "shopping"]
+    assert made["fields"]["VAR"] == {"id": id}
+    assert made["inputs"]["VALUE"]["block"]["type"] == "lists_create"
+    assert len(them.newest()["variables"]) == 3
+
+
+def test_without_a_new_one_they_are_about_the_list_that_a_block_makes(qtbot, view, person) -> None:
+    saved = workspace(
+        started(block("variables_set", VAR={"id": "names"}, VALUE=list_of(number(1)))),
+        variables=("names", "x"),
+    )
+    them = person(state=saved)
+    them.open_category("Lists")
+    assert "names" in them.ask("document.querySelector('.blocklyFlyout .lists_add').textContent")

@@ -25,6 +25,7 @@ BASES = {
     "registry",
     "one_robot_panel",
     "table_panel",
+    "no_robot",
 }  # no panels themselves
 NAMES = sorted({module.name for module in pkgutil.iter_modules(app.ui.panels.__path__)} - BASES)
 

@@ -246,7 +246,13 @@ export class Tab {
 
   editVariable(edit: VariableEdit): void {
     if (edit.do === 'watch' && edit.id) this.watched.toggle(edit.id);
+    else if (edit.do === 'new' && edit.list) this.addList(edit);
     else editVariable(this.workspace, edit);
+  }
+
+  private addList(edit: VariableEdit): void {
+    const made = editVariable(this.workspace, edit);
+    if (made) this.variables.useAsList(made);
   }
 
   reveal(id: string): void {

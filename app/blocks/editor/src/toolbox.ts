@@ -232,6 +232,14 @@ export class Toolbox extends Blockly.Toolbox {
     return this.given.find((item) => item['dynamic'] === dynamic)?.['contents'] as unknown[] ?? [];
   }
 
+  /** Opens a category of what people made, also again with what is new in it. */
+  openDynamic(dynamic: string): void {
+    const id = this.given.find((item) => item['dynamic'] === dynamic)?.['toolboxitemid'];
+    const item = this.getToolboxItems().find((each) => each.getId() === id);
+    if (item && item === this.selectedItem_) this.refreshSelection();
+    else if (item) this.setSelectedItem(item);
+  }
+
   /** Shows a category of what people made again, if it is open. */
   refreshDynamic(dynamic: string): void {
     const open = this.selectedItem_;
