@@ -27,6 +27,7 @@ class Editor(QWidget):
     command_wanted = Signal(str)
     values_watched = Signal(tuple)
     wanted = Signal(str)
+    try_asked = Signal(str)
     toolbox_pinned = Signal(bool)
     blocks_deleted = Signal(int)
 
