@@ -234,7 +234,7 @@ class FaultAlerts:
             self._tell(self._faults[what], count=1)  # of others and of how often the log tells
 
     def _tell(self, fault: _Fault, *, count: int) -> None:
-        title = _("Studio has a fault and may show old values.")
+        title = _("Something went wrong in Studio. It may show old values.")
         self._alerts.put(
             ALERT, "error", title, fault.said, button=_("Show the log"), action="help.log", count=count
         )

@@ -115,9 +115,9 @@ class Lowering:
         text = " ".join((name, *(f"{_plain(each.name)} %{gap.name}" for each, gap in gaps)))
         made = replace(block, type=f"{block.type}:{placed.id}", text=text)
         if function is None:
-            sentence = _(
-                "“{name}” has no definition in this behaviour. Make one, or take this block away."
-            ).format(name=name)
+            sentence = _("The function “{name}” is not here. Define it, or delete this block.").format(
+                name=name
+            )
             made = replace(
                 made, text=name, arguments=(), python="fail(%X_SENTENCE)",
                 constants={"X_SENTENCE": sentence}, undefined=sentence,

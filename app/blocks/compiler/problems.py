@@ -65,8 +65,9 @@ class ProblemCollector:
     def unattached(self, placed: Placed, block: Block) -> None:
         """Blocks that hang under nothing."""
         name = self.label(placed, block)
-        sentence = _("{block} hangs under no start, so it does not run.")
-        self._note("info", placed, block, name, sentence.format(block=name))
+        sentence = _("{block} does not run. Put it below “{start}”.")
+        start = pgettext("block", "when started")
+        self._note("info", placed, block, name, sentence.format(block=name, start=start))
 
     def misplaced(self, placed: Placed, block: Block) -> None:
         """A block where it can't stand; the editor does not let this happen, a file may."""
@@ -81,7 +82,7 @@ class ProblemCollector:
         self._note(
             "error", placed, block, name,
             _(
-                "{block} is nested too deep to run. Put inner parts into variables or scripts of "
+                "{block} has too many blocks inside each other. Put inner parts into variables or scripts of "
                 "their own."
             ).format(block=name),
         )  # fmt: skip
@@ -91,15 +92,13 @@ class ProblemCollector:
         name = self.label(placed, block)
         self._note(
             "warning", placed, block, name,
-            _("{block} is known only under “when a message arrives”.").format(block=name),
+            _("{block} only works below “when a message arrives”.").format(block=name),
         )  # fmt: skip
 
     def no_input(self, placed: Placed, block: Block) -> None:
         """An input of a function outside of it, or one that was taken away."""
         name = reading(placed, self._catalogue.blocks, self._workspace.variables)
-        sentence = _(
-            "“{name}” is known only inside the function that has it. It is kept and skipped."
-        ).format(name=name)
+        sentence = _("“{name}” only works inside its own function. It is kept and skipped.").format(name=name)
         self._note("warning", placed, block, name, sentence)
 
     def undefined(self, placed: Placed, block: Block) -> None:

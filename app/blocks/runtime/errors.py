@@ -41,9 +41,9 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
     if isinstance(error, ZeroDivisionError):
         return BehaviourError(_("{name} can't divide by 0.").format(name=name), block)
     if isinstance(error, (OverflowError, MemoryError)):
-        return BehaviourError(_("{name} gives something too large.").format(name=name), block)
+        return BehaviourError(_("{name} gives a value that is too large.").format(name=name), block)
     if isinstance(error, RecursionError):
-        return BehaviourError(_("{name} is nested too deep.").format(name=name), block)
+        return BehaviourError(_("{name} has too many blocks inside each other.").format(name=name), block)
     if isinstance(error, TypeError):
         if "NoneType" in str(error):
             return BehaviourError(

@@ -67,9 +67,7 @@ class Calls:
         depth = int(getattr(self._mine, "depth", 0))
         if depth >= MOST_DEEP:
             raise BehaviourError(
-                _("“{name}” uses itself more than {count} times, one inside the other.").format(
-                    name=name, count=MOST_DEEP
-                ),
+                _("“{name}” calls itself more than {count} times.").format(name=name, count=MOST_DEEP),
                 block,
             )
         self._mine.depth = depth + 1
@@ -169,7 +167,7 @@ class Runtime:
             self.scheduler.rest()
             if hat.dropped:
                 self.write(
-                    _("“{title}” was too slow: {dropped} of its events were left out").format(
+                    _("“{title}” could not keep up: {dropped} of its events were skipped").format(
                         title=hat.title, dropped=hat.dropped
                     )
                 )

@@ -62,10 +62,10 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
     try:
         content = deep_json.loads(data.decode("utf-8", "surrogatepass"))
     except (ValueError, RecursionError) as error:
-        damaged = _("{file} is damaged or no behaviour").format(file=name)
+        damaged = _("{file} is damaged or not a behaviour").format(file=name)
         raise DocumentError(path, damaged, _(FROM_BEFORE)) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DocumentError(path, _("{file} is no behaviour").format(file=name), what_behaviours_are())
+        raise DocumentError(path, _("{file} is not a behaviour").format(file=name), what_behaviours_are())
     version = content.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
         raise DocumentError(path, _("{file} does not say its version").format(file=name), _(FROM_BEFORE))

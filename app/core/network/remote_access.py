@@ -80,7 +80,7 @@ class RemoteAccess:
             self._alerts.put(
                 NOT_KEPT,
                 "warn",
-                _("Who may connect is not kept."),
+                _("Who may connect can't be saved."),
                 words.format(error=error),
                 button=_("Choose again"),
                 action="network.others",

@@ -158,7 +158,7 @@ def _camera(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[He
             CAMERA, "ok", _("sends {rate} pictures a second").format(rate=f"{topic.rate_hz:.0f}")
         )
     elif topic is not None and topic.gone_s is None and topic.heard_since is None:
-        yield HealthFact(CAMERA, "off", _("ready; nobody looks"))
+        yield HealthFact(CAMERA, "off", _("ready; nobody is watching"))
     else:
         yield HealthFact(CAMERA, "off", _("no picture yet"))
 

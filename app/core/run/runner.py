@@ -297,7 +297,7 @@ class Runner:
                 size=number(self._most_bytes / 1e9)
             )
         if hung:
-            return _("The program closed its line to Studio and was ended.")
+            return _("The program lost its connection to Studio and was stopped.")
         code = child.popen.returncode
         words = next((line for line in reversed(self._errors) if line.strip()), "")
         if code < 0:

@@ -83,7 +83,7 @@ class HealthPanel(OneRobotPanel):
         self.rows: list[HealthRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        title, text = _("No robot is connected"), _("How it is stands here as soon as it is there.")
+        title, text = _("No robot is connected"), _("Its health appears here as soon as it is connected.")
         steps = [
             EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot"),
             EmptyAction(_("Find out why"), lambda: context.run("help.doctor"), "stethoscope"),

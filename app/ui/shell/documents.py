@@ -351,10 +351,10 @@ def words_of(error: Exception) -> AlertText:
 def strange_words(paths: Sequence[Path]) -> AlertText:
     """What is wrong with files that are no behaviours, and what behaviours are."""
     names = [path.name or str(path) for path in paths]
-    words, others = _("{file} is no behaviour"), len(names) - 1
+    words, others = _("{file} is not a behaviour"), len(names) - 1
     if others:
         words = ngettext(
-            "{file} and {count} more are no behaviours", "{file} and {count} more are no behaviours", others
+            "{file} and {count} more are not behaviours", "{file} and {count} more are not behaviours", others
         )
     return AlertText(f"{words.format(file=names[0], count=others)}.", _sentence(what_behaviours_are()))
 

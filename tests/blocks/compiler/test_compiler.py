@@ -212,7 +212,7 @@ def test_what_the_robot_would_refuse_is_told_before_run():
         (block("messages_publish", VALUE=text("x"), TOPIC="two words"), "needs a topic without spaces"),
         (
             block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="up", ANGLE=number(1)),
-            "has no choice “up”",
+            "does not offer “up”",
         ),
         (block("robot_pepper_do_light", ROBOT="Pepper", WHERE="eyes", COLOUR="blue"), "needs a colour"),
         (write(number("three")), "needs a number"),
@@ -229,7 +229,7 @@ def test_blocks_without_a_start():
     saved = workspace(say("Hi"))
     assert sentences(saved) == [
         ("warning", "Nothing starts these blocks. Put “when started” above them."),
-        ("info", "say hangs under no start, so it does not run."),
+        ("info", "say does not run. Put it below “when started”."),
     ]
     assert sentences(workspace()) == []
     assert [severity for severity, _ in sentences(workspace(started(), say("Hi")))] == ["info"]
@@ -237,7 +237,7 @@ def test_blocks_without_a_start():
 
 def test_the_message_outside_of_its_script():
     saved = workspace(started(write(block("messages_message"))))
-    assert sentences(saved) == [("warning", "message is known only under “when a message arrives”.")]
+    assert sentences(saved) == [("warning", "message only works below “when a message arrives”.")]
     assert play(saved).lines == [""]
 
 
@@ -299,7 +299,7 @@ def test_a_long_script_and_a_deep_one():
         deep = block("values_not", A=deep)
     (problem,) = compile_behaviour(workspace(started(write(deep))), []).problems
     assert problem.severity == "error"
-    assert "nested too deep" in problem.sentence
+    assert "too many blocks inside each other" in problem.sentence
 
     allowed: dict[str, object] = number(1)
     for _ in range(35):

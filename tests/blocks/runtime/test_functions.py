@@ -75,7 +75,7 @@ def test_a_function_that_never_ends_calling_itself_is_stopped_with_a_sentence() 
     run = play(workspace(started(call("g", id="outer")), loop))
     error = run.runtime.error
     assert error is not None
-    assert error.sentence == "“loop” uses itself more than 200 times, one inside the other."
+    assert error.sentence == "“loop” calls itself more than 200 times."
     assert error.block == "inner"
 
 
@@ -171,7 +171,7 @@ def test_a_call_of_nothing_is_an_error_with_its_mend() -> None:
     saved = workspace(started(call("greet", id="c", who=text("Ada"))))
     run = play(saved)
     (problem,) = run.program.errors
-    sentence = "“greet” has no definition in this behaviour. Make one, or take this block away."
+    sentence = "The function “greet” is not here. Define it, or delete this block."
     assert (problem.sentence, problem.block_id, problem.mend) == (sentence, "c", "Define it")
     assert run.runtime.error is not None
     assert (run.runtime.error.sentence, run.runtime.error.block) == (sentence, "c")
@@ -196,7 +196,7 @@ def test_inputs_and_returns_outside_their_function_are_skipped_and_said() -> Non
         [],
     )
     sentences = [problem.sentence for problem in program.problems]
-    assert "“who” is known only inside the function that has it. It is kept and skipped." in sentences
+    assert "“who” only works inside its own function. It is kept and skipped." in sentences
     assert sum(sentence.endswith("can't stand there. It is kept and skipped.") for sentence in sentences) == 2
     assert "write('after')" in program.source
 

@@ -73,7 +73,7 @@ def test_a_file_cut_at_every_byte_is_a_sentence(tmp_path: Path) -> None:
     for length in range(len(whole)):
         with pytest.raises(DocumentError) as told:
             parse_file(whole[:length], Path("x.nepb"))
-        assert told.value.reason == "x.nepb is damaged or no behaviour"
+        assert told.value.reason == "x.nepb is damaged or not a behaviour"
         assert told.value.advice == "open a copy from before"
 
 

@@ -194,8 +194,8 @@ def test_a_failed_save_keeps_the_work_unsaved_and_journalled(
     [
         (b"", "damaged"),
         (b"{", "damaged"),
-        (b"[1, 2]", "no behaviour"),
-        (b'{"format": "other"}', "no behaviour"),
+        (b"[1, 2]", "not a behaviour"),
+        (b'{"format": "other"}', "not a behaviour"),
         (b'{"format": "nep-behaviour", "version": 99, "workspace": {}}', "newer NEP Studio"),
         (b'{"format": "nep-behaviour", "version": 1}', "no blocks"),
         (b'{"format": "nep-behaviour", "version": 1, "workspace": []}', "no blocks"),

@@ -80,9 +80,9 @@ def test_what_is_not_known_yet_is_no_warning(case: Case) -> None:
 def test_a_camera_that_nobody_looks_at_sends_nothing_and_is_well(case: Case) -> None:
     (camera,) = [sensor.topic for sensor in PEPPER.sensors if sensor.is_image]
     case.topics[camera] = Topic(camera, subscribers=0)
-    assert case.says("Camera") == ("off", "ready; nobody looks")
+    assert case.says("Camera") == ("off", "ready; nobody is watching")
     case.topics[camera] = Topic(camera, age_s=15.0)
-    assert case.says("Camera") == ("off", "ready; nobody looks"), "it sent while somebody looked"
+    assert case.says("Camera") == ("off", "ready; nobody is watching"), "it sent while somebody looked"
     case.topics[camera] = Topic(camera, subscribers=1, heard_since=NOW)
     assert case.says("Camera") == ("off", "no picture yet")
 

@@ -142,7 +142,7 @@ def test_errors_without_end_are_bounded(started, heard) -> None:
 
 def test_a_program_that_closes_its_output_is_ended(started, heard) -> None:
     started(CLOSES)
-    assert heard.until("ended").text == "The program closed its line to Studio and was ended."
+    assert heard.until("ended").text == "The program lost its connection to Studio and was stopped."
 
 
 def child_of(heard: Heard, runner: Runner) -> psutil.Process:

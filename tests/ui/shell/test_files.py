@@ -330,7 +330,7 @@ def test_files_from_outside_open_and_strange_ones_are_told_once(commands, window
     commands.files.open_all(paths)
     assert names(window) == ["A", "B"]
     alert = window.session.alerts.active[0]
-    assert alert.title == "photo.png and 1 more are no behaviours."
+    assert alert.title == "photo.png and 1 more are not behaviours."
     assert alert.detail == "Behaviours are files ending in .nepb."
 
 
@@ -340,7 +340,7 @@ def test_a_file_that_is_no_behaviour_becomes_an_alert(commands, window, document
     document.edited(BLOCKS)
     commands.files.open(path)
     alert = window.session.alerts.active[0]
-    assert alert.title == "bad.nepb is damaged or no behaviour."
+    assert alert.title == "bad.nepb is damaged or not a behaviour."
     assert alert.detail == "Open a copy from before."
     assert alert.action == "file.open"
     assert document.workspace == BLOCKS

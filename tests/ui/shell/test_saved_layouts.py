@@ -184,15 +184,17 @@ def test_what_can_not_be_written_is_not_said_to_be_kept(shown: MainWindow, comma
     path.unlink()
     path.mkdir()  # as a disk that can't be written
     keep_as(shown, commands, "Two")
-    assert shown.toast.text == "“Two” is there until Studio ends"
+    assert shown.toast.text == "“Two” is kept until Studio closes: it can't be saved"
     assert "Two" in menu(shown, commands)
     shown.session.tick()
     alert = next(each for each in shown.session.alerts.active if each.id == "settings")
     assert alert.title == "What you choose now is forgotten when Studio ends."
     commands.run("layout.delete")
-    assert shown.toast.text == "“Two” is gone until Studio ends"
+    assert shown.toast.text == "“Two” comes back at the next start: the change can't be saved"
     commands.behaviours.forget_recent()
-    assert shown.toast.text == "The list of recent files is empty until Studio ends"
+    assert (
+        shown.toast.text == "The list of recent files comes back at the next start: the change can't be saved"
+    )
     commands.run("robots.ask")
     assert shown.toast.text == "Studio asks again before a real robot moves, until Studio ends"
     path.rmdir()

@@ -109,7 +109,7 @@ def test_one_that_can_not_be_read_says_so_and_does_not_open(qtbot, commands, sho
     keep_earlier(path)
     commands.files.open(saved(path))
     sheet = opened(qtbot, commands, shown)
-    assert rows(sheet) == [("Today", "Mine is damaged or no behaviour")]
+    assert rows(sheet) == [("Today", "Mine is damaged or not a behaviour")]
     QTest.keyClick(sheet.rows, Qt.Key.Key_Return)
     assert sheet.isVisible()
 

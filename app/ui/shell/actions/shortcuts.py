@@ -45,7 +45,7 @@ FIXED: tuple[Fixed, ...] = (
     Fixed(lazy("Everywhere"), lazy("Close the palette or a sheet, leave a field"), "Esc"),
     Fixed(lazy("Everywhere"), lazy("Next control in the panel"), "Tab"),
     Fixed(lazy("Everywhere"), lazy("Control before it"), "Shift+Tab"),
-    Fixed(lazy("Everywhere"), lazy("Press the button that has the ring"), "Space"),
+    Fixed(lazy("Everywhere"), lazy("Press the chosen button"), "Space"),
     Fixed(lazy("Tables and trees"), lazy("Go to the filter"), "/"),
     Fixed(lazy("Tables and trees"), lazy("Row above or below"), "Up, Down"),
     Fixed(lazy("Tables and trees"), lazy("Open the row"), "Enter"),

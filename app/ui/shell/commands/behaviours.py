@@ -306,7 +306,7 @@ class BehaviourCommands:
         before: list[RecentFile] = self._session.settings.recent_known
         words = _("Cleared the list of recent files")
         if not self._set_recent([]):
-            words = _("The list of recent files is empty until Studio ends")
+            words = _("The list of recent files comes back at the next start: the change can't be saved")
         self._shell.say(words, _("Undo"), lambda: self._set_recent(before))
 
     def _set_recent(self, files: list[RecentFile]) -> bool:

@@ -210,7 +210,11 @@ class ViewCommands:
 
         def keep(name: str) -> None:
             kept = arrangements.keep_as(bench, base, name)
-            words = _("Kept the layout “{name}”") if kept else _("“{name}” is there until Studio ends")
+            words = (
+                _("Kept the layout “{name}”")
+                if kept
+                else _("“{name}” is kept until Studio closes: it can't be saved")
+            )
             shell.say(words.format(name=name))
 
         self._ask_name().ask(_("Keep this layout as"), _("Keep it"), arrangements.refusal, keep)
@@ -234,7 +238,11 @@ class ViewCommands:
         name = arrangements.own(shell.showing)
         if name:
             kept, undo = arrangements.delete(shell.bench, name)
-            words = _("Deleted the layout “{name}”") if kept else _("“{name}” is gone until Studio ends")
+            words = (
+                _("Deleted the layout “{name}”")
+                if kept
+                else _("“{name}” comes back at the next start: the change can't be saved")
+            )
             shell.say(words.format(name=name), _("Undo"), undo)
 
     def freeze(self) -> None:
