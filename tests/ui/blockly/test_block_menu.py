@@ -83,14 +83,15 @@ def test_the_menu_of_a_block_has_rows_for_fingers_and_says_the_keys(view, them, 
     view.set_theme(TOKENS, dark)
     rows = open_menu(them, "loop")
     looked_at(them, f"menu-{'dark' if dark else 'light'}")
-    assert rows[:4] == ["Duplicate", "Copy", "Cut", "Paste"]
+    assert rows[:5] == ["Run from here", "Duplicate", "Copy", "Cut", "Paste"]
     assert {"Fold up", "Switch off", "Help"} <= set(rows)
     assert rows[-1] == "Delete 3 blocks"
     heights = (
         "[...document.querySelectorAll('.blocklyContextMenu .blocklyMenuItem')].map(e => e.offsetHeight)"
     )
     assert min(them.ask(heights)) >= 36
-    assert them.ask("document.querySelector('.nepMenuRow kbd').textContent") == "Ctrl+D"
+    keys = "[...document.querySelectorAll('.nepMenuRow kbd')].map(e => e.textContent)"
+    assert them.ask(keys)[:2] == ["Ctrl+↵", "Ctrl+D"]
     assert them.ask("document.querySelectorAll('.nepMenuRow svg').length") == len(rows)
     them.press(Qt.Key_Escape)
 

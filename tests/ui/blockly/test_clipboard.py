@@ -67,6 +67,8 @@ def test_duplicates_lie_free_beside_the_original_and_in_sight(qtbot, them):
     for count in range(2, 6):
         press(them, Qt.Key_D)
         qtbot.waitUntil(lambda count=count: len(them.tops()) == count, timeout=WAIT_MS)
+        # The keys go to the copy.
+        them.wait_for("document.hasFocus() && !!document.querySelector('.blocklySelected')")
     boxes = them.ask(BOXES)
     assert len(boxes) == 5
     assert apart(boxes)
@@ -83,7 +85,7 @@ def test_copies_are_pasted_under_the_mouse_and_undone_in_one_step(qtbot, them):
     qtbot.waitUntil(lambda: QGuiApplication.clipboard().text().startswith('{"nepStudio":"block"'))
     at = QPoint(700, 400)
     QTest.mouseMove(them.target, at)
-    them.ask("new Promise(done => requestAnimationFrame(done)) && 0")
+    them.wait_for("!!document.querySelector('.nepTab:not([hidden]) .blocklyMainBackground:hover')")
     press(them, Qt.Key_V)
     qtbot.waitUntil(lambda: types(them) == ["control_wait", "events_started"], timeout=WAIT_MS)
     box = them.ask(BOXES)[1]

@@ -167,7 +167,7 @@ def test_a_killed_web_process_loses_nothing(qtbot, view, person, caplog):
 
 
 @pytest.mark.parametrize(
-    ("language", "words"), [("de", "Kopieren"), ("pt-BR", "Duplicar"), ("xx", "Duplicate")]
+    ("language", "words"), [("de", "Baustein löschen"), ("pt-BR", "Deletar bloco"), ("xx", "Delete")]
 )
 def test_blockly_speaks_the_language_or_english(qtbot, language, words):
     view = BlocklyView(language=language)
