@@ -4,6 +4,7 @@ import {takeBackClicked} from './bin';
 import {focusedBlock} from './help';
 import {drawIcon} from './icons';
 import {ctrl} from './keys';
+import {menuIcon} from './menu';
 import {t} from './words';
 
 const SVG = 'http://www.w3.org/2000/svg';
@@ -50,6 +51,7 @@ function words(block: Blockly.BlockSvg | null): string {
 /** Once for the page: menu, key, and the click on a block of the toolbox; `tell` hears what is to be tried. */
 export function registerTries(tell: Tell): void {
   tellTry = tell;
+  menuIcon(NAME, 'play');
   Blockly.ContextMenuRegistry.registry.register({
     id: NAME,
     weight: 0,
