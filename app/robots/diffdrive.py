@@ -177,13 +177,19 @@ class DiffDrive:
         with self._steering:
             self.wheels.drive(0.0, 0.0)
 
-    def _roll(self, call: Call, distance: float, told: Callable[[float], dict[str, object]]) -> float:
-        """Go straight; the metres that were made. Failed when something is in the way."""
+    def odometer(self) -> Callable[[], float]:
+        """What tells how many metres straight were made since now; by its place, unless it knows better."""
         start_x, start_y, _ = self.wheels.pose()
 
         def made() -> float:
             x, y, _ = self.wheels.pose()
             return math.hypot(x - start_x, y - start_y)
+
+        return made
+
+    def _roll(self, call: Call, distance: float, told: Callable[[float], dict[str, object]]) -> float:
+        """Go straight; the metres that were made. Failed when something is in the way."""
+        made = self.odometer()
 
         def steer(left: float) -> None:
             speed = min(SPEED, max(SLOWEST, math.sqrt(2 * SLOW_DOWN * left)))

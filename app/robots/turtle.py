@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import cv2
@@ -19,9 +19,9 @@ from app.robots.virtual.camera import Camera
 from app.robots.virtual.lens import Lens
 from app.robots.virtual.room import Other
 from app.robots.virtual.shared_room import SharedRoom
-from app.robots.virtual.simulation import ITSELF, Beat, happen, surroundings, told_event
+from app.robots.virtual.simulation import ITSELF, Beat, may_happen, surroundings, told_event
 from app.robots.virtual.vision import colours_in
-from app.robots.virtual.wheels import HEIGHT, RADIUS, SIDES, WheelBody
+from app.robots.virtual.wheels import HEIGHT, RADIUS, WheelBody
 
 BODY_HZ, CAMERA_HZ = 60.0, 15.0
 _STATE_EVERY, _SLOW_EVERY, _CALM_EVERY = 2, 6, 60
@@ -67,6 +67,11 @@ class VirtualWheels:
         """Where it is."""
         with self._lock:
             return self.body.x, self.body.y, self.body.theta_deg
+
+    def driven(self) -> float:
+        """The metres that its wheels have rolled so far; where a person carries it they do not roll."""
+        with self._lock:
+            return self.body.driven
 
     def still(self) -> bool:
         """Whether it stands still."""
@@ -166,12 +171,15 @@ class VirtualWheels:
             if change.get("reset") is True:
                 self.body.reset(self._shared.put_back())
         if isinstance(change.get("happen"), str):
-            event, data = told_event(change)
-            if event == "bump" and data.get("side") in SIDES:
+            event, given = told_event(change)
+            data = {**({"x": 0.0, "area": 0.1} if event == "colour" else {}), **given}
+            if not may_happen(self._link, event, data):
+                return
+            if event == "bump":
                 with self._lock:
                     self.body.press(str(data["side"]))
             else:
-                happen(self._link, event, {**({"x": 0.0, "area": 0.1} if event == "colour" else {}), **data})
+                self._link.happen(event, **data)
 
 
 class VirtualTurtle(DiffDrive):
@@ -180,7 +188,13 @@ class VirtualTurtle(DiffDrive):
     def __init__(self, link: Link) -> None:
         wheels = VirtualWheels(link, MonotonicClock())
         super().__init__(link, wheels)
+        self._rolled = wheels
         wheels.start()
+
+    def odometer(self) -> Callable[[], float]:
+        """What its wheels roll counts: a person who carries it does not move it on."""
+        began = self._rolled.driven()
+        return lambda: self._rolled.driven() - began
 
 
 ROBOT = replace(

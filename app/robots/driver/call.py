@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Protocol
 
 
@@ -60,6 +60,9 @@ class Link(Protocol):
 
     def happen(self, event: str, **data: object) -> None:
         """Publish an event."""
+
+    def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
+        """A sentence for each thing in which an event is not as the description says; empty when it is."""
 
     def tell(self, leaf: str, value: object) -> None:
         """Publish something that the description doesn't name on ``/<name>/<leaf>``, such as ``state``."""

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import nep
 from app.errors import DescriptionError, RobotValueError
 from app.robots.description.description import LARGEST_BYTES, parse, td_for, topic_of
+from app.robots.description.inputs import problems_of
 from app.robots.description.json_access import as_part
 from app.robots.driver.call import Call, Canceled, Clock, MonotonicClock
 from app.robots.driver.commands import CommandHandler
@@ -183,6 +184,20 @@ class Driver:
         if spec.to_rize is not None:
             primitive, given = spec.to_rize(data)
             self._publish(BLACKBOARD, {"primitive": primitive, "input": dict(given), "robot": self.name})
+
+    def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
+        """A sentence for each thing in which an event is not as the description says; empty when it is.
+
+        Every field is there, no other, each as described: it is what programs are promised.
+        """
+        described = self.robot.event(event)
+        if described is None:
+            return (_("{robot} has no event “{event}”").format(robot=self.name, event=event),)
+        missing = [field for field in described.fields if field.name not in data]
+        return (
+            *(problem.sentence for problem in problems_of(described.fields, data)),
+            *(_("{place} is missing").format(place=field.title) for field in missing),
+        )
 
     def tell(self, leaf: str, value: object) -> None:
         """Publish on a topic of the robot that its description doesn't name, such as ``state``."""

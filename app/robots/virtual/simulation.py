@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 
 import cv2
 
-from app.errors import RobotValueError
 from app.robots.driver.call import Clock, Link
 from app.robots.virtual.body import HEIGHT, RADIUS, Body, BodyEvent
 from app.robots.virtual.camera import Camera, lens_of
@@ -187,16 +186,19 @@ class Simulation:
 
     def _let_happen(self, change: Mapping[str, object]) -> None:
         """A person lets an event happen as if the robot had noticed it."""
-        event, data = told_event(change)
+        event, given = told_event(change)
+        data = {**self._made_up(event), **given}
+        if not may_happen(self._link, event, data):
+            return
         with self.changed:
-            if event == "heard" and isinstance(data.get("word"), str):
+            if event == "heard":
                 self.body.hear(str(data["word"]))
                 return
-            if event == "touched" and data.get("place") in PLACES:
+            if event == "touched":
                 for down in (True, False):
                     self.body.touch(str(data["place"]), down=down)
                 return
-        happen(self._link, event, {**self._made_up(event), **data})
+        self._link.happen(event, **data)
 
     def _made_up(self, event: str) -> dict[str, object]:
         """What belongs to an event that a person lets happen and does not say."""
@@ -227,12 +229,12 @@ def told_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
     return str(change["happen"]), {name: value for name, value in change.items() if name != "happen"}
 
 
-def happen(link: Link, event: str, data: Mapping[str, object]) -> None:
-    """Publish an event that a person made up; one that the robot does not have is logged and left out."""
-    try:
-        link.happen(event, **data)
-    except (KeyError, TypeError, RobotValueError) as error:
-        _log.warning("%s: it can't notice '%s': %s", link.name, event, error)
+def may_happen(link: Link, event: str, data: Mapping[str, object]) -> bool:
+    """Whether an event that a person lets happen is as the description says; one that is not is logged."""
+    wrong = link.wrong_in(event, data)
+    if wrong:
+        _log.warning("%s: it can't notice '%s': %s", link.name, event, "; ".join(wrong))
+    return not wrong
 
 
 def drawable(body: Body) -> dict[str, object]:

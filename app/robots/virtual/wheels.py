@@ -20,7 +20,6 @@ _DRAIN_PER_S, _DRAIN_MOVING_PER_S = 1 / 300, 1 / 90
 _ASIDE_DEG = 50.0
 PRESS_S = 0.3
 """How long a bumper that a person pressed stays pressed."""
-SIDES = ("front", "left", "right", "back")
 
 
 @dataclass
@@ -40,6 +39,8 @@ class WheelBody:
     _wanted: tuple[float, float] = (0.0, 0.0)
     held: bool = False
     """Whether a person holds it up: it does not move."""
+    driven: float = 0.0
+    """The metres that it has rolled, forwards and backwards."""
     _pressed_s: float = 0.0
 
     def drive(self, speed: float, turn_speed: float) -> None:
@@ -111,6 +112,7 @@ class WheelBody:
         y = self.y + way * math.sin(math.radians(self.theta_deg))
         if self.room.free(x, y, RADIUS, (self.x, self.y)):
             self.x, self.y = x, y
+            self.driven += abs(way)
             self.bumped = self.bumped if self._pressed_s > 0.0 else ""
             self.room = self.room.pushed_ball(x, y, RADIUS)
             return

@@ -14,7 +14,7 @@ from app.ui.robot_drawing.objects import paint_thing, thing_area
 from app.ui.robot_drawing.pepper import HEAD, limbs, paint_figure
 from app.ui.robot_drawing.room import WIDTH, Spot, Stage, paint_room
 from app.ui.robot_drawing.state import RobotState, Thing
-from app.ui.robot_drawing.turtle import TOP, paint_turtle
+from app.ui.robot_drawing.turtle import TOP, paint_turtle, side_at
 
 TURTLE = "turtle"
 Others: TypeAlias = Sequence[tuple[str, RobotState]]
@@ -104,6 +104,19 @@ class RobotDrawing:
             if thing_area(thing, spot).adjusted(-3, -3, 3, 3).contains(unit):
                 return thing.name or thing.kind
         return next((each.named("body") for each in figures if each.area.contains(unit)), None)
+
+    def side_at(
+        self, point: QPointF, area: QRectF, part: str, state: RobotState, others: Others = ()
+    ) -> str | None:
+        """The side on which a hand at a pixel presses the bumper of the robot whose body `part` is.
+
+        None when it has none that can be pressed.
+        """
+        stage = Stage(area, state.room)
+        for figure in _figures(stage, state, others):
+            if figure.named("body") == part and figure.state.figure == TURTLE:
+                return side_at(figure.own(stage.unit(point)), figure.state.theta_deg)
+        return None
 
     def floor_at(self, point: QPointF, area: QRectF, state: RobotState) -> tuple[float, float]:
         """The place of the floor (m) that is seen at a pixel."""

@@ -18,6 +18,8 @@ LOW, HIGH = -9.0, -31.0  # its lower and upper deck
 MAST = -52.0  # the top of the camera's mast
 WHEEL = 14.0
 TOP = QPointF(0.0, -36.0)
+ABOVE = 0.6  # the share of its radius in which a hand comes from above
+FRONT_DEG, BACK_DEG = 40.0, 130.0
 
 SHELL, SHELL_DARK, DECK, RUBBER, METAL = "#4E8C7A", "#376B5C", "#6FB3A0", "#2B2D33", "#C8CCD8"
 
@@ -44,6 +46,20 @@ def paint_turtle(p: QPainter, state: RobotState) -> None:
 def on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QPointF:
     """The point at this azimuth (radians, 0 towards the person), at a share of the radius, so high."""
     return QPointF(RADIUS * share * math.sin(azimuth), RADIUS * share * FLAT * math.cos(azimuth) + height)
+
+
+def side_at(own: QPointF, theta_deg: float) -> str:
+    """The side of its bumper that a hand at a point of its own presses; from above it is the front."""
+    across, along = own.x() / RADIUS, (own.y() - HIGH) / (RADIUS * FLAT)
+    if math.hypot(across, along) < ABOVE or along < -1.0:
+        return "front"
+    if along > 0:  # the deck's near edge and the drum below it: all of it is the side towards the person
+        along = math.sqrt(max(0.0, 1.0 - across * across))
+    aside = math.degrees(math.atan2(across, along)) - theta_deg
+    aside = (aside + 180.0) % 360.0 - 180.0
+    if abs(aside) <= FRONT_DEG:
+        return "front"
+    return "back" if abs(aside) > BACK_DEG else "left" if aside > 0 else "right"
 
 
 def _wheel(p: QPainter, azimuth: float) -> None:

@@ -178,8 +178,10 @@ def test_a_person_lets_anything_happen_that_its_description_knows(pepper):
     pepper.world(happen="heard", word="yes")
     pepper.world(happen="touched", place="left_hand")
     pepper.world(happen="face_seen", name="Ben")
-    for wrong in ({"side": "top"}, {"side": 3}):
+    for wrong in ({"side": "top"}, {"side": 3}, {}, {"side": "front", "how": "hard"}):
         pepper.world(happen="bumped", **wrong)
+    pepper.world(happen="heard", word="no", loud=True)
+    pepper.world(happen="touched", place="head", how="softly")
     pepper.world(happen="flies")
     pepper.world(happen="touched", place="nose")
     eventually(lambda: pepper.heard["released"] == [{"place": "left_hand"}])

@@ -168,6 +168,28 @@ def test_it_moves_turns_and_goes_to_a_place(turtle) -> None:
     assert ears.final("4")["state"] == "succeeded"  # it is there
 
 
+def test_carrying_it_does_not_count_as_the_way_that_it_was_to_move(turtle) -> None:
+    body, ears = turtle
+    ears.invoke("1", "move", distance=0.4)
+    eventually(lambda: ears.answers("1") and any(a["feedback"] for a in ears.answers("1")))
+    body.wheels.act({"hold": True})
+    body.wheels.act({"move": "robot", "x": 0.5, "y": 1.2})
+    body.wheels.act({"hold": False})
+    assert near(ears.final("1")["output"]["moved"], 0.4, 0.05)
+    eventually(lambda: math.hypot(pose(ears)[0] - 0.5, pose(ears)[1] - 1.2) > 0.15)
+
+
+def test_a_colour_that_a_person_lets_it_see_is_as_it_is_described(turtle) -> None:
+    body, ears = turtle
+    for wrong in ({"name": "pink"}, {"name": "red", "area": 3}, {"name": "red", "x": "left"}, {}):
+        body.wheels.act({"happen": "colour", **wrong})
+    body.wheels.act({"happen": "bump", "side": "top"})
+    body.wheels.act({"happen": "colour", "name": "green", "area": 0.5})
+    eventually(lambda: {"name": "green", "x": 0.0, "area": 0.5} in ears.heard["colour"])
+    assert all(told["name"] != "pink" and told["area"] <= 1 for told in ears.heard["colour"])
+    assert ears.heard["bump"] == []
+
+
 def test_it_drives_until_its_program_falls_silent(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "drive", program="test", speed=-0.2, turn=30)

@@ -117,10 +117,37 @@ def test_a_robot_is_taken_up_carried_and_put_down(panel, window) -> None:
 
 
 def test_a_press_without_a_move_moves_nothing(panel, window) -> None:
-    QTest.mouseClick(panel.view, LEFT, pos=point(panel, "Turtle/body"))
+    QTest.mouseClick(panel.view, LEFT, pos=point(panel, "body"))
     QTest.mouseClick(panel.view, LEFT, pos=point(panel, "ball"))
-    assert window.session.changes("Turtle") == []
+    assert window.session.changes("Pepper") == []
     assert window.session.room.room == Room()
+
+
+@pytest.mark.parametrize(
+    ("at", "side"), [(0, "front"), (35, "front"), (90, "right"), (-90, "left"), (180, "back")]
+)
+def test_a_tap_on_the_small_robot_presses_its_bumper_on_that_side(panel, window, at, side) -> None:
+    window.session.fleet.links[1].drawing = of_turtle(theta_deg=at)
+    panel.refresh()
+    toes = point(panel, "Turtle/body") + QPoint(0, round(panel.view.height() / 286 * 31 * 1.1))
+    QTest.mouseClick(panel.view, LEFT, pos=toes)  # towards the person, low on its body
+    assert window.session.changes("Turtle") == [{"happen": "bump", "side": side}]
+
+
+def test_two_quick_taps_and_the_keyboard_press_the_bumper_and_a_drag_does_not(panel, window) -> None:
+    place = point(panel, "Turtle/body")
+    QTest.mouseClick(panel.view, LEFT, pos=place)
+    QTest.mouseDClick(panel.view, LEFT, pos=place)
+    QTest.mouseRelease(panel.view, LEFT, pos=place)
+    front = {"happen": "bump", "side": "front"}  # from above
+    assert window.session.changes("Turtle") == [front, front]
+    panel.view.chosen = "Turtle/body"
+    QTest.keyClick(panel.view, Qt.Key.Key_Space)
+    assert window.session.changes("Turtle") == [front]
+    drag(panel, "Turtle/body", QPoint(-50, 0))
+    changes = window.session.changes("Turtle")
+    assert changes[0] == {"hold": True}
+    assert front not in changes
 
 
 def test_what_can_be_moved_is_outlined_under_the_mouse(panel) -> None:

@@ -106,6 +106,7 @@ class RobotPanel(OneRobotPanel):
             lambda name, x, y: self._change({"move": "robot", "x": round(x, 3), "y": round(y, 3)}, name)
         )
         view.held.connect(lambda name, on: self._change({"hold": on}, name))
+        view.bumped.connect(lambda name, side: self._change({"happen": "bump", "side": side}, name))
         view.removed.connect(self.session.room.remove)
         view.menu_wanted.connect(self._show_room_menu)
         view.enlarged.connect(self.enlarge)

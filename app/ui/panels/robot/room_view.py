@@ -9,7 +9,7 @@ from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QContextMenuEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.ui.robot_drawing.scene import Marks, RobotDrawing
+from app.ui.robot_drawing.scene import TURTLE, Marks, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
@@ -26,6 +26,7 @@ ARROWS = {
     Qt.Key.Key_Left: (0, -1),
     Qt.Key.Key_Right: (0, 1),
 }
+PRESSES = {Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter}
 STEP_M, SMALL_STEP_M = 0.1, 0.02
 DRAG_FROM_PX = 4
 
@@ -39,13 +40,15 @@ def split(part: str) -> tuple[str, str]:
 class RoomView(QWidget):
     """The drawing. A press on head or hands touches them; robots and things are dragged over the floor.
 
-    With the keyboard Tab goes from one to the next, arrows move it, Delete takes a thing away.
+    A tap on a robot with a bumper presses it. With the keyboard Tab goes from one to the next, arrows move
+    it, Space presses its bumper, Delete takes a thing away.
     """
 
     touched = Signal(str, str, bool)  # robot (empty: the shown one), part, down
     moved = Signal(str, float, float)  # thing, x, y in m
     carried = Signal(str, float, float)  # robot, x, y in m
     held = Signal(str, bool)  # robot, taken up or put down
+    bumped = Signal(str, str)  # robot, the side on which a hand presses its bumper
     removed = Signal(str)  # thing
     menu_wanted = Signal(str, QPoint)  # thing or empty, where on the screen
     enlarged = Signal()
@@ -72,7 +75,10 @@ class RoomView(QWidget):
         self.setAccessibleName(_("The robots in their room"))
         self.setToolTip(
             plain.tip(
-                _("Press a head or a hand to touch it; drag robots and things; double click for a large room")
+                _(
+                    "Press a head, a hand or the small robot to touch it; drag robots and things; "
+                    "double click for a large room"
+                )
             )
         )
         theme.changed.connect(self.update)
@@ -213,12 +219,26 @@ class RoomView(QWidget):
             self.touched.emit(*split(pressed), False)
         elif self._dragging and self._robot(pressed) is not None:
             self.held.emit(split(pressed or "")[0], False)
+        elif pressed is not None:
+            self._bump(pressed, event.position())
         self._dragging = False
         self._hover(self._at(event.position()))
 
+    def _bump(self, part: str, position: QPointF) -> bool:
+        """A tap on a robot with a bumper presses it; whether it has one."""
+        area = QRectF(self.rect())
+        side = self._drawing.side_at(position, area, part, self.state, self.others)
+        if side is not None:
+            self.bumped.emit(split(part)[0], side)
+        return side is not None
+
+    def _has_bumper(self, part: str | None) -> bool:
+        robot = self._robot(part)
+        return robot is not None and robot.figure == TURTLE
+
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         part = self._at(event.position())
-        if part is not None and split(part)[1] in TOUCHABLE:
+        if part is not None and (split(part)[1] in TOUCHABLE or self._has_bumper(part)):
             self.mousePressEvent(event)  # two quick taps
         elif event.button() == Qt.MouseButton.LeftButton:
             self.enlarged.emit()
@@ -259,6 +279,8 @@ class RoomView(QWidget):
             self._move(self.chosen, where[0] + ahead * step, where[1] + aside * step)
         elif key in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self._thing(self.chosen) is not None:
             self.removed.emit(self.chosen)
+        elif key in PRESSES and self._has_bumper(self.chosen) and not event.isAutoRepeat():
+            self.bumped.emit(split(self.chosen or "")[0], "front")
         else:
             self._key(event, down=True)
 
