@@ -67,7 +67,7 @@ def test_keys_are_those_of_the_moment(tmp_path: Path) -> None:
     (tmp_path / "en").mkdir()
     (tmp_path / "en" / "1.md").write_text("# Keys\nRun: {key:run.run}, {key:none}\n", "utf-8")
     (page,) = read_pages(tmp_path, "en", lambda command: {"run.run": "Ctrl+F5"}.get(command, ""))
-    assert page.text == "# Keys\nRun: **Ctrl F5**, **-**\n"
+    assert page.text == "# Keys\nRun: **Ctrl+F5**, **-**\n"
 
 
 def test_words_are_found_in_any_order_without_marks() -> None:
