@@ -30,7 +30,7 @@ from app.ui.widgets.buttons import StopButton
 from app.ui.widgets.paint import RIGHT, box, words
 
 CUT_ON = frozenset({"xcb"})
-MARK, TEXT_LEFT = 15, 33
+MARK, LARGEST_MARK, TEXT_LEFT = 15, 22, 33
 SCROLLER = 22  # px, as the style sheet has it
 
 
@@ -130,7 +130,8 @@ class Menu(QMenu):
             return
         if action is self.activeAction() and action.isEnabled():
             box(painter, place, theme.radius("small"), theme.colour("hover"))
-        mark = QRectF(place.left() + 9, place.center().y() - MARK / 2, MARK, MARK)
+        side = min(theme.scaled(MARK), LARGEST_MARK)
+        mark = QRectF(place.left() + 9 - (side - MARK) / 4, place.center().y() - side / 2, side, side)
         if action.isChecked():
             paint_icon(painter, mark, "check", theme.colour("accentText"))
         elif not action.icon().isNull():

@@ -139,7 +139,7 @@ def test_every_size_shows_everything_whole(qtbot, window: MainWindow, mode: Mode
     assert not faults, "\n".join(["", *faults])
 
 
-FOLDING = {"robot", "camera", "sensors", "problems"}
+FOLDING = {"robot", "camera", "sensors", "problems", "variables"}
 
 
 def tabs_of(bench: Workbench, name: str) -> set[str]:
