@@ -4,6 +4,7 @@ import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import {freePlace, inSight, obstacles} from './free_place';
 import {focusedBlock} from './help';
+import {chosenWith, runsOf, selectionOf} from './selection';
 import {type BlockState, unwrapUnknown, wrapUnknown} from './unknown_blocks';
 
 /** Every text of ours begins so; `app/ui/blockly/bridge.py` looks for it. */
@@ -12,6 +13,12 @@ const MARK = '{"nepStudio":';
 interface Copied {
   nepStudio: 'block' | 'note';
   state: BlockState;
+}
+
+/** Several scripts, whose places beside each other stay. */
+interface CopiedBlocks {
+  nepStudio: 'blocks';
+  states: BlockState[];
 }
 
 type Item = Blockly.BlockSvg | Blockly.comments.RenderedWorkspaceComment;
@@ -37,7 +44,7 @@ export class Clipboard {
 
   /** Whether there was something to copy. */
   copy(item = focusedItem()): boolean {
-    const copied = item && stateOf(item);
+    const copied = item && copyOf(item);
     if (!copied) return false;
     this.copied = JSON.stringify(copied);
     this.system.write(this.copied);
@@ -54,7 +61,7 @@ export class Clipboard {
   /** Beside the original. */
   duplicate(item = focusedItem()): boolean {
     if (!item || item.workspace.isFlyout) return false;
-    const copied = stateOf(item);
+    const copied = copyOf(item);
     if (copied) add(copied, item.workspace, beside(item));
     return copied !== null;
   }
@@ -89,16 +96,46 @@ function stateOf(item: Item): Copied | null {
   return data?.commentState ? {nepStudio: 'note', state: data.commentState as BlockState} : null;
 }
 
+/** The item, or all blocks that are chosen with it. */
+function copyOf(item: Item): Copied | CopiedBlocks | null {
+  const chosen = item instanceof Blockly.BlockSvg ? chosenWith(item) : [];
+  const [only, ...more] = runsOf(chosen).map(stateOfRun).filter((each) => each !== null);
+  if (!only) return stateOf(item);
+  return more.length ? {nepStudio: 'blocks', states: [only, ...more]} : {nepStudio: 'block', state: only};
+}
+
+/** Blocks that hang below each other, without what hangs below them and is not chosen. */
+export function stateOfRun(run: readonly Blockly.BlockSvg[]): BlockState | null {
+  let state: BlockState | null = null;
+  for (const block of [...run].reverse()) {
+    const copied = stateOf(block);
+    if (copied) state = state ? {...copied.state, next: {block: withoutPlace(state)}} : copied.state;
+  }
+  return state;
+}
+
+function withoutPlace({x: _x, y: _y, ...rest}: BlockState): BlockState {
+  return rest as BlockState;
+}
+
 /** What is on the clipboard, if it is ours. It may come from anywhere: whatever is in it has still to be made. */
-function parse(text: string): Copied | null {
+function parse(text: string): Copied | CopiedBlocks | null {
   if (!text.startsWith(MARK)) return null;
   try {
-    const {nepStudio, state} = JSON.parse(text) as Copied;
+    const {nepStudio, state, states} = JSON.parse(text) as Copied & {states?: unknown};
+    if ((nepStudio as string) === 'blocks') {
+      const good = (Array.isArray(states) ? states as unknown[] : []).filter(isBlock);
+      return good.length ? {nepStudio: 'blocks', states: good} : null;
+    }
     const isOne = ['block', 'note'].includes(nepStudio) && typeof state === 'object' && state !== null;
     return isOne && (nepStudio === 'note' || typeof state.type === 'string') ? {nepStudio, state} : null;
   } catch {
     return null;
   }
+}
+
+function isBlock(state: unknown): state is BlockState {
+  return typeof state === 'object' && state !== null && typeof (state as BlockState).type === 'string';
 }
 
 function toCanvas(workspace: Blockly.WorkspaceSvg, {x, y}: {x: number; y: number}): Point {
@@ -129,32 +166,52 @@ function inOneStep<T>(change: () => T): T {
 }
 
 /** Makes it as one step that undo takes back, lets it lie free, and gives it the keys. */
-function add(copied: Copied, workspace: Blockly.WorkspaceSvg, wanted: Point): void {
+export function add(copied: Copied | CopiedBlocks, workspace: Blockly.WorkspaceSvg, wanted: Point): void {
   const there = new Set<unknown>([...workspace.getTopBlocks(false), ...workspace.getTopComments()]);
   const {scrollX, scrollY} = workspace;
   workspace.hideChaff();
   const made = inOneStep(() => {
     try {
-      return layFree(make(copied, workspace, wanted), wanted);
+      return layFree(makeAll(copied, workspace, wanted), wanted);
     } catch (error) {
       console.warn(`not pasted: ${String(error)}`);
       for (const each of [...workspace.getTopBlocks(false), ...workspace.getTopComments()]) {
         if (!there.has(each)) each.dispose();
       }
-      return null;
+      return [];
     }
   });
   workspace.scroll(scrollX, scrollY);  // more on the canvas is no reason to move what is there
-  if (made) Blockly.getFocusManager().focusNode(made);
+  if (made[0]) Blockly.getFocusManager().focusNode(made[0]);
+  if (made.length > 1) selectionOf(workspace)?.choose(made.flatMap(stackOf));
 }
 
-function layFree(made: Item, wanted: Point): Item {
+function stackOf(top: Item): Blockly.BlockSvg[] {
+  const blocks: Blockly.BlockSvg[] = [];
+  for (let each = top instanceof Blockly.BlockSvg ? top : null; each; each = each.getNextBlock()) blocks.push(each);
+  return blocks;
+}
+
+/** Together at a free place, as they were beside each other. */
+function layFree(made: Item[], wanted: Point): Item[] {
   Blockly.renderManagement.triggerQueuedRenders();
-  const size = (made as Blockly.IBoundedElement).getBoundingRectangle();
-  const others = obstacles(made.workspace, new Set([made]));
-  const place = freePlace(wanted, {width: size.getWidth(), height: size.getHeight()}, others, inSight(made.workspace));
-  made.moveBy(place.x - size.left, place.y - size.top);
+  const boxes = made.map((each) => (each as Blockly.IBoundedElement).getBoundingRectangle());
+  const [left, top] = [Math.min(...boxes.map((box) => box.left)), Math.min(...boxes.map((box) => box.top))];
+  const size = {width: Math.max(...boxes.map((box) => box.right)) - left,
+    height: Math.max(...boxes.map((box) => box.bottom)) - top};
+  const [first] = made;
+  if (!first) return made;
+  const place = freePlace(wanted, size, obstacles(first.workspace, new Set(made)), inSight(first.workspace));
+  for (const each of made) each.moveBy(place.x - left, place.y - top);
   return made;
+}
+
+function makeAll(copied: Copied | CopiedBlocks, workspace: Blockly.WorkspaceSvg, wanted: Point): Item[] {
+  if (copied.nepStudio !== 'blocks') return [make(copied, workspace, wanted)];
+  return copied.states.map((state) => {
+    const place = new Blockly.utils.Coordinate(Number(state['x']) || 0, Number(state['y']) || 0);
+    return make({nepStudio: 'block', state}, workspace, place);
+  });
 }
 
 function make({nepStudio, state}: Copied, workspace: Blockly.WorkspaceSvg, {x, y}: Point): Item {

@@ -1,5 +1,7 @@
 // A block in the hand: how near is near, where letting go deletes, and how it leaves the flyout.
 import * as Blockly from 'blockly/core';
+import {Carried} from './carry';
+import {chosenWith, runsOf} from './selection';
 
 /** How near a gap has to be, in pixels of the screen; one that is offered already holds a little further. */
 const NEAR = 28;
@@ -29,17 +31,42 @@ class Dragger extends Blockly.dragging.Dragger {
   private readonly cameFrom = this.draggable instanceof Blockly.BlockSvg && this.draggable.workspace.isFlyout ?
     this.draggable.workspace.scale : 0;
   private placed = false;
+  /** The other blocks that were chosen go along. */
+  private carried: Carried | null = null;
 
   override onDragStart(event?: PointerEvent | KeyboardEvent): Blockly.IDraggable {
-    const dragged = super.onDragStart(event);
+    this.takeChosen();
+    // Ctrl takes one block out of its script; of several each is out already.
+    const dragged = super.onDragStart(this.carried && event instanceof PointerEvent ? undefined : event);
+    this.carried?.start();
     this.setRadius();
     return dragged;
+  }
+
+  private takeChosen(): void {
+    const held = this.draggable instanceof Blockly.BlockSvg ? this.draggable : null;
+    const chosen = chosenWith(held).filter((each) => each.isMovable());
+    if (!held || !chosen.length) return;
+    if (!Blockly.Events.getGroup()) Blockly.Events.setGroup(true);
+    this.carried = new Carried(runsOf(chosen), held);
+    this.draggable = this.carried.head;
+  }
+
+  /** How far the one in the hand is from where it was taken, in units of the canvas. */
+  private get way(): Blockly.utils.Coordinate {
+    const {draggable, startLoc} = this;
+    const at = draggable.getRelativeToSurfaceXY();
+    // Blockly moves what was let go onto the grid only after the next picture.
+    const grid = draggable instanceof Blockly.BlockSvg && !draggable.isDragging() && !draggable.getParent() ?
+      draggable.workspace.getGrid() : null;
+    return Blockly.utils.Coordinate.difference(grid?.shouldSnap() ? grid.alignXY(at) : at, startLoc);
   }
 
   override onDrag(event: PointerEvent | KeyboardEvent | undefined, delta: Blockly.utils.Coordinate): void {
     this.setRadius();
     if (event instanceof PointerEvent) this.holdWhereHeld(event, delta);
     super.onDrag(event, delta);
+    this.carried?.move(this.pixelsToWorkspaceUnits(delta));
     if (event instanceof PointerEvent) this.tellDelete(this.wouldDelete(event) ? mouseOf(event) : null);
   }
 
@@ -49,8 +76,16 @@ class Dragger extends Blockly.dragging.Dragger {
     const joins = Boolean((draggable as unknown as Strategy).dragStrategy?.connectionCandidate);
     const loose = mouse && !joins && !this.wouldDelete(event as PointerEvent);
     const group = Blockly.Events.getGroup();
+    const {carried, way} = this;
     super.onDragEnd(event);
     this.end();
+    if (carried) {
+      Blockly.Events.setGroup(group);
+      if (draggable.workspace && (draggable as Blockly.BlockSvg).isDeadOrDying()) carried.remove();
+      else carried.end(joins ? way : this.way);
+      Blockly.Events.setGroup(false);
+      return;
+    }
     if (!loose || !(draggable instanceof Blockly.BlockSvg) || draggable.isDeadOrDying()) return;
     const before = Blockly.Events.getGroup();
     Blockly.Events.setGroup(group);  // what follows from the drop is undone with it
@@ -59,8 +94,14 @@ class Dragger extends Blockly.dragging.Dragger {
   }
 
   override onDragRevert(event?: PointerEvent | KeyboardEvent): void {
+    const group = Blockly.Events.getGroup();
     super.onDragRevert(event);
     this.end();
+    if (!this.carried) return;
+    Blockly.Events.setGroup(group || true);
+    this.carried.revert();
+    forgetSoon(this.draggable.workspace, Blockly.Events.getGroup());
+    Blockly.Events.setGroup(group);
   }
 
   /** The radius is the screen's, whatever the zoom. */
@@ -95,6 +136,14 @@ class Dragger extends Blockly.dragging.Dragger {
   private tellDelete(mouse: Blockly.utils.Coordinate | null): void {
     listeners.get(this.draggable.workspace)?.overDelete(this.cameFrom ? null : mouse);
   }
+}
+
+/** What was put back is nothing to undo. Blockly lists edits after the next frame. */
+function forgetSoon(workspace: Blockly.WorkspaceSvg, group: string): void {
+  window.requestAnimationFrame(() => window.setTimeout(() => {
+    const steps = workspace.getUndoStack();
+    while (steps.length && steps[steps.length - 1]?.group === group) steps.pop();
+  }));
 }
 
 function mouseOf(event: PointerEvent): Blockly.utils.Coordinate {

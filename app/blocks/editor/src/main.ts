@@ -7,6 +7,7 @@ import './mutators';
 import {Clipboard} from './clipboard';
 import {type Begin, EmptyCanvas, Pointer, type Wanted} from './guidance';
 import {binButton} from './bin';
+import {frameButton} from './frame';
 import {HelpCard, focusedBlock, registerHelpMenu} from './help';
 import {iconElement} from './icons';
 import {useClipboard, useOwnKeys} from './keys';
@@ -220,7 +221,7 @@ class Editor {
     }
     const bin = binButton();
     bin.onclick = (event) => this.shown.bin.toggle(event.detail === 0);
-    box.prepend(bin);
+    box.prepend(frameButton(), bin);
     document.body.append(box);
     this.dressBin();
   }

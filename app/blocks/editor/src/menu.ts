@@ -6,10 +6,12 @@ import {canPause, pausesHere, togglePause} from './breakpoints';
 import {type Clipboard} from './clipboard';
 import {focusedBlock} from './help';
 import {canFold, fold} from './folding';
+import {CHOOSE_ALL_SHORTCUT, chooseAll, registerChooseAll} from './frame';
 import {iconElement} from './icons';
 import {ctrl, keyWords} from './keys';
 import {addCanvasNote, addNote, hasNote, removeNote} from './notes';
 import {registerRemoveMenu} from './remove_menu';
+import {chosenWith, countIn} from './selection';
 import {lazy, t} from './words';
 
 const {names} = Blockly.ShortcutItems;
@@ -116,14 +118,16 @@ export function registerMenu(clipboard: Clipboard): void {
     when: own, run: (_it, place) => clipboard.paste(place)});
   line(ScopeType.BLOCK, 50);
   block({id: 'nepCollapse', weight: 51, icon: 'fold-vertical', words: t('Fold up'),
-    when: (it) => own(it) && !it.block!.isCollapsed() && canFold(it.block!), run: (it) => fold(it.block!, true)});
+    when: (it) => own(it) && all(it.block!).some((each) => !each.isCollapsed() && canFold(each)),
+    run: (it) => step(() => all(it.block!).filter(canFold).forEach((each) => fold(each, true)))});
   block({id: 'nepExpand', weight: 52, icon: 'unfold-vertical', words: t('Unfold'),
-    when: (it) => own(it) && it.block!.isCollapsed(), run: (it) => fold(it.block!, false)});
+    when: (it) => own(it) && all(it.block!).some((each) => each.isCollapsed()),
+    run: (it) => step(() => all(it.block!).forEach((each) => fold(each, false)))});
   block({id: 'nepOff', weight: 53, icon: 'power-off', words: t('Switch off'), shortcut: SWITCH,
-    when: (it) => own(it) && !it.block!.hasDisabledReason(OFF) && !it.block!.getInheritedDisabled(),
+    when: (it) => own(it) && all(it.block!).some((each) => !each.hasDisabledReason(OFF) && !each.getInheritedDisabled()),
     run: (it) => switchOff(it.block!, true)});
   block({id: 'nepOn', weight: 54, icon: 'power', words: t('Switch on'), shortcut: SWITCH,
-    when: (it) => own(it) && it.block!.hasDisabledReason(OFF), run: (it) => switchOff(it.block!, false)});
+    when: (it) => own(it) && all(it.block!).some((each) => each.hasDisabledReason(OFF)), run: (it) => switchOff(it.block!, false)});
   block({id: 'nepNote', weight: 70, icon: 'sticky-note', words: t('Add a note'),
     when: (it) => own(it) && !hasNote(it.block!) && !it.block!.isCollapsed(), run: (it) => addNote(it.block!)});
   block({id: 'nepNoNote', weight: 70, icon: 'sticky-note', words: t('Remove the note'),
@@ -148,6 +152,10 @@ export function registerMenu(clipboard: Clipboard): void {
     },
   });
 
+  registerChooseAll();
+  add(ScopeType.WORKSPACE, {id: 'nepChooseAll', weight: 12, icon: 'square-dashed-mouse-pointer', words: t('Choose all blocks'),
+    shortcut: CHOOSE_ALL_SHORTCUT, when: ({workspace}) => (workspace?.getTopBlocks(false).length ?? 0) > 0,
+    run: ({workspace}) => workspace && chooseAll(workspace)});
   add(ScopeType.WORKSPACE, {id: 'nepPasteHere', weight: 10, icon: 'clipboard-paste', words: t('Paste'),
     shortcut: names.PASTE, when: () => true, run: (_it, place) => clipboard.paste(place)});
   line(ScopeType.WORKSPACE, 15);
@@ -169,7 +177,10 @@ export function registerMenu(clipboard: Clipboard): void {
 
 /** A block that is off is skipped; with the block that starts a script, all of the script. */
 export function switchOff(block: Blockly.BlockSvg, off: boolean): void {
+  const chosen = chosenWith(block);
   step(() => {
+    for (const each of chosen) each.setDisabledReason(off, OFF);
+    if (chosen.length) return;
     const starts = !block.previousConnection && !block.outputConnection;
     for (let each: Blockly.BlockSvg | null = block; each; each = starts ? each.getNextBlock() : null) {
       each.setDisabledReason(off, OFF);
@@ -184,12 +195,24 @@ function step(change: () => void): void {
   Blockly.Events.setGroup(group);
 }
 
-/** Grey values in gaps are no blocks to a person. */
 function deleteWords(block: Blockly.BlockSvg): string {
-  const below = new Set(block.getNextBlock()?.getDescendants(false) ?? []);
-  const count = block.getDescendants(false).filter((each) => !each.isShadow() && !below.has(each)).length;
+  const count = countIn(all(block));
   return count === 1 ? Blockly.Msg['DELETE_BLOCK'] ?? '' :
     (Blockly.Msg['DELETE_X_BLOCKS'] ?? '').replace('%1', String(count));
+}
+
+/** The block of a menu, or all that are chosen with it. */
+function all(block: Blockly.BlockSvg): Blockly.BlockSvg[] {
+  const chosen = chosenWith(block);
+  return chosen.length ? chosen : [block];
+}
+
+/** Where several blocks are chosen, only what is done to all of them. */
+const FOR_SEVERAL = new Set(['nepDuplicate', 'nepCopy', 'nepCut', 'nepPaste', 'nepCollapse', 'nepExpand', 'nepOff', 'nepOn', 'nepDelete']);
+
+/** Who adds an entry that is done to all chosen blocks says so. */
+export function forSeveral(id: string): void {
+  FOR_SEVERAL.add(id);
 }
 
 function remove(block: Blockly.BlockSvg): void {
@@ -227,7 +250,8 @@ function withoutSpareLines(options: Option[]): Option[] {
 const registryOf = Blockly.ContextMenuRegistry.prototype;
 const optionsOf = registryOf.getContextMenuOptions;
 registryOf.getContextMenuOptions = function (scope, event) {
-  const options = optionsOf.call(this, scope, event);
+  const several = chosenWith(scope.block as Blockly.BlockSvg | undefined).length > 0;
+  const options = optionsOf.call(this, scope, event).filter((each) => each.separator || !several || FOR_SEVERAL.has(each.id));
   for (const each of options) {
     if (each.separator || typeof each.text !== 'string') continue;
     const {associatedKeyboardShortcut: shortcut} = each;

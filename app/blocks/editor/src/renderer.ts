@@ -48,6 +48,8 @@ export class StatePath extends Blockly.zelos.PathObject {
   /** The style of the block around this one; '' for none. Blocks below each other lie in the same. */
   private around = '';
   private selection: SVGGElement | null = null;
+  private selected = false;
+  private chosen = false;
 
   override applyColour(block: Blockly.BlockSvg): void {
     super.applyColour(block);
@@ -71,9 +73,22 @@ export class StatePath extends Blockly.zelos.PathObject {
   /** Two tones, of which one is seen on any block and the other on any canvas. */
   override updateSelected(enable: boolean): void {
     this.setClass_('blocklySelected', enable);
-    if (enable === (this.selection !== null)) return;
+    this.selected = enable;
+    this.outline();
+  }
+
+  /** One of several that are chosen; it looks selected, whichever of them has the keys. */
+  setChosen(chosen: boolean): void {
+    this.setClass_('nepChosen', chosen);
+    this.chosen = chosen;
+    this.outline();
+  }
+
+  private outline(): void {
+    const outlined = this.selected || this.chosen;
+    if (outlined === (this.selection !== null)) return;
     this.selection?.remove();
-    this.selection = enable ? this.group('nepSelection', 'nepSelected', [7, 3]) : null;
+    this.selection = outlined ? this.group('nepSelection', 'nepSelected', [7, 3]) : null;
     if (this.selection) this.svgRoot.append(this.selection);
   }
 

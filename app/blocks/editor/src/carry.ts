@@ -1,0 +1,90 @@
+// Chosen blocks that go somewhere together: taken out of their scripts, which close behind them, and moved by one hand.
+import * as Blockly from 'blockly/core';
+
+type Block = Blockly.BlockSvg;
+type Point = Blockly.utils.Coordinate;
+
+const {Coordinate} = Blockly.utils;
+
+/** Makes blocks that hang below each other a script of their own; what it returns puts them back. */
+export function takeOut(run: readonly Block[]): () => void {
+  const [head, tail] = [run[0]!, run[run.length - 1]!];
+  const above = (head.previousConnection ?? head.outputConnection)?.targetConnection ?? null;
+  const below = tail.getNextBlock();
+  const place = head.getRelativeToSurfaceXY();
+  if (below) tail.nextConnection!.disconnect();
+  if (above) head.unplug(false);
+  const next = below?.previousConnection ?? null;
+  const heals = next !== null && above?.type === Blockly.ConnectionType.NEXT_STATEMENT &&
+    above.getConnectionChecker().canConnect(above, next, false);
+  if (heals) above.connect(next);
+  return () => {
+    if (heals) below!.unplug(false);
+    if (above) above.connect((head.previousConnection ?? head.outputConnection)!);
+    else head.moveTo(place);
+    if (below) tail.nextConnection!.connect(next!);
+  };
+}
+
+/** Deletes them; the scripts that they were in close. */
+export function removeRuns(runs: readonly Block[][]): void {
+  for (const run of runs) {
+    takeOut(run);
+    run[0]!.dispose(false);
+  }
+}
+
+/** The first is in the hand, the others keep their places beside it. */
+export class Carried {
+  readonly head: Block;
+  private readonly others: {block: Block; from: Point}[];
+  private readonly putBack: (() => void)[];
+
+  constructor(runs: readonly Block[][], held: Block) {
+    const first = runs.find((run) => run.includes(held)) ?? runs[0]!;
+    this.putBack = runs.map(takeOut);
+    this.head = first[0]!;
+    Blockly.renderManagement.triggerQueuedRenders();
+    this.others = runs.filter((run) => run !== first)
+      .map(([block]) => ({block: block!, from: block!.getRelativeToSurfaceXY()}));
+  }
+
+  start(): void {
+    for (const {block} of this.others) {
+      block.bringToFront();
+      block.setDragging(true);
+    }
+  }
+
+  move(by: Point): void {
+    for (const {block, from} of this.others) block.moveDuringDrag(Coordinate.sum(from, by));
+  }
+
+  /** Where they are let go; undo takes back the whole way. */
+  end(by: Point): void {
+    this.goBack();
+    for (const {block} of this.others) block.moveBy(by.x, by.y, ['drag']);
+  }
+
+  /** The head is gone already. Undo brings them back to where they were taken. */
+  remove(): void {
+    this.goBack();
+    for (const {block} of this.others) block.dispose(false);
+  }
+
+  /** As if nobody had touched them. */
+  revert(): void {
+    this.goBack();
+    for (const each of [...this.putBack].reverse()) each();
+  }
+
+  /** Nobody is told of the way: it was only in the hand. */
+  private goBack(): void {
+    Blockly.Events.disable();
+    for (const {block, from} of this.others) {
+      block.setDragging(false);
+      block.moveTo(from);
+    }
+    Blockly.Events.enable();
+  }
+}

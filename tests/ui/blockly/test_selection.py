@@ -1,0 +1,212 @@
+"""Several blocks at once: chosen by a frame, by clicks or all; moved, copied and deleted together."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
+
+from app.blocks import editor_definitions
+from app.ui.blockly.view import BlocklyView
+from tests.blocks.samples import number, robot, started, workspace
+from tests.ui.blockly_person import WAIT_MS, Person, editor
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+CHOSEN = "[...document.querySelectorAll('.nepTab:not([hidden]) .nepChosen')].map(e => e.dataset.id).sort()"
+OUTLINED = "[...document.querySelectorAll('.nepTab:not([hidden]) .nepChosen > .nepSelection')].length"
+
+
+def wait_block(id: str, below: dict | None = None) -> dict:
+    block = {"type": "control_wait", "id": id, "inputs": {"SECONDS": {"shadow": number(1)}}}
+    return block | ({"next": {"block": below}} if below else {})
+
+
+@pytest.fixture
+def view(qtbot) -> BlocklyView:
+    return editor(qtbot, editor_definitions([robot()]))
+
+
+@pytest.fixture
+def can_undo(view) -> list[bool]:
+    """What the page told about that; the newest is the last."""
+    told: list[bool] = []
+    view.history_changed.connect(lambda can, _again: told.append(can))
+    return told
+
+
+@pytest.fixture
+def them(view, person) -> Person:
+    """One script of a start and three waits, and two lone waits to its right."""
+    QGuiApplication.clipboard().setText("")
+    script = started(wait_block("a", wait_block("b", wait_block("c")))) | {"id": "start", "x": 60, "y": 60}
+    state = workspace(script, wait_block("d") | {"x": 420, "y": 60}, wait_block("e") | {"x": 420, "y": 200})
+    made: Person = person(state=state)
+    made.view.setFocus()
+    made.wait_for("document.hasFocus()")
+    return made
+
+
+def click(them: Person, id: str, modifier=Qt.NoModifier) -> None:
+    box = them.box(f".nepTab:not([hidden]) [data-id={id}] > .blocklyPath")
+    at = QPoint(round(box["left"] + 14), round(box["top"] + 14))
+    QTest.mouseClick(them.target, Qt.LeftButton, modifier, at)
+
+
+def frame(them: Person, first: str, last: str, modifier=Qt.ShiftModifier) -> None:
+    """Draw a frame from above the one to below the other."""
+    one, other = (them.box(f"[data-id={each}] > .blocklyPath") for each in (first, last))
+    start = QPoint(round(one["left"] - 12), round(one["top"] - 6))
+    end = QPoint(round(other["right"] + 8), round(other["bottom"] - 8))
+    QTest.mousePress(them.target, Qt.LeftButton, modifier, start)
+    them.move(start, end)
+    QTest.mouseRelease(them.target, Qt.LeftButton, modifier, end)
+
+
+def undo(them: Person, known: list[bool]) -> None:
+    """Take the last step back, once the page has listed it."""
+    them.until(lambda: known and known[-1], "there is something to undo")
+    them.press(Qt.Key_Z, Qt.ControlModifier)
+
+
+def place(top: dict) -> tuple[float, float]:
+    return top["x"], top["y"]
+
+
+def by_id(them: Person) -> dict[str, dict]:
+    return {top["id"]: top for top in them.tops()}
+
+
+def ids(top: dict) -> list[str]:
+    below = top.get("next", {}).get("block")
+    return [top["id"], *(ids(below) if below else [])]
+
+
+def test_a_frame_chooses_what_it_touches_and_the_canvas_stays(them):
+    before = them.box("[data-id=e] > .blocklyPath")
+    frame(them, "d", "e")
+    them.wait_for(CHOSEN, ["d", "e"])
+    them.wait_for(OUTLINED, 2)
+    assert them.box("[data-id=e] > .blocklyPath") == before
+    them.press(Qt.Key_Escape)
+    them.wait_for(CHOSEN, [])
+
+
+def test_the_button_lets_a_drag_draw_one_frame(them):
+    them.click(".nepFrameButton")
+    frame(them, "d", "e", Qt.NoModifier)
+    them.wait_for(CHOSEN, ["d", "e"])
+    assert them.ask("document.querySelector('.nepFrameButton').getAttribute('aria-pressed')") == "false"
+
+
+@pytest.mark.parametrize("key", [Qt.ControlModifier, Qt.ShiftModifier])
+def test_clicks_add_and_take_away_and_a_plain_one_lets_go(them, key):
+    click(them, "d")
+    click(them, "e", key)
+    click(them, "b", key)
+    them.wait_for(CHOSEN, ["b", "d", "e"])
+    click(them, "d", key)
+    them.wait_for(CHOSEN, ["b", "e"])
+    click(them, "a")
+    them.wait_for(CHOSEN, [])
+
+
+def test_one_drag_moves_all_and_one_undo_takes_it_back(qtbot, them, can_undo):
+    before = them.tops()
+    click(them, "d")
+    click(them, "e", Qt.ControlModifier)
+    them.wait_for(CHOSEN, ["d", "e"])
+    start = them.hold("[data-id=e] > .blocklyPath")
+    end = start + QPoint(110, 90)
+    them.move(start, end)
+    them.drop(end)
+    qtbot.waitUntil(lambda: place(by_id(them)["e"]) != place(before[2]), timeout=WAIT_MS)
+    now = by_id(them)
+    way = [now["d"]["x"] - before[1]["x"], now["d"]["y"] - before[1]["y"]]
+    assert way == [now["e"]["x"] - before[2]["x"], now["e"]["y"] - before[2]["y"]]
+    assert way[0] > 60
+    them.wait_for(CHOSEN, ["d", "e"])
+    undo(them, can_undo)
+    qtbot.waitUntil(lambda: them.tops() == before, timeout=WAIT_MS)
+
+
+def test_blocks_out_of_the_middle_of_a_script_come_along_and_the_rest_closes(qtbot, them, can_undo):
+    before = them.tops()
+    click(them, "a")
+    click(them, "b", Qt.ControlModifier)
+    click(them, "e", Qt.ControlModifier)
+    them.wait_for(CHOSEN, ["a", "b", "e"])
+    start = them.hold("[data-id=b] > .blocklyPath")
+    end = start + QPoint(160, 220)
+    them.move(start, end)
+    them.drop(end)
+    qtbot.waitUntil(lambda: len(them.tops()) == 4, timeout=WAIT_MS)
+    assert sorted(ids(top) for top in them.tops()) == [["a", "b"], ["d"], ["e"], ["start", "c"]]
+    undo(them, can_undo)
+    qtbot.waitUntil(lambda: them.tops() == before, timeout=WAIT_MS)
+
+
+def test_delete_takes_all_that_are_chosen_in_one_step(qtbot, them, can_undo):
+    before = by_id(them)
+    click(them, "b")
+    click(them, "d", Qt.ControlModifier)
+    them.wait_for(CHOSEN, ["b", "d"])
+    them.press(Qt.Key_Delete)
+    qtbot.waitUntil(lambda: sorted(map(ids, them.tops())) == [["e"], ["start", "a", "c"]], timeout=WAIT_MS)
+    undo(them, can_undo)
+    qtbot.waitUntil(lambda: by_id(them) == before, timeout=WAIT_MS)
+
+
+def test_the_bin_takes_all_that_are_in_the_hand(qtbot, them, can_undo):
+    before = by_id(them)
+    frame(them, "d", "e")
+    them.wait_for(CHOSEN, ["d", "e"])
+    button = them.box(".nepBin")
+    start = them.hold("[data-id=d] > .blocklyPath")
+    end = QPoint(round(button["left"] + 12), round(button["top"] + 12))
+    them.move(start, end)
+    them.drop(end)
+    qtbot.waitUntil(lambda: list(by_id(them)) == ["start"], timeout=WAIT_MS)
+    undo(them, can_undo)
+    qtbot.waitUntil(lambda: by_id(them) == before, timeout=WAIT_MS)
+
+
+def test_copies_keep_their_places_beside_each_other(qtbot, them, can_undo):
+    before = by_id(them)
+    frame(them, "d", "e")
+    them.wait_for(CHOSEN, ["d", "e"])
+    them.press(Qt.Key_C, Qt.ControlModifier)
+    them.press(Qt.Key_V, Qt.ControlModifier)
+    qtbot.waitUntil(lambda: len(them.tops()) == 5, timeout=WAIT_MS)
+    one, other = (top for id, top in by_id(them).items() if id not in before)
+    assert other["y"] - one["y"] == before["e"]["y"] - before["d"]["y"]
+    assert other["x"] == one["x"]
+    new = sorted([one["id"], other["id"]])
+    them.wait_for(CHOSEN, new)
+    undo(them, can_undo)
+    qtbot.waitUntil(lambda: by_id(them) == before, timeout=WAIT_MS)
+
+
+def test_all_are_chosen_and_the_menu_counts_them(qtbot, them):
+    click(them, "d")
+    them.press(Qt.Key_A, Qt.ControlModifier)
+    them.wait_for(CHOSEN, ["a", "b", "c", "d", "e", "start"])
+    box = them.box("[data-id=d] > .blocklyPath")
+    at = QPoint(round(box["left"] + 14), round(box["top"] + 14))
+    QTest.mouseClick(them.target, Qt.RightButton, Qt.NoModifier, at)
+    rows = "[...document.querySelectorAll('.blocklyContextMenu .nepMenuRow > span')].map(e => e.textContent)"
+    qtbot.waitUntil(lambda: "Delete 6 blocks" in them.ask(rows), timeout=WAIT_MS)
+    assert "Add a note" not in them.ask(rows)
+
+
+def test_all_chosen_are_switched_off_together(qtbot, them):
+    click(them, "d")
+    click(them, "e", Qt.ControlModifier)
+    them.wait_for(CHOSEN, ["d", "e"])
+    them.press(Qt.Key_E, Qt.ControlModifier)
+    qtbot.waitUntil(
+        lambda: [id for id, top in by_id(them).items() if top.get("disabledReasons")] == ["d", "e"],
+        timeout=WAIT_MS,
+    )
