@@ -153,3 +153,18 @@ def test_what_is_not_there_is_found() -> None:
     assert _PATH.findall("see `app/core/gone.py`, ../app/core/gone.py and x/app/core/gone.py") == [
         "app/core/gone.py"
     ]
+
+
+def test_each_habit_of_the_comparison_has_its_test() -> None:
+    """Every row of docs/compare-blocks.md in which Studio has a Y names tests that are there."""
+    rows = [
+        line for line in (ROOT / "docs" / "compare-blocks.md").read_text("utf-8").splitlines()
+        if line.startswith("| ") and not line.startswith("| habit")
+    ]  # fmt: skip
+    assert len(rows) > 40
+    for row in rows:
+        *_marks, studio, tests = [cell.strip() for cell in row.strip("|").split("|")]
+        named = re.findall(r"`(tests/[\w/]+\.py)::(test_\w+)`", tests)
+        assert named or not studio.startswith("Y"), row
+        for path, name in named:
+            assert f"def {name}(" in (ROOT / path).read_text("utf-8"), f"{path}::{name}"
