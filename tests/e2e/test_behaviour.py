@@ -85,7 +85,7 @@ def test_a_robot_that_dies_is_missed_and_comes_back(with_robot: Callable[[dict],
     studio.says("The virtual robot Pepper has ended.")
     until(lambda: "not connected" in str(studio.page("document.body.textContent")), "the toolbox says so")
     studio.says("Pepper is not connected, so ")
-    studio.click("Use the virtual Pepper")
+    studio.click("Start a virtual Pepper")
     studio.says("Pepper ready", 40)
     studio.open_category("Movement")
     studio.screen.key("Escape")

@@ -60,7 +60,7 @@ def test_a_second_virtual_robot_comes_and_is_drawn(start: Callable[..., Studio])
     studio.choose("Robots", "Use the virtual Turtle")
     studio.says("Turtle ready", 40)
     studio.choose("Robots", "Try what a robot can do")
-    studio.find("The robot in its room")
+    studio.find("The robots in their room")
     press(studio, "Try turn")  # a virtual robot is not asked for
     studio.says("done in ")
     assert not studio.all("Let it move")

@@ -20,10 +20,14 @@ LEAST_PX = 120
 def shares(wanted: Sequence[int], room: int, *, keep: Sequence[bool]) -> list[int]:
     """Sizes that fill ``room``: those to keep as they are wanted, the others in their proportion.
 
-    In little room also those to keep have their proportion, and at least `LEAST_PX`.
+    Where the others would have less than `LEAST_PX` each, also those to keep have their proportion, and at
+    least that.
     """
     whole = max(1, sum(wanted))
-    sizes = [min(size, max(LEAST_PX, round(room * size / whole))) for size in wanted]
+    least = sum(size if kept else LEAST_PX for size, kept in zip(wanted, keep, strict=True))
+    sizes = list(wanted)
+    if least > room:
+        sizes = [min(size, max(LEAST_PX, round(room * size / whole))) for size in wanted]
     kept = sum(size for size, kept in zip(sizes, keep, strict=True) if kept)
     free = sum(size for size, kept in zip(wanted, keep, strict=True) if not kept)
     left = max(room - kept, LEAST_PX * sum(1 for kept in keep if not kept))
