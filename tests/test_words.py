@@ -266,8 +266,8 @@ def test_every_help_of_a_block_is_translated(pseudo) -> None:
 
 def test_a_translated_block_is_found_by_its_english_words_too(pseudo) -> None:
     found = {described.type: described for category in categories() for described in category.blocks}
-    assert "array" in found["lists_empty"].words
-    assert found["lists_empty"].words[-1].startswith("[")
+    assert "array" in found["lists_empty"].english_words
+    assert found["lists_empty"].words.startswith("[")
 
 
 def test_types_and_python_stay(pseudo) -> None:

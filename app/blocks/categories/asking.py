@@ -25,7 +25,7 @@ CATEGORY = Category(
             "question first, if it shall be heard. The other scripts go on; what they ask comes afterwards.",
             python="ask(%QUESTION)",
             arguments=(ValueInput("QUESTION", None, "What is your name?"),),
-            words=("input", "prompt", "type", "person", "read"),
+            words="input, prompt, question, type, person, read, keyboard, user, form",
         ),
         Block(
             type="asking_answer",
@@ -37,7 +37,7 @@ CATEGORY = Category(
             help="What is typed as a number can be counted with. Before the first question it is empty.",
             python="answer()",
             fails=False,
-            words=("input", "reply", "response", "typed"),
+            words="input, reply, response, typed, user",
         ),
     ),
 )

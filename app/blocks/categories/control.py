@@ -25,6 +25,7 @@ CATEGORY = Category(
             tooltip="Waits that many seconds; the other scripts go on.",
             python="wait(%SECONDS)",
             arguments=(ValueInput("SECONDS", "Number", 2, unit="s"),),
+            words="sleep, pause, delay, seconds, hold, rest, stay, timer",
         ),
         Block(
             type="control_wait_until",
@@ -35,6 +36,7 @@ CATEGORY = Category(
             tooltip="Waits until this is so; the other scripts go on.",
             python="wait_until(lambda: %CONDITION)",
             arguments=(_CONDITION,),
+            words="sleep, pause, hold, condition, as soon as",
         ),
         Block(
             type="control_wait_until_at_most",
@@ -45,6 +47,7 @@ CATEGORY = Category(
             tooltip="Waits until this is so, but not longer than that many seconds.",
             python="wait_until(lambda: %CONDITION, at_most_s=%SECONDS)",
             arguments=(_CONDITION, ValueInput("SECONDS", "Number", 10, unit="s")),
+            words="timeout, time limit, pause, give up, limit, seconds",
         ),
         Block(
             type="control_repeat",
@@ -55,7 +58,7 @@ CATEGORY = Category(
             tooltip="Runs the blocks inside that many times.",
             python="for _ in repeat(%TIMES):\n    %BODY",
             arguments=(ValueInput("TIMES", "Number", 3), _BODY),
-            words=("loop", "for", "again", "count", "iterate"),
+            words="loop, for, again, count, iterate, do, cycle, many times",
         ),
         Block(
             type="control_forever",
@@ -66,6 +69,7 @@ CATEGORY = Category(
             tooltip="Runs the blocks inside again and again, until the behaviour is stopped.",
             python="while True:\n    %BODY",
             arguments=(_BODY,),
+            words="loop, always, endless, infinite, again, while true, nonstop, cycle",
         ),
         Block(
             type="control_while",
@@ -80,6 +84,7 @@ CATEGORY = Category(
             },
             arguments=(ChoiceField("MODE", (("while", "while"), ("until", "until"))), _CONDITION, _BODY),
             variant="MODE",
+            words="loop, while, until, as long as, again, condition, do while, cycle",
         ),
         Block(
             type="control_count",
@@ -97,7 +102,7 @@ CATEGORY = Category(
                 ValueInput("STEP", "Number", 1),
                 _BODY,
             ),
-            words=("for", "loop", "index", "range", "counter", "repeat", "i"),
+            words="for, loop, index, range, counter, repeat, i, numbers, step, cycle",
         ),
         Block(
             type="control_if",
@@ -108,6 +113,7 @@ CATEGORY = Category(
             tooltip="Runs the blocks inside only if this is so.",
             python="if %CONDITION:\n    %BODY",
             arguments=(_CONDITION, _BODY),
+            words="if then, then, condition, when, check, decide, test, case, choose, branch, whether",
         ),
         Block(
             type="control_if_else",
@@ -118,6 +124,7 @@ CATEGORY = Category(
             tooltip="Runs the first blocks if this is so, the others if not.",
             python="if %CONDITION:\n    %BODY\nelse:\n    %ELSE",
             arguments=(_CONDITION, _BODY, StatementInput("ELSE")),
+            words="if then else, then, otherwise, condition, decide, check, choose, branch, or else",
         ),
         Block(
             type="control_stop_script",
@@ -128,6 +135,7 @@ CATEGORY = Category(
             tooltip="Ends this script; the others go on. An event starts it again.",
             python="return",
             python_in_function="stop_script()",
+            words="end, exit, return, quit, break, halt, finish",
         ),
         Block(
             type="control_stop_others",
@@ -138,7 +146,7 @@ CATEGORY = Category(
             tooltip="Ends what all other scripts do now; this one goes on. Events start them again.",
             help="What a robot does for one of them is taken back.",
             python="stop_others()",
-            words=("end", "cancel", "all", "kill"),
+            words="end, cancel, kill, halt, interrupt, rest, other programs",
         ),
         Block(
             type="control_stop_program",
@@ -148,6 +156,7 @@ CATEGORY = Category(
             icon="octagon-x",
             tooltip="Ends all scripts and tells the robots to stop.",
             python="stop_program()",
+            words="end, exit, quit, all, everything, halt, finish, abort, kill, program, script",
         ),
     ),
 )

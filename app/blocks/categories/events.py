@@ -24,6 +24,7 @@ CATEGORY = Category(
             tooltip="The blocks below run when the behaviour starts. A behaviour may have several of these: "
             "they run side by side.",
             python="on_start",
+            words="begin, start, run, go, green flag, flag, play, launch, on start, setup, main",
         ),
         Block(
             type="events_message",
@@ -35,6 +36,7 @@ CATEGORY = Category(
             python="on_message(%TOPIC)",
             arguments=(TopicField("TOPIC"),),
             parameters=("message",),
+            words="topic, subscribe, listen, receive, data, incoming, on message",
         ),
         Block(
             type="events_becomes_true",
@@ -45,6 +47,7 @@ CATEGORY = Category(
             tooltip="The blocks below run each time this was not so and now is.",
             python="on_true(lambda: %CONDITION)",
             arguments=(ValueInput("CONDITION", "Boolean"),),
+            words="condition, whenever, event, trigger, as soon as, watch, sensor, above, below, happens",
         ),
         Block(
             type="events_received",
@@ -56,7 +59,7 @@ CATEGORY = Category(
             help="Several scripts may receive the same name. One that still runs begins anew.",
             python="on_broadcast(%NAME)",
             arguments=(_NAME,),
-            words=("broadcast", "message", "signal", "event", "start"),
+            words="broadcast, message, signal, event, on message, trigger, get",
         ),
         Block(
             type="events_broadcast",
@@ -68,7 +71,7 @@ CATEGORY = Category(
             help="It stays inside this behaviour. “publish” in Messages tells other programs and robots.",
             python="broadcast(%NAME)",
             arguments=(_NAME,),
-            words=("send", "message", "signal", "event", "start"),
+            words="send, message, signal, event, tell, emit, shout, trigger, start other scripts",
         ),
         Block(
             type="events_broadcast_wait",
@@ -79,7 +82,7 @@ CATEGORY = Category(
             tooltip="Starts the scripts that receive this name, and waits until they have ended.",
             python="broadcast_and_wait(%NAME)",
             arguments=(_NAME,),
-            words=("send", "message", "signal", "event", "start"),
+            words="send, message, signal, event, call, until done, trigger",
         ),
     ),
 )

@@ -36,7 +36,7 @@ CATEGORY = Category(
             python="",
             arguments=(_NAME, _INPUTS, _BODY),
             mutator="function",
-            words=("define", "procedure", "method", "own", "block", "make"),
+            words="function, define, procedure, method, own block, my block, block, make, create, subroutine",
         ),
         _definition(
             "functions_define_result",
@@ -47,7 +47,7 @@ CATEGORY = Category(
             python="",
             arguments=(TextField("NAME", "my result"), _INPUTS, _BODY, ValueInput("RESULT")),
             mutator="function",
-            words=("define", "return", "procedure", "own", "block", "make"),
+            words="function, define, return, procedure, own block, my block, block, make, result, calculate",
         ),
         _statement(
             "functions_return_if",
@@ -58,7 +58,7 @@ CATEGORY = Category(
             python="if %CONDITION:\n    return %VALUE",
             arguments=(ValueInput("CONDITION", "Boolean"), ValueInput("VALUE")),
             needs_function="result",
-            words=("return",),
+            words="return, result, exit",
         ),
         _statement(
             "functions_leave_if",
@@ -69,7 +69,7 @@ CATEGORY = Category(
             python="if %CONDITION:\n    return",
             arguments=(ValueInput("CONDITION", "Boolean"),),
             needs_function="plain",
-            words=("return", "exit", "end"),
+            words="return, exit, end, break, quit",
         ),
         _statement(
             "functions_call",
@@ -80,6 +80,7 @@ CATEGORY = Category(
             arguments=(_INPUTS,),
             mutator="call",
             in_toolbox=False,
+            words="call, run, do, use, procedure, own block",
         ),
         _value(
             "functions_result",
@@ -90,6 +91,7 @@ CATEGORY = Category(
             arguments=(_INPUTS,),
             mutator="call",
             in_toolbox=False,
+            words="call, run, use, result, procedure, own block",
         ),
         _value(
             "functions_input",
@@ -100,6 +102,7 @@ CATEGORY = Category(
             arguments=(InputField("INPUT"),),
             fails=False,
             in_toolbox=False,
+            words="input, parameter, argument, value",
         ),
     ),
 )

@@ -35,7 +35,7 @@ _MAKING = (
         python="new_list()",
         check="List",
         fails=False,
-        words=("new", "create", "array"),
+        words="new, create, array, make, no items",
     ),
     _value(
         "lists_create",
@@ -48,7 +48,7 @@ _MAKING = (
         check="List",
         mutator="items",
         extra={"items": 3},
-        words=("new", "create", "array", "make"),
+        words="new, create, array, make, collection, several",
     ),
     _value(
         "lists_split",
@@ -59,7 +59,7 @@ _MAKING = (
         python="split_text(%TEXT, %BETWEEN)",
         arguments=(ValueInput("TEXT", None, "yes,no"), ValueInput("BETWEEN", None, ",")),
         check="List",
-        words=("text", "words", "separate"),
+        words="text, words, separate, divide, cut, csv",
     ),
 )
 
@@ -73,7 +73,7 @@ _READING = (
         python=_at("item(%LIST, @)"),
         arguments=(_WHERE, _NUMBER, _LIST),
         variant="WHERE",
-        words=("get", "element", "index", "choose"),
+        words="get, element, index, choose, item, pick, first, last, read",
     ),
     _value(
         "lists_length",
@@ -83,7 +83,7 @@ _READING = (
         python="length(%LIST)",
         arguments=(_LIST,),
         check="Number",
-        words=("length", "count", "size"),
+        words="length, count, size, how many",
     ),
     _boolean(
         "lists_contains",
@@ -94,7 +94,7 @@ _READING = (
         python="contains(%LIST, %VALUE)",
         arguments=(ValueInput("LIST", None, variable="list"), ValueInput("VALUE", None, "apple")),
         check="Boolean",
-        words=("in", "has", "includes", "find"),
+        words="in, has, includes, find, search, member",
     ),
     _value(
         "lists_position",
@@ -104,7 +104,7 @@ _READING = (
         python="position(%LIST, %VALUE)",
         arguments=(ValueInput("VALUE", None, "apple"), _LIST),
         check="Number",
-        words=("index", "find", "where", "position"),
+        words="index, find, where, position, search, place",
     ),
     _value(
         "lists_join",
@@ -115,7 +115,7 @@ _READING = (
         python="join_items(%LIST, %BETWEEN)",
         arguments=(_LIST, ValueInput("BETWEEN", None, ", ")),
         check="String",
-        words=("join", "text", "say"),
+        words="join, text, say, concatenate, glue, combine",
     ),
     _value(
         "lists_part",
@@ -126,7 +126,7 @@ _READING = (
         python="part_of_list(%LIST, %FIRST, %LAST)",
         arguments=(ValueInput("FIRST", "Number", 1), ValueInput("LAST", "Number", 3), _LIST),
         check="List",
-        words=("slice", "sublist", "piece", "some"),
+        words="slice, sublist, piece, some, part",
     ),
     _boolean(
         "lists_is_empty",
@@ -136,7 +136,7 @@ _READING = (
         python="is_empty_list(%LIST)",
         arguments=(_LIST,),
         check="Boolean",
-        words=("nothing", "none", "length"),
+        words="nothing, none, length, no items",
     ),
 )
 
@@ -169,7 +169,8 @@ _WORKING_OUT = (
         ),
         variant="WHAT",
         check="Number",
-        words=("total", "add", "mean", "min", "max", "minimum", "maximum", "median", "statistics"),
+        words="total, sum, add, average, mean, min, max, minimum, maximum, median, smallest, largest, "
+        "statistics",
     ),
     _value(
         "lists_copy",
@@ -200,7 +201,8 @@ _WORKING_OUT = (
         ),
         variant="ORDER",
         check="List",
-        words=("sort", "order", "reverse", "shuffle", "mix", "duplicate", "ascending", "descending"),
+        words="sort, order, reverse, shuffle, mix, duplicate, ascending, descending, random order, "
+        "alphabetical",
     ),
 )
 
@@ -222,7 +224,7 @@ _CHANGING = (
         help="A variable begins with 0: set it to an empty list before the first item.",
         python="add_item(%LIST, %VALUE)",
         arguments=(ValueInput("VALUE", None, "apple"), _LIST),
-        words=("append", "push", "put"),
+        words="append, push, put, insert, element",
     ),
     _statement(
         "lists_insert",
@@ -232,7 +234,7 @@ _CHANGING = (
         python=_at("insert_item(%LIST, @, %VALUE)", _PLACES),
         arguments=(ValueInput("VALUE", None, "apple"), ChoiceField("WHERE", _PLACES), _NUMBER, _LIST),
         variant="WHERE",
-        words=("add", "put", "push"),
+        words="add, put, push, element, between",
     ),
     _statement(
         "lists_set",
@@ -242,14 +244,14 @@ _CHANGING = (
         python=_at("set_item(%LIST, @, %VALUE)"),
         arguments=(_WHERE, _NUMBER, _LIST, ValueInput("VALUE", None, "apple")),
         variant="WHERE",
-        words=("replace", "change"),
+        words="replace, change, element, item, overwrite",
     ),
     _removing(
         "lists_remove",
         "remove %WHERE %NUMBER of %LIST",
         shape="statement",
         tooltip="Takes an item out of a list; the items behind it move up.",
-        words=("delete", "drop", "pop"),
+        words="delete, drop, pop, erase, element",
     ),
     _removing(
         "lists_take",
@@ -257,7 +259,7 @@ _CHANGING = (
         shape="value",
         tooltip="Takes an item out of a list and gives it.",
         help="To go through a list in a random order: take out a random item until the list is empty.",
-        words=("pop", "draw", "remove"),
+        words="pop, draw, remove, delete, pull",
     ),
     _statement(
         "lists_clear",
@@ -266,7 +268,7 @@ _CHANGING = (
         tooltip="Makes a list empty.",
         python="clear_list(%LIST)",
         arguments=(_LIST,),
-        words=("delete", "empty", "reset", "clear"),
+        words="delete, empty, reset, clear, erase",
     ),
     _statement(
         "lists_each",
@@ -276,7 +278,7 @@ _CHANGING = (
         help="It goes over the items that were there when it began, whatever happens to the list inside.",
         python="for %VAR in each(%LIST):\n    %BODY",
         arguments=(VariableField("VAR", "item"), _LIST, StatementInput("BODY")),
-        words=("loop", "repeat", "for"),
+        words="loop, repeat, for, foreach, iterate, every, cycle",
     ),
 )
 

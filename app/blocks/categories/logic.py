@@ -46,6 +46,8 @@ CATEGORY = Category(
             ),
             variant="RELATION",
             check="Boolean",
+            words="compare, greater, less, equals, equal, smaller, larger, bigger, more than, less than, "
+            "greater than, same, different, between, =, <, >, ≠, ≤, ≥, ==, !=, <=, >=",
         ),
         Block(
             type="values_logic",
@@ -63,6 +65,7 @@ CATEGORY = Category(
             variant="LOGIC",
             check="Boolean",
             fails=False,
+            words="both, either, boolean, condition, all of, any of, &&, ||",
         ),
         Block(
             type="values_not",
@@ -75,6 +78,7 @@ CATEGORY = Category(
             arguments=(ValueInput("A", "Boolean"),),
             check="Boolean",
             fails=False,
+            words="opposite, invert, negate, unless, false, !",
         ),
         Block(
             type="values_boolean",
@@ -87,6 +91,7 @@ CATEGORY = Category(
             arguments=(ChoiceField("VALUE", (("true", True), ("false", False))),),
             check="Boolean",
             fails=False,
+            words="yes, no, on, off, boolean, bool, constant",
         ),
         Block(
             type="values_known",
@@ -99,6 +104,7 @@ CATEGORY = Category(
             arguments=(ValueInput("A"),),
             check="Boolean",
             fails=False,
+            words="exists, available, defined, none, null, empty, has value, already",
         ),
     ),
 )

@@ -23,6 +23,7 @@ CATEGORY = Category(
             python="publish(%TOPIC, %VALUE)",
             arguments=(ValueInput("VALUE", None, "hello"), TopicField("TOPIC")),
             publishes=True,
+            words="send, topic, tell, transmit, post, message, network, share",
         ),
         Block(
             type="messages_publish_field",
@@ -34,6 +35,7 @@ CATEGORY = Category(
             python="publish(%TOPIC, {%FIELD: %VALUE})",
             arguments=(TextField("FIELD", "name"), ValueInput("VALUE", None, "Ada"), TopicField("TOPIC")),
             publishes=True,
+            words="send, topic, json, key, named, field, message, network",
         ),
         Block(
             type="messages_write",
@@ -44,6 +46,7 @@ CATEGORY = Category(
             tooltip="Shows a value as a line in the console.",
             python="write(%VALUE)",
             arguments=(ValueInput("VALUE", None, "Hello"),),
+            words="print, say, log, show, display, console, output, debug, text, terminal, screen",
         ),
         Block(
             type="messages_newest",
@@ -54,6 +57,7 @@ CATEGORY = Category(
             tooltip="The field of the newest message on this topic. Not known until the first message.",
             python="newest(%TOPIC, %FIELD)",
             arguments=(PathField("FIELD", "name"), TopicField("TOPIC", "/faces")),
+            words="read, topic, latest, last, get, receive, subscribe, value, current",
         ),
         Block(
             type="messages_message",
@@ -65,6 +69,7 @@ CATEGORY = Category(
             python="message",
             fails=False,
             needs_message=True,
+            words="received, data, content, payload, what arrived",
         ),
         Block(
             type="messages_field",
@@ -76,6 +81,7 @@ CATEGORY = Category(
             python="part(message, %FIELD)",
             arguments=(PathField("FIELD", "name", topic=""),),
             needs_message=True,
+            words="received, part, data, json, key, value",
         ),
     ),
 )

@@ -58,6 +58,7 @@ _BASIC = (
         arguments=(NumberField("NUMBER", 0),),
         check="Number",
         fails=False,
+        words="digit, figure, integer, decimal, value, amount",
     ),
     Block(
         type="values_arithmetic",
@@ -70,6 +71,9 @@ _BASIC = (
         arguments=(*_TWO, ChoiceField("SIGN", _SIGNS)),
         variant="SIGN",
         check="Number",
+        words="calculate, sum, add, plus, addition, subtract, minus, difference, multiply, times, product, "
+        "divide, division, math, maths, mathematics, formula, remainder, modulo, power, operator, +, -, "
+        "*, /, %, ^",
     ),
     Block(
         type="values_random",
@@ -81,6 +85,7 @@ _BASIC = (
         python="random_number(%LOW, %HIGH)",
         arguments=(ValueInput("LOW", "Number", 1), ValueInput("HIGH", "Number", 6)),
         check="Number",
+        words="dice, die, chance, luck, lottery, coin, pick, surprise, draw lots",
     ),
     Block(
         type="values_round",
@@ -100,6 +105,7 @@ _BASIC = (
         ),
         variant="HOW",
         check="Number",
+        words="round, round up, round down, whole, integer, ceiling, floor, nearest, decimals",
     ),
 )
 
@@ -118,7 +124,8 @@ _MORE = (
             ValueInput("NUMBER", "Number", 9),
         ),
         variant="FUNCTION",
-        words=("sqrt", "root", "abs", "sine", "cosine", "tangent", "logarithm", "exponent", "angle", "math"),
+        words="square root, sqrt, root, absolute, abs, sine, cosine, tangent, logarithm, exponent, angle, "
+        "math, trigonometry",
     ),
     _number(
         "numbers_round_to",
@@ -128,7 +135,7 @@ _MORE = (
         help="With 0 places it is a whole number. With −1 places it is rounded to tens.",  # noqa: RUF001
         python="rounded_to(%NUMBER, %PLACES)",
         arguments=(ValueInput("NUMBER", "Number", 3.14159), ValueInput("PLACES", "Number", 2)),
-        words=("digits", "decimals", "precision"),
+        words="digits, decimals, precision, places",
     ),
     _number(
         "numbers_of_two",
@@ -142,7 +149,7 @@ _MORE = (
             ValueInput("B", "Number", 2),
         ),
         variant="WHICH",
-        words=("min", "max", "minimum", "maximum", "least", "most"),
+        words="min, max, minimum, maximum, least, most, bigger, highest, lowest",
     ),
     _number(
         "numbers_limit",
@@ -156,7 +163,7 @@ _MORE = (
             ValueInput("LOW", "Number", 0),
             ValueInput("HIGH", "Number", 100),
         ),
-        words=("constrain", "clamp", "range", "minimum", "maximum"),
+        words="constrain, clamp, range, minimum, maximum, at least, at most, restrict",
     ),
     _number(
         "numbers_map",
@@ -173,7 +180,7 @@ _MORE = (
             ValueInput("NEW_LOW", "Number", 0),
             ValueInput("NEW_HIGH", "Number", 1),
         ),
-        words=("scale", "convert", "range", "proportion"),
+        words="scale, convert, range, proportion, rescale",
     ),
     _number(
         "numbers_constant",
@@ -187,7 +194,7 @@ _MORE = (
         ),
         variant="CONSTANT",
         fails=False,
-        words=("pi", "circle", "constant", "golden", "ratio"),
+        words="pi, circle, constant, golden, ratio, e",
     ),
     _boolean(
         "numbers_is",
@@ -216,7 +223,7 @@ _MORE = (
             ),
         ),
         variant="KIND",
-        words=("integer", "sign", "question"),
+        words="even, odd, whole, positive, negative, integer, sign, check",
     ),
     _boolean(
         "numbers_divisible",
@@ -225,7 +232,7 @@ _MORE = (
         tooltip="Whether nothing is left over when the first number is divided by the second.",
         python="is_divisible(%NUMBER, %BY)",
         arguments=(ValueInput("NUMBER", "Number", 12), ValueInput("BY", "Number", 3)),
-        words=("multiple", "remainder", "modulo"),
+        words="multiple, remainder, modulo, divided",
     ),
 )
 

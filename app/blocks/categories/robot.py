@@ -11,9 +11,10 @@ from app.blocks.model.block import Block, RobotUse
 from app.blocks.model.category import Category, Group, ToolboxEntry
 from app.blocks.model.fields import ChoiceField, LiveField, NumberField, robot_field
 from app.blocks.model.robot_text import TextParts, about, field_of, input_of, type_of
+from app.blocks.model.robot_words import CHANGES, PASSES, in_both, words_of_action, words_of_sensor
 from app.robots.description.description import Action, Event, Robot, Sensor
-from app.robots.description.json_access import spoken
-from nep.i18n import _, pgettext
+from app.robots.description.json_access import names, spoken
+from nep.i18n import _, pgettext, translate
 
 _ICONS = {
     "Speech": "message-circle",
@@ -78,6 +79,9 @@ def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         if parameter.name in parts.shown
     ]
     returns = _returned(robot, action)
+    called = [action.name, action.title, *_types(robot, "actions", action.name)]
+    called += [parameter.name for parameter in action.parameters]
+    found = words_of_action(called, action.uses)
     do = "robot(%ROBOT).do(%X_NAME, **%X_INPUT)"
     ask = "robot(%ROBOT).ask(%X_NAME, %X_FIELD, **%X_INPUT)"
     return Block(
@@ -93,7 +97,8 @@ def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         keywords={"X_INPUT": tuple((argument.name, parameter.name) for parameter, argument in inputs)},
         robot=RobotUse("action", action.name, action.title, robot.model),
         about={argument.name: (parameter.title, about(parameter)) for parameter, argument in inputs},
-        words=(action.category, action.name),
+        words=", ".join((found.words, translate("category", _group_title(action)))),
+        english_words=found.english,
     )
 
 
@@ -106,6 +111,7 @@ def _tooltip(robot: Robot, action: Action) -> str:
 def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
     parts = TextParts(sensor.text, [])
     robots = robot_field(robot.model, alike)
+    found = words_of_sensor((sensor.name, sensor.title, *_types(robot, "properties", sensor.name)))
     if sensor.kind == "object":
         fields = tuple((field.title or field.name, field.name) for field in sensor.fields)
         return Block(
@@ -119,6 +125,8 @@ def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
             arguments=(robots, ChoiceField("FIELD", fields), LiveField("LIVE")),
             constants={"X_NAME": sensor.name},
             robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
+            words=found.words,
+            english_words=found.english,
         )
     boolean = sensor.kind == "boolean"
     return Block(
@@ -133,6 +141,8 @@ def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
         check="Boolean" if boolean else "Number" if sensor.kind in _NUMBERS else "String",
         constants={"X_NAME": sensor.name},
         robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
+        words=found.words,
+        english_words=found.english,
     )
 
 
@@ -144,6 +154,7 @@ def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
         for name in event.filters
         if name in parts.shown
     ]
+    found = words_of_sensor((event.name, event.title, *_types(robot, "events", event.name)))
     return Block(
         type=type_of(robot.model, "when", event.name),
         text=parts.text,
@@ -156,6 +167,8 @@ def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
         constants={"X_NAME": event.name},
         keywords={"X_INPUT": tuple((argument.name, name) for name, argument in filters)},
         robot=RobotUse("event", event.name, event.title, robot.model),
+        words=found.words,
+        english_words=found.english,
     )
 
 
@@ -176,6 +189,8 @@ def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
                 python="robot(%ROBOT).on_change(%SENSOR)",
                 arguments=(robot_field(robot.model, alike), _sensor_field(told)),
                 robot=RobotUse("sensor", "", "changes", robot.model),
+                words=in_both(CHANGES).words,
+                english_words=in_both(CHANGES).english,
             )
         )
     if numbers:
@@ -198,6 +213,8 @@ def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
                     NumberField("LIMIT", 20),
                 ),
                 robot=RobotUse("sensor", "", "passes", robot.model),
+                words=in_both(PASSES).words,
+                english_words=in_both(PASSES).english,
             )
         )
     return tuple(hats)
@@ -218,6 +235,12 @@ def _member(robot: Robot, kind: str, name: str) -> Mapping[str, object]:
     group = robot.source.get(kind)
     member = group.get(name) if isinstance(group, Mapping) else None
     return member if isinstance(member, Mapping) else {}
+
+
+def _types(robot: Robot, kind: str, name: str) -> tuple[str, ...]:
+    """What a description says that it is, beside its name: ``iot:TurnOn``."""
+    told = _member(robot, kind, name).get("@type")
+    return (told,) if isinstance(told, str) else names(told)
 
 
 CATEGORY = Category(

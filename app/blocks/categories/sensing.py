@@ -40,7 +40,7 @@ CATEGORY = Category(
             help="It stands while the behaviour is paused.",
             python="timer()",
             check="Number",
-            words=("stopwatch", "seconds", "since", "time", "elapsed"),
+            words="stopwatch, seconds, since, time, elapsed, chronometer, clock",
         ),
         Block(
             type="sensing_reset",
@@ -50,7 +50,7 @@ CATEGORY = Category(
             icon="timer-reset",
             tooltip="Sets the timer to 0; it begins to count again at once.",
             python="reset_timer()",
-            words=("stopwatch", "start", "zero", "seconds"),
+            words="stopwatch, start, zero, seconds, restart, clear, chronometer",
         ),
         _value(
             "sensing_now",
@@ -61,7 +61,7 @@ CATEGORY = Category(
             python="now(%PART)",
             arguments=(ChoiceField("PART", _PARTS),),
             fails=False,
-            words=("current", "today", "clock", "weekday", "calendar"),
+            words="current, today, clock, weekday, calendar, date, time, hour, day",
         ),
         _value(
             "sensing_seconds_since",
@@ -73,7 +73,7 @@ CATEGORY = Category(
             python="seconds_since(%MOMENT)",
             arguments=(ValueInput("MOMENT", None, "14:30"),),
             check="Number",
-            words=("elapsed", "difference", "until", "age", "duration"),
+            words="elapsed, difference, until, age, duration, days since",
         ),
     ),
 )

@@ -24,6 +24,7 @@ _BASIC = (
         arguments=(TextField("TEXT", "Hello"),),
         check="String",
         fails=False,
+        words="text, string, word, letters, sentence, quote, write",
     ),
     Block(
         type="values_join",
@@ -35,6 +36,7 @@ _BASIC = (
         python="join(%A, %B)",
         arguments=(ValueInput("A", None, "Hello "), ValueInput("B", None, "Pepper")),
         check="String",
+        words="concatenate, combine, append, connect, plus, glue, text, put together, merge, string, add",
     ),
     Block(
         type="values_length",
@@ -46,6 +48,7 @@ _BASIC = (
         python="length(%TEXT)",
         arguments=(ValueInput("TEXT", None, "Hello"),),
         check="Number",
+        words="count, letters, characters, size, how long, how many",
     ),
 )
 
@@ -77,7 +80,7 @@ _TAKING_APART = (
             ValueInput("TEXT", None, "Hello"),
         ),
         variant="WHERE",
-        words=("character", "char", "get", "index"),
+        words="character, char, get, index, letter, first, last",
     ),
     _text(
         "texts_part",
@@ -91,7 +94,7 @@ _TAKING_APART = (
             ValueInput("LAST", "Number", 3),
             ValueInput("TEXT", None, "Hello"),
         ),
-        words=("substring", "slice", "piece", "characters", "cut"),
+        words="substring, slice, piece, characters, cut, part, extract",
     ),
     _number(
         "texts_position",
@@ -100,7 +103,7 @@ _TAKING_APART = (
         tooltip="At which letter these characters begin; 0 when they are not in the text.",
         python="position_in_text(%TEXT, %PIECE)",
         arguments=(ValueInput("PIECE", None, "l"), ValueInput("TEXT", None, "Hello")),
-        words=("index", "find", "where", "search"),
+        words="index, find, where, search, place",
     ),
     _text(
         "texts_change",
@@ -126,7 +129,8 @@ _TAKING_APART = (
             ),
         ),
         variant="CHANGE",
-        words=("upper", "lower", "case", "uppercase", "lowercase", "trim", "strip", "reverse"),
+        words="upper, lower, case, uppercase, lowercase, capital letters, small letters, trim, strip, "
+        "reverse, spaces",
     ),
     _text(
         "texts_replace",
@@ -140,7 +144,7 @@ _TAKING_APART = (
             ValueInput("NEW", None, "Leo"),
             ValueInput("TEXT", None, "Hello Ada"),
         ),
-        words=("substitute", "exchange", "remove", "change"),
+        words="substitute, exchange, swap, remove, change",
     ),
     _number(
         "texts_number",
@@ -151,7 +155,7 @@ _TAKING_APART = (
         "“has a number” first.",
         python="number_in(%TEXT)",
         arguments=(ValueInput("TEXT", None, "12 apples"),),
-        words=("convert", "parse", "to", "int", "value"),
+        words="convert, parse, to number, int, value",
     ),
 )
 
@@ -173,7 +177,7 @@ _QUESTIONS = (
             ValueInput("PIECE", None, "Ada"),
         ),
         variant="HOW",
-        words=("in", "includes", "has", "begins", "find"),
+        words="in, includes, has, begins, starts with, ends with, find, search",
     ),
     _boolean(
         "texts_same",
@@ -183,7 +187,7 @@ _QUESTIONS = (
         help="For what people type or say: “Yes”, “yes” and “YES ” are the same.",
         python="same_words(%A, %B)",
         arguments=(ValueInput("A", None, "Yes"), ValueInput("B", None, "yes")),
-        words=("equals", "same", "compare", "case", "insensitive"),
+        words="equals, equal, same, compare, case, insensitive, uppercase",
     ),
     _boolean(
         "texts_empty",
@@ -192,7 +196,7 @@ _QUESTIONS = (
         tooltip="Whether there is nothing in a text, or only spaces.",
         python="is_empty(%TEXT)",
         arguments=(ValueInput("TEXT", None, ""),),
-        words=("nothing", "blank", "none"),
+        words="nothing, blank, none, no text",
     ),
     _boolean(
         "texts_has_number",
@@ -201,7 +205,7 @@ _QUESTIONS = (
         tooltip="Whether a number is written in a text.",
         python="has_number(%TEXT)",
         arguments=(ValueInput("TEXT", None, "12 apples"),),
-        words=("is", "numeric", "digit"),
+        words="is a number, numeric, digit, check number",
     ),
 )
 

@@ -64,7 +64,8 @@ class Block:
     in_toolbox: bool = True
     about: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> its name, more about it
     help: str = ""  # for people who ask: more than the tooltip, with an example
-    words: tuple[str, ...] = ()  # other words that people look for it by
+    words: str = ""  # other words that people look for it by, with commas between
+    english_words: str = ""  # the English ones, where its words are in another language
 
     def argument(self, name: str) -> Argument | None:
         """The argument of that name."""
@@ -100,13 +101,15 @@ class Block:
 
         `say` is called for every word that a person reads: ``tools/words.py`` collects them by it.
         """
+        words = say(f"words to find {self.type}", self.words) if self.words else ""
         return replace(
             self,
             text=say("block", self.text),
             tooltip=say(None, self.tooltip),
             help=say(None, self.help),
             arguments=tuple(argument.translated(say) for argument in self.arguments),
-            words=(*self.words, say("words to find a block by", " ".join(self.words))),
+            words=words,
+            english_words="" if words == self.words else f"{_plain(self.text)}, {self.words}",
         )
 
     def to_blockly(self) -> dict[str, object]:
@@ -137,6 +140,11 @@ class Block:
         if inputs:
             entry["inputs"] = inputs
         return entry
+
+
+def _plain(text: str) -> str:
+    """The words between its gaps."""
+    return " ".join(_HOLE.sub(" ", text).split())
 
 
 def _messages(block: Block) -> dict[str, object]:

@@ -136,7 +136,10 @@ _UNIT = 3  # letters that a unit has at most
 
 
 def help_of(block: Block) -> dict[str, object]:
-    """``title``, ``name``, ``does``, ``more``, ``gaps`` as (name, words), ``example``; ``words`` find it."""
+    """``title``, ``name``, ``does``, ``more``, ``gaps`` as (name, words), ``example``.
+
+    ``words``, ``english`` and ``choices`` find it: lists of other words, and what may be chosen on it.
+    """
     gaps = [
         [name_of_gap(block, argument), words]
         for argument in block.arguments
@@ -149,7 +152,9 @@ def help_of(block: Block) -> dict[str, object]:
         "more": block.help,
         "gaps": gaps,
         "example": _example(block),
-        "words": " ".join(block.words),
+        "words": block.words,
+        "english": block.english_words,
+        "choices": _choices(block),
     }
 
 
@@ -247,6 +252,11 @@ def _choice(field: ChoiceField) -> str:
         few = ", ".join(names[: _MOST_CHOICES - 1])
         return _("one of {count} choices: {few} and others").format(count=len(names), few=few)
     return listed(names, "or") if len(names) > 1 else _("choose one")
+
+
+def _choices(block: Block) -> list[str]:
+    fields = [each for each in block.arguments if isinstance(each, ChoiceField) and each.name != "ROBOT"]
+    return [words for field in fields for words, _value in field.options]
 
 
 def _number(field: NumberField) -> str:

@@ -124,7 +124,7 @@ def test_the_toolbox():
 def test_a_long_category_has_headings_between_its_blocks():
     (lists,) = [item for item in DEFINITIONS["toolbox"]["contents"] if item["name"] == "Lists"]  # type: ignore[index]
     shown = [entry.get("text") or entry["type"] for entry in lists["contents"]]
-    assert shown[:2] == ["Make a list", "lists_empty"]
+    assert shown[:3] == ["New list", "Make a list", "lists_empty"]
     assert shown[shown.index("Change a list") + 1] == "lists_add"
 
 

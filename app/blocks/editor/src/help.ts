@@ -13,7 +13,10 @@ export interface BlockHelp {
   more: string;
   gaps: [string, string][];
   example: string;
+  /** Other words that people look for it by: those of their language, and English ones; what may be chosen on it. */
   words: string;
+  english: string;
+  choices: string[];
 }
 
 let all: Record<string, BlockHelp> = {};
@@ -98,7 +101,7 @@ export class HelpCard {
 function keptHelp(block: Blockly.BlockSvg): BlockHelp {
   return {title: t('A block that is not known here'), name: '', does: String(block.getTooltip()),
     more: t('It may belong to a robot that was never seen here, or to a newer Studio. It stays in the file as it is.'),
-    gaps: [], example: t('For example: connect the robot whose block it is.'), words: ''};
+    gaps: [], example: t('For example: connect the robot whose block it is.'), words: '', english: '', choices: []};
 }
 
 function element(tag: string, name: string, words = ''): HTMLElement {

@@ -8,36 +8,109 @@ import {t} from './words';
 export type Entry = Record<string, unknown>;
 
 function plain(words: string): string {
-  return words.normalize('NFKD').replace(/[\u0300-\u036f]/g, '').toLowerCase().replace(/\s+/g, ' ').trim();
+  return words.normalize('NFKD').replace(/[\u0300-\u036f]/g, '').toLowerCase().replace(/’/g, '\'')
+    .replace(/\s+/g, ' ').trim();
 }
 
-/** How well a toolbox entry answers; 0 is not at all. */
-function score(entry: Entry, wanted: string[]): number {
+/** Words of at least so many letters are found although one letter is wrong, missing or too many. */
+const LONG = 4;
+
+/** Whether two words differ by one letter at most, or by two neighbours that changed places. */
+function isNear(one: string, other: string): boolean {
+  const [short, long] = one.length <= other.length ? [one, other] : [other, one];
+  if (long.length - short.length > 1) return false;
+  let at = 0;
+  while (at < short.length && short[at] === long[at]) at += 1;
+  const rest = (from: number) => long.slice(from);
+  if (short.length < long.length) return short.slice(at) === rest(at + 1);
+  return short.slice(at + 1) === rest(at + 1) ||
+    (short[at] === long[at + 1] && short[at + 1] === long[at] && short.slice(at + 2) === rest(at + 2));
+}
+
+/** Whether a word of the text begins nearly like this one. */
+function hasNear(text: string, wanted: string): boolean {
+  if (wanted.length < LONG) return false;
+  return text.split(' ').some((word) => word.length >= LONG - 1 && [0, -1, 1].some((more) =>
+    isNear(word.slice(0, wanted.length + more), wanted)));
+}
+
+/** Where a word may be found, with what that is worth: on the block, in a choice of it, in lists of other words. */
+interface Searched {
+  title: string;
+  choices: string[];
+  lists: [text: string, worth: number, ofBeginning: number, first: number][];
+  told: string;
+}
+
+/** Less than this is found in what is told about a block, not in what it is called. */
+const CALLED = 3;
+
+function searched(entry: Entry): Searched {
   const type = String(entry['type']);
   const help = helpFor(type);
   const shown = Object.values((entry['fields'] ?? {}) as object).filter((each) => typeof each === 'string').join(' ');
   const name = String((entry['extraState'] as {name?: unknown} | undefined)?.name ?? '');
   const gaps = /\([^)]*\)|%\d+/g;
   const title = plain(`${name} ${(help?.title ?? String(definitionOf(type)?.['message0'] ?? '')).replace(gaps, ' ')} ${shown}`);
-  const also = plain(help?.words ?? '');
-  const told = plain(`${help?.does ?? ''} ${help?.more ?? ''} ${help?.gaps.map(([, words]) => words).join(' ') ?? ''}`);
-  const has = (text: string, word: string) => ` ${text}`.includes(` ${word}`);
-  let sum = 0;
-  for (const word of wanted) {
-    const worth = has(title, word) ? 9 : has(also, word) ? 6 : title.includes(word) ? 4 : has(told, word) ? 2 : 0;
-    if (!worth) return 0;
-    sum += worth;
-  }
-  return sum / wanted.length + (title.startsWith(wanted.join(' ')) ? 5 : 0);
+  const choices = (help?.choices ?? []).map(plain);
+  const list = (words: string) => plain(words.replace(/,/g, ' '));
+  return {
+    title,
+    choices,
+    lists: [[title, 7, 6.5, 9], [choices.join(' '), 7, 5, 7], [list(help?.words ?? ''), 6, 5.5, 8],
+      [list(help?.english ?? ''), 4, 3.5, 5]],
+    told: plain(`${help?.does ?? ''} ${help?.more ?? ''} ${help?.gaps.map(([, words]) => words).join(' ') ?? ''}`),
+  };
 }
 
-/** The entries that answer, best first. */
+/**
+ * How well one word is answered; 0 is not at all.
+ *
+ * A whole word is worth more than the beginning of one, and the first word more than the others: what a block begins
+ * with, and what most people call it instead.
+ */
+function worthOf({title, lists, told}: Searched, word: string): number {
+  const found = lists.map(([text, worth, ofBeginning, first]) => `${text} `.startsWith(`${word} `) ? first :
+    ` ${text} `.includes(` ${word} `) ? worth : ` ${text}`.includes(` ${word}`) ? ofBeginning : 0);
+  if (found.some(Boolean)) return Math.max(...found);
+  if (word.length >= LONG - 1 && title.includes(word)) return CALLED;
+  return ` ${told}`.includes(` ${word}`) ? 1 : 0;
+}
+
+function nearWorthOf({lists}: Searched, word: string): number {
+  const found = lists.map(([text, worth, , first]) => !hasNear(text, word) ? 0 :
+    hasNear(text.split(' ', 1)[0] ?? '', word) ? first : worth);
+  return found.some(Boolean) ? CALLED + Math.max(...found) / 10 : 0;
+}
+
+/**
+ * The entries that answer, best first.
+ *
+ * The words may come in any order. One that nothing has may have a wrong letter. When nothing answers to all of them,
+ * the blocks that are called by most of them do.
+ */
 export function findEntries(entries: Entry[], words: string, most = 40): Entry[] {
-  const wanted = plain(words).split(' ').filter(Boolean);
+  const wanted = [...new Set(plain(words).split(/[\s,]+/).filter(Boolean))];
   if (!wanted.length) return [];
-  return entries.map((entry, place) => ({entry, place, worth: score(entry, wanted)}))
-    .filter(({worth}) => worth > 0)
-    .sort((one, other) => other.worth - one.worth || one.place - other.place)
+  const known = entries.map(searched);
+  const worths = wanted.map((word) => {
+    const exact = known.map((each) => worthOf(each, word));
+    return exact.some(Boolean) ? exact : known.map((each) => nearWorthOf(each, word));
+  });
+  const whole = wanted.join(' ');
+  const answers = entries.map((entry, place) => {
+    const own = worths.map((each) => each[place] ?? 0);
+    const {title, choices} = known[place] as Searched;
+    const begins = title.startsWith(whole) || choices.some((choice) => `${choice} `.startsWith(`${whole} `));
+    return {
+      entry,
+      answered: own.every(Boolean) ? wanted.length : own.filter((worth) => worth >= CALLED).length,
+      worth: own.reduce((sum, each) => sum + each, 0) / wanted.length + (begins ? 5 : 0),
+    };
+  });
+  const best = Math.max(...answers.map(({answered}) => answered));
+  return answers.filter(({answered}) => answered > 0 && answered === best)
+    .sort((one, other) => other.worth - one.worth)
     .slice(0, most).map(({entry}) => entry);
 }
 

@@ -1,0 +1,322 @@
+"""Other words by which people look for the blocks of robots, whatever each robot calls them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from nep.i18n import ENGLISH, gettext, language, plazy
+
+_PART = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+
+
+class _Ability(NamedTuple):
+    """What robots can do or tell: parts of names that mean it, and the words that find it."""
+
+    names: frozenset[str]
+    words: str
+
+
+def _ability(names: str, words: str) -> _Ability:
+    return _Ability(frozenset(names.split()), words)
+
+
+# Translators: other words that people may type to find a block that does this, with commas between.
+# Write what people say in your language; it need not be a translation, and may be shorter or longer.
+_DOES: Mapping[str, _Ability] = {
+    "say": _ability(
+        "say speak talk tell speech speaking",
+        plazy(
+            "words to find what a robot does: say",
+            "say, talk, speak, tell, voice, speech, greet, hello, print, announce",
+        ),
+    ),
+    "move": _ability(
+        "move walk drive go forward forwards backward backwards step steps run travel",
+        plazy(
+            "words to find what a robot does: move",
+            "move, go, walk, drive, step, forward, forwards, backward, back, straight, ahead, advance, "
+            "travel",
+        ),
+    ),
+    "turn": _ability(
+        "turn rotate spin steer",
+        plazy(
+            "words to find what a robot does: turn",
+            "turn, rotate, spin, left, right, degrees, angle, around, steer, direction",
+        ),
+    ),
+    "go to": _ability(
+        "to toward towards navigate approach",
+        plazy(
+            "words to find what a robot does: go to",
+            "go to, navigate, position, place, target, approach, destination, come",
+        ),
+    ),
+    "look": _ability(
+        "look gaze",
+        plazy(
+            "words to find what a robot does: look",
+            "look, watch, gaze, see, face, eyes",
+        ),
+    ),
+    "head": _ability(
+        "head neck",
+        plazy(
+            "words to find what a robot does: head",
+            "head, nod, tilt, neck, look up, look down",
+        ),
+    ),
+    "arms": _ability(
+        "wave arm arms hand hands gesture",
+        plazy(
+            "words to find what a robot does: arms",
+            "wave, hand, arm, greet, hello, goodbye, bye, gesture, raise",
+        ),
+    ),
+    "grip": _ability(
+        "open close grip grab gripper claw hold pick release",
+        plazy(
+            "words to find what a robot does: grip",
+            "open, close, grab, grip, hold, pick up, release, let go, gripper, claw",
+        ),
+    ),
+    "posture": _ability(
+        "stand sit posture pose crouch lie rest",
+        plazy(
+            "words to find what a robot does: posture",
+            "stand, sit, posture, pose, rest, get up, straight, upright, lie down",
+        ),
+    ),
+    "dance": _ability(
+        "dance animation animate choreography mode",
+        plazy(
+            "words to find what a robot does: dance",
+            "dance, animation, gesture, move, perform, show",
+        ),
+    ),
+    "follow": _ability(
+        "follow track chase",
+        plazy(
+            "words to find what a robot does: follow",
+            "follow, track, chase, come along, watch",
+        ),
+    ),
+    "emotion": _ability(
+        "emotion emotions feeling mood face smile expression",
+        plazy(
+            "words to find what a robot does: emotion",
+            "emotion, feeling, mood, smile, happy, sad, angry, face, expression",
+        ),
+    ),
+    "light": _ability(
+        "light lights led leds lamp colour color blink",
+        plazy(
+            "words to find what a robot does: light",
+            "light, led, lamp, colour, color, shine, glow, blink, eyes, rgb, red, green, blue",
+        ),
+    ),
+    "sound": _ability(
+        "sound sounds volume music play audio beep song tone",
+        plazy(
+            "words to find what a robot does: sound",
+            "sound, noise, music, audio, beep, tone, volume, loud, quiet, song, play",
+        ),
+    ),
+    "language": _ability(
+        "language",
+        plazy(
+            "words to find what a robot does: language",
+            "language, translate, English, Spanish, accent",
+        ),
+    ),
+    "photo": _ability(
+        "photo picture camera snapshot",
+        plazy(
+            "words to find what a robot does: photo",
+            "photo, picture, camera, snapshot, image, take a picture",
+        ),
+    ),
+    "show": _ability(
+        "display screen tablet image video page url",
+        plazy(
+            "words to find what a robot does: show",
+            "show, display, screen, tablet, picture, image, video, web page",
+        ),
+    ),
+    "stop": _ability(
+        "stop halt brake",
+        plazy(
+            "words to find what a robot does: stop",
+            "stop, halt, stand still, brake, freeze, end",
+        ),
+    ),
+    "wait": _ability(
+        "wait sleep pause",
+        plazy(
+            "words to find what a robot does: wait",
+            "wait, sleep, pause, delay, seconds",
+        ),
+    ),
+    "listen": _ability(
+        "listen hear hears heard word words speech",
+        plazy(
+            "words to find what a robot does: listen",
+            "listen, hear, microphone, voice, speech recognition, understand, spoken, word, told",
+        ),
+    ),
+}
+_TELLS: Mapping[str, _Ability] = {
+    "listen": _ability(
+        "listen hear hears heard word words speech",
+        plazy(
+            "words to find what a robot tells: listen",
+            "listen, hear, microphone, voice, speech recognition, understand, spoken, word, told",
+        ),
+    ),
+    "battery": _ability(
+        "battery charge power",
+        plazy(
+            "words to find what a robot tells: battery",
+            "battery, charge, power, energy, level, percent",
+        ),
+    ),
+    "distance": _ability(
+        "distance sonar range ultrasonic ultrasound laser lidar proximity obstacle",
+        plazy(
+            "words to find what a robot tells: distance",
+            "distance, sonar, ultrasonic, ultrasound, range, how far, proximity, obstacle, near, wall, "
+            "infrared, centimetres, metres",
+        ),
+    ),
+    "touch": _ability(
+        "touch touched touches bumper bump bumped pressed tactile button released hit collision contact",
+        plazy(
+            "words to find what a robot tells: touch",
+            "touch, press, button, bump, bumper, hit, crash, collision, tactile, contact, tap, pat",
+        ),
+    ),
+    "face": _ability(
+        "face faces person people human",
+        plazy(
+            "words to find what a robot tells: face",
+            "face, person, people, somebody, see, detect, recognize, recognise, camera, vision",
+        ),
+    ),
+    "ball": _ability(
+        "ball balls marker markers object objects colour color seen sees",
+        plazy(
+            "words to find what a robot tells: ball",
+            "ball, thing, object, marker, colour, color, see, detect, find, camera, vision",
+        ),
+    ),
+    "position": _ability(
+        "pose position location odometry heading x y",
+        plazy(
+            "words to find what a robot tells: position",
+            "position, place, where, location, coordinates, x, y, heading, direction",
+        ),
+    ),
+    "temperature": _ability(
+        "temperature heat",
+        plazy(
+            "words to find what a robot tells: temperature",
+            "temperature, warm, cold, heat, degrees, thermometer",
+        ),
+    ),
+    "brightness": _ability(
+        "light brightness lux",
+        plazy(
+            "words to find what a robot tells: brightness",
+            "light, brightness, dark, bright, lux",
+        ),
+    ),
+    "loudness": _ability(
+        "sound loudness noise volume",
+        plazy(
+            "words to find what a robot tells: loudness",
+            "sound, loudness, noise, volume, microphone, clap",
+        ),
+    ),
+    "tilt": _ability(
+        "tilt gyro gyroscope accelerometer acceleration imu compass",
+        plazy(
+            "words to find what a robot tells: tilt",
+            "tilt, gyro, gyroscope, acceleration, shake, compass, angle",
+        ),
+    ),
+    "line": _ability(
+        "line ground floor",
+        plazy(
+            "words to find what a robot tells: line",
+            "line, black, ground, floor, line follower",
+        ),
+    ),
+}
+_USES: Mapping[str, str] = {
+    "speech": "say",
+    "base": "move",
+    "wheels": "move",
+    "legs": "move",
+    "head": "head",
+    "arms": "arms",
+    "hands": "arms",
+    "lights": "light",
+    "light": "light",
+    "leds": "light",
+    "face": "emotion",
+    "tablet": "show",
+    "screen": "show",
+    "camera": "photo",
+    "audio": "sound",
+}
+"""What most of those do that use this part of a robot, when their name says nothing."""
+
+CHANGES = plazy("words to find “when … changes”", "sensor, change, new value, whenever, event, update")
+PASSES = plazy(
+    "words to find “when … goes below …”",
+    "sensor, above, below, more, less, greater, smaller, threshold, limit, event",
+)
+
+
+class SearchWords(NamedTuple):
+    """Words in the language of now, and in English where that is another one."""
+
+    words: str
+    english: str
+
+
+def words_of_action(names: Iterable[str], uses: Iterable[str] = ()) -> SearchWords:
+    """By what an action is found: `names` are its name, title and types, `uses` what it makes busy."""
+    parts = _parts(names)
+    found = _among(_DOES, parts) or [_DOES[_USES[part]] for part in uses if part in _USES]
+    return _found(parts, found)
+
+
+def words_of_sensor(names: Iterable[str]) -> SearchWords:
+    """By what a sensor or an event is found."""
+    parts = _parts(names)
+    return _found(parts, _among(_TELLS, parts))
+
+
+def in_both(english: str) -> SearchWords:
+    """These words in the language of now, and the English ones."""
+    return SearchWords(gettext(english), "" if language() == ENGLISH else str(english))
+
+
+def _parts(names: Iterable[str]) -> tuple[str, ...]:
+    found = (part.lower() for name in names for part in _PART.findall(name.rpartition(":")[2]))
+    return tuple(dict.fromkeys(found))
+
+
+def _among(abilities: Mapping[str, _Ability], parts: Iterable[str]) -> list[_Ability]:
+    known = frozenset(parts)
+    return [ability for ability in abilities.values() if ability.names & known]
+
+
+def _found(parts: Iterable[str], abilities: Iterable[_Ability]) -> SearchWords:
+    lists = [in_both(ability.words) for ability in abilities]
+    words = ", ".join(each.words for each in lists)
+    english = ", ".join([*(each.english for each in lists if each.english), " ".join(parts)])
+    return SearchWords(words, english)

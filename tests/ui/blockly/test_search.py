@@ -1,0 +1,171 @@
+"""Finding blocks in the toolbox by the words that people type, in English and Spanish."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.blocks import editor_definitions
+from nep.i18n import install, language
+from tests.blocks.samples import nao, robot
+from tests.ui.blockly_person import START, WAIT_MS, Person, editor, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+FIELD = ".nepTab:not([hidden]) .nepSearch input"
+FLYOUT = ".nepTab:not([hidden]) .nepCategory.blocklyFlyout"
+FIRST = f"""(all => all.sort((a, b) => a.getBoundingClientRect().top - b.getBoundingClientRect().top)[0])(
+    [...document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .blocklyDraggable')])"""
+
+ENGLISH = {
+    "loop": "control_repeat",
+    "repeat": "control_repeat",
+    "always": "control_forever",
+    "if then": "control_if",
+    "otherwise": "control_if_else",
+    "sleep": "control_wait",
+    "timeout": "control_wait_until_at_most",
+    "stop all": "control_stop_program",
+    "green flag": "events_started",
+    "subscribe": "events_message",
+    "send": "events_broadcast",
+    "print": "messages_write",
+    "question": "asking_ask",
+    "dice": "values_random",
+    "+": "values_arithmetic",
+    "minus": "values_arithmetic",
+    "less than": "values_compare",
+    "and": "values_logic",
+    "opposite": "values_not",
+    "concatenate": "values_join",
+    "sqrt": "numbers_function",
+    "max": "numbers_of_two",
+    "average": "lists_total",
+    "sort": "lists_copy",
+    "append": "lists_add",
+    "for each": "lists_each",
+    "stopwatch": "sensing_timer",
+    "score": "variables_change",
+    "variable": "variables_set",
+    "my block": "functions_define",
+    "talk": "robot_pepper_do_say",
+    "speak": "robot_pepper_do_say",
+    "spin": "robot_pepper_do_turn",
+    "rotate": "robot_pepper_do_turn",
+    "move forward": "robot_pepper_do_go_home",
+    "led": "robot_pepper_do_light",
+    "color": "robot_pepper_do_light",
+    "happy": "robot_pepper_do_look",
+    "microphone": "robot_pepper_when_heard",
+    "sonar": "robot_pepper_get_distance",
+    "charge": "robot_pepper_get_battery",
+    "bumper": "robot_pepper_when_touched",
+    "gesture": "robot_nao_do_wave",
+    # in any order
+    "left turn": "robot_pepper_do_turn",
+    "then if": "control_if",
+    # a wrong letter, one too few, one too many, two that changed places
+    "repeet": "control_repeat",
+    "brodcast": "events_broadcast",
+    "waitt": "control_wait",
+    "trun": "robot_pepper_do_turn",
+    # a word that nothing has beside one that something has
+    "rotate zzyzx": "robot_pepper_do_turn",
+}
+SPANISH = {
+    "bucle": "control_repeat",
+    "ciclo": "control_repeat",
+    "por siempre": "control_forever",
+    "si entonces": "control_if",
+    "sino": "control_if_else",
+    "pausa": "control_wait",
+    "detener todo": "control_stop_program",
+    "bandera verde": "events_started",
+    "difundir": "events_broadcast",
+    "enviar mensaje": "events_broadcast",
+    "imprimir": "messages_write",
+    "preguntar": "asking_ask",
+    "azar": "values_random",
+    "dado": "values_random",
+    "restar": "values_arithmetic",
+    "mayor que": "values_compare",
+    "y": "values_logic",
+    "unir": "values_join",
+    "raiz cuadrada": "numbers_function",
+    "raíz cuadrada": "numbers_function",
+    "promedio": "lists_total",
+    "cronometro": "sensing_timer",
+    "función": "functions_define",
+    "mis bloques": "functions_define",
+    "hablar": "robot_pepper_do_say",
+    "rotar": "robot_pepper_do_turn",
+    "caminar": "robot_pepper_do_go_home",
+    "luces": "robot_pepper_do_light",
+    "bateria": "robot_pepper_get_battery",
+    "lejos": "robot_pepper_get_distance",
+    "choque": "robot_pepper_when_touched",
+    "saludar": "robot_nao_do_wave",
+    "repteir": "control_repeat",
+    # English words, too
+    "loop": "control_repeat",
+    "random": "values_random",
+}
+
+
+@pytest.fixture
+def opened(qtbot) -> Iterator[Callable[[str], Person]]:
+    """A function that shows the editor with the blocks of a language, and two robots."""
+    before = language()
+
+    def show(wanted: str) -> Person:
+        install(wanted)
+        view = editor(qtbot, editor_definitions([robot("Pepper"), nao()]), 1320, 700)
+        view.load(workspace(START))
+        with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
+            view.show()
+        them = Person(qtbot, view)
+        them.box(FIELD)
+        return them
+
+    yield show
+    install(before)
+
+
+def found(them: Person, words: str) -> str:
+    """The type of the block that comes first when the field holds these words."""
+    given = f"(f => {{ f.value = {json.dumps(words)}; f.dispatchEvent(new Event('input')); }})"
+    return them.ask(
+        f"({given}(document.querySelector({FIELD!r})), "
+        f"[...({FIRST})?.classList ?? []].find(name => /^[a-z]+_/.test(name)) ?? '')"
+    )
+
+
+@pytest.mark.parametrize(("wanted", "table"), [("en", ENGLISH), ("es", SPANISH)])
+def test_the_words_of_people_find_the_block_that_they_mean(opened, wanted, table):
+    them = opened(wanted)
+    assert {words: found(them, words) for words in table} == table
+
+
+def test_typed_words_show_blocks_and_enter_takes_the_first(qtbot, opened):
+    them = opened("en")
+    them.click(FIELD)
+    QTest.keyClicks(them.target, "nap pause")
+    them.wait_for(f"document.querySelector({FIELD!r}).value", "nap pause")
+    them.box(f"{FLYOUT} .control_wait")
+    them.press(Qt.Key_Return)
+    qtbot.waitUntil(lambda: "control_wait" in json.dumps(them.tops()), timeout=WAIT_MS)
+
+
+def test_who_finds_nothing_is_told_what_to_try(opened):
+    them = opened("en")
+    them.click(FIELD)
+    QTest.keyClicks(them.target, "zzyzx")
+    them.wait_for(
+        f"[...document.querySelectorAll('{FLYOUT} .blocklyFlyoutLabelText')].map(e => e.textContent.trim())",
+        ["No block for “zzyzx”", "Try a simpler word, such as “turn” or “say”,", "or look into a category."],
+    )
