@@ -47,6 +47,7 @@ from app.core.robots.launcher import VIRTUAL_ROBOTS, Launcher, LaunchFailed, Vir
 from app.core.robots.room import SessionRoom
 from app.core.robots.stop import RobotStopper, StopTarget
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.robots.voices import RobotVoices
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.core.storage.settings import Settings
@@ -99,6 +100,7 @@ class Session:
         processes = VirtualProcesses(modules, lambda: self.launcher.process_ids)
         self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)
         self.room = SessionRoom(self.settings, self._watches, self.source.submit, clock, clock_ns)
+        self.voices = RobotVoices(self.settings, self.fleet, self.watch, self.console.add, clock)
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
@@ -172,6 +174,8 @@ class Session:
             self.nodes.age(now)
         with self.guarded(lazy("follow the robots")):
             self._follow_robots()
+        with self.guarded(lazy("let the robots be heard")):
+            self.voices.follow()
         with self.guarded(lazy("tell the program of its robots")):
             self.runs.follow_robots()
         with self.guarded(lazy("stop robots again")):
@@ -223,6 +227,7 @@ class Session:
             ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
             ("keep which robots were here", partial(self.last_robots.keep, self.launcher)),
             ("end the behaviours", self.documents.end),
+            ("silence the robots", self.voices.close),
             ("end the robots", self.fleet.close),
             ("keep the room", self.room.close),
             ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),

@@ -22,6 +22,7 @@ from app.robots.driver.schema import Colour, Range, Suggested, Text, Title, Word
 from app.robots.virtual.acting import FEEDBACK_S, Acting
 from app.robots.virtual.body import START_PITCH
 from app.robots.virtual.room import Room
+from app.robots.virtual.sounds import SOUNDS, Notes, SoundName
 from nep.i18n import _, number
 
 SPEECH, FACE = "Speech", "Face and lights"
@@ -30,6 +31,7 @@ Side: TypeAlias = Literal["left", "right"]
 Language: TypeAlias = Annotated[
     Literal["en", "fr", "ja"], Words({"en": "English", "fr": "French", "ja": "Japanese"})
 ]
+Volume: TypeAlias = Annotated[int, Range(0, 100, 5, "%")]
 Target: TypeAlias = Annotated[
     Literal["ahead", "left", "right", "up", "down", "face", "ball"],
     Words({"face": "the face", "ball": "the ball", "left": "the left", "right": "the right"}),
@@ -76,7 +78,7 @@ class VirtualPepper(Acting):
         self,
         call: Call,
         text: Annotated[str, Text(1, 500), Suggested("Hello! I am Pepper.")],
-        volume: Annotated[int, Range(0, 100, 5, "%")] = 60,
+        volume: Volume = 60,
         language: Language = "en",
     ) -> Mapping[str, object]:
         """Say a text; the words stand in a bubble for as long as they take."""
@@ -94,6 +96,48 @@ class VirtualPepper(Acting):
                     self._life.body.hush()
             raise
         return {"seconds": round(speech.seconds, 2)}
+
+    @action(
+        "play sound %sound",
+        SPEECH,
+        "music",
+        says="plays a %sound",
+        uses=("speech",),
+        timeout_s=15,
+    )
+    def play_sound(self, call: Call, sound: SoundName = "beep", volume: Volume = 60) -> None:
+        """Play a sound, to its end."""
+        self._play(call, sound, SOUNDS[sound], volume)
+
+    @action(
+        "play tone %frequency Hz for %seconds s",
+        SPEECH,
+        "music-2",
+        says="plays a tone of %frequency Hz",
+        uses=("speech",),
+        timeout_s=15,
+    )
+    def play_tone(
+        self,
+        call: Call,
+        frequency: Annotated[float, Range(50, 5000, 10, "Hz")] = 440.0,
+        seconds: Annotated[float, Range(0.1, 10, 0.1, "s")] = 0.5,
+        volume: Volume = 60,
+    ) -> None:
+        """Play one tone; 262 Hz is the middle C, twice as much is the C above it."""
+        self._play(call, f"{frequency:g} Hz", ((frequency, seconds),), volume)
+
+    def _play(self, call: Call, title: str, notes: Notes, volume: int) -> None:
+        with self._life.changed:
+            body = self._life.body
+            body.volume = volume
+            sound = body.play(title, notes)
+
+        def end() -> None:
+            if not sound.done:
+                self._life.body.hush()
+
+        self._until(call, lambda: sound.done, end)
 
     # ---- movement ---------------------------------------------------------------------------------
 

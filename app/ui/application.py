@@ -28,6 +28,7 @@ from app.ui.shell.bars.logo import LogoEngine
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.shell.window_state import WindowState, fitting
+from app.ui.speaker import QtSpeaker
 from app.ui.startup import interpreter, portal, qt_log, single_instance
 from app.ui.startup.deferred import DeferredSteps
 from app.ui.startup.file_open import Application, IncomingFiles
@@ -207,6 +208,7 @@ def run(options: Options) -> int:
     hearing = QTimer(window)
     hearing.timeout.connect(lambda: log.take(session.console.add))
     hearing.start(LOG_EVERY_MS)
+    speaker = session.voices.speaker = QtSpeaker()
     soon = DeferredSteps(window, steps_after(window))
     window.show()
     window.activateWindow()  # keys go there at once, also where no window manager sees to it
@@ -223,6 +225,7 @@ def run(options: Options) -> int:
         application.open_files_with(window.commands.files.open_all)
     driver = SelfDrive(window, options.self_drive) if options.self_drive is not None else None
     code = application.exec()
+    speaker.close()
     if driver is not None and not driver.well:
         return 1
     return code

@@ -108,6 +108,8 @@ class Fleet:
         self._told = False
         self._settled: dict[str, None] = {}
         self.revision = 0
+        self.stops = 0
+        """How often robots were told to stop."""
 
     @property
     def links(self) -> Sequence[RobotLink]:
@@ -210,6 +212,7 @@ class Fleet:
 
     def told_to_stop(self, names: Iterable[str]) -> None:
         """These robots are being told to stop; `stopped` says what each did."""
+        self.stops += 1
         for link in map(self._links.get, names):
             if link is not None and link.stop_began_s is None:
                 link.stop_began_s = self._clock()

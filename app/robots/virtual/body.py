@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from app.robots.virtual.motion import Joint, Motion, Wave
 from app.robots.virtual.room import Room
+from app.robots.virtual.sounds import Notes, Sound
 
 RADIUS, HEIGHT = 0.27, 1.2
 EYE_HEIGHT = 1.12
@@ -85,6 +86,9 @@ class Body:
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _base: Motion | None = field(default=None, repr=False)
     _turning: bool = field(default=False, repr=False)
+    sound: Sound | None = None
+    """What it plays now."""
+    _sounds: int = field(default=0, repr=False)
     _speech: Speech | None = field(default=None, repr=False)
     _waves: list[Wave] = field(default_factory=list, repr=False)
     _leaving: set[str] = field(default_factory=set, repr=False)
@@ -112,10 +116,20 @@ class Body:
         return self._speech
 
     def hush(self) -> None:
-        """Say nothing more."""
+        """Say and play nothing more."""
         if self._speech is not None:
             self._speech.done = True
             self._speech = None
+        if self.sound is not None:
+            self.sound.done = True
+            self.sound = None
+
+    def play(self, title: str, notes: Notes) -> Sound:
+        """Start to play these tones; what was being said or played ends."""
+        self.hush()
+        self._sounds += 1
+        self.sound = Sound(self._sounds, title, notes)
+        return self.sound
 
     def wave(self, side: str) -> Wave:
         """Start to wave with the left or right hand."""
@@ -256,6 +270,10 @@ class Body:
             self._speech.spoken_s += dt
             if self._speech.spoken_s >= self._speech.seconds:
                 self.hush()
+        if self.sound is not None:
+            self.sound.step(dt)
+            if self.sound.done:
+                self.sound = None
         self.battery = max(0.0, self.battery - dt * (_DRAIN_PER_S if self.still else _DRAIN_MOVING_PER_S))
 
     def _roll(self, motion: Motion, dt: float) -> None:

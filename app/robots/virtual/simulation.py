@@ -249,6 +249,7 @@ def drawable(body: Body) -> dict[str, object]:
         "spoken": round(body.spoken, 2),
         "language": body.language,
         "volume": body.volume,
+        "sound": body.sound.drawable() if body.sound is not None else None,
         "eyes": body.eyes,
         "shoulders": body.shoulders,
         "emotion": body.emotion,

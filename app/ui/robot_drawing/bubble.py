@@ -72,7 +72,7 @@ def scrolled(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
 
 def paint_bubble(p: QPainter, bounds: QRectF, head: Spot, state: RobotState, font: QFont) -> None:
     """Paint what a robot says beside its ``head``, inside ``bounds``; ``p`` is in units of the stage."""
-    near, words = 31.0 * head.scale, state.speech or ""
+    near, words = 31.0 * head.scale, state.caption
     room_right, room_left = bounds.right() - EDGE - head.u - near, head.u - near - bounds.left() - EDGE
     face = QFont(font)
     face.setWeight(QFont.Weight.DemiBold)
@@ -104,6 +104,22 @@ def paint_bubble(p: QPainter, bounds: QRectF, head: Spot, state: RobotState, fon
         p.drawText(at, Qt.AlignmentFlag.AlignCenter, line)
     if scrolls:
         _paint_thumb(p, box, text)
+
+
+def paint_heard(p: QPainter, area: QRectF, words: str, font: QFont) -> None:
+    """Paint what is heard though its bubble has gone, in one line at the foot of ``area`` (pixels)."""
+    metrics = QFontMetricsF(font)
+    most = max(0.0, area.width() - 4 * EDGE - 2 * INSIDE)
+    line = metrics.elidedText(words, Qt.TextElideMode.ElideRight, most)
+    width, height = metrics.horizontalAdvance(line) + 2 * INSIDE, metrics.height() + 10
+    box = QRectF(area.center().x() - width / 2, area.bottom() - EDGE - height, width, height)
+    p.setRenderHint(QPainter.RenderHint.Antialiasing)
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor(28, 27, 25, 215))
+    p.drawRoundedRect(box, 8, 8)
+    p.setFont(font)
+    p.setPen(QColor("#FFFFFF"))
+    p.drawText(box, Qt.AlignmentFlag.AlignCenter, line)
 
 
 def _paint_box(p: QPainter, box: QRectF, foot: float, side: float) -> None:

@@ -80,7 +80,7 @@ class RobotDrawing:
                 _paint_figure(painter, one)
         self._mark(painter, stage, state, others, marks)
         for figure in figures:
-            if figure.state.speech:
+            if figure.state.caption:
                 high = TOP.y() if figure.state.figure == TURTLE else HEAD.y()
                 head = replace(figure.spot, v=figure.spot.v + high * figure.spot.scale)
                 paint_bubble(painter, stage.bounds(), head, figure.state, self._font)

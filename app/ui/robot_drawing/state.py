@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from nep.i18n import _
+
 EYES = "#35B0FA"
 SHOULDERS = "#3AB5FF"
 
@@ -39,9 +41,8 @@ class RobotState:
     ``x``, ``y`` in m, ``theta_deg`` 0 looks along x, at the person, and grows to the robot's left. Head yaw
     grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
     ``figure`` is how it looks, ``pepper`` or ``turtle``; ``bumped`` is the side that touches something,
-    ``spoken`` how much of its words it has said (0 to 1), in which
-    ``language`` (a code) and how loudly (``volume``, 0 to 1). ``held`` says that a person holds it up,
-    ``shared`` that its room is the one that all virtual robots share.
+    ``spoken`` how much of its words it has said (0 to 1), ``sound`` what it plays ("bell", "440 Hz").
+    ``held`` says that a person holds it up, ``shared`` that its room is the one that all robots share.
     """
 
     x: float = 0.0
@@ -51,8 +52,7 @@ class RobotState:
     head_pitch_deg: float = 0.0
     speech: str | None = None
     spoken: float = 0.0
-    language: str = "en"
-    volume: float = 0.6
+    sound: str = ""
     eyes: str = EYES
     shoulders: str = SHOULDERS
     emotion: str = "neutral"
@@ -67,6 +67,12 @@ class RobotState:
     objects: tuple[Thing, ...] = ()
     room: RoomBounds = field(default_factory=RoomBounds)
 
+    @property
+    def caption(self) -> str:
+        """What it says or plays, as its bubble has it: "♪ bell"."""
+        played = f"♪\N{NO-BREAK SPACE}{_(self.sound)}" if self.sound else ""
+        return " ".join(each for each in (self.speech or "", played) if each)
+
     @classmethod
     def parse(cls, data: Mapping[str, object]) -> RobotState:
         """The state in a message; whatever is missing or of a wrong type keeps its default."""
@@ -79,8 +85,7 @@ class RobotState:
             head_pitch_deg=_number(data.get("head_pitch_deg")),
             speech=speech if isinstance(speech, str) and speech.strip() else None,
             spoken=min(1.0, max(0.0, _number(data.get("spoken")))),
-            language=str(data.get("language") or "en"),
-            volume=min(1.0, max(0.0, _number(data.get("volume"), 60.0) / 100)),
+            sound=_sound(data.get("sound")),
             eyes=_colour(data.get("eyes"), EYES),
             shoulders=_colour(data.get("shoulders"), SHOULDERS),
             emotion=str(data.get("emotion") or "neutral"),
@@ -95,6 +100,10 @@ class RobotState:
             objects=_things(data.get("objects")),
             room=_room(data.get("room")),
         )
+
+
+def _sound(value: object) -> str:
+    return str(value.get("title") or "")[:40] if isinstance(value, Mapping) else ""
 
 
 def _number(value: object, default: float = 0.0) -> float:

@@ -30,6 +30,8 @@ NOISE = re.compile(
     r"|Failed to create platform Vulkan instance$|QVulkanInstance: Failed to initialize Vulkan$"
     r"|Unable to detect GPU vendor|GBM is not supported with the current configuration"
     r"|GPUInfo not initialized on GpuInfoUpdate|Sandboxing disabled by user"
+    r"|Couldn't (load|resolve) (pipewire|va)\b.* (library|symbols)$"
+    r"|PulseAudioService: pa_context_connect\(\) failed$|Using Qt multimedia with FFmpeg "
     r"|This plugin does not support (propagateSizeHints|raise|createPlatformVulkanInstance)"
 )
 LEVELS = {

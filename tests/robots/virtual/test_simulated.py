@@ -50,6 +50,8 @@ def pepper(node: nep.Node) -> Iterator[Pepper]:
 
 QUICK = {
     "say": {"text": "Hi"},
+    "play_sound": {"sound": "beep"},
+    "play_tone": {"frequency": 440, "seconds": 0.1},
     "turn": {"angle": 5, "speed": 90},
     "walk": {"distance": 0.05},
     "look_at": {"target": "left"},
@@ -75,6 +77,8 @@ def test_every_action_can_be_done(pepper):
     ("action", "given"),
     [
         ("say", {"text": "x" * 200}),
+        ("play_sound", {"sound": "cheer"}),
+        ("play_tone", {"seconds": 10}),
         ("turn", {"angle": 360}),
         ("walk", {"distance": -1}),
         ("look_at", {"target": "left"}),
@@ -97,6 +101,7 @@ def test_every_long_action_can_be_canceled_and_stopped(pepper, action, given):
     still = pepper.heard["state"][seen + 1 :]
     for value in ("x", "theta_deg", "head_yaw_deg", "arm_right_deg", "speech", "emotion"):
         assert len({state[value] for state in still}) == 1, value
+    assert {str(state["sound"]) for state in still} == {"None"}
     assert not any(state["moving"] for state in still)
 
 
@@ -248,3 +253,25 @@ def test_its_model_is_the_one_that_is_shipped():
     from tests.robots.test_description import model
 
     assert model("pepper") == ROBOT.thing_model
+
+
+def test_it_tells_what_it_plays_each_sound_with_a_number_of_its_own(pepper):
+    numbers = set()
+    for call, (action, given, title) in enumerate(
+        [
+            ("play_sound", {"sound": "bell"}, "bell"),
+            ("play_sound", {"sound": "bell"}, "bell"),
+            ("play_tone", {"frequency": 262.5, "seconds": 0.4, "volume": 20}, "262.5 Hz"),
+        ]
+    ):
+        seen = len(pepper.heard["state"])
+        pepper.invoke(str(call), action, **given)
+        assert pepper.final(str(call))["state"] == "succeeded"
+        told = [state["sound"] for state in pepper.heard["state"][seen:] if state["sound"]]
+        assert {sound["title"] for sound in told} == {title}
+        numbers |= {sound["number"] for sound in told}
+        assert [sound["played"] for sound in told] == sorted(sound["played"] for sound in told)
+    assert len(numbers) == 3
+    assert told[0]["notes"] == [[262.5, 0.4]]
+    assert pepper.newest("state")["volume"] == 20
+    eventually(lambda: pepper.newest("state")["sound"] is None)

@@ -22,6 +22,7 @@ from app.core.network.master import MasterState
 from app.core.network.topics import Topic
 from app.core.robots.fleet import COMMAND_TYPE
 from app.core.robots.robot_link import RobotLink, topics_of
+from app.core.robots.voices import RobotVoices
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.robots.description.model import Robot
@@ -97,6 +98,7 @@ class Session(session_module.Session):
         )
         post = self._mailbox.post_event
         self.console = Console(self.clock.epoch_s)
+        self.voices = RobotVoices(self.settings, self.fleet, self.watch, self.console.add, self.clock)
         self.documents = Documents(Document)
         self.document.key = "behaviour-1"
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))

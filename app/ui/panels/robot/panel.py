@@ -21,7 +21,6 @@ from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robot.large_room import LargeRoom
 from app.ui.panels.robot.room_view import RoomView
 from app.ui.panels.robot.say_bar import SayBar
-from app.ui.panels.robot.voice import QtSpeaker, RobotVoices
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from app.core.network.watches import Suspendable, Watch
     from app.core.robots.robot_link import RobotLink
 
-SOUND = "robots_heard"
 STALE_AFTER_S = 2.0
 """A virtual robot tells how it is many times a second, also when it does nothing."""
 
@@ -123,8 +121,8 @@ class RobotPanel(OneRobotPanel):
         self.sound = IconButton(self.theme, "volume-2", _("Hear the robots"), size=26)
         self.sound.clicked.connect(self._switch_sound)
         self.say.add(self.sound)
+        self._sound_shown: object = None
         self._show_sound()
-        self.voices = RobotVoices(QtSpeaker(), lambda: self.session.settings.get(SOUND, True))
         self._large: LargeRoom | None = None
         self._things: tuple[int, tuple[Thing, ...]] = (-1, ())
         self._looks: dict[str, Watch] = {}
@@ -136,13 +134,14 @@ class RobotPanel(OneRobotPanel):
         if link is None:
             self._no_robot.tell(self.session.coming)
             return
+        self._show_sound()
         self.chip.set(link.chip, ROBOT_STATUS.get(link.state, "ok"))
         if link.drawing is not None:
             now = time.monotonic()
             if link.drawing is not self._told:
                 self._told, self._told_s = link.drawing, now
             self._show_room(link)
-            self._speak(link)
+            self.view.show_heard(self._heard_beside())
             self.view.set_stale(not link.connected or link.mute or now - self._told_s > STALE_AFTER_S)
             if self._large is None:
                 self.pages.setCurrentWidget(self.stage)
@@ -192,13 +191,21 @@ class RobotPanel(OneRobotPanel):
     def _switch_sound(self) -> None:
         """Robots are heard from now on, or not any more; their words stand in their bubbles all the same."""
         with suppress(SettingsError):
-            self.session.settings.set(SOUND, not self.session.settings.get(SOUND, True))
+            self.session.voices.switch(on=not self.session.voices.on)
         self._show_sound()
 
     def _show_sound(self) -> None:
-        on = self.session.settings.get(SOUND, True)
-        self.sound.set_icon("volume-2" if on else "volume-x")
-        self.sound.set_name(_("Mute the robots") if on else _("Hear the robots"))
+        """Whether robots are heard, and why they are not though a person wants it."""
+        on, problem = self.session.voices.on, self.session.voices.problem
+        if (on, problem) == self._sound_shown:
+            return
+        self._sound_shown = (on, problem)
+        self.sound.set_icon("volume-2" if on and not problem else "volume-x")
+        words = _("Mute the robots") if on else _("Hear the robots")
+        self.sound.set_name(words)
+        self.sound.setAccessibleDescription(problem if on else "")
+        if on and problem:
+            self.sound.setToolTip(plain.tip(f"{words}\n{problem}"))
 
     # -- the room -----------------------------------------------------------------------------------
 
@@ -218,11 +225,11 @@ class RobotPanel(OneRobotPanel):
         ]
         self.view.show_state(drawing, others, self._things[1])
 
-    def _speak(self, link: RobotLink) -> None:
-        """Let virtual robots be heard that are in the picture, and are there."""
-        heard = {name or link.name: state for name, state in (("", self.view.state), *self.view.others)}
-        there = link.virtual and link.connected and not link.mute
-        self.voices.follow(heard if there else {})
+    def _heard_beside(self) -> str:
+        """What is heard now and stands in no bubble any more, with who says it."""
+        said = self.session.voices.saying
+        shown = {state.speech for state in (self.view.state, *(state for _name, state in self.view.others))}
+        return "" if said is None or said.words in shown else f"{said.robot}: {said.words}"
 
     def _others(self, link: RobotLink) -> list[RobotLink]:
         """The other virtual robots that are there; each is watched while the panel shows."""
@@ -319,7 +326,6 @@ class RobotPanel(OneRobotPanel):
 
     def shut(self) -> None:
         super().shut()
-        self.voices.silence()
         for watch in self._looks.values():
             watch.close()
         self._looks.clear()

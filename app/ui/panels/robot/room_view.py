@@ -9,6 +9,7 @@ from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QContextMenuEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from app.ui.robot_drawing.bubble import paint_heard
 from app.ui.robot_drawing.scene import TURTLE, Marks, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
@@ -61,6 +62,7 @@ class RoomView(QWidget):
         self.state = RobotState()
         self.others: Sequence[tuple[str, RobotState]] = ()
         self.stale = False
+        self.heard = ""
         self._pressed: str | None = None
         self._pressed_at = QPointF()
         self._offset = QPointF()
@@ -116,8 +118,14 @@ class RoomView(QWidget):
             self.setAccessibleDescription(self._described())
             self.update()
 
+    def show_heard(self, words: str) -> None:
+        """What is heard and stands in no bubble, below the picture; "" for nothing."""
+        if words != self.heard:
+            self.heard = words
+            self.update()
+
     def _described(self) -> str:
-        return "" if self.stale else self.state.speech or ""
+        return "" if self.stale else self.state.caption
 
     def sizeHint(self) -> QSize:
         return QSize(382, 286)
@@ -128,13 +136,15 @@ class RoomView(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        state = replace(self.state, speech=None, moving=False) if self.stale else self.state
+        state = replace(self.state, speech=None, sound="", moving=False) if self.stale else self.state
         chosen = self.chosen if self.hasFocus() else None
         marks = Marks(self._hovered, chosen, self._theme.colour("focus"))
         area = QRectF(self.rect())
         self._drawing.paint(painter, area, state, self.others, marks=marks, dark=self._theme.dark)
         if self.stale:
             painter.fillRect(self.rect(), STALE)
+        if self.heard:
+            paint_heard(painter, area, self.heard, self._theme.font("label"))
         painter.end()
 
     # -- what is where ----------------------------------------------------------------------------

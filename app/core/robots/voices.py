@@ -1,0 +1,249 @@
+"""What virtual robots say and play, heard wherever a person is in Studio: one voice at a time, in turn."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, TypeAlias
+
+from nep.i18n import _
+
+if TYPE_CHECKING:
+    from app.core.network.watches import Watch
+    from app.core.robots.fleet import Fleet
+    from app.core.robots.robot_link import RobotLink
+    from app.core.storage.settings import Settings
+
+SOUND = "robots_heard"
+"""The setting: whether a person wants to hear the robots."""
+ENDED = 0.9
+"""Who has said so much has not been interrupted: a voice may take a little longer than the bubble."""
+MOST_WAITING = 4
+PATIENCE_S, PATIENCE_PER_LETTER_S = 10.0, 0.2
+"""A voice that takes longer than this is not waited for: its engine hangs."""
+MOST_NOTES, LONGEST_S = 32, 10.0
+LOWEST_HZ, HIGHEST_HZ = 20.0, 20_000.0
+
+Notes: TypeAlias = Sequence[tuple[float, float]]
+"""Tones one after the other: hertz (0 is silence) and seconds."""
+
+
+class Speaker(Protocol):
+    """Who makes robots heard. Nothing here waits or raises; a computer without sound is silent."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether a voice still speaks."""
+
+    @property
+    def problem(self) -> str:
+        """Why robots are not heard on this computer, as a sentence; empty when they are, or nobody tried."""
+
+    def say(self, words: str, language: str, volume: float) -> None:
+        """Say this; ``language`` is a code such as ``en``, ``volume`` from 0 to 1."""
+
+    def play(self, notes: Notes, volume: float) -> None:
+        """Play these tones, also while a voice speaks."""
+
+    def stop_voice(self) -> None:
+        """End the voice at once."""
+
+    def stop(self) -> None:
+        """Be silent at once, voice and tones."""
+
+
+@dataclass(frozen=True, slots=True)
+class Utterance:
+    """Words of a robot that are, or will be, heard."""
+
+    robot: str
+    words: str
+    language: str
+    volume: float
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What of a robot's drawing can be heard; `played` and `spoken` go from 0 to 1."""
+
+    speech: str = ""
+    spoken: float = 0.0
+    language: str = "en"
+    volume: float = 0.6
+    sound: int = 0
+    played: float = 0.0
+    notes: Notes = ()
+
+    @classmethod
+    def parse(cls, drawing: Mapping[str, object]) -> Heard:
+        """What is missing or of a wrong type is silent."""
+        speech, sound = drawing.get("speech"), drawing.get("sound")
+        played = sound if isinstance(sound, Mapping) else {}
+        number = played.get("number")
+        return cls(
+            speech=speech.strip() if isinstance(speech, str) else "",
+            spoken=_share(drawing.get("spoken")),
+            language=str(drawing.get("language") or "en"),
+            volume=_share(drawing.get("volume"), 60.0, 100.0),
+            sound=number if isinstance(number, int) else 0,
+            played=_share(played.get("played")),
+            notes=_notes(played.get("notes")),
+        )
+
+
+class RobotVoices:
+    """Follows what virtual robots say, and lets it be heard by its `speaker`, if it has one.
+
+    One thread uses it (the window's). Robots speak one after the other; who is broken off is silent at once.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        fleet: Fleet,
+        watch: Callable[[str], Watch],
+        tell: Callable[[str, str, str], object],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``watch`` looks at a topic; ``tell`` writes into the Console: a level, who, a sentence."""
+        self._settings, self._fleet, self._watch, self._tell = settings, fleet, watch, tell
+        self._clock = clock
+        self.speaker: Speaker | None = None
+        self._watches: dict[str, Watch] = {}
+        self._seen: dict[str, tuple[object, Heard]] = {}
+        self._waiting: deque[Utterance] = deque()
+        self._now: Utterance | None = None
+        self._until_s = 0.0
+        self._plays = ""
+        self._stops = fleet.stops
+
+    @property
+    def on(self) -> bool:
+        """Whether a person wants to hear robots."""
+        return bool(self._settings.get(SOUND, True))
+
+    def switch(self, *, on: bool) -> None:
+        """Let robots be heard, or not; raises SettingsError when that can't be kept."""
+        try:
+            self._settings.set(SOUND, on)
+        finally:
+            if not on:
+                self.silence()
+
+    @property
+    def problem(self) -> str:
+        """Why robots are not heard, as a sentence; empty when there is no reason."""
+        return self.speaker.problem if self.speaker is not None else ""
+
+    @property
+    def saying(self) -> Utterance | None:
+        """What is heard now."""
+        return self._now
+
+    def follow(self) -> None:
+        """Take over what robots say now; called with every tick."""
+        if self.speaker is None:
+            return
+        there = {link.name: link for link in self._fleet.connected if _is_heard(link)} if self.on else {}
+        for name in self._watches.keys() - there.keys():
+            self._watches.pop(name).close()
+            self._break_off(name, self._seen.pop(name, (None, Heard()))[1], Heard())
+        stopped = self._fleet.stops != self._stops
+        if stopped:
+            self._stops = self._fleet.stops
+            self.silence()
+        for name, link in there.items():
+            if name not in self._watches and link.robot.topics.state is not None:
+                self._watches[name] = self._watch(link.robot.topics.state)
+            self._take(name, link.drawing, is_heard=not stopped)
+        self._go_on(self.speaker)
+
+    def _take(self, name: str, drawing: Mapping[str, object] | None, *, is_heard: bool) -> None:
+        told, before = self._seen.get(name, (None, Heard()))
+        if drawing is None or drawing is told:
+            return
+        now = Heard.parse(drawing)
+        first = name not in self._seen
+        self._seen[name] = (drawing, now)
+        self._break_off(name, before, now)
+        if now.speech and is_heard and (now.speech != before.speech or now.spoken < before.spoken):
+            self._queue(Utterance(name, now.speech, now.language, now.volume))
+        if now.notes and is_heard and not first and now.sound != before.sound and self.speaker is not None:
+            self._plays = name
+            self.speaker.play(now.notes, now.volume)
+
+    def _break_off(self, name: str, before: Heard, now: Heard) -> None:
+        """End what a robot has not said or played to its end."""
+        if self.speaker is None:
+            return
+        if before.speech and before.spoken < ENDED and now.speech != before.speech:
+            self._waiting = deque(each for each in self._waiting if each.robot != name)
+            if self._now is not None and self._now.robot == name:
+                self._now = None
+                self.speaker.stop_voice()
+        if before.notes and before.played < ENDED and not now.notes and self._plays == name:
+            self._plays = ""
+            self.speaker.play((), 0.0)
+
+    def _queue(self, said: Utterance) -> None:
+        if len(self._waiting) >= MOST_WAITING:
+            lost = self._waiting.popleft()
+            words = _("“{words}” was only shown: others were speaking").format(words=lost.words)
+            self._tell("info", lost.robot, words)
+        self._waiting.append(said)
+
+    def _go_on(self, speaker: Speaker) -> None:
+        """Let the next one speak when the last one has ended."""
+        if self._now is not None and speaker.busy:
+            if self._clock() < self._until_s:
+                return
+            speaker.stop_voice()
+        self._now = None
+        if self._waiting:
+            said = self._now = self._waiting.popleft()
+            self._until_s = self._clock() + PATIENCE_S + PATIENCE_PER_LETTER_S * len(said.words)
+            speaker.say(said.words, said.language, said.volume)
+
+    def silence(self) -> None:
+        """Nobody is heard any more, and nobody who waits."""
+        self._waiting.clear()
+        self._now, self._plays = None, ""
+        if self.speaker is not None:
+            self.speaker.stop()
+
+    def close(self) -> None:
+        """Be silent, and look at nobody."""
+        self.silence()
+        for watch in self._watches.values():
+            watch.close()
+        self._watches.clear()
+
+
+def _is_heard(link: RobotLink) -> bool:
+    return link.virtual and not link.mute
+
+
+def _share(value: object, default: float = 0.0, whole: float = 1.0) -> float:
+    good = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return min(1.0, max(0.0, (float(value) if good else default) / whole))  # type: ignore[arg-type]
+
+
+def _notes(value: object) -> Notes:
+    """The tones of a message, as many and as long as a person wants to hear."""
+    if not isinstance(value, list):
+        return ()
+    notes: list[tuple[float, float]] = []
+    left_s = LONGEST_S
+    for each in value[:MOST_NOTES]:
+        if not (isinstance(each, list) and len(each) == 2):
+            return ()
+        hz, seconds = each
+        if not all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in each):
+            return ()
+        if (hz != 0 and not LOWEST_HZ <= hz <= HIGHEST_HZ) or not 0 < seconds <= left_s:
+            return tuple(notes)
+        notes.append((float(hz), float(seconds)))
+        left_s -= seconds
+    return tuple(notes)

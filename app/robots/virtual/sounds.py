@@ -1,0 +1,49 @@
+"""What a virtual robot plays: a sound that has a name, or a tone; stepped in time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+Notes: TypeAlias = Sequence[tuple[float, float]]
+"""Hertz (0 is silence) and seconds."""
+SoundName: TypeAlias = Literal["beep", "bell", "cheer", "buzzer", "whistle"]
+
+SOUNDS: Mapping[SoundName, Notes] = {
+    "beep": ((880, 0.25),),
+    "bell": ((1319, 0.3), (1047, 0.6)),
+    "cheer": ((523, 0.12), (659, 0.12), (784, 0.12), (0, 0.05), (784, 0.12), (1047, 0.45)),
+    "buzzer": ((146, 0.35), (0, 0.08), (146, 0.5)),
+    "whistle": tuple((900 + 75 * step, 0.05) for step in range(9)),
+}
+
+
+@dataclass
+class Sound:
+    """Something that is being played; ``done`` when the last tone is out. ``number`` tells it from others."""
+
+    number: int
+    title: str
+    notes: Notes
+    played_s: float = 0.0
+    done: bool = False
+
+    @property
+    def seconds(self) -> float:
+        """How long all of it takes."""
+        return sum(seconds for _hz, seconds in self.notes)
+
+    def step(self, seconds: float) -> None:
+        """Let time pass."""
+        self.played_s += seconds
+        self.done = self.done or self.played_s >= self.seconds
+
+    def drawable(self) -> dict[str, object]:
+        """As Studio hears and shows it; ``played`` goes from 0 to 1."""
+        return {
+            "number": self.number,
+            "title": self.title,
+            "played": round(min(1.0, self.played_s / self.seconds), 2),
+            "notes": [list(note) for note in self.notes],
+        }

@@ -1,0 +1,301 @@
+"""Makes robots heard through Qt: its text to speech and its sound, in a thread of their own.
+
+Both are imported at the first word or tone, and may take seconds to begin; the window never waits for them.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+from PySide6.QtCore import QBuffer, QByteArray, QEventLoop, QLocale, QObject, Qt, Signal
+
+from app.core.robots.voices import Notes
+from nep.i18n import _, lazy
+
+if TYPE_CHECKING:
+    from PySide6.QtMultimedia import QAudioSink
+    from PySide6.QtTextToSpeech import QTextToSpeech
+
+LANGUAGES = {"en": lazy("English"), "fr": lazy("French"), "ja": lazy("Japanese"), "es": lazy("Spanish")}
+NO_SOUND = lazy("This computer plays no sound.")
+MOST_TONES = 4
+RATE_HZ, EDGE_S, LOUDNESS = 44_100, 0.006, 0.5
+JOIN_S = 0.5
+Order: TypeAlias = tuple[str, tuple[Any, ...], int]
+_log = logging.getLogger(__name__)
+
+
+def no_voice(language: str) -> str:
+    """The sentence that says that nobody here speaks a language."""
+    name = _(LANGUAGES[language]) if language in LANGUAGES else QLocale(language).nativeLanguageName()
+    return _("This computer has no voice for {language}.").format(language=name or language)
+
+
+def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
+    """Tones as 16 bit samples of one channel, soft at both ends of each so that nothing clicks."""
+    import numpy as np  # noqa: PLC0415 (heavy; only who plays a tone needs it)
+
+    made = []
+    for hz, seconds in notes:
+        count = max(1, round(seconds * rate_hz))
+        wave = np.sin(np.arange(count) * (2 * math.pi * hz / rate_hz)) if hz else np.zeros(count)
+        edge = min(count // 2, round(EDGE_S * rate_hz))
+        if edge:
+            rise = np.linspace(0.0, 1.0, edge)
+            wave[:edge] *= rise
+            wave[-edge:] *= rise[::-1]
+        made.append(wave)
+    whole = np.concatenate(made) if made else np.zeros(0)
+    return (whole * (LOUDNESS * min(1.0, max(0.0, volume)) * 32767)).astype("<i2").tobytes()
+
+
+class Engine(Protocol):
+    """What makes the noise; used in one thread only, which has an event loop of Qt."""
+
+    def say(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
+        """Begin to say it; `ended` is called once when it is said. A sentence why not, else ""."""
+
+    def play(self, notes: Notes, volume: float) -> str:
+        """Begin to play it; a sentence why not, else ""."""
+
+    def stop_voice(self) -> None:
+        """End the voice."""
+
+    def stop_tones(self) -> None:
+        """End the tones."""
+
+
+class QtEngine:
+    """Qt's text to speech and audio output; each is made when it is first needed."""
+
+    def __init__(self) -> None:
+        self._voice: QTextToSpeech | None = None
+        self._voice_tried = False
+        self._ended: Callable[[], None] | None = None
+        self._sinks: list[tuple[QAudioSink, QBuffer]] = []
+
+    def _found_voice(self) -> QTextToSpeech | None:
+        if not self._voice_tried:
+            self._voice_tried = True
+            try:
+                from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy, and needs a sound system)
+
+                if set(QTextToSpeech.availableEngines()) - {"mock"}:
+                    self._voice = QTextToSpeech()
+                    self._voice.stateChanged.connect(self._changed)
+            except (ImportError, RuntimeError) as error:
+                _log.info("robots have no voice here: %s", error)
+        return self._voice
+
+    def _changed(self) -> None:
+        voice = self._voice
+        if voice is None or self._ended is None:
+            return
+        if voice.state() in {voice.State.Ready, voice.State.Error}:
+            ended, self._ended = self._ended, None
+            ended()
+
+    def say(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
+        """Say it, if there is a voice."""
+        voice = self._found_voice()
+        locales = voice.availableLocales() if voice is not None else []
+        locale = next((each for each in locales if each.name().split("_")[0] == language), None)
+        if voice is None or locale is None:
+            return no_voice(language)
+        self.stop_voice()
+        voice.setLocale(locale)
+        voice.setVolume(volume)
+        voice.say(words)
+        if voice.state() == voice.State.Error:
+            return no_voice(language)
+        self._ended = ended
+        return ""
+
+    def play(self, notes: Notes, volume: float) -> str:
+        """Play it on the output that the computer uses now, if there is one."""
+        try:
+            from PySide6.QtMultimedia import QAudioFormat, QAudioSink, QMediaDevices  # noqa: PLC0415 (heavy)
+        except (ImportError, RuntimeError) as error:
+            _log.info("robots make no sounds here: %s", error)
+            return _(NO_SOUND)
+        device = QMediaDevices.defaultAudioOutput()
+        shape = QAudioFormat()
+        shape.setSampleRate(RATE_HZ)
+        shape.setChannelCount(1)
+        shape.setSampleFormat(QAudioFormat.SampleFormat.Int16)
+        if device.isNull() or not device.isFormatSupported(shape):
+            return _(NO_SOUND)
+        while len(self._sinks) >= MOST_TONES:
+            self._sinks.pop(0)[0].stop()
+        buffer = QBuffer()
+        buffer.setData(QByteArray(samples(notes, volume)))
+        buffer.open(QBuffer.OpenModeFlag.ReadOnly)
+        sink = QAudioSink(device, shape)
+        sink.start(buffer)
+        self._sinks.append((sink, buffer))
+        return ""
+
+    def stop_voice(self) -> None:
+        """End the voice in the middle of the word."""
+        self._ended = None
+        if self._voice is not None:
+            self._voice.stop(self._voice.BoundaryHint.Immediate)
+
+    def stop_tones(self) -> None:
+        """End all tones."""
+        for sink, _buffer in self._sinks:
+            sink.stop()
+        self._sinks.clear()
+
+
+class _Desk(QObject):
+    """Takes orders in the thread of the engine; those from before a stop are not carried out any more."""
+
+    woken = Signal()
+    ended = Signal(int)
+    told = Signal(str, str)  # what it is about, the sentence (empty: all is well)
+
+    def __init__(self, make: Callable[[], Engine], orders: deque[Order], speaker: QtSpeaker) -> None:
+        super().__init__()
+        self._make, self._orders, self._speaker = make, orders, speaker
+        self._engine: Engine | None = None
+        self.loop = QEventLoop()
+        self.woken.connect(self.take, Qt.ConnectionType.QueuedConnection)
+
+    def take(self) -> None:
+        """Carry out what waits."""
+        while self._orders:
+            what, given, turn = self._orders.popleft()
+            if what == "end":
+                self._silence("all")
+                self._engine = None
+                self.loop.quit()
+            elif what == "stop":
+                self._silence(str(given[0]))
+            elif self._speaker.counts(what, turn):
+                self._carry_out(what, given, turn)
+
+    def _silence(self, which: str) -> None:
+        if self._engine is not None:
+            if which != "tones":
+                self._engine.stop_voice()
+            if which != "voice":
+                self._engine.stop_tones()
+
+    def _carry_out(self, what: str, given: tuple[Any, ...], turn: int) -> None:
+        problem = _(NO_SOUND)
+        first, *others = given
+        try:
+            if self._engine is None:
+                self._engine = self._make()
+            if not self._speaker.counts(what, turn):  # it took so long that a stop came
+                return
+            if what == "say":
+                language, volume = others
+                problem = self._engine.say(first, language, volume, lambda: self.ended.emit(turn))
+            else:
+                problem = self._engine.play(first, *others)
+        except Exception:  # noqa: BLE001 - whatever an engine of the system raises: Studio goes on in silence
+            _log.warning("the computer's voice broke off", exc_info=True)
+        self.told.emit(what, problem)
+        if problem and what == "say":
+            self.ended.emit(turn)
+
+
+class QtSpeaker(QObject):
+    """The speaker of a window: tells its thread what to do, and never waits for it."""
+
+    def __init__(self, make: Callable[[], Engine] = QtEngine, parent: QObject | None = None) -> None:
+        """``make`` makes the engine, in the thread, at the first word."""
+        super().__init__(parent)
+        self._make = make
+        self._orders: deque[Order] = deque()
+        self._desk: _Desk | None = None
+        self._thread: threading.Thread | None = None
+        self._turns: dict[str, int] = {"say": 0, "play": 0}
+        self._busy = False
+        self._problems: dict[str, str] = {}
+        self._closed = False
+
+    @property
+    def busy(self) -> bool:
+        """Whether a voice still speaks, or is about to."""
+        return self._busy
+
+    @property
+    def problem(self) -> str:
+        """Why robots are not heard; empty when they are, or nobody tried."""
+        return self._problems.get("say", "") or self._problems.get("play", "")
+
+    def counts(self, what: str, turn: int) -> bool:
+        """Whether an order has not been overtaken by a stop; in any thread."""
+        return not self._closed and turn >= self._turns[what]
+
+    def say(self, words: str, language: str, volume: float) -> None:
+        """Say this."""
+        self._turns["say"] += 1
+        self._busy = True
+        self._order("say", words, language, volume)
+
+    def play(self, notes: Notes, volume: float) -> None:
+        """Play these tones; none ends those that are played."""
+        if notes:
+            self._order("play", tuple(notes), volume)
+        else:
+            self._stop("tones")
+
+    def stop_voice(self) -> None:
+        """End the voice."""
+        self._stop("voice")
+
+    def stop(self) -> None:
+        """Be silent."""
+        self._stop("all")
+
+    def _stop(self, which: str) -> None:
+        if which != "tones":
+            self._turns["say"] += 1
+            self._busy = False
+        if which != "voice":
+            self._turns["play"] += 1
+        if self._thread is not None:
+            self._order("stop", which)
+
+    def close(self) -> None:
+        """End the thread; one that the system's sound holds up is left behind."""
+        self.stop()
+        if self._thread is not None:
+            self._order("end")
+            self._thread.join(JOIN_S)
+        self._closed = True
+
+    def _order(self, what: str, *given: object) -> None:
+        if self._closed:
+            return
+        self._orders.append((what, given, self._turns.get(what, 0)))
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._live, name="robots' voice", daemon=True)
+            self._thread.start()
+        elif self._desk is not None:
+            self._desk.woken.emit()
+
+    def _live(self) -> None:
+        desk = _Desk(self._make, self._orders, self)
+        desk.ended.connect(self._has_ended, Qt.ConnectionType.QueuedConnection)
+        desk.told.connect(self._has_told, Qt.ConnectionType.QueuedConnection)
+        self._desk = desk
+        desk.woken.emit()
+        desk.loop.exec()
+        self._desk = None
+
+    def _has_ended(self, turn: int) -> None:
+        if turn == self._turns["say"]:
+            self._busy = False
+
+    def _has_told(self, what: str, problem: str) -> None:
+        self._problems[what] = problem

@@ -1,0 +1,205 @@
+"""Robots are heard one after the other, also where their panel does not show; Stop silences them at once."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.core.robots.voices import LONGEST_S, MOST_WAITING, SOUND, Heard, Notes, RobotVoices, Speaker
+from app.core.storage.settings import Settings
+from app.robots.description.description import parse, td_for
+from app.robots.simulated import ROBOT as PEPPER
+from tests.ui.fakes import Session
+
+STATE = "/{}/state"
+
+
+class FakeSpeaker:
+    """Speaks until the test lets it end; notes what it is told."""
+
+    def __init__(self) -> None:
+        self.did: list[object] = []
+        self.busy = False
+        self.problem = ""
+
+    def say(self, words: str, language: str, volume: float) -> None:
+        self.did.append((words, language, volume))
+        self.busy = True
+
+    def play(self, notes: Notes, volume: float) -> None:
+        self.did.append((tuple(notes), volume))
+
+    def stop_voice(self) -> None:
+        self.did.append("stop voice")
+        self.busy = False
+
+    def stop(self) -> None:
+        self.did.append("stop")
+        self.busy = False
+
+
+class Case:
+    """A session with virtual robots that tell what they say."""
+
+    def __init__(self, *names: str) -> None:
+        self.session = Session()
+        for name in names:
+            self.session.join(parse(td_for(PEPPER.thing_model, name)))
+        self.speaker = FakeSpeaker()
+        speaker: Speaker = self.speaker
+        self.session.voices.speaker = speaker
+        self.session.tick()
+
+    def tell(self, name: str, words: str | None, spoken: float = 0.1, **more: object) -> None:
+        told = {"speech": words, "spoken": spoken, "language": "en", "volume": 40, **more}
+        link = self.session.fleet.link(name)
+        assert link is not None
+        link.drawing = told
+        self.session.tick()
+
+    @property
+    def said(self) -> list[object]:
+        return [each[0] for each in self.speaker.did if isinstance(each, tuple)]
+
+
+@pytest.fixture
+def case() -> Case:
+    return Case("Pepper", "Ginger")
+
+
+def test_each_speech_is_said_once_though_no_panel_shows(case) -> None:
+    for spoken in (0.0, 0.3, 0.95):
+        case.tell("Pepper", "Hello", spoken)
+    case.tell("Pepper", None)
+    assert case.speaker.did == [("Hello", "en", 0.4)]  # its voice may take a little longer than the bubble
+    case.speaker.busy = False
+    case.tell("Pepper", "Hello", 0.0)
+    case.tell("Pepper", "Hello", 0.9)
+    case.speaker.busy = False
+    case.tell("Pepper", "Hello", 0.0)  # the same words at once again
+    assert case.said == ["Hello", "Hello", "Hello"]
+
+
+def test_nobody_is_looked_at_without_a_speaker_or_a_wish(case) -> None:
+    assert {STATE.format("Pepper"), STATE.format("Ginger")} <= case.session.source.wanted
+    case.session.voices.switch(on=False)
+    case.session.tick()
+    assert STATE.format("Pepper") not in case.session.source.wanted
+    case.session.voices.switch(on=True)
+    case.session.tick()
+    assert STATE.format("Pepper") in case.session.source.wanted
+
+
+def test_two_robots_speak_one_after_the_other_and_the_caption_says_who(case) -> None:
+    case.tell("Pepper", "A long story")
+    case.tell("Ginger", "And I say")
+    assert case.said == ["A long story"]
+    case.tell("Ginger", "And I say", 0.95)
+    case.tell("Ginger", None)
+    case.speaker.busy = False
+    case.session.tick()
+    assert case.said == ["A long story", "And I say"]
+    said = case.session.voices.saying
+    assert said is not None
+    assert (said.robot, said.words) == ("Ginger", "And I say")
+    case.speaker.busy = False
+    case.session.tick()
+    assert case.session.voices.saying is None
+
+
+def test_too_many_that_wait_are_bounded_and_told(case) -> None:
+    case.tell("Pepper", "A long story")
+    for count in range(MOST_WAITING + 1):
+        case.tell("Ginger", f"word {count}", 0.95)
+    lines = [line.text for line in case.session.console.records if line.origin == "Ginger"]
+    assert lines == ["“word 0” was only shown: others were speaking"]
+    heard = []
+    for _turn in range(MOST_WAITING + 2):
+        case.speaker.busy = False
+        case.session.tick()
+        heard = case.said
+    assert heard == ["A long story", *(f"word {count}" for count in range(1, MOST_WAITING + 1))]
+
+
+def test_a_voice_that_never_ends_is_not_waited_for(case) -> None:
+    case.tell("Pepper", "Hello", 0.95)
+    case.tell("Ginger", "Hi", 0.95)
+    case.session.clock.now += 60.0
+    case.session.tick()
+    assert case.speaker.did[-2:] == ["stop voice", ("Hi", "en", 0.4)]
+
+
+@pytest.mark.parametrize("how", ["broken off", "gone"])
+def test_a_speech_that_is_broken_off_is_silent_at_once(case, how) -> None:
+    case.tell("Pepper", "A long story", 0.2)
+    case.tell("Ginger", "Me, too", 0.95)
+    if how == "gone":
+        case.session.fleet.link("Pepper").connected = False
+        case.session.tick()
+    else:
+        case.tell("Pepper", None)
+    assert case.speaker.did[-2:] == ["stop voice", ("Me, too", "en", 0.4)]
+
+
+def test_stop_silences_all_at_once_also_those_who_wait(case) -> None:
+    case.tell("Pepper", "A long story", 0.2)
+    case.tell("Ginger", "Me, too", 0.95)
+    case.session.fleet.told_to_stop(["Pepper", "Ginger"])
+    case.session.fleet.stopped({"Pepper": ("answered", "ok"), "Ginger": ("answered", "ok")}, {})
+    case.tell("Pepper", "A long story", 0.3)  # it says so for one more moment
+    assert case.speaker.did[-1] == "stop"
+    case.speaker.busy = False
+    case.session.tick()
+    assert case.said == ["A long story"]
+
+
+def test_switched_off_it_ends_at_once_and_begins_with_the_next_speech(case) -> None:
+    case.tell("Pepper", "A long story", 0.2)
+    case.session.voices.switch(on=False)
+    assert case.speaker.did[-1] == "stop"
+    assert case.session.settings.get(SOUND, True) is False
+    case.session.voices.switch(on=True)
+    case.session.tick()
+    case.tell("Pepper", "The end")
+    assert case.said[-1] == "The end"
+
+
+def test_tones_are_played_beside_a_voice_and_end_when_they_are_broken_off(case) -> None:
+    case.tell("Pepper", "Hello")
+    bell = {"number": 1, "title": "bell", "played": 0.1, "notes": [[880, 0.3], [0, 0.1]]}
+    case.tell("Ginger", None, sound=None)
+    case.tell("Ginger", None, sound=bell)
+    case.tell("Ginger", None, sound={**bell, "played": 0.4})
+    assert case.speaker.did == [("Hello", "en", 0.4), (((880.0, 0.3), (0.0, 0.1)), 0.4)]
+    case.tell("Ginger", None, sound={**bell, "number": 2})
+    case.tell("Ginger", None, sound=None)
+    assert case.speaker.did[2:] == [(((880.0, 0.3), (0.0, 0.1)), 0.4), ((), 0.0)]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "bell",
+        {"notes": 3},
+        {"notes": [[440]]},
+        {"notes": [["a", 1]]},
+        {"notes": [[5, 1]]},
+        {"notes": [[440, 99]]},
+    ],
+)
+def test_what_is_no_sound_is_silent(wrong) -> None:
+    assert Heard.parse({"sound": wrong, "speech": 3, "spoken": "x", "volume": True}) == Heard()
+
+
+def test_a_sound_ends_where_nobody_wants_to_hear_more() -> None:
+    notes = Heard.parse({"sound": {"number": 1, "notes": [[440, 0.9]] * 40}}).notes
+    assert sum(seconds for _hz, seconds in notes) <= LONGEST_S
+
+
+def test_without_a_speaker_nothing_happens() -> None:
+    session = Session()
+    session.join(parse(td_for(PEPPER.thing_model, "Pepper")))
+    voices: RobotVoices = session.voices
+    voices.follow()
+    voices.silence()
+    assert STATE.format("Pepper") not in session.source.wanted
+    assert isinstance(session.settings, Settings)

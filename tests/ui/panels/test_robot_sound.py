@@ -1,0 +1,80 @@
+"""The button that mutes robots, why they are silent, and what stands in the picture of what they play."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.core.robots.voices import SOUND, Utterance
+from app.robots.virtual.body import Body
+from app.robots.virtual.simulation import drawable
+from app.ui.panels.robot.panel import PANEL, RobotPanel
+from app.ui.robot_drawing.state import RobotState
+from tests.core.robots.test_voices import FakeSpeaker
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, press
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(qtbot, window) -> RobotPanel:
+    made = window.make(PANEL, (384, 320))
+    qtbot.addWidget(made)
+    assert isinstance(made, RobotPanel)
+    return made
+
+
+def test_the_button_is_kept(panel, window) -> None:
+    assert panel.sound.accessibleName() == "Mute the robots"
+    press(panel.sound)
+    heard = window.session.settings.get(SOUND, True)
+    assert (heard, panel.sound.accessibleName()) == (False, "Hear the robots")
+    press(panel.sound)
+    assert window.session.settings.get(SOUND, False)
+
+
+def test_the_button_says_why_robots_are_silent(panel, window) -> None:
+    speaker = window.session.voices.speaker = FakeSpeaker()
+    panel.refresh()
+    assert "no voice" not in panel.sound.toolTip()
+    speaker.problem = "This computer has no voice for English."
+    panel.refresh()
+    assert "This computer has no voice for English." in panel.sound.toolTip()
+    assert panel.sound.accessibleDescription() == "This computer has no voice for English."
+    press(panel.sound)  # who has muted them knows why they are silent
+    assert "no voice" not in panel.sound.toolTip()
+
+
+def test_a_sound_stands_in_a_bubble_beside_what_it_says() -> None:
+    played = {"title": "bell", "number": 1, "notes": [[880, 0.3]], "played": 0.1}
+    assert RobotState.parse({"sound": played}).caption == "♪\N{NO-BREAK SPACE}bell"
+    assert RobotState.parse({"speech": "Hi", "sound": played}).caption == "Hi ♪\N{NO-BREAK SPACE}bell"
+    assert RobotState.parse({"speech": "Hi", "sound": 3}).caption == "Hi"
+
+
+def test_the_bubble_of_a_sound_is_painted(panel, window) -> None:
+    body = Body()
+    link = window.session.fleet.links[0]
+    link.drawing = drawable(body)
+    panel.refresh()
+    silent = panel.view.grab().toImage()
+    body.play("bell", ((880, 0.3),))
+    link.drawing = drawable(body)
+    panel.refresh()
+    assert panel.view.grab().toImage() != silent
+    assert panel.view.accessibleDescription() == "♪\N{NO-BREAK SPACE}bell"
+
+
+def test_who_is_heard_after_the_bubble_has_gone_is_named_below(panel, window) -> None:
+    panel.refresh()
+    before = panel.view.grab().toImage()
+    window.session.voices._now = Utterance("Ginger", "And I say", "en", 0.5)
+    panel.refresh()
+    assert panel.view.heard == "Ginger: And I say"
+    assert panel.view.grab().toImage() != before
+    window.session.voices._now = None
+    panel.refresh()
+    assert panel.view.heard == ""

@@ -1,0 +1,155 @@
+"""The window's speaker never waits for the computer's sound, however slow, and says why it is silent."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from array import array
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
+import pytest
+
+from app.core.robots.voices import Notes
+from app.ui.speaker import QtEngine, QtSpeaker, no_voice, samples
+
+
+class FakeEngine:
+    """Has a voice for English; begins when the test lets it, ends when the test says so."""
+
+    def __init__(self) -> None:
+        self.did: list[object] = []
+        self.may_begin = threading.Event()
+        self.may_begin.set()
+        self.begins = threading.Event()
+        self.end: Callable[[], None] | None = None
+        self.threads: set[str] = set()
+
+    def make(self) -> FakeEngine:
+        self.begins.set()
+        assert self.may_begin.wait(20)
+        return self
+
+    def say(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
+        self.threads.add(threading.current_thread().name)
+        if language != "en":
+            return no_voice(language)
+        self.did.append((words, volume))
+        self.end = ended
+        return ""
+
+    def play(self, notes: Notes, volume: float) -> str:
+        self.did.append((notes, volume))
+        return ""
+
+    def stop_voice(self) -> None:
+        self.did.append("stop voice")
+
+    def stop_tones(self) -> None:
+        self.did.append("stop tones")
+
+
+@pytest.fixture
+def engine() -> FakeEngine:
+    return FakeEngine()
+
+
+@pytest.fixture
+def speaker(qapp, engine) -> Iterator[QtSpeaker]:
+    made = QtSpeaker(engine.make)
+    yield made
+    engine.may_begin.set()
+    made.close()
+    assert "robots' voice" not in [thread.name for thread in threading.enumerate()]
+
+
+def test_nothing_begins_before_the_first_word(speaker, engine) -> None:
+    speaker.stop()
+    speaker.stop_voice()
+    speaker.play((), 0.0)
+    assert not engine.begins.is_set()
+    assert "robots' voice" not in [thread.name for thread in threading.enumerate()]
+
+
+def test_a_voice_is_busy_until_its_engine_has_said_it(qtbot, speaker, engine) -> None:
+    speaker.say("Hello", "en", 0.5)
+    assert speaker.busy
+    qtbot.waitUntil(lambda: engine.end is not None)
+    assert engine.did == [("Hello", 0.5)]
+    assert speaker.busy
+    assert engine.threads == {"robots' voice"}
+    engine.end()
+    qtbot.waitUntil(lambda: not speaker.busy)
+    assert speaker.problem == ""
+
+
+def test_an_engine_that_takes_long_holds_nobody_up_and_a_stop_overtakes_it(qtbot, speaker, engine) -> None:
+    engine.may_begin.clear()
+    speaker.say("Hello", "en", 0.5)
+    speaker.play(((440.0, 0.1),), 0.5)
+    assert engine.begins.wait(20)  # the window goes on while it begins
+    assert speaker.busy
+    speaker.stop()
+    assert not speaker.busy
+    speaker.say("Again", "en", 0.5)
+    engine.may_begin.set()
+    qtbot.waitUntil(lambda: engine.end is not None)
+    assert [each for each in engine.did if isinstance(each, tuple)] == [("Again", 0.5)]
+
+
+def test_the_end_of_what_was_stopped_does_not_end_the_next(qtbot, speaker, engine) -> None:
+    speaker.say("Hello", "en", 0.5)
+    qtbot.waitUntil(lambda: engine.end is not None)
+    first, engine.end = engine.end, None
+    speaker.stop_voice()
+    speaker.say("Again", "en", 0.5)
+    qtbot.waitUntil(lambda: engine.end is not None)
+    first()
+    speaker.say("More", "fr", 0.5)
+    qtbot.waitUntil(lambda: speaker.problem != "")
+    assert [each for each in engine.did if isinstance(each, tuple)] == [("Hello", 0.5), ("Again", 0.5)]
+
+
+def test_a_language_without_a_voice_ends_at_once_and_says_why(qtbot, speaker) -> None:
+    speaker.say("Bonjour", "fr", 0.5)
+    qtbot.waitUntil(lambda: not speaker.busy)
+    assert speaker.problem == "This computer has no voice for French."
+    speaker.say("Hello", "en", 0.5)
+    qtbot.waitUntil(lambda: speaker.problem == "")
+
+
+def test_an_engine_that_breaks_off_leaves_silence(qtbot, caplog) -> None:
+    def broken() -> FakeEngine:
+        raise RuntimeError("no sound server")
+
+    speaker = QtSpeaker(broken)
+    speaker.say("Hello", "en", 0.5)
+    qtbot.waitUntil(lambda: not speaker.busy)
+    assert speaker.problem == "This computer plays no sound."
+    speaker.close()
+    assert "no sound server" in caplog.text
+
+
+def test_without_the_libraries_of_sound_it_is_silent_and_says_why(qtbot, monkeypatch) -> None:
+    for module in ("PySide6.QtTextToSpeech", "PySide6.QtMultimedia"):
+        monkeypatch.setitem(sys.modules, module, None)  # what an import fails at
+    speaker = QtSpeaker(QtEngine)
+    speaker.say("Hello", "en", 0.5)
+    qtbot.waitUntil(lambda: not speaker.busy)
+    assert speaker.problem == "This computer has no voice for English."
+    speaker.play(((440.0, 0.1),), 0.5)
+    qtbot.waitUntil(lambda: len(speaker._problems) == 2)
+    assert speaker._problems["play"] == "This computer plays no sound."
+    speaker.close()
+
+
+def test_a_tone_is_as_high_as_long_and_as_loud_as_asked_and_does_not_click() -> None:
+    made = array("h", samples(((441.0, 0.5), (0.0, 0.25)), 1.0))
+    assert len(made) == round(44_100 * 0.75)
+    rises = sum(1 for one, two in pairwise(made) if one < 0 <= two)
+    assert abs(rises - 441 * 0.5) <= 1
+    assert abs(made[0]) < 50
+    assert set(made[-10_000:]) == {0}
+    quiet = array("h", samples(((441.0, 0.5),), 0.5))
+    assert abs(max(made) - 2 * max(quiet)) < 5
+    assert samples((), 1.0) == b""
