@@ -70,8 +70,19 @@ def scrolled(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
     return BubbleText(lines, max(0, first), shown)
 
 
-def paint_bubble(p: QPainter, bounds: QRectF, head: Spot, state: RobotState, font: QFont) -> None:
-    """Paint what a robot says beside its ``head``, inside ``bounds``; ``p`` is in units of the stage."""
+def paint_bubble(
+    p: QPainter,
+    bounds: QRectF,
+    head: Spot,
+    state: RobotState,
+    font: QFont,
+    taken: Sequence[QRectF] = (),
+) -> QRectF:
+    """Paint what a robot says beside its ``head``, inside ``bounds``; ``p`` is in units of the stage.
+
+    ``taken`` are the bubbles of others, over which it goes only where there is no other place; its own is
+    returned.
+    """
     near, words = 31.0 * head.scale, state.caption
     room_right, room_left = bounds.right() - EDGE - head.u - near, head.u - near - bounds.left() - EDGE
     face = QFont(font)
@@ -91,10 +102,13 @@ def paint_bubble(p: QPainter, bounds: QRectF, head: Spot, state: RobotState, fon
     width = max(metrics.horizontalAdvance(line) for line in lines) + 2 * INSIDE
     height = text.shown * line_height + 18
     side = -1.0 if room_left > room_right and room_right < width else 1.0
-    left = head.u + near if side > 0 else head.u - near - width
-    left = min(max(left, bounds.left() + EDGE), max(bounds.left() + EDGE, bounds.right() - EDGE - width))
-    top = max(bounds.top() + EDGE, head.v - 39 * head.scale - height)
-    box = QRectF(left, top, width, height)
+
+    def box_at(towards: float) -> QRectF:
+        left = head.u + near if towards > 0 else head.u - near - width
+        left = min(max(left, bounds.left() + EDGE), max(bounds.left() + EDGE, bounds.right() - EDGE - width))
+        return QRectF(left, max(bounds.top() + EDGE, head.v - 39 * head.scale - height), width, height)
+
+    side, box = _free_place([(side, box_at(side)), (-side, box_at(-side))], taken, bounds)
     _paint_box(p, box, min(max(head.u + side * 58 * head.scale, box.left() + 18), box.right() - 30), side)
     p.setFont(face)
     p.setPen(QColor("#1C1B19"))
@@ -104,6 +118,22 @@ def paint_bubble(p: QPainter, bounds: QRectF, head: Spot, state: RobotState, fon
         p.drawText(at, Qt.AlignmentFlag.AlignCenter, line)
     if scrolls:
         _paint_thumb(p, box, text)
+    return box
+
+
+def _free_place(
+    places: Sequence[tuple[float, QRectF]], taken: Sequence[QRectF], bounds: QRectF
+) -> tuple[float, QRectF]:
+    """The first place that covers no other bubble, else below the others; else that which covers least."""
+
+    def covered(place: tuple[float, QRectF]) -> float:
+        common = [place[1].intersected(other) for other in taken]
+        return sum(each.width() * each.height() for each in common)
+
+    tops = [other.bottom() + EDGE for other in taken]
+    lower = [(side, box.translated(0, top - box.top())) for top in tops for side, box in places]
+    inside = [place for place in lower if place[1].bottom() <= bounds.bottom() - EDGE]
+    return min([*places, *inside], key=covered)
 
 
 def paint_heard(p: QPainter, area: QRectF, words: str, font: QFont) -> None:

@@ -79,11 +79,13 @@ class RobotDrawing:
             else:
                 _paint_figure(painter, one)
         self._mark(painter, stage, state, others, marks)
+        bubbles: list[QRectF] = []
         for figure in figures:
             if figure.state.caption:
                 high = TOP.y() if figure.state.figure == TURTLE else HEAD.y()
                 head = replace(figure.spot, v=figure.spot.v + high * figure.spot.scale)
-                paint_bubble(painter, stage.bounds(), head, figure.state, self._font)
+                bubble = paint_bubble(painter, stage.bounds(), head, figure.state, self._font, bubbles)
+                bubbles.append(bubble)
         painter.restore()
         if dark:
             painter.fillRect(area, QColor(0, 0, 12, 34))

@@ -6,9 +6,9 @@ import pytest
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter
 
-from app.ui.robot_drawing.bubble import scrolled, wrapped
+from app.ui.robot_drawing.bubble import paint_bubble, scrolled, wrapped
 from app.ui.robot_drawing.pepper import EMOTIONS
-from app.ui.robot_drawing.room import Stage
+from app.ui.robot_drawing.room import Spot, Stage
 from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, RoomBounds, Thing
 from tests.ui.sample_data import drawing
@@ -172,3 +172,18 @@ def test_a_long_bubble_stays_inside_and_moves_on(qapp, size, place) -> None:
     edges = [(x, y) for x in (0, size[0] - 1) for y in range(size[1])]
     silent = painted(replace(told, speech=None), area)
     assert all(begun.pixel(*at) == silent.pixel(*at) for at in edges)
+
+
+@pytest.mark.parametrize("apart", [0.0, 20.0, 60.0, 150.0])
+def test_bubbles_of_robots_that_stand_close_do_not_cover_each_other(qapp, apart) -> None:
+    image = QImage(382, 286, QImage.Format.Format_RGB32)
+    painter = QPainter(image)
+    first = paint_bubble(
+        painter, AREA, Spot(150.0, 110.0, 1.0), RobotState(speech="I like to tell long stories"), QFont()
+    )
+    second = paint_bubble(
+        painter, AREA, Spot(150.0 + apart, 110.0, 1.0), RobotState(sound="bell"), QFont(), [first]
+    )
+    painter.end()
+    assert not first.intersects(second)
+    assert AREA.contains(second)
