@@ -103,6 +103,14 @@ class Screen:
         for each in reversed(held):
             self._key(each, down=False)
 
+    def hold(self, name: str) -> None:
+        """Press a key and keep it down, until `let_go`."""
+        self._key(name, down=True)
+
+    def let_go(self, name: str) -> None:
+        """Release a key that is held down."""
+        self._key(name, down=False)
+
     def type(self, text: str) -> None:
         """Type on a keyboard with the American layout, which Xvfb has."""
         for letter in text:

@@ -36,6 +36,9 @@ class BlocklyBridge(QObject):
     wanted = Signal(str)  # what a button of the empty canvas is for: "robot", "examples"
     pinned = Signal(bool)  # a person wants the blocks of a category to stay open, or not
     removed = Signal(int)  # a person has deleted so many blocks at once
+    carried_out = Signal(int, int, bool)  # a block is outside of the page, at x, y; False: not any more
+    let_go_outside = Signal(int, int)  # and was let go there
+    carried_over = Signal(int, str)  # so many blocks are in this tab now: "moved", "copied", "added"
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -89,6 +92,18 @@ class BlocklyBridge(QObject):
     @Slot(int)
     def deleted(self, count: int) -> None:
         self.removed.emit(count)
+
+    @Slot(int, int, bool)
+    def carried(self, x: int, y: int, out: bool) -> None:
+        self.carried_out.emit(x, y, out)
+
+    @Slot(int, int)
+    def dropped(self, x: int, y: int) -> None:
+        self.let_go_outside.emit(x, y)
+
+    @Slot(int, str)
+    def brought(self, count: int, how: str) -> None:
+        self.carried_over.emit(count, how)
 
     @Slot(str)
     def copy(self, blocks: str) -> None:

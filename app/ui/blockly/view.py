@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QPoint, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.documents.workspace_json import WorkspaceJson
@@ -37,6 +37,9 @@ class BlocklyView(BlocklyHost):
     values_watched = Signal(tuple)  # the variables (ids) whose values the page shows
     toolbox_pinned = Signal(bool)  # a person wants the blocks of a category to stay open, or not
     blocks_deleted = Signal(int)  # a person has deleted so many blocks at once in the shown tab
+    block_carried = Signal(object)  # outside of the page, at this place of the screen (QPoint); None: no more
+    block_dropped = Signal(QPoint)  # it was let go there; unless `bring_blocks` follows it is where it was
+    blocks_brought = Signal(int, str)  # so many are in the shown tab now: "moved", "copied" or "added"
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
         super().__init__(parent, language or i18n.language())
@@ -58,6 +61,11 @@ class BlocklyView(BlocklyHost):
         self._bridge.try_asked.connect(self.try_asked)
         self._bridge.pinned.connect(self._toolbox_pinned)
         self._bridge.removed.connect(self.blocks_deleted)
+        self._bridge.carried_out.connect(
+            lambda x, y, out: self.block_carried.emit(self._on_screen(x, y) if out else None)
+        )
+        self._bridge.let_go_outside.connect(lambda x, y: self.block_dropped.emit(self._on_screen(x, y)))
+        self._bridge.carried_over.connect(self.blocks_brought)
         self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(_pairs(text)))
 
     # -- the program ------------------------------------------------------------------------------
@@ -213,6 +221,14 @@ class BlocklyView(BlocklyHost):
         """Bring back what was deleted last, whatever was done since."""
         self._tell("undelete", None)
 
+    def bring_blocks(self) -> None:
+        """Let the shown tab have what was carried out of the page last, and take it from its own tab."""
+        self._tell("bring", None)
+
+    def give_blocks_back(self) -> None:
+        """Undo the last `bring_blocks`, in both tabs."""
+        self._tell("giveBack", None)
+
     def redo(self) -> None:
         """Do it again."""
         self._tell("redo", None)
@@ -263,6 +279,12 @@ class BlocklyView(BlocklyHost):
     def _toolbox_pinned(self, keeps: bool) -> None:
         self._pinned = keeps
         self.toolbox_pinned.emit(keeps)
+
+    def _on_screen(self, x: int, y: int) -> QPoint:
+        """A place of the page, or beside it."""
+        zoom = self.web.view.zoomFactor() if self.web is not None else 1.0
+        view = self.web.view if self.web is not None else self
+        return view.mapToGlobal(QPoint(round(x * zoom), round(y * zoom)))
 
     def _page_came(self) -> None:
         self._tell("definitions", self._definitions)

@@ -33,6 +33,7 @@ ARROW = 16
 Place = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112
 BARE_WIDTH = 56
+AIM_WIDTH = 2.0
 RING = 4  # px around Stop, for the ring that says that answers are awaited
 
 
@@ -87,6 +88,18 @@ class PaintedButton(QAbstractButton):
         self.setProperty("focusRadius", theme.radius(radius))
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         theme.changed.connect(self.updateGeometry)
+        self._aimed = False
+
+    @property
+    def is_aimed(self) -> bool:
+        """Whether what is in the hand would go there."""
+        return self._aimed
+
+    def set_aimed(self, aimed: bool) -> None:
+        """Put a ring round it: what is in the hand goes there."""
+        if aimed != self._aimed:
+            self._aimed = aimed
+            self.update()
 
     def say(self, text: str, name: str = "") -> None:
         """Show these words; a screen reader says them too, or ``name`` where there is one."""
@@ -120,6 +133,9 @@ class PaintedButton(QAbstractButton):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
+        if self._aimed:
+            radius, role = self._theme.radius("small"), self._theme.colour
+            paint.box(painter, QRectF(self.rect()), radius, role("accentTint"), role("accent"), AIM_WIDTH)
         self.paint_button(painter, QRectF(self.rect()))
         painter.end()
 

@@ -3,11 +3,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QPoint, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
 from app.ui.panels.base import Panel
+from app.ui.panels.behaviour.carried_blocks import brought_words
 from app.ui.panels.behaviour.panel import BehaviourPanel
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.theme.theme import Theme
@@ -30,6 +31,9 @@ class Editor(QWidget):
     try_asked = Signal(str)
     toolbox_pinned = Signal(bool)
     blocks_deleted = Signal(int)
+    block_carried = Signal(object)
+    block_dropped = Signal(QPoint)
+    blocks_brought = Signal(int, str)
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -313,3 +317,47 @@ def test_what_was_deleted_can_be_brought_back_from_the_toast(panel, window, coun
     assert run is not None
     run()
     assert editor(panel).count("undo_deletion") == 1
+
+
+@pytest.mark.parametrize(
+    ("count", "how", "words"),
+    [
+        (1, "moved", "Moved 1 block to Quiz"),
+        (3, "moved", "Moved 3 blocks to Quiz"),
+        (3, "copied", "Copied 3 blocks to Quiz"),
+        (1, "added", "Added 1 block to Quiz"),
+        (0, "moved", "Moved the note to Quiz"),
+        (0, "copied", "Copied the note to Quiz"),
+    ],
+)
+def test_words_say_what_became_of_blocks_let_go_on_a_tab(count: int, how: str, words: str) -> None:
+    assert brought_words(count, how, "Quiz") == words
+
+
+def test_a_block_let_go_on_its_own_tab_or_elsewhere_stays(panel, window) -> None:
+    title = panel.replaces_title()
+    title.resize(900, 34)
+    title.show()
+    tabs = title.tabs
+    own = tabs.tabs[window.session.document.key]
+    for place in (own.mapToGlobal(own.rect().center()), own.mapToGlobal(QPoint(10, 300))):
+        editor(panel).block_carried.emit(place)
+        assert not own.is_aimed
+        editor(panel).block_dropped.emit(place)
+    assert window.commands == []
+    assert editor(panel).count("bring_blocks") == 0
+
+
+def test_plus_has_a_ring_while_a_block_is_over_it_and_makes_a_new_behaviour(panel, window) -> None:
+    title = panel.replaces_title()
+    title.resize(900, 34)
+    title.show()
+    tabs = title.tabs
+    place = tabs.add.mapToGlobal(tabs.add.rect().center())
+    editor(panel).block_carried.emit(place)
+    assert tabs.add.is_aimed
+    editor(panel).block_carried.emit(None)
+    assert not tabs.add.is_aimed
+    editor(panel).block_dropped.emit(place)
+    assert window.commands == ["file.new"]
+    assert editor(panel).count("bring_blocks") == 0, "no new one came: the block stays"

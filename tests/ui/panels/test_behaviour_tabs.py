@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolTip
 
 from app.ui.panels.behaviour.tab import TabFacts
-from app.ui.panels.behaviour.tabs import BehaviourTabs
+from app.ui.panels.behaviour.tabs import NEW, BehaviourTabs
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 
@@ -218,3 +218,38 @@ def test_the_folder_that_tells_it_apart_is_not_edited(tabs) -> None:
     tabs.show_tabs([TabFacts("a", "Quiz — class 3", plain_name="Quiz", has_file=True), B], "a")
     QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
     assert tabs.field.text() == "Quiz"
+
+
+# -- blocks from the page -------------------------------------------------------------------------
+
+
+def test_a_place_of_the_screen_is_a_tab_or_plus_or_nothing(qtbot, tabs) -> None:
+    tab = tabs.tabs["b"]
+    assert tabs.target_at(tab.mapToGlobal(tab.rect().center())) == "b"
+    assert tabs.target_at(tabs.add.mapToGlobal(tabs.add.rect().center())) == NEW
+    assert tabs.target_at(tab.mapToGlobal(QPoint(10, 90))) == ""
+    beyond = tabs.mapToGlobal(QPoint(tabs.width() - 2, 10))
+    assert tabs.target_at(beyond) == ""
+    tabs.hide()
+    assert tabs.target_at(tab.mapToGlobal(tab.rect().center())) == ""
+
+
+def test_a_tab_out_of_sight_is_nowhere(qtbot, tabs) -> None:
+    tabs.resize(150, 30)
+    tabs.show_tabs([A, B, C], "a")
+    hidden = tabs.tabs["c"]
+    assert tabs.target_at(hidden.mapToGlobal(hidden.rect().center())) in {"", NEW}
+
+
+def test_the_ring_is_round_one_of_them(tabs) -> None:
+    def ringed() -> list[bool]:
+        return [tabs.tabs["a"].is_aimed, tabs.tabs["b"].is_aimed, tabs.add.is_aimed]
+
+    tab = tabs.tabs["b"]
+    before = tab.grab().toImage()
+    for key, expected in (("b", [False, True, False]), (NEW, [False, False, True])):
+        tabs.aim(key)
+        assert ringed() == expected
+        assert (tab.grab().toImage() == before) == (key != "b")
+    tabs.aim("")
+    assert ringed() == [False, False, False]

@@ -69,6 +69,8 @@ export class Bin {
   /** What was taken out again: deleted once more it comes back here, even by Redo. */
   private readonly takenBack = new Map<string, State>();
   private readonly made = new Map<string, string>();
+  /** What goes to another behaviour. */
+  private readonly moves = new Set<string>();
   private last = {group: '', ids: [] as string[], count: 0};
   private timer = 0;
   private sheet: BinSheet | null = null;
@@ -109,6 +111,11 @@ export class Bin {
     if (!this.sheet) return;
     bins.delete(this.sheet.getWorkspace());
     this.sheet.dispose();
+  }
+
+  /** This block goes to another behaviour: its deletion here is no loss. */
+  leaves(id: string): void {
+    this.moves.add(id);
   }
 
   /** Shows over the toolbox, or on the button, that letting go here deletes; null: it does not. */
@@ -220,6 +227,7 @@ export class Bin {
   private onDelete(event: Blockly.Events.BlockDelete): void {
     const id = event.blockId ?? '';
     const state = event.oldJson;
+    if (this.moves.delete(id)) return;
     if (!state || event.wasShadow || this.workspace.getBlockById(id)) return;
     const cameBack = this.takenBack.delete(id);
     // What never was more than a block in the hand is no loss, and an undone addition can be done again.
@@ -250,7 +258,7 @@ export class Bin {
 const bins = new Map<Blockly.WorkspaceSvg, Bin>();
 
 /** How many blocks a person sees in it: the grey values in the gaps are part of what holds them. */
-function countOf(state: State): number {
+export function countOf(state: State): number {
   const held = Object.values(state.inputs ?? {}).map((input) => input.block);
   return [...held, state.next?.block].reduce((sum, each) => sum + (each ? countOf(each) : 0), 1);
 }

@@ -40,7 +40,7 @@ export class Carried {
   private readonly others: {block: Block; from: Point}[];
   private readonly putBack: (() => void)[];
 
-  constructor(runs: readonly Block[][], held: Block) {
+  constructor(readonly runs: readonly Block[][], held: Block) {
     const first = runs.find((run) => run.includes(held)) ?? runs[0]!;
     this.putBack = runs.map(takeOut);
     this.head = first[0]!;

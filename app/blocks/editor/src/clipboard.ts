@@ -10,18 +10,18 @@ import {type BlockState, unwrapUnknown, wrapUnknown} from './unknown_blocks';
 /** Every text of ours begins so; `app/ui/blockly/bridge.py` looks for it. */
 const MARK = '{"nepStudio":';
 
-interface Copied {
+export interface Copied {
   nepStudio: 'block' | 'note';
   state: BlockState;
 }
 
 /** Several scripts, whose places beside each other stay. */
-interface CopiedBlocks {
+export interface CopiedBlocks {
   nepStudio: 'blocks';
   states: BlockState[];
 }
 
-type Item = Blockly.BlockSvg | Blockly.comments.RenderedWorkspaceComment;
+export type Item = Blockly.BlockSvg | Blockly.comments.RenderedWorkspaceComment;
 type Point = Blockly.utils.Coordinate;
 
 /** The computer's clipboard: the page itself may not read it. */
@@ -90,8 +90,9 @@ export function focusedItem(): Item | null {
   return node instanceof Blockly.comments.RenderedWorkspaceComment ? node : focusedBlock();
 }
 
-function stateOf(item: Item): Copied | null {
-  const data = item.toCopyData() as {blockState?: unknown; commentState?: unknown} | null;
+/** `stack`: with the blocks that hang below it. */
+export function stateOf(item: Item, stack = false): Copied | null {
+  const data = item.toCopyData(stack) as {blockState?: unknown; commentState?: unknown} | null;
   if (data?.blockState) return {nepStudio: 'block', state: unwrapUnknown(data.blockState as BlockState)};
   return data?.commentState ? {nepStudio: 'note', state: data.commentState as BlockState} : null;
 }
@@ -155,7 +156,7 @@ function beside(item: Item): Point {
   return new Blockly.utils.Coordinate(right + FROM_ORIGINAL, item.getRelativeToSurfaceXY().y);
 }
 
-function inOneStep<T>(change: () => T): T {
+export function inOneStep<T>(change: () => T): T {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
   try {
@@ -165,8 +166,8 @@ function inOneStep<T>(change: () => T): T {
   }
 }
 
-/** Makes it as one step that undo takes back, lets it lie free, and gives it the keys. */
-export function add(copied: Copied | CopiedBlocks, workspace: Blockly.WorkspaceSvg, wanted: Point): void {
+/** Makes it as one step that undo takes back, lets it lie free, and gives it the keys; none: it can't be made. */
+export function add(copied: Copied | CopiedBlocks, workspace: Blockly.WorkspaceSvg, wanted: Point): Item[] {
   const there = new Set<unknown>([...workspace.getTopBlocks(false), ...workspace.getTopComments()]);
   const {scrollX, scrollY} = workspace;
   workspace.hideChaff();
@@ -184,6 +185,7 @@ export function add(copied: Copied | CopiedBlocks, workspace: Blockly.WorkspaceS
   workspace.scroll(scrollX, scrollY);  // more on the canvas is no reason to move what is there
   if (made[0]) Blockly.getFocusManager().focusNode(made[0]);
   if (made.length > 1) selectionOf(workspace)?.choose(made.flatMap(stackOf));
+  return made;
 }
 
 function stackOf(top: Item): Blockly.BlockSvg[] {

@@ -2,6 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {Carried} from './carry';
 import {chosenWith, runsOf} from './selection';
+import {type Leaving, isOutside, leaving, leavingTogether} from './carrying';
 
 /** How near a gap has to be, in pixels of the screen; one that is offered already holds a little further. */
 const NEAR = 28;
@@ -13,6 +14,10 @@ export interface DragListener {
   overDelete(mouse: Blockly.utils.Coordinate | null): void;
   /** A block was let go on the canvas and joined nothing; where the mouse was on the page. */
   letGo(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void;
+  /** Where the mouse is with something in the hand while it is outside of the page; null: it is not. */
+  outside(mouse: Blockly.utils.Coordinate | null): void;
+  /** It was let go there, and went back to where it was. */
+  letGoOutside(what: Leaving, mouse: Blockly.utils.Coordinate): void;
 }
 
 const listeners = new WeakMap<Blockly.Workspace, DragListener>();
@@ -67,18 +72,32 @@ class Dragger extends Blockly.dragging.Dragger {
     if (event instanceof PointerEvent) this.holdWhereHeld(event, delta);
     super.onDrag(event, delta);
     this.carried?.move(this.pixelsToWorkspaceUnits(delta));
-    if (event instanceof PointerEvent) this.tellDelete(this.wouldDelete(event) ? mouseOf(event) : null);
+    if (!(event instanceof PointerEvent)) return;
+    this.tellDelete(this.wouldDelete(event) ? mouseOf(event) : null);
+    this.listener?.outside(this.leaves(mouseOf(event)) ? mouseOf(event) : null);
   }
 
   override onDragEnd(event?: PointerEvent | KeyboardEvent): void {
     const {draggable} = this;
     const mouse = event instanceof PointerEvent ? mouseOf(event) : null;
+    const {listener} = this;
+    const leaves = mouse && this.leaves(mouse) ? this.leaving(event as PointerEvent) : null;
     const joins = Boolean((draggable as unknown as Strategy).dragStrategy?.connectionCandidate);
     const loose = mouse && !joins && !this.wouldDelete(event as PointerEvent);
     const group = Blockly.Events.getGroup();
     const {carried, way} = this;
+    const free = leaves ? keepPlace(draggable) : null;
     super.onDragEnd(event);
     this.end();
+    free?.();
+    if (carried && leaves) {
+      Blockly.Events.setGroup(group || true);
+      carried.revert();
+      forgetSoon(draggable.workspace, Blockly.Events.getGroup());
+      Blockly.Events.setGroup(false);
+    }
+    if (leaves && mouse) listener?.letGoOutside(leaves, mouse);
+    if (leaves) return;
     if (carried) {
       Blockly.Events.setGroup(group);
       if (draggable.workspace && (draggable as Blockly.BlockSvg).isDeadOrDying()) carried.remove();
@@ -89,7 +108,7 @@ class Dragger extends Blockly.dragging.Dragger {
     if (!loose || !(draggable instanceof Blockly.BlockSvg) || draggable.isDeadOrDying()) return;
     const before = Blockly.Events.getGroup();
     Blockly.Events.setGroup(group);  // what follows from the drop is undone with it
-    listeners.get(draggable.workspace)?.letGo(draggable, mouse);
+    listener?.letGo(draggable, mouse);
     Blockly.Events.setGroup(before);
   }
 
@@ -104,6 +123,31 @@ class Dragger extends Blockly.dragging.Dragger {
     Blockly.Events.setGroup(group);
   }
 
+  /** Outside of the page nothing is deleted: it goes back to where it was, to the toolbox if it came from there. */
+  protected override wouldDeleteDraggable(mouse: Blockly.utils.Coordinate,
+    draggable: Blockly.IDraggable & Blockly.IDeletable): boolean {
+    return this.leaves(mouse) ? this.cameFrom > 0 : super.wouldDeleteDraggable(mouse, draggable);
+  }
+
+  protected override shouldReturnToStart(mouse: Blockly.utils.Coordinate, draggable: Blockly.IDraggable): boolean {
+    return this.leaves(mouse) ? !this.cameFrom : super.shouldReturnToStart(mouse, draggable);
+  }
+
+  /** Whether it is outside of the page there, as blocks and notes may be. */
+  private leaves(mouse: Blockly.utils.Coordinate): boolean {
+    return isOutside(mouse) && (this.draggable instanceof Blockly.BlockSvg ||
+      this.draggable instanceof Blockly.comments.RenderedWorkspaceComment);
+  }
+
+  private leaving({ctrlKey, metaKey}: PointerEvent): Leaving | null {
+    const copies = ctrlKey || metaKey;
+    return this.carried ? leavingTogether(this.carried.runs, copies) : leaving(this.draggable, this.cameFrom > 0, copies);
+  }
+
+  private get listener(): DragListener | undefined {
+    return listeners.get(this.draggable.workspace);
+  }
+
   /** The radius is the screen's, whatever the zoom. */
   private setRadius(): void {
     const {scale} = this.draggable.workspace;
@@ -114,6 +158,7 @@ class Dragger extends Blockly.dragging.Dragger {
   private end(): void {
     Object.assign(Blockly.config, USUAL);
     this.tellDelete(null);
+    this.listener?.outside(null);
   }
 
   /** The flyout has a zoom of its own: what is under the mouse there is under it here. */
@@ -134,7 +179,7 @@ class Dragger extends Blockly.dragging.Dragger {
 
   /** What comes from the flyout and goes back there was never on the canvas. */
   private tellDelete(mouse: Blockly.utils.Coordinate | null): void {
-    listeners.get(this.draggable.workspace)?.overDelete(this.cameFrom ? null : mouse);
+    this.listener?.overDelete(this.cameFrom ? null : mouse);
   }
 }
 
@@ -144,6 +189,13 @@ function forgetSoon(workspace: Blockly.WorkspaceSvg, group: string): void {
     const steps = workspace.getUndoStack();
     while (steps.length && steps[steps.length - 1]?.group === group) steps.pop();
   }));
+}
+
+/** Blockly moves what was let go onto the grid, some only after the next picture: not what is where it was. */
+function keepPlace(item: Blockly.IDraggable): () => void {
+  const kept = item as {snapToGrid?: () => void};
+  kept.snapToGrid = () => undefined;
+  return () => void Blockly.renderManagement.finishQueuedRenders().then(() => delete kept.snapToGrid);
 }
 
 function mouseOf(event: PointerEvent): Blockly.utils.Coordinate {

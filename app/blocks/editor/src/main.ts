@@ -4,6 +4,7 @@ import './blockly_patches';
 import './fields';
 import './focus_after_delete';
 import './mutators';
+import {Carrying} from './carrying';
 import {Clipboard} from './clipboard';
 import {type Begin, EmptyCanvas, Pointer, type Wanted} from './guidance';
 import {binButton} from './bin';
@@ -43,6 +44,9 @@ interface Bridge {
   tries(stack: string): void;
   pin(keeps: boolean): void;
   deleted(count: number): void;
+  carried(x: number, y: number, out: boolean): void;
+  dropped(x: number, y: number): void;
+  brought(count: number, how: string): void;
 }
 
 declare const QWebChannel: new (transport: unknown, done: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
@@ -53,6 +57,7 @@ class Editor {
   private readonly help = new HelpCard();
   private readonly clipboard: Clipboard;
   private readonly answer = new TryAnswer();
+  private readonly carrying: Carrying;
   private offered = '[]';
   private watched = '[]';
   private readonly find = new FindBar(() => this.shown.workspace);
@@ -61,6 +66,11 @@ class Editor {
 
   constructor(private readonly bridge: Bridge, pinned: boolean | null) {
     this.empty = new EmptyCanvas(() => this.shown.workspace, this.pointer, (what) => bridge.wants(what));
+    this.carrying = new Carrying({
+      carried: (x, y, out) => bridge.carried(x, y, out),
+      dropped: (x, y) => bridge.dropped(x, y),
+      brought: (count, how) => bridge.brought(count, how),
+    });
     const ofShown = (tab: Tab, tell: () => void) => {
       if (tab === this.tabs?.shown) tell();
     };
@@ -80,6 +90,8 @@ class Editor {
       },
       deleted: (tab, count) => ofShown(tab, () => bridge.deleted(count)),
       binned: (tab) => ofShown(tab, () => this.dressBin()),
+      outside: (mouse) => this.carrying.over(mouse),
+      letGoOutside: (tab, what, mouse) => this.carrying.letGo(tab, what, mouse),
     });
     this.tabs.setPinned(pinned);
     new ResizeObserver(() => this.tabs.resize()).observe(document.body);
@@ -143,6 +155,8 @@ class Editor {
     flush: (token: number) => this.bridge.flushed(token, this.shown.program.flush()),
     change: (state: Record<string, unknown>) => this.shown.change(state),
     undo: () => this.shown.program.undo(false),
+    bring: () => this.carrying.bring(this.shown),
+    giveBack: () => this.carrying.giveBack(),
     undelete: () => this.shown.bin.undoLast() && this.shown.program.undo(false),
     redo: () => this.shown.program.undo(true),
     zoom: (steps: number) => this.shown.workspace.zoomCenter(steps),

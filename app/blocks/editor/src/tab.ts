@@ -1,6 +1,7 @@
 // One behaviour in the page: a workspace of its own, with its undo, zoom, scroll position and open category.
 import * as Blockly from 'blockly/core';
 import {Bin} from './bin';
+import type {Leaving} from './carrying';
 import {CHECKER} from './checker';
 import {FieldChoice} from './choices';
 import {Culling} from './culling';
@@ -39,6 +40,10 @@ export interface TabListener {
   deleted(tab: Tab, count: number): void;
   /** There is another number of deletions in the bin. */
   binned(tab: Tab): void;
+  /** Something in the hand is outside of the page, there; null: it is not any more. */
+  outside(mouse: Blockly.utils.Coordinate | null): void;
+  /** It was let go there. */
+  letGoOutside(tab: Tab, what: Leaving, mouse: Blockly.utils.Coordinate): void;
 }
 
 export class Tab {
@@ -91,6 +96,8 @@ export class Tab {
     listenToDrags(this.workspace, {
       overDelete: (mouse) => this.bin.showHint(mouse),
       letGo: (block, mouse) => this.wrongDrops.explain(block, mouse),
+      outside: (mouse) => listener.outside(mouse),
+      letGoOutside: (what, mouse) => listener.letGoOutside(this, what, mouse),
     });
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.onFound = () => this.overlays.showLive();

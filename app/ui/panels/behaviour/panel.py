@@ -17,6 +17,7 @@ from app.core.documents.titles import told_apart
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.behaviour.carried_blocks import CarriedBlocks
 from app.ui.panels.behaviour.live_values import live_words
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.panels.behaviour.tab import TabFacts
@@ -58,6 +59,9 @@ class Editor(Protocol):
     try_asked: SignalInstance
     toolbox_pinned: SignalInstance
     blocks_deleted: SignalInstance
+    block_carried: SignalInstance
+    block_dropped: SignalInstance
+    blocks_brought: SignalInstance
 
     @property
     def is_ready(self) -> bool: ...
@@ -84,6 +88,8 @@ class Editor(Protocol):
     def undo(self) -> None: ...
     def edit(self, what: str) -> None: ...
     def undo_deletion(self) -> None: ...
+    def bring_blocks(self) -> None: ...
+    def give_blocks_back(self) -> None: ...
     def open_find(self) -> None: ...
     def open_search(self) -> None: ...
     def redo(self) -> None: ...
@@ -132,6 +138,7 @@ class BehaviourPanel(PanelWidget):
         self._offered: tuple[tuple[str, str], ...] = ()  # in the toolbox, while it is open
         self._watched: tuple[str, ...] = ()  # the variables whose values the page shows
         self._ticks = 0
+        self._carried: CarriedBlocks | None = None
 
     def replaces_title(self) -> QWidget:
         return self._bar
@@ -222,6 +229,9 @@ class BehaviourPanel(PanelWidget):
         editor.try_asked.connect(lambda stack: self.context.run(f"try:{stack}"))
         editor.toolbox_pinned.connect(self._keep_pinned)
         editor.blocks_deleted.connect(lambda count: self._deleted(editor, count))
+        self._carried = CarriedBlocks(
+            self.context, self.session, self._bar.tabs, editor, self.flush, self.show_current
+        )
         pinned: object = self.session.settings.get(PINNED, None)
         editor.set_toolbox_pinned(pinned if isinstance(pinned, bool) else None)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)

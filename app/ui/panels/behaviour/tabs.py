@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QPoint, QSize, Qt, Signal
 from PySide6.QtGui import QContextMenuEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
@@ -17,6 +17,8 @@ from nep.i18n import _
 SHORTEST = 76
 GAP = 4
 NAME_WIDTH = 180  # to edit a name in
+NEW = "+"
+"""In the place of a tab's key: the button for a new one."""
 
 
 class BehaviourTabs(QWidget):
@@ -78,6 +80,25 @@ class BehaviourTabs(QWidget):
             tab.rename_wanted.connect(lambda: self.edit(key))
             tab.show()
         return self.tabs[key]
+
+    # -- blocks from the page ---------------------------------------------------------------------
+
+    def target_at(self, place: QPoint) -> str:
+        """The key of the tab at that place of the screen, `NEW` for "+", "" where there is neither."""
+        if not self.isVisible():
+            return ""
+        here = self.mapFromGlobal(place)
+        if self.add.isVisible() and self.add.geometry().contains(here):
+            return NEW
+        if not self._room.geometry().contains(here):
+            return ""
+        return next((key for key, tab in self.tabs.items() if tab.geometry().contains(here)), "")
+
+    def aim(self, key: str) -> None:
+        """Put a ring round this tab, or "+" (`NEW`): what is in the hand goes there; "" takes it away."""
+        for each, tab in self.tabs.items():
+            tab.set_aimed(each == key)
+        self.add.set_aimed(key == NEW)
 
     # -- another name -----------------------------------------------------------------------------
 

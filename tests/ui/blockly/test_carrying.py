@@ -1,0 +1,198 @@
+"""Blocks and notes that are dragged out of the page: what the window hears, and how another tab gets them."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from tests.ui.blockly_person import START, WAIT_MS, Person, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+WAITS = {
+    "type": "control_wait",
+    "id": "one",
+    "x": 280,
+    "y": 224,
+    "next": {
+        "block": {"type": "control_wait", "id": "two", "next": {"block": {"type": "control_wait", "id": "3"}}}
+    },
+}
+NOTE = {"height": 100, "width": 160, "id": "note", "x": 420, "y": 56, "text": "Look"}
+TWO = ".nepTab:not([hidden]) [data-id=two] > .blocklyPath"
+SHOWN = "document.querySelector('.nepTab:not([hidden])')"
+ABOVE, LEFT = QPoint(500, -40), QPoint(-30, 300)
+
+
+class Told:
+    def __init__(self, view) -> None:
+        self.places: list[QPoint | None] = []
+        self.dropped: list[QPoint] = []
+        self.brought: list[tuple[int, str]] = []
+        self.deleted: list[int] = []
+        view.block_carried.connect(self.places.append)
+        view.block_dropped.connect(self.dropped.append)
+        view.blocks_brought.connect(lambda *each: self.brought.append(each))
+        view.blocks_deleted.connect(self.deleted.append)
+
+
+@pytest.fixture
+def told(view) -> Told:
+    return Told(view)
+
+
+@pytest.fixture
+def them(view, person) -> Person:
+    """Tab "a" is shown, "b" was shown before."""
+    view.show_tab("b", workspace(START))
+    person_there = person(state=workspace(START))
+    view.show_tab("a", {**workspace(START, WAITS), "workspaceComments": [NOTE]})
+    person_there.wait_for(f"!!{SHOWN}.querySelector('[data-id=two]')")
+    return person_there
+
+
+def carry(
+    them: Person, told: Told, selector: str, to: QPoint, modifiers=Qt.KeyboardModifier.NoModifier
+) -> None:
+    box = them.box(selector)
+    start = QPoint(
+        round(box["left"]) + (60 if "Comment" in selector else 12), round(box["top"] + box["bottom"]) // 2
+    )
+    QTest.mouseMove(them.target, start)
+    QTest.mousePress(them.target, Qt.MouseButton.LeftButton, pos=start)
+    them.move(start, start + QPoint(60, 30))
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    them.move(start + QPoint(60, 30), to)
+    them.until(lambda: told.places[-1:] == [them.view.mapToGlobal(to)], "the window knows where it is")
+    QTest.mouseRelease(them.target, Qt.MouseButton.LeftButton, modifiers, to)
+    them.wait_for("!!document.querySelector('.blocklyDragging')", False)
+
+
+def chain(top: dict) -> list[str]:
+    below = top.get("next", {}).get("block")
+    return [top["type"].rpartition("_")[2], *(chain(below) if below else [])]
+
+
+def chains(them: Person) -> list[list[str]]:
+    return [chain(each) for each in them.tops()]
+
+
+def bring(qtbot, view, told: Told, key: str = "b") -> None:
+    qtbot.waitUntil(lambda: bool(told.dropped), timeout=WAIT_MS)
+    view.show_tab(key, {})
+    view.bring_blocks()
+    qtbot.waitUntil(lambda: bool(told.brought), timeout=WAIT_MS)
+
+
+BEFORE = [["started"], ["wait", "wait", "wait"]]
+
+
+@pytest.mark.parametrize("to", [ABOVE, LEFT])
+def test_what_is_let_go_outside_is_where_it_was_and_no_edit(qtbot, view, them, told, to) -> None:
+    before, changes = them.newest(), []
+    view.changed.connect(lambda key, _program: changes.append(key))
+    carry(them, told, TWO, to)
+    qtbot.waitUntil(lambda: bool(told.dropped), timeout=WAIT_MS)
+    assert told.dropped == [view.mapToGlobal(to)]
+    assert told.places[-1] is None, "the ring goes"
+    assert them.newest() == before
+    assert (changes, told.deleted) == ([], [])
+    assert them.ask("document.querySelector('.nepDropHere').hidden") is True
+
+
+def test_the_window_is_told_where_it_is_outside_and_when_it_is_back(qtbot, view, them, told) -> None:
+    start = them.hold(TWO)
+    them.move(start, start + QPoint(60, 30))
+    them.move(start + QPoint(60, 30), ABOVE)
+    qtbot.waitUntil(lambda: told.places[-1:] == [view.mapToGlobal(ABOVE)], timeout=WAIT_MS)
+    them.move(ABOVE, QPoint(600, 300))
+    qtbot.waitUntil(lambda: told.places[-1] is None, timeout=WAIT_MS)
+    them.drop(QPoint(600, 300))
+    qtbot.waitUntil(lambda: chains(them) == [["started"], ["wait"], ["wait", "wait"]], timeout=WAIT_MS)
+    assert told.dropped == []
+
+
+def test_it_moves_with_what_hangs_below_as_one_step_in_each(qtbot, view, them, told) -> None:
+    carry(them, told, TWO, ABOVE)
+    bring(qtbot, view, told)
+    assert told.brought == [(2, "moved")]
+    assert chains(them) == [["started"], ["wait", "wait"]]
+    assert len(them.ask(f"[...{SHOWN}.querySelectorAll('.blocklySelected')].map(e => 1)")) == 1
+    view.undo()
+    qtbot.waitUntil(lambda: chains(them) == [["started"]], timeout=WAIT_MS)
+    view.show_tab("a", {})
+    them.until(lambda: chains(them) == [["started"], ["wait"]], "it is gone there")
+    view.undo()
+    qtbot.waitUntil(lambda: chains(them) == BEFORE, timeout=WAIT_MS)
+    assert told.deleted == [], "it is no deletion"
+    assert them.ask("document.querySelector('.nepBin').title") == "Deleted blocks"
+
+
+@pytest.mark.parametrize("edited", [False, True])
+def test_undo_of_the_toast_takes_it_back_in_both(qtbot, view, them, told, edited: bool) -> None:
+    carry(them, told, TWO, ABOVE)
+    bring(qtbot, view, told)
+    rest = [["started"]]
+    if edited:
+        rest = []
+        them.click(".nepTab:not([hidden]) [data-id=start] > .blocklyPath", dy=30)
+        them.press(Qt.Key.Key_Delete)
+        them.until(lambda: chains(them) == [["wait", "wait"]], "another edit came later")
+    view.show_tab("a", {})
+    view.give_blocks_back()
+    qtbot.waitUntil(lambda: chains(them) == BEFORE, timeout=WAIT_MS)
+    view.show_tab("b", {})
+    qtbot.waitUntil(lambda: chains(them) == rest, timeout=WAIT_MS)
+
+
+def test_several_chosen_ones_go_together_or_stay_where_they_were(qtbot, view, them, told) -> None:
+    before = them.newest()
+    path = ".nepTab:not([hidden]) [data-id='{}'] > .blocklyPath"
+    them.click(path.format("one"))
+    box = them.box(path.format("3"))
+    at = QPoint(round(box["left"]) + 12, round(box["top"]) + 18)
+    QTest.mouseClick(them.target, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.ControlModifier, at)
+    them.wait_for("document.querySelectorAll('.nepTab:not([hidden]) .nepChosen').length", 2)
+    carry(them, told, path.format("one"), ABOVE)
+    qtbot.waitUntil(lambda: bool(told.dropped), timeout=WAIT_MS)
+    assert them.newest() == before
+    bring(qtbot, view, told)
+    assert told.brought == [(2, "moved")]
+    assert chains(them) == [["started"], ["wait"], ["wait"]]
+    view.show_tab("a", {})
+    them.until(lambda: chains(them) == [["started"], ["wait"]], "the script closes behind them")
+    view.give_blocks_back()
+    them.until(lambda: chains(them) == BEFORE, "they are in their script again")
+    view.show_tab("b", {})
+    them.until(lambda: chains(them) == [["started"]], "and gone there")
+    assert told.deleted == []
+
+
+def test_with_ctrl_a_copy_goes(qtbot, view, them, told) -> None:
+    carry(them, told, TWO, ABOVE, Qt.KeyboardModifier.ControlModifier)
+    bring(qtbot, view, told)
+    assert told.brought == [(2, "copied")]
+    assert chains(them) == [["started"], ["wait", "wait"]]
+    view.show_tab("a", {})
+    qtbot.waitUntil(lambda: chains(them) == BEFORE, timeout=WAIT_MS)
+
+
+def test_a_block_of_the_toolbox_goes_straight_to_another_tab(qtbot, view, them, told) -> None:
+    them.open_category("Control")
+    carry(them, told, ".nepTab:not([hidden]) .nepCategory .control_wait", ABOVE)
+    bring(qtbot, view, told)
+    assert told.brought == [(1, "added")]
+    assert chains(them) == [["started"], ["wait"]]
+    view.show_tab("a", {})
+    qtbot.waitUntil(lambda: chains(them) == BEFORE, timeout=WAIT_MS)
+
+
+def test_a_note_moves_too(qtbot, view, them, told) -> None:
+    carry(them, told, ".nepTab:not([hidden]) .blocklyCommentTopbar", ABOVE)
+    bring(qtbot, view, told)
+    assert told.brought == [(0, "moved")]
+    assert [each["text"] for each in them.newest()["workspaceComments"]] == ["Look"]
+    view.show_tab("a", {})
+    qtbot.waitUntil(lambda: "workspaceComments" not in them.newest(), timeout=WAIT_MS)
