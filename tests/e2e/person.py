@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from tests.e2e.waiting import until
-from tests.e2e.x11 import Picture, Screen
+from tests.e2e.x11 import WHEEL_DOWN, WHEEL_UP, Picture, Screen
 
 STEP_S = 40.0
 RUNNING = (0xFF, 0xB3, 0x00)  # the token "running" of the light theme
@@ -154,13 +154,29 @@ class Person:
     def open_category(self, name: str) -> None:
         """Open a category of the toolbox and wait for its blocks."""
         self.find(kind="QWebEngineView")
-        labels = "[...document.querySelectorAll('.blocklyToolboxCategoryLabel')]"
+        shown = "document.querySelector('.nepTab:not([hidden]) .blocklyToolbox')"
+        labels = f"[...({shown}?.querySelectorAll('.blocklyToolboxCategoryLabel') ?? [])]"
         until(lambda: name in (self.page(f"{labels}.map(e => e.textContent)") or []), f"no category {name}")
-        rect = self.page(
-            f"(r => [r.left, r.top, r.width, r.height])"
-            f"({labels}.find(e => e.textContent == {json.dumps(name)}).getBoundingClientRect())"
-        )
         view = self.find(kind="QWebEngineView")["rect"]
+        before: list[object] = []
+
+        def in_sight() -> list[float] | None:
+            """Where the category is, once the wheel has brought it into the toolbox and it stands still."""
+            rect, box = self.page(
+                f"[{labels}.find(e => e.textContent == {json.dumps(name)}), {shown}]"
+                ".map(e => (r => [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
+            )
+            x, y = view[0] + box[0] + box[2] / 2, view[1] + box[1] + box[3] / 2
+            still, before[:] = before == [rect], [rect]
+            if rect[1] < box[1]:
+                self.screen.click(x, y, WHEEL_UP)
+            elif rect[1] + rect[3] > box[1] + box[3]:
+                self.screen.click(x, y, WHEEL_DOWN)
+            elif still:
+                return list(rect)
+            return None
+
+        rect = until(in_sight, f"{name} does not come into sight")
         self.screen.click(view[0] + rect[0] + rect[2] / 2, view[1] + rect[1] + rect[3] / 2)
         self.spot(".blocklyFlyout .blocklyDraggable")
 

@@ -13,6 +13,7 @@ import numpy as np
 
 Picture = np.ndarray
 LEFT, RIGHT = 1, 3
+WHEEL_UP, WHEEL_DOWN = 4, 5
 ALL_PLANES = ctypes.c_ulong(-1).value
 Z_PIXMAP = 2
 KEYSYMS = {
