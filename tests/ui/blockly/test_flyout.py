@@ -190,3 +190,17 @@ def test_a_new_variable_is_offered_at_once(qtbot, opened, width):
     assert "steps" in them.ask("document.querySelector('.blocklyFlyout .variables_set').textContent")
     them.view.undo()
     them.wait_for(f"{gets}.join().includes('steps')", False)
+
+
+def test_a_block_that_is_brought_back_leaves_nothing_to_undo(opened):
+    them = opened(WIDE)
+    told: list[tuple[bool, bool]] = []
+    them.view.history_changed.connect(lambda *history: told.append(history))
+    them.open_category("Movement")
+    start = them.hold(TURN)
+    them.move(start, CANVAS)
+    them.until(lambda: told[-1:] == [(True, False)], "it is on the canvas")
+    them.move(CANVAS, start)
+    them.drop(start)
+    them.until(lambda: told[-1:] == [(False, False)], "there is nothing to undo")
+    assert [top["id"] for top in them.tops()] == ["start"]

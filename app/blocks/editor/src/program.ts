@@ -180,6 +180,7 @@ export class Program {
       this.listener.selected((event as Blockly.Events.Selected).newElementId ?? '');
     }
     if (event.isUiEvent || this.loading || event.type === Blockly.Events.FINISHED_LOADING) return;
+    if (event.type === Blockly.Events.BLOCK_DELETE) this.forgetWhatCameAndWent(event.group);
     this.tellHistory();
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => {
@@ -187,6 +188,20 @@ export class Program {
       if (this.workspace.isDragging()) this.onEvent(event);
       else this.flush();
     }, QUIET_MS);
+  }
+
+  /** A block that was dragged out of the toolbox and back into it has changed nothing: there is nothing to undo. */
+  private forgetWhatCameAndWent(group: string): void {
+    const stack = this.workspace.getUndoStack();
+    const first = group ? stack.findIndex((each) => each.group === group) : -1;
+    if (first < 0) return;
+    const step = stack.slice(first) as Blockly.Events.BlockBase[];
+    const ids = (type: string) => step.filter((each) => each.type === type)
+      .flatMap((each) => (each as Blockly.Events.BlockCreate | Blockly.Events.BlockDelete).ids ?? []);
+    const came = new Set(ids(Blockly.Events.BLOCK_CREATE));
+    const went = new Set(ids(Blockly.Events.BLOCK_DELETE));
+    const isNothing = step.every((each) => each.group === group && came.has(each.blockId ?? ''));
+    if (isNothing && [...came].every((id) => went.has(id))) stack.splice(first);
   }
 
   /** Tells what can be undone; `again`: also when that was told before. */
