@@ -30,7 +30,8 @@ class BlocklyBridge(QObject):
     went_wrong = Signal(str)
     try_asked = Signal(str)  # a stack to be tried, as JSON
     block_focused = Signal(bool)  # whether the keys go to a block
-    command_wanted = Signal(str)  # a command of the window about variables
+    command_wanted = Signal(str)  # a command of the window about variables or the picture of the blocks
+    drawn = Signal(int, str)  # token of a picture, the picture; "" for none
     values_watched = Signal(str)  # the variables whose values the page shows, as JSON: [id, …]
     sensors_offered = Signal(str)  # the sensors in the open toolbox as JSON: [[robot, sensor], …]
     wanted = Signal(str)  # what a button of the empty canvas is for: "robot", "examples"
@@ -72,6 +73,10 @@ class BlocklyBridge(QObject):
     @Slot(int, str)
     def flushed(self, token: int, workspace: str) -> None:
         self.answered.emit(token, workspace)
+
+    @Slot(int, str)
+    def pictured(self, token: int, data: str) -> None:
+        self.drawn.emit(token, data)
 
     @Slot(str)
     def tries(self, stack: str) -> None:
@@ -118,7 +123,7 @@ class BlocklyBridge(QObject):
 
     @Slot(str)
     def command(self, name: str) -> None:
-        if name.startswith("variable."):
+        if name.startswith(("variable.", "picture.")):
             self.command_wanted.emit(name)
 
     @Slot(str)

@@ -7,6 +7,7 @@ shown) or die (its process can be killed): it is given everything again and the 
 from __future__ import annotations
 
 import json
+from base64 import b64decode
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from PySide6.QtCore import QPoint, Signal
@@ -50,11 +51,13 @@ class BlocklyView(BlocklyHost):
         self._values: Json = {}
         self._first_step: Json | None = None
         self._waiting: dict[int, Callable[[WorkspaceJson], None]] = {}
+        self._pictures: dict[int, Callable[[bytes], None]] = {}
         self._tokens = 0
         self._bridge.edited.connect(self._edited)
         self._bridge.undo_changed.connect(self.history_changed)
         self._bridge.block_chosen.connect(self.block_selected)
         self._bridge.answered.connect(self._answered)
+        self._bridge.drawn.connect(self._drawn)
         self._bridge.command_wanted.connect(self.command_wanted)
         self._bridge.values_watched.connect(lambda text: self.values_watched.emit(_texts(text)))
         self._bridge.wanted.connect(self.wanted)
@@ -124,6 +127,18 @@ class BlocklyView(BlocklyHost):
         self._tokens += 1
         self._waiting[self._tokens] = done
         self._bridge.tell("flush", self._tokens)
+
+    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+        """Make a "png" or "svg" of all blocks of the shown tab, on white or on nothing.
+
+        `done` is called once, with b"" when there is nothing to be seen or no page.
+        """
+        if not self._up:
+            done(b"")
+            return
+        self._tokens += 1
+        self._pictures[self._tokens] = done
+        self._bridge.tell("picture", {"token": self._tokens, "kind": kind, "white": white})
 
     def set_toolbox_pinned(self, pinned: bool | None) -> None:
         """Let the blocks of a category stay open, or close after each use; None: as the room allows."""
@@ -294,6 +309,9 @@ class BlocklyView(BlocklyHost):
         self._send_tab()
 
     def _page_went(self) -> None:
+        pictures, self._pictures = self._pictures, {}
+        for without in pictures.values():
+            without(b"")
         waiting, self._waiting = self._waiting, {}
         for done in waiting.values():
             done(self._tabs.shown.program)
@@ -327,6 +345,11 @@ class BlocklyView(BlocklyHost):
         if tab is not None:
             tab.program = WorkspaceJson(workspace)
             self.changed.emit(key, tab.program)
+
+    def _drawn(self, token: int, data: str) -> None:
+        done = self._pictures.pop(token, None)
+        if done is not None:
+            done(b64decode(data.partition(",")[2]) if data.startswith("data:") else data.encode())
 
     def _answered(self, token: int, workspace: str) -> None:
         done = self._waiting.pop(token, None)

@@ -12,7 +12,8 @@ import {frameButton} from './frame';
 import {HelpCard, focusedBlock, registerHelpMenu} from './help';
 import {iconElement} from './icons';
 import {useClipboard, useOwnKeys} from './keys';
-import {registerMenu, trimMenu} from './menu';
+import {registerMenu, registerPictureMenu, trimMenu} from './menu';
+import {asPng, pictureOf} from './picture';
 import {FindBar} from './search';
 import {followModality, setKeyboardLed} from './modality';
 import {type Tab} from './tab';
@@ -33,6 +34,7 @@ interface Bridge {
   history(canUndo: boolean, canRedo: boolean): void;
   selected(id: string): void;
   flushed(token: number, json: string): void;
+  pictured(token: number, data: string): void;
   failed(sentence: string): void;
   on_block(has: boolean): void;
   offers(sensors: string): void;
@@ -64,7 +66,7 @@ class Editor {
   private readonly pointer = new Pointer(() => this.shown.workspace);
   private readonly empty: EmptyCanvas;
 
-  constructor(private readonly bridge: Bridge, pinned: boolean | null) {
+  constructor(private readonly bridge: Bridge, pinned: boolean | null, private theme: {tokens: Tokens; dark: boolean}) {
     this.empty = new EmptyCanvas(() => this.shown.workspace, this.pointer, (what) => bridge.wants(what));
     this.carrying = new Carrying({
       carried: (x, y, out) => bridge.carried(x, y, out),
@@ -103,6 +105,7 @@ class Editor {
     this.clipboard = new Clipboard({write: (text) => bridge.copy(text), read: () => bridge.copied()});
     useClipboard(this.clipboard);
     registerMenu(this.clipboard);
+    registerPictureMenu((command) => bridge.command(command));
     // Keys that come while nothing in the page has them, as after a change of tabs, are the canvas's.
     document.addEventListener('keydown', (event) => {
       if (document.activeElement !== document.body || !(event.ctrlKey || event.metaKey)) return;
@@ -153,6 +156,7 @@ class Editor {
     alarms: (alarms: Record<string, Alarm>) => showAlarms(alarms),
     live: (it: {values: Record<string, string>; old: string[]}) => this.shown.overlays.setLive(it.values, it.old),
     flush: (token: number) => this.bridge.flushed(token, this.shown.program.flush()),
+    picture: (it: WantedPicture) => void this.takePicture(it),
     change: (state: Record<string, unknown>) => this.shown.change(state),
     undo: () => this.shown.program.undo(false),
     bring: () => this.carrying.bring(this.shown),
@@ -210,7 +214,23 @@ class Editor {
     if (offered !== this.offered) this.bridge.offers(this.offered = offered);
   }
 
+  /** The window gets "" when there is nothing to be seen. */
+  private async takePicture({token, kind, white}: WantedPicture): Promise<void> {
+    let data = '';
+    try {
+      const {tokens, dark} = this.theme;
+      if (dark) this.setTheme(tokens, false);  // nobody sees it: all is as before when the page is painted
+      const taking = pictureOf(this.shown.workspace, white);
+      if (dark) this.setTheme(tokens, true);
+      const picture = await taking;
+      if (picture) data = kind === 'svg' ? picture.svg : await asPng(picture);
+    } finally {
+      this.bridge.pictured(token, data);
+    }
+  }
+
   private setTheme(tokens: Tokens, dark: boolean): void {
+    this.theme = {tokens, dark};
     useTokens(tokens, dark);
     setCssVariables(dark);
     this.tabs.themeChanged();
@@ -250,6 +270,12 @@ class Editor {
   }
 }
 
+interface WantedPicture {
+  token: number;
+  kind: 'png' | 'svg';
+  white: boolean;
+}
+
 interface Beginning {
   language: string;
   words: Record<string, string>;
@@ -281,7 +307,7 @@ async function start(bridge: Bridge): Promise<void> {
   useOwnKeys();
   // Blockly measures text once; the font has to be there before.
   await Promise.allSettled([document.fonts.load('600 15px Inter'), document.fonts.load('500 14px Inter')]);
-  const editor = new Editor(bridge, beginning.pinned);
+  const editor = new Editor(bridge, beginning.pinned, beginning.theme);
   followModality();
   bridge.told.connect((name, payload) => {
     try {

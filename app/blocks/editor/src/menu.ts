@@ -173,6 +173,14 @@ export function registerMenu(clipboard: Clipboard): void {
     when: () => true, run: (it) => it.comment && step(() => it.comment!.dispose())});
 }
 
+export function registerPictureMenu(command: (name: string) => void): void {
+  const canvas = (entry: Omit<Entry, 'when'>) => add(ScopeType.WORKSPACE,
+    {...entry, when: ({workspace}) => (workspace?.getTopBlocks(false).length ?? 0) > 0});
+  line(ScopeType.WORKSPACE, 60);
+  canvas({id: 'nepPicture', weight: 61, icon: 'image-down', words: t('Save a picture'), run: () => command('picture.save')});
+  canvas({id: 'nepCopyPicture', weight: 62, icon: 'image', words: t('Copy as a picture'), run: () => command('picture.copy')});
+}
+
 // ---- how a block is
 
 /** A block that is off is skipped; with the block that starts a script, all of the script. */

@@ -1,0 +1,184 @@
+// A picture of all blocks of a behaviour, also of those outside the view: SVG that needs nothing else (looks and fonts
+// are in it), or PNG made of that. The canvas that is seen stays as it is; states of a run and outlines are left out.
+import * as Blockly from 'blockly/core';
+import {keepTyped} from './notes';
+
+const SVG = 'http://www.w3.org/2000/svg';
+/** Around the blocks; the signs at their left are 20 wide. */
+const MARGIN = 32;
+const SCALE = 2;
+/** What Chromium can draw at once: on a side, and in all. */
+const MOST_SIDE = 16_000;
+const MOST_PIXELS = 120_000_000;
+
+/** The looks that make a difference, with what they are where nobody says anything: that needs no words. */
+const LOOKS: Readonly<Record<string, string>> = {
+  'fill': 'rgb(0, 0, 0)', 'fill-opacity': '1', 'fill-rule': 'nonzero', 'stroke': 'none', 'stroke-width': '1px', 'stroke-opacity': '1',
+  'stroke-linecap': 'butt', 'stroke-linejoin': 'miter', 'stroke-dasharray': 'none', 'opacity': '1', 'paint-order': 'normal',
+};
+const LETTERS: readonly string[] = ['font-family', 'font-size', 'font-weight', 'text-anchor', 'dominant-baseline'];
+const SHAPES: readonly string[] = ['d', 'x', 'y', 'width', 'height', 'rx', 'ry', 'cx', 'cy', 'r', 'x1', 'y1', 'x2', 'y2', 'points',
+  'transform', 'href', 'viewBox', 'dy', 'dx'];
+const LEFT_OUT = '.nepState, .nepSelection, .nepTryHandle, .nepNoteButton, .blocklyInsertionMarker, .blocklyHighlightedConnectionPath, ' +
+  '.blocklyResizeHandle, .blocklyFoldoutIcon, .blocklyDeleteIcon, .blocklyConnectionIndicator, title';
+
+export interface Picture {
+  svg: string;
+  width: number;
+  height: number;
+}
+
+/** null: there is nothing to be seen. Call it while the page has the light theme. */
+export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean): Promise<Picture | null> {
+  keepTyped();
+  Blockly.renderManagement.triggerQueuedRenders();
+  const items = [...workspace.getTopBlocks(true), ...workspace.getTopComments()] as (Blockly.IBoundedElement & {
+    getSvgRoot?(): SVGElement; view?: {getSvgRoot(): SVGElement};
+  })[];
+  const boxes = items.map((each) => each.getBoundingRectangle());
+  const patterns = new Map<string, SVGElement>();
+  const drawn = items.map((each) => copy(each.getSvgRoot?.() ?? each.view!.getSvgRoot(), patterns));
+  for (const sheet of workspace.getBubbleCanvas().querySelectorAll<SVGGElement>('.nepNote')) {
+    const {x, y, width, height} = sheet.getBBox();
+    const {e, f} = sheet.transform.baseVal.consolidate()?.matrix ?? {e: 0, f: 0};
+    boxes.push(new Blockly.utils.Rect(y + f, y + f + height, x + e, x + e + width));
+    drawn.push(copy(sheet, patterns));
+  }
+  if (!boxes.length) return null;
+  const left = Math.floor(Math.min(...boxes.map((box) => box.left)) - MARGIN);
+  const top = Math.floor(Math.min(...boxes.map((box) => box.top)) - MARGIN);
+  const width = Math.ceil(Math.max(...boxes.map((box) => box.right)) + MARGIN) - left;
+  const height = Math.ceil(Math.max(...boxes.map((box) => box.bottom)) + MARGIN) - top;
+  const made = document.createElementNS(SVG, 'svg');
+  for (const [name, value] of Object.entries({width, height, viewBox: `${left} ${top} ${width} ${height}`})) made.setAttribute(name, `${value}`);
+  const looks = document.createElementNS(SVG, 'style');
+  const weights = new Set(drawn.flatMap((each) => [...each?.querySelectorAll('text') ?? []].map((text) => text.getAttribute('font-weight'))));
+  const defs = document.createElementNS(SVG, 'defs');
+  defs.append(...patterns.values());
+  made.append(looks, defs);
+  if (white) {
+    const ground = document.createElementNS(SVG, 'rect');
+    for (const [name, value] of Object.entries({x: left, y: top, width, height, fill: '#ffffff'})) ground.setAttribute(name, `${value}`);
+    made.append(ground);
+  }
+  made.append(...drawn.filter((each) => each !== null));
+  looks.textContent = (await Promise.all([...weights].map(fontFace))).join('\n');
+  return {svg: new XMLSerializer().serializeToString(made), width, height};
+}
+
+/** As a `data:` URL of a PNG, twice as large as on the screen or as large as can be. */
+export async function asPng({svg, width, height}: Picture): Promise<string> {
+  const scale = Math.min(SCALE, MOST_SIDE / width, MOST_SIDE / height, Math.sqrt(MOST_PIXELS / (width * height)));
+  const image = new Image(width, height);
+  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`;
+  await image.decode();
+  const canvas = document.createElement('canvas');
+  [canvas.width, canvas.height] = [Math.round(width * scale), Math.round(height * scale)];
+  canvas.getContext('2d')!.drawImage(image, 0, 0, canvas.width, canvas.height);
+  return canvas.toDataURL('image/png');
+}
+
+/** The same shapes with their looks written on them; null for what is not seen. */
+function copy(source: Element, patterns: Map<string, SVGElement>): SVGElement | null {
+  if (source.matches(LEFT_OUT)) return null;
+  const style = getComputedStyle(source);
+  if (style.display === 'none' || style.visibility === 'hidden' || style.opacity === '0') return null;
+  if (source.localName === 'foreignObject') return wordsOf(source);
+  const made = document.createElementNS(SVG, source.localName);
+  for (const name of SHAPES) {
+    const value = source.getAttribute(name);
+    if (value !== null) made.setAttribute(name, value);
+  }
+  if (source instanceof SVGGElement) {
+    if (style.opacity !== '1') made.setAttribute('opacity', style.opacity);
+  } else writeLooks(source, style, made, patterns);
+  for (const child of source.childNodes) {
+    if (child instanceof Element) {
+      const inner = copy(child, patterns);
+      if (inner) made.append(inner);
+    } else if (child instanceof Text && (source.localName === 'text' || source.localName === 'tspan')) {
+      made.append(child.data);
+    }
+  }
+  return made;
+}
+
+function writeLooks(source: Element, style: CSSStyleDeclaration, made: SVGElement, patterns: Map<string, SVGElement>): void {
+  for (const [name, usual] of Object.entries(LOOKS)) {
+    const value = style.getPropertyValue(name);
+    if (value && value !== usual) made.setAttribute(name, value);
+  }
+  if (source.localName === 'text') for (const name of LETTERS) made.setAttribute(name, style.getPropertyValue(name));
+  const id = /url\("?#([^")]+)"?\)/.exec(style.fill)?.[1];
+  if (!id) return;
+  made.setAttribute('fill', `url(#${id})`);
+  const pattern = document.getElementById(id);
+  if (!pattern || patterns.has(id)) return;
+  const kept = pattern.cloneNode(true) as SVGElement;
+  [...pattern.querySelectorAll('*')].forEach((each, at) => {
+    const looks = getComputedStyle(each);
+    const mine = kept.querySelectorAll('*')[at];
+    for (const name of ['fill', 'stroke']) mine?.setAttribute(name, looks.getPropertyValue(name));
+  });
+  patterns.set(id, kept);
+}
+
+/** The words of a note as lines of text: other programs show no fields of a page. */
+function wordsOf(source: Element): SVGElement | null {
+  const area = source.querySelector('textarea');
+  if (!area?.value) return null;
+  const style = getComputedStyle(area);
+  const size = parseFloat(style.fontSize);
+  const [x, y] = ['x', 'y'].map((name) => parseFloat(source.getAttribute(name) ?? '0') || 0) as [number, number];
+  const [width, height] = ['width', 'height'].map((name) => parseFloat(source.getAttribute(name) ?? '0') || 0) as [number, number];
+  const inset = parseFloat(style.paddingLeft) || 8;
+  const rise = parseFloat(style.paddingTop) || 0;
+  const each = parseFloat(style.lineHeight) || size * 1.4;
+  const made = document.createElementNS(SVG, 'text');
+  for (const name of ['font-family', 'font-size', 'font-weight'] as const) made.setAttribute(name, style.getPropertyValue(name));
+  made.setAttribute('fill', style.color);
+  const lines = wrapped(area.value, width - 2 * inset, `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`);
+  const room = Math.max(1, Math.floor((height - rise) / each));
+  lines.slice(0, room).forEach((line, at) => {
+    const part = document.createElementNS(SVG, 'tspan');
+    part.setAttribute('x', `${x + inset}`);
+    part.setAttribute('y', `${y + rise + size + at * each}`);
+    part.textContent = at === room - 1 && lines.length > room ? `${line} …` : line;
+    made.append(part);
+  });
+  return made;
+}
+
+function wrapped(words: string, width: number, font: string): string[] {
+  const pen = document.createElement('canvas').getContext('2d')!;
+  pen.font = font;
+  const lines: string[] = [];
+  for (const paragraph of words.split('\n')) {
+    let line = '';
+    for (const word of paragraph.split(' ')) {
+      const longer = line ? `${line} ${word}` : word;
+      if (line && pen.measureText(longer).width > width) {
+        lines.push(line);
+        line = word;
+      } else line = longer;
+    }
+    lines.push(line);
+  }
+  return lines;
+}
+
+const FONTS: Readonly<Record<string, string>> = {'400': 'Regular', '500': 'Medium', '600': 'SemiBold', '700': 'Bold'};
+
+/** The font itself, so that the picture looks the same where it is not installed. */
+async function fontFace(weight: string | null): Promise<string> {
+  const file = FONTS[weight ?? ''];
+  if (!file) return '';
+  const answer = await fetch(`fonts/Inter-${file}.otf`);
+  const data = await new Promise<string>((done, failed) => {
+    const reader = new FileReader();
+    reader.onload = () => done(String(reader.result));
+    reader.onerror = () => failed(reader.error ?? new Error('a font cannot be read'));
+    void answer.blob().then((blob) => reader.readAsDataURL(blob), failed);
+  });
+  return `@font-face { font-family: Inter; font-weight: ${weight}; src: url(${data}); }`;
+}

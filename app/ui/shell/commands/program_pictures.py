@@ -1,0 +1,97 @@
+"""Pictures of the blocks: saved as PNG or SVG, or copied."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from PySide6.QtGui import QGuiApplication, QImage
+from PySide6.QtWidgets import QFileDialog
+
+from app.core.session import Session
+from app.core.storage.atomic_file import write_atomically
+from app.core.storage.settings import kept_folder
+from app.ui.shell.commands.shell import Shell
+from app.ui.widgets.file_dialogs import show_free
+from nep.i18n import _
+
+
+@runtime_checkable
+class SupportsPicture(Protocol):
+    """A panel of which pictures can be made."""
+
+    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+        """Make a "png" or "svg", on white or on nothing; ``done`` gets b"" when there is none."""
+
+
+class ProgramPictures:
+    """Makes pictures of the blocks that are open."""
+
+    def __init__(self, shell: Shell, session: Session) -> None:
+        self._shell, self._session = shell, session
+
+    def ask(self) -> None:
+        """Ask where and as what, then save there."""
+        kinds = {
+            _("Picture") + " (*.png)": ("png", True),
+            _("Picture without background") + " (*.png)": ("png", False),
+            _("Picture that stays sharp at any size") + " (*.svg)": ("svg", True),
+            _("Picture that stays sharp, without background") + " (*.svg)": ("svg", False),
+        }
+        document = self._session.document
+        own = document.path
+        folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
+        dialog = QFileDialog(self._shell.surface.window(), _("Save a picture of the blocks"), str(folder))
+        dialog.setNameFilters(list(kinds))
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix("png")
+        dialog.filterSelected.connect(lambda chosen: dialog.setDefaultSuffix(kinds[chosen][0]))
+        dialog.selectFile(document.name)
+
+        def take(chosen: str) -> None:
+            kind, white = kinds[dialog.selectedNameFilter()]
+            self.save(Path(chosen), "svg" if chosen.lower().endswith(".svg") else kind, white)
+
+        dialog.fileSelected.connect(take)
+        show_free(dialog)
+
+    def save(self, path: Path, kind: str, white: bool) -> None:
+        """Write a "png" or "svg" there; a name with another ending gets the right one."""
+        whole = path if path.suffix.lower() == f".{kind}" else path.with_name(f"{path.name}.{kind}")
+
+        def write(data: bytes) -> None:
+            if not data:
+                self._say_nothing_there()
+                return
+            try:
+                write_atomically(whole, data)
+            except OSError as error:
+                self._shell.say(
+                    _("The picture can't be saved: {why}").format(why=error.strerror or str(error))
+                )
+            else:
+                self._shell.say(_("Saved {name}").format(name=whole.name))
+
+        self._make(kind, white, write)
+
+    def copy(self) -> None:
+        """Put a picture onto the computer's clipboard, for documents and slides."""
+
+        def put(data: bytes) -> None:
+            image = QImage.fromData(data)
+            if image.isNull():
+                self._say_nothing_there()
+                return
+            QGuiApplication.clipboard().setImage(image)
+            self._shell.say(_("The picture is on the clipboard"))
+
+        self._make("png", True, put)
+
+    def _make(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+        editor = self._shell.editor()
+        if isinstance(editor, SupportsPicture):
+            editor.picture(kind, white, done)
+
+    def _say_nothing_there(self) -> None:
+        self._shell.say(_("There are no blocks to be seen"))

@@ -1,0 +1,87 @@
+"""Pictures of all blocks: also those outside the view, light in the dark theme, complete in themselves."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtGui import QImage
+
+from app.blocks import editor_definitions
+from app.ui.blockly.view import BlocklyView
+from tests.blocks.samples import number, robot, started, workspace
+from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+
+def wait_block(id: str) -> dict:
+    return {"type": "control_wait", "id": id, "inputs": {"SECONDS": {"shadow": number(1)}}}
+
+
+@pytest.fixture
+def view(qtbot) -> BlocklyView:
+    return editor(qtbot, editor_definitions([robot()]))
+
+
+@pytest.fixture
+def them(view, person) -> Person:
+    state = workspace(
+        started(wait_block("a")) | {"id": "start", "x": 60, "y": 60},
+        wait_block("far") | {"x": 60, "y": 4000},
+    )
+    return person(state=state)
+
+
+def taken(qtbot, view: BlocklyView, kind: str, white: bool = True) -> bytes:
+    got: list[bytes] = []
+    view.picture(kind, white, got.append)
+    qtbot.waitUntil(lambda: bool(got), timeout=WAIT_MS)
+    return got[0]
+
+
+def test_a_picture_shows_all_blocks_twice_as_large_on_white(qtbot, view, them):
+    them.wait_for("!!document.querySelector('.nepFar')")  # the one that is far away is not drawn
+    image = QImage.fromData(taken(qtbot, view, "png"))
+    assert image.height() > 2 * 3940
+    assert image.pixelColor(2, 2).getRgb() == (255, 255, 255, 255)
+    orange = TOKENS["block"]["control"]["light"]["primary"].lower()
+    column = [image.pixelColor(80, y).name() for y in range(image.height())]
+    assert orange in column[:600]
+    assert orange in column[-200:]
+
+
+def test_a_picture_without_background_is_clear_beside_the_blocks(qtbot, view, them):
+    image = QImage.fromData(taken(qtbot, view, "png", white=False))
+    assert image.pixelColor(2, 2).alpha() == 0
+
+
+def test_the_dark_theme_takes_the_same_picture_and_stays(qtbot, view, them):
+    light = taken(qtbot, view, "svg")
+    view.set_theme(TOKENS, dark=True)
+    assert taken(qtbot, view, "svg") == light
+    them.wait_for("getComputedStyle(document.documentElement).colorScheme", "dark")
+
+
+def test_an_svg_needs_nothing_else(qtbot, view, them):
+    svg = taken(qtbot, view, "svg").decode()
+    assert "@font-face" in svg
+    assert "var(--" not in svg
+    assert "foreignObject" not in svg
+    assert "data:font/otf" in svg or "data:application" in svg
+
+
+def test_what_a_person_has_chosen_is_not_in_the_picture(qtbot, view, them):
+    before = taken(qtbot, view, "svg")
+    them.click("[data-id=a] > .blocklyPath")
+    them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "a")
+    view.highlight(["a"])
+    them.wait_for("!!document.querySelector('.nepState')")
+    after = taken(qtbot, view, "svg")
+    assert sorted(after.split(b"<")) == sorted(
+        before.split(b"<")
+    )  # what is selected lies above what is below it
+
+
+def test_an_empty_canvas_has_no_picture(qtbot, view, them):
+    view.load(workspace())
+    assert taken(qtbot, view, "png") == b""

@@ -1,0 +1,69 @@
+"""Pictures of the blocks are written under the name that was chosen, or it is said why they are not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+from PySide6.QtGui import QColor, QGuiApplication, QImage
+from pytestqt.qtbot import QtBot
+
+from app.core.session import Session
+from app.ui.shell.commands.program_pictures import ProgramPictures
+from app.ui.shell.commands.shell import Shell
+
+
+class Editor:
+    """Has one picture."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self.asked: list[tuple[str, bool]] = []
+
+    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+        self.asked.append((kind, white))
+        done(self.data)
+
+
+def made(editor: Editor, said: list[str]) -> ProgramPictures:
+    shell = SimpleNamespace(editor=lambda: editor, say=said.append)
+    return ProgramPictures(cast("Shell", shell), cast("Session", SimpleNamespace()))
+
+
+def test_a_picture_is_written_with_the_ending_of_its_kind(tmp_path: Path) -> None:
+    said: list[str] = []
+    editor = Editor(b"<svg/>")
+    made(editor, said).save(tmp_path / "Greeting 1.2", "svg", False)
+    assert (tmp_path / "Greeting 1.2.svg").read_bytes() == b"<svg/>"
+    assert editor.asked == [("svg", False)]
+    assert said == ["Saved Greeting 1.2.svg"]
+
+
+def test_a_place_where_nothing_can_be_written_is_said(tmp_path: Path) -> None:
+    said: list[str] = []
+    (tmp_path / "file").write_text("")
+    made(Editor(b"<svg/>"), said).save(tmp_path / "file" / "a.svg", "svg", True)
+    (sentence,) = said
+    assert sentence.startswith("The picture can't be saved")
+
+
+def test_without_blocks_nothing_is_written(tmp_path: Path) -> None:
+    said: list[str] = []
+    made(Editor(b""), said).save(tmp_path / "a.png", "png", True)
+    assert said == ["There are no blocks to be seen"]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("qapp")
+def test_a_picture_is_copied(qtbot: QtBot, tmp_path: Path) -> None:
+    image = QImage(3, 2, QImage.Format.Format_RGB32)
+    image.fill(QColor("#0a0b0c"))
+    image.save(str(tmp_path / "a.png"))
+    said: list[str] = []
+    made(Editor((tmp_path / "a.png").read_bytes()), said).copy()
+    qtbot.waitUntil(lambda: QGuiApplication.clipboard().image().size() == image.size())
+    assert QGuiApplication.clipboard().image().pixelColor(1, 1) == QColor("#0a0b0c")
+    assert said == ["The picture is on the clipboard"]
