@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.runtime import Runtime
+from app.blocks.runtime.values import letters
 from app.blocks.runtime.values import text as as_text
 from tests.blocks.samples import block, boolean, list_of, number, started, text, workspace, write
 
@@ -79,7 +80,8 @@ def reference(tree):
     if kind == "join":
         return as_text(reference(first)) + as_text(reference(second))
     if kind == "length":
-        return len(reference(first))
+        told = reference(first)
+        return len(letters(told) if isinstance(told, str) else told)
     if kind in ("list", "item", "contains"):
         return of_list(kind, how, first, second)
     left = reference(first)

@@ -63,7 +63,7 @@ def apart(boxes: list[list[float]]) -> bool:
 
 def test_duplicates_lie_free_beside_the_original_and_in_sight(qtbot, them):
     them.click("[data-id=w] > .blocklyPath")
-    them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")
+    them.wait_for("document.hasFocus() && document.querySelector('.blocklySelected')?.dataset.id", "w")
     for count in range(2, 6):
         press(them, Qt.Key_D)
         qtbot.waitUntil(lambda count=count: len(them.tops()) == count, timeout=WAIT_MS)

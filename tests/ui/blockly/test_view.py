@@ -197,9 +197,8 @@ def test_the_pages_own_words_come_from_the_window(qtbot, monkeypatch):
         view.show()
     them = Person(qtbot, view)
     them.wait_for("document.querySelector('.nepSearch input')?.placeholder === 'Buscar un bloque'")
-    assert (
-        them.ask("document.querySelector('.nepZoom button:nth-child(2)').title") == "Zoom in"
-    )  # nobody has translated it
+    titles = them.ask("[...document.querySelectorAll('.nepZoom button')].map(e => e.title)")
+    assert "Zoom in" in titles  # nobody has translated it
     assert them.ask("document.querySelector('.nepFind input').placeholder") == "Find in the blocks"
 
 

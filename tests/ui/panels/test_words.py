@@ -40,7 +40,7 @@ SHOWING = frozenset({
 })  # fmt: skip
 NOT_SHOWN = frozenset({"icon", "kind", "role", "size", "status"})
 NO_WORDS = (
-    "Ctrl", "Esc", "NEP Studio", "Return", "Shift", "Space", "bodyLarge", "font-weight", "textSecondary",
+    "Alt+", "Ctrl", "Esc", "NEP Studio", "Return", "Shift", "Space", "bodyLarge", "font-weight", "textSecondary",
     "textTertiary",
 )  # fmt: skip
 """Keys, our name, roles and styles."""
