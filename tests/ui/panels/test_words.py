@@ -40,8 +40,8 @@ SHOWING = frozenset({
 })  # fmt: skip
 NOT_SHOWN = frozenset({"icon", "kind", "role", "size", "status"})
 NO_WORDS = (
-    "Alt+", "Ctrl", "Esc", "NEP Studio", "Return", "Shift", "Space", "bodyLarge", "font-weight", "textSecondary",
-    "textTertiary",
+    "Alt+", "Ctrl", "Esc", "NEP Studio", "Return", "Shift", "Space", "bodyLarge", "font-weight",
+    "textSecondary", "textTertiary",
 )  # fmt: skip
 """Keys, our name, roles and styles."""
 SAID = (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole)
