@@ -55,9 +55,9 @@ def test_recent_files_are_newest_first(settings: Settings, tmp_path: Path) -> No
     for file in files:
         file.write_text("x", "utf-8")
         settings.add_recent(file)
-    settings.add_recent(files[5], "Five")
+    settings.add_recent(files[5], "Five")  # it is called as its file
     files[-1].unlink()
-    assert [each.name for each in settings.recent][:2] == ["Five", files[-2].stem]
+    assert [each.name for each in settings.recent][:2] == ["5", files[-2].stem]
     assert len(settings.recent_known) == RECENT_LIMIT
     settings.set_recent([])
     assert settings.recent == []

@@ -199,4 +199,5 @@ def test_nothing_in_the_window_is_modal() -> None:
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(node, ast.Attribute) and node.attr in MODAL
     ]
-    assert found == ["application.py: application.exec"]
+    # the speaker's loop is that of its own thread
+    assert sorted(found) == ["application.py: application.exec", "speaker.py: desk.loop.exec"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -152,9 +153,10 @@ def test_the_window_says_every_word_in_the_chosen_language(qtbot, whole: MainWin
     found: set[str] = set()
     paths = (plain.tip(str(tmp_path / "Mine.nepb")), str(snapshots.folder(whole.session.settings)))
     languages = [name for _code, name in i18n.offered()]  # each is called what it calls itself
+    system = f"{platform.system()} {platform.release()} ({platform.machine()})"
 
     def look(what: str, root: QWidget) -> None:
-        found.update(f"{what}: {each}" for each in forgotten(root, *paths, *languages))
+        found.update(f"{what}: {each}" for each in forgotten(root, *paths, *languages, system))
 
     everything(qtbot, whole, look)
     assert "\n".join(sorted(found)) == ""

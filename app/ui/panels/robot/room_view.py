@@ -75,14 +75,11 @@ class RoomView(QWidget):
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(_("The robots in their room"))
-        self.setToolTip(
-            plain.tip(
-                _(
-                    "Press a head, a hand or the small robot to touch it; drag robots and things; "
-                    "double click for a large room"
-                )
-            )
+        words = _(
+            "Press a head, a hand or the small robot to touch it; drag robots and things; "
+            "double click for a large room"
         )
+        self.setToolTip(plain.tip(words))
         theme.changed.connect(self.update)
 
     # -- what it shows ----------------------------------------------------------------------------

@@ -54,7 +54,7 @@ def fit(
     for column in layout.columns:
         there = []
         for names, height in column.rows:
-            dock = _first(docks, [name for name in names if name not in folded])
+            dock = _first(bench, docks, [name for name in names if name not in folded])
             if dock is not None and not any(dock in bench.tabifiedDockWidgets(b) for b in before):
                 before.append(dock)
                 shared = [dock, *bench.tabifiedDockWidgets(dock)]
@@ -89,10 +89,12 @@ def fit(
     bench.resizeDocks(heads, shares(wanted, wide, keep=keep), Qt.Orientation.Horizontal)
 
 
-def _first(docks: Mapping[str, QDockWidget], names: Sequence[str]) -> QDockWidget | None:
-    """The first of the panels that share a place and are in it."""
+def _first(bench: QMainWindow, docks: Mapping[str, QDockWidget], names: Sequence[str]) -> QDockWidget | None:
+    """The first of the panels that share a place and are in it; one that is on its way to another is not."""
     for name in names:
         dock = docks.get(name)
-        if dock is not None and not dock.isHidden() and not dock.isFloating():
+        if dock is None or dock.isHidden() or dock.isFloating():
+            continue
+        if bench.dockWidgetArea(dock) != Qt.DockWidgetArea.NoDockWidgetArea:
             return dock
     return None
