@@ -54,6 +54,16 @@ def test_on_a_wide_page_the_first_category_is_open_and_stays(qtbot, opened):
     assert (them.ask(SHOWN), them.ask(TITLE)) == ("block", "Movement")
 
 
+def test_what_floats_over_the_canvas_leaves_the_open_blocks_free(opened):
+    them = opened(860)
+    them.open_category("Movement")
+    them.click(".nepTab:not([hidden]) .nepFlyoutHead.nepCategory button", 8, 8)
+    them.view.open_find()
+    them.wait_for("!!document.querySelector('.nepFind:not([hidden])')")
+    assert them.ask(SHOWN) == "block"
+    assert them.box(".nepFind")["left"] >= them.box(".nepFlyoutHead.nepCategory")["right"]
+
+
 def test_on_a_narrow_page_it_closes_after_each_use(qtbot, opened):
     them = opened(NARROW)
     assert them.ask(SHOWN) == "none"

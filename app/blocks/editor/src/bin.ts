@@ -38,6 +38,9 @@ class BinArea extends Blockly.DeleteArea {
 
 /** The sheet with what was deleted, at the right of the canvas. */
 class BinSheet extends Flyout {
+  /** It is open for a moment only. */
+  protected override leaveRoom(): void {}
+
   protected override readonly foot = FOOT;
   protected override readonly name = 'nepSheet';
 

@@ -56,6 +56,7 @@ export class Flyout extends Blockly.VerticalFlyout {
   setPinned(keeps: boolean): void {
     this.button.setAttribute('aria-pressed', String(keeps));
     if (keeps !== this.isPinned) this.setAutoClose(!keeps);
+    this.leaveRoom();
   }
 
   /** Says above the blocks what they are. */
@@ -72,6 +73,13 @@ export class Flyout extends Blockly.VerticalFlyout {
     super.setVisible(visible);
     this.head.hidden = !visible;
     this.across?.setContainerVisible(visible);
+    this.leaveRoom();
+  }
+
+  /** What floats over the canvas keeps beside it while it stays open. */
+  protected leaveRoom(): void {
+    if (this.targetWorkspace.getInjectionDiv().closest('[hidden]')) return;
+    document.documentElement.style.setProperty('--flyout', `${this.isPinned ? this.getWidth() : 0}px`);
   }
 
   override position(): void {
@@ -79,6 +87,7 @@ export class Flyout extends Blockly.VerticalFlyout {
     super.position();
     this.head.style.left = `${this.getX()}px`;
     this.head.style.width = `${this.getWidth()}px`;
+    this.leaveRoom();
   }
 
   protected override positionAt_(width: number, height: number, x: number, y: number): void {
