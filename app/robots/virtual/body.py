@@ -231,11 +231,9 @@ class Body:
 
     def carry(self, x: float, y: float) -> None:
         """A person puts it there, if nothing is in the way; at walls it stops."""
-        place = self.room.inside(x, y, RADIUS)
-        for x_to, y_to in (place, (place[0], self.y), (self.x, place[1])):
-            if self.room.free(x_to, y_to, RADIUS, (self.x, self.y)):
-                self.place(x_to, y_to)
-                return
+        place = self.room.carried(x, y, RADIUS, (self.x, self.y))
+        if place is not None:
+            self.place(*place)
 
     def place(self, x: float, y: float) -> None:
         """It stands there from now on."""

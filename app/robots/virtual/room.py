@@ -280,6 +280,19 @@ class Room:
             return replace(card, x=x, y=y, facing_deg=None)
         return replace(card, x=place[0], y=place[1], facing_deg=facing)
 
+    def carried(
+        self, x: float, y: float, radius: float, at: tuple[float, float]
+    ) -> tuple[float, float] | None:
+        """Where a body that stands ``at`` comes to when it is carried there; None when all ways are taken.
+
+        At walls it stops; what is in the way lets it go along one side.
+        """
+        place = self.inside(x, y, radius)
+        for to in (place, (place[0], at[1]), (at[0], place[1])):
+            if self.free(*to, radius, at):
+                return to
+        return None
+
     def inside(self, x: float, y: float, half: float, deep: float | None = None) -> tuple[float, float]:
         """The place nearest to a point where something so large (m to each side) is inside the walls."""
         deep = half if deep is None else deep
