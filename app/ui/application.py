@@ -100,7 +100,8 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
 def steps_after(window: MainWindow) -> list[Callable[[], object]]:
     """What a person needs a moment later: the panels, and the editor, which has then only to be started."""
     panels = window.panels.steps() if isinstance(window.panels, PanelRegistry) else ()
-    return [*panels, *(partial(importlib.import_module, name) for name in SOON)]
+    modules = (partial(importlib.import_module, name) for name in SOON)
+    return [*panels, *modules, *window.steps_ahead()]
 
 
 def make_window(session: Session, options: Options) -> MainWindow:

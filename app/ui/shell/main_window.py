@@ -6,6 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from PySide6.QtCore import QKeyCombination, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence
@@ -28,7 +29,7 @@ from app.ui.shell.commands.shell import START
 from app.ui.shell.dialogs.file_sheet import StudioDialogs
 from app.ui.shell.dialogs.motion_permission import MotionQuestion
 from app.ui.shell.docking.dock import Dock, fitting
-from app.ui.shell.docking.layouts import LAYOUTS, layout_named
+from app.ui.shell.docking.layouts import LAYOUTS, Layout, layout_named
 from app.ui.shell.docking.saved_layouts import SavedLayouts
 from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.documents import FlushBeforeClose
@@ -85,6 +86,7 @@ class MainWindow(QMainWindow):
         self.on_shut: Callable[[], object] = lambda: None
         self._showing = self._left = ""
         self.benches: dict[str, Workbench] = {}
+        self._ahead: dict[str, Workbench] = {}  # with panels, for layouts that nobody has gone to yet
         self._facts = StatusFacts(session)
         self._alerts_seen = -1
         self._ticks = self._halves = 0
@@ -244,9 +246,8 @@ class MainWindow(QMainWindow):
         """Show a layout; it is made, as it was left, when it is the first time."""
         layout = layout_named(name)
         if layout.name not in self.benches:
-            bench = Workbench(self.theme, layout, self.panels, self.context)
-            bench.panel_failed.connect(self._panel_failed)
-            self.benches[layout.name] = bench
+            self.benches[layout.name] = bench = self._new_bench(layout)
+            self._ahead.pop(layout.name, None)
             self.pages.addWidget(bench)
             bench.resize(self.pages.size())
             self.saved_layouts.bring_back(bench, layout.name)
@@ -261,6 +262,24 @@ class MainWindow(QMainWindow):
         self._show_bars(layout.name)
         self.state.keep_layout(layout.name)
         return bench
+
+    def _new_bench(self, layout: Layout) -> Workbench:
+        """The workbench of a layout, with what was made of it ahead."""
+        bench = self._ahead.get(layout.name)
+        if bench is None:
+            bench = Workbench(self.theme, layout, self.panels, self.context)
+            bench.panel_failed.connect(self._panel_failed)
+        return bench
+
+    def steps_ahead(self) -> list[Callable[[], object]]:
+        """What makes the panels of the layouts that nobody has gone to yet, one panel in a step."""
+
+        def make(layout: Layout, name: str) -> None:
+            if not self._shut and layout.name not in self.benches:
+                self._ahead[layout.name] = bench = self._new_bench(layout)
+                bench.make_ahead(name)
+
+        return [partial(make, layout, name) for layout in LAYOUTS for name in layout.at_first]
 
     def expect(self, layout: str) -> None:
         """Show the bars of a layout, and in its place that it is made in a moment."""
@@ -456,7 +475,7 @@ class MainWindow(QMainWindow):
             with log_errors("keep how the window looks"):
                 self._keep()
             self.hide()
-            for bench in self.benches.values():
+            for bench in (*self.benches.values(), *self._ahead.values()):
                 bench.shut()
             self.session.close()
             self.on_shut()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,7 @@ from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description.description import parse, td_for
 from app.ui.application import Options, first_steps, layout_left
+from app.ui.panels.base import PanelContext
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.docking.dock_title import DockTitle
@@ -702,3 +705,51 @@ def test_a_start_shows_what_was_left(
         step()
     assert window.showing == "developer"
     assert [step.__name__ for step in first_steps(window, Options(new_window=True))] == ["<lambda>"]
+
+
+def test_panels_made_ahead_are_those_that_a_layout_shows(theme: Theme, session: Session) -> None:
+    made: list[str] = []
+    seen: dict[str, PlainPanel] = {}
+
+    def make(name: str) -> Callable[[PanelContext], PlainPanel]:
+        def one(context: PanelContext) -> PlainPanel:
+            made.append(name)
+            seen[name] = PlainPanel(context, name)
+            return seen[name]
+
+        return one
+
+    counted = {name: replace(each, make=make(name)) for name, each in PANELS.items()}
+    window = MainWindow(session, theme, counted)
+    window.show_layout("behaviour")
+    shown = len(made)
+    for step in window.steps_ahead():
+        step()
+    ahead = made[shown:]
+    assert {"topics", "inspector"} <= set(ahead)
+    window.show_layout("developer")
+    assert made[shown:] == ahead, "none is made twice"
+    docks = window.benches["developer"].docks
+    assert docks["topics"].panel is seen["topics"]
+    window.close()
+
+
+def test_panels_that_were_made_ahead_and_never_seen_end_with_the_window(
+    theme: Theme, session: Session
+) -> None:
+    panels: list[PlainPanel] = []
+
+    def make(context: PanelContext) -> PlainPanel:
+        panels.append(PlainPanel(context, "any"))
+        return panels[-1]
+
+    window = MainWindow(session, theme, {name: replace(each, make=make) for name, each in PANELS.items()})
+    steps = window.steps_ahead()
+    for step in steps[:-1]:
+        step()
+    assert panels
+    window.show()
+    window.close()
+    steps[-1]()
+    assert all(each.closed for each in panels)
+    assert window.state.layouts() == {}, "what nobody went to is not kept as if somebody had left it so"

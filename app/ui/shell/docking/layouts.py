@@ -59,6 +59,12 @@ class Layout:
     taller: Mapping[str, int] = field(default_factory=dict)
 
     @property
+    def at_first(self) -> tuple[str, ...]:
+        """The panels that are open before a person has opened or closed any."""
+        names = (name for column in self.columns for names, _height in column.rows for name in names)
+        return tuple(name for name in names if name not in self.later)
+
+    @property
     def later(self) -> frozenset[str]:
         """The panels whose rows are not there at first."""
         return frozenset(self.brings.values())

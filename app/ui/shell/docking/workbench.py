@@ -38,6 +38,7 @@ class Workbench(QMainWindow):
         super().__init__()
         self._theme, self._layout, self._panels, self._context = theme, layout, panels, context
         self.docks: dict[str, Dock] = {}
+        self._ahead: dict[str, Dock] = {}  # made before anybody opened them
         self._floating: list[Dock] = []
         self._sharing: dict[Dock, list[Dock]] = {}  # the panels of a place, in the order of its tabs
         self._folded: tuple[Fold, ...] = ()  # which panels a small window, or large text, made tabs of
@@ -66,6 +67,13 @@ class Workbench(QMainWindow):
         theme.changed.connect(self._text_changed)
 
     # -- opening ----------------------------------------------------------------------------------
+
+    def make_ahead(self, name: str) -> None:
+        """Make a panel before it is opened, so that nobody waits for it then; it rests until it is seen."""
+        description = self._panels.get(name)
+        if description is not None and name not in self.docks and name not in self._ahead:
+            self._ahead[name] = made = make_dock(description, self._context, self._layout.density)
+            made.follow(0.0)
 
     def arrange(self) -> None:
         """Put the panels where the layout has them at first; what a person moved is put back."""
@@ -130,7 +138,7 @@ class Workbench(QMainWindow):
         description = self._panels.get(name)
         if description is None:
             return None
-        dock = make_dock(description, self._context, self._layout.density)
+        dock = self._ahead.pop(name, None) or make_dock(description, self._context, self._layout.density)
         dock.dockLocationChanged.connect(self._tabs_soon)
         dock.topLevelChanged.connect(self._tabs_soon)
         dock.visibilityChanged.connect(self._tabs_soon)
@@ -359,7 +367,7 @@ class Workbench(QMainWindow):
 
     def shut(self) -> None:
         """The window closes: every panel ends its watches."""
-        for dock in self.docks.values():
+        for dock in (*self.docks.values(), *self._ahead.values()):
             dock.shut()
 
 
