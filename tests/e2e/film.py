@@ -18,7 +18,6 @@ import cv2
 import numpy as np
 
 from tests.e2e.person import Person, Reaction, middle
-from tests.e2e.waiting import until
 from tests.e2e.x11 import LEFT, Picture, Screen
 
 WHEEL_UP, WHEEL_DOWN = 4, 5
@@ -120,12 +119,6 @@ def with_caption(picture: Picture, words: str) -> Picture:
 
 
 # -- what both paths need ---------------------------------------------------------------------------
-
-
-def snapped(studio: Person, above: str, kind: str) -> str:
-    """Wait until a block of this type hangs below or inside a block; its id."""
-    script = f"document.querySelector(\"[data-id='{above}'] .{kind}\")?.closest('[data-id]')?.dataset.id"
-    return str(until(lambda: studio.page(script), f"{kind} is at its place"))
 
 
 def topic(studio: Person, name: str) -> tuple[float, float]:

@@ -9,40 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.e2e.film import Film, MouseOnly, snapped, topic
+from tests.e2e.film import Film, MouseOnly, topic
+from tests.e2e.hour import Hands, of, words_of
 from tests.e2e.person import middle
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
 pytestmark = pytest.mark.timeout(230)
-WORKSPACE = ".nepTab:not([hidden])"
-
-
-class Hand:
-    """What a hand does here with several blocks."""
-
-    def __init__(self, studio: Studio) -> None:
-        self.studio = studio
-
-    def put_hat(self) -> str:
-        """Drag "when started" onto the empty page; the block's id."""
-        self.studio.open_category("Events")
-        view = self.studio.find(kind="QWebEngineView")["rect"]
-        self.studio.drag(f"{WORKSPACE} .blocklyFlyout .events_started", view[0] + 420, view[1] + 90)
-        (hat,) = until(self.studio.blocks, "the hat is in the workspace")
-        return hat
-
-    def put(self, category: str, kind: str, above: str, dx: float = 16, dy: float = 20) -> str:
-        """Drag a block to just below another one, or with ``dx`` into it; its id."""
-        self.studio.open_category(category)
-        left, top, _, height = self.studio.spot(f"{WORKSPACE} [data-id='{above}'] > .blocklyPath")
-        into = 62 if dx > 16 else height + dy
-        self.studio.drag(f"{WORKSPACE} .blocklyFlyout .{kind}", left + dx, top + into)
-        return snapped(self.studio, above, kind)
-
-    def text_of(self, block: str) -> str:
-        words = f"document.querySelector(\"[data-id='{block}']\").textContent"
-        return str(self.studio.page(words)).replace("\u00a0", " ")
 
 
 def colours_of(studio: Studio, block: str) -> str:
@@ -56,7 +29,7 @@ def test_a_persons_path_with_the_mouse_alone(start: Callable[..., Studio], tmp_p
     home.mkdir()
     studio = start(HOME=str(home))
     studio.screen = mouse = MouseOnly(studio.screen.display)
-    film, hand = Film(studio, "mouse", tmp_path), Hand(studio)
+    film, hand = Film(studio, "mouse", tmp_path), Hands(studio)
 
     with film.step("The start page asks what you would like to do"):
         studio.says("What would you like to do?")
@@ -69,20 +42,19 @@ def test_a_persons_path_with_the_mouse_alone(start: Callable[..., Studio], tmp_p
         studio.find("New behaviour", kind="BehaviourTab")
         until(lambda: studio.blocks() == [], "its page is empty")
     with film.step("The first block is dragged from the toolbox"):
-        hat = hand.put_hat()
+        hat = hand.put("Events", "events_started", 60, 40)
     with film.step("What is to be done for ever goes below it"):
-        loop = hand.put("Control", "control_forever", hat)
+        loop = hand.below(hat, "Control", "control_forever")
     with film.step("The eyes, a sentence, a turn and a wait are dragged into it"):
-        light = hand.put("Face and lights", "robot_pepper_do_light", loop, dx=40)
-        say = hand.put("Speech", "robot_pepper_do_say", light)
-        turn = hand.put("Movement", "robot_pepper_do_turn", say)
-        hand.put("Control", "control_wait", turn)
+        light = hand.inside(loop, "Face and lights", "robot_pepper_do_light")
+        say = hand.below(light, "Speech", "robot_pepper_do_say")
+        turn = hand.below(say, "Movement", "robot_pepper_do_turn")
+        hand.below(turn, "Control", "control_wait")
     with film.step("A drop-down: turn to the right"):
-        studio.screen.click(*middle(direction(studio, turn)))
-        menu_item(studio, "right")
-        until(lambda: "right" in hand.text_of(turn), "the block says so")
+        hand.choose(turn, "left", "right")
+        until(lambda: "right" in words_of(studio, turn), "the block says so")
     with film.step("A colour: the eyes become red"):
-        studio.point(f"{WORKSPACE} [data-id='{light}'] .nepColour", 12, 9)
+        studio.point(f"{of(light)} .nepColour", 12, 9)
         studio.point(".nepPalette [title=red]", 8, 8)
         until(lambda: "#ff3b30" in colours_of(studio, light), "the block has it")
     with film.step("Run: the block that runs now glows"):
@@ -103,35 +75,6 @@ def test_a_persons_path_with_the_mouse_alone(start: Callable[..., Studio], tmp_p
     see_what_the_robot_says(studio, film, mouse)
     save(studio, film, home)
     assert len(film.pictures) >= 15
-
-
-def direction(studio: Studio, turn: str) -> list[float]:
-    """Where the drop-down "left" of the turn block is on the screen."""
-    found = (
-        f"(e => e && (r => [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
-        f"([...document.querySelectorAll(\"[data-id='{turn}'] .blocklyDropdownField\")]"
-        f".find(e => e.textContent.includes('left')))"
-    )
-    left, top, width, height = until(lambda: studio.page(found), "the drop-down is there")
-    view = studio.find(kind="QWebEngineView")["rect"]
-    return [view[0] + left, view[1] + top, width, height]
-
-
-def menu_item(studio: Studio, words: str) -> None:
-    """Choose from the drop-down that is open in the page."""
-    found = (
-        f"(e => e && (r => [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
-        f"([...document.querySelectorAll('.blocklyMenuItem')].find(e => e.textContent.includes('{words}')))"
-    )
-    before: list[object] = []
-
-    def still() -> object:
-        before.append(studio.page(found))
-        return before[-1] if len(before) > 1 and before[-1] == before[-2] else None
-
-    left, top, width, height = until(still, f"{words} is offered")
-    view = studio.find(kind="QWebEngineView")["rect"]
-    studio.screen.click(view[0] + left + width / 2, view[1] + top + height / 2)
 
 
 def see_what_the_robot_says(studio: Studio, film: Film, mouse: MouseOnly) -> None:
