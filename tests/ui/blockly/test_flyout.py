@@ -114,6 +114,16 @@ def test_everything_is_shown_beside_the_open_blocks(opened):
     assert them.box("[data-id=start] > .blocklyPath")["left"] > right
 
 
+def test_the_canvas_keeps_its_place_from_one_open_category_to_the_next(opened):
+    them = opened(WIDE)
+    them.open_category("Lists")
+    before = them.box("[data-id=start] > .blocklyPath")
+    for name in ("Variables", "Movement", "Lists"):
+        them.open_category(name)
+        them.wait_for(TITLE, name)
+        assert them.box("[data-id=start] > .blocklyPath") == before
+
+
 def test_the_blocks_are_as_large_at_any_zoom_and_come_out_under_the_mouse(opened):
     them = opened(WIDE)
     them.open_category("Movement")

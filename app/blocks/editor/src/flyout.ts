@@ -6,8 +6,11 @@ import {t} from './words';
 /** The zoom of a canvas when it is new, and of the flyout at any time. */
 export const SCALE = 0.8;
 
-/** Most categories fit into it: the canvas beside keeps its place from one to the next. */
 const LEAST_WIDTH = 312;
+/** Most categories fit into it: while it stays open, the canvas beside keeps its place from one to the next. */
+const PINNED_WIDTH = 400;
+/** As much of the page it has from the start while it stays open. */
+const PINNED_SHARE = 1 / 3;
 /** As much of the page it takes at most; what is wider is scrolled to. */
 const MOST = 0.45;
 const HEAD = 40;
@@ -25,6 +28,8 @@ export class Flyout extends Blockly.VerticalFlyout {
   /** A class for the style sheet. */
   protected readonly name: string = 'nepCategory';
   private across: Blockly.Scrollbar | null = null;
+  /** While it stays open, the width that its widest category wanted: a narrow one would pull the canvas along. */
+  private kept = 0;
 
   override init(target: Blockly.WorkspaceSvg): void {
     super.init(target);
@@ -55,7 +60,10 @@ export class Flyout extends Blockly.VerticalFlyout {
 
   setPinned(keeps: boolean): void {
     this.button.setAttribute('aria-pressed', String(keeps));
-    if (keeps !== this.isPinned) this.setAutoClose(!keeps);
+    if (keeps !== this.isPinned) {
+      this.kept = 0;
+      this.setAutoClose(!keeps);
+    }
     this.leaveRoom();
   }
 
@@ -114,7 +122,10 @@ export class Flyout extends Blockly.VerticalFlyout {
     const widest = Math.max(0, ...widths) + this.MARGIN * 1.5 + this.tabWidth_;
     const wanted = widest * this.getFlyoutScale() + Blockly.Scrollbar.scrollbarThickness;
     const page = this.targetWorkspace.getCachedParentSvgSize().width;
-    return Math.round(Math.max(LEAST_WIDTH, Math.min(wanted, page * MOST)));
+    if (!this.isPinned || !this.isVisible()) return Math.round(Math.max(LEAST_WIDTH, Math.min(wanted, page * MOST)));
+    this.kept = Math.max(this.kept, wanted);
+    const started = Math.max(this.kept, Math.min(PINNED_WIDTH, page * PINNED_SHARE));
+    return Math.round(Math.max(LEAST_WIDTH, Math.min(started, page * MOST)));
   }
 
   protected override setMetrics_(ratio: {x: number; y: number}): void {
@@ -165,6 +176,11 @@ export class Flyout extends Blockly.VerticalFlyout {
 
 export const FLYOUT = 'nep';
 Blockly.registry.register(Blockly.registry.Type.FLYOUTS_VERTICAL_TOOLBOX, FLYOUT, Flyout);
+
+// Its buttons ("New variable") are as high as the others of Studio, in pixels at its scale.
+Blockly.FlyoutButton.TEXT_MARGIN_X = 16;
+Blockly.FlyoutButton.TEXT_MARGIN_Y = 11;
+Blockly.FlyoutButton.BORDER_RADIUS = 8;
 
 /** A click on a field in the flyout opens it: the chosen value is what is dragged out next. */
 Blockly.Field.prototype.isClickableInFlyout = () => true;

@@ -31,9 +31,9 @@ class Lesson:
 STEPS: tuple[Lesson, ...] = (
     Lesson("robot", lazy("Use the virtual robot"), lazy("It comes with Studio."), button="robots.virtual"),
     Lesson("start", lazy("Drag “{start}” onto the page"), lazy("It is in Events, on the left."), takes=START),
-    Lesson("say", lazy("Put “{say}” below it"), lazy("It is in Speech, below the robot."), takes=SAY),
+    Lesson("say", lazy("Put “{say}” below it"), lazy("It is in Speech, on the left."), takes=SAY),
     Lesson("run", lazy("Press Run and listen"), lazy("It is green, at the top left."), button="run.run"),
-    Lesson("turn", lazy("Put “{turn}” below “{say}”"), lazy("It is in Movement."), takes=TURN),
+    Lesson("turn", lazy("Put “{turn}” below “{say}”"), lazy("It is in Movement, on the left."), takes=TURN),
     Lesson(
         "stop",
         lazy("Press Run, then Stop while it turns"),
