@@ -28,7 +28,8 @@ class CameraPanel(OneRobotPanel):
         super().__init__(context, _("Camera"))
         self._topic = ""
         self._stream: ImageStream | None = None
-        self.rate = ElidedLabel("body", "textSecondary", least=60)
+        # It stays whole; the topic beside it is what can be shortened.
+        self.rate = ElidedLabel("body", "textSecondary", least=110)
         self.header = [self.rate]
         self.chip = Chip(self.theme)
         self.chips = [self.chip]

@@ -16,6 +16,7 @@ from app.robots.virtual.room import Room
 from app.robots.virtual.simulation import drawable, surroundings
 from app.ui.panels.robot.large_room import LargeRoom
 from app.ui.panels.robot.panel import ADDED, PANEL, RobotPanel
+from app.ui.widgets import IconButton
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press
 
@@ -269,6 +270,15 @@ def test_it_fills_the_screen_and_leaves_it_with_esc(panel, large) -> None:
     QTest.keyClick(large, Qt.Key.Key_Escape)
     assert not window.windowState() & Qt.WindowState.WindowFullScreen
     assert panel.isAncestorOf(panel.view)
+
+
+def test_the_large_room_is_furnished_and_put_back_by_its_own_buttons(panel, large, window) -> None:
+    buttons = {each.accessibleName(): each for each in large.findChildren(IconButton)}
+    press(buttons["Add something to the room"])
+    choose(panel, "Add a ball")
+    assert window.session.room.room.thing("ball 2") is not None
+    press(buttons["Put the robot and its room back"])
+    assert window.session.room.room.thing("ball 2") is None
 
 
 def test_the_large_room_goes_on_showing_what_is_new(panel, large, window) -> None:

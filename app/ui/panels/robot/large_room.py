@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QVBoxLayout, QWidget
@@ -16,8 +18,11 @@ class LargeRoom(QWidget):
 
     closed = Signal()
 
-    def __init__(self, theme: Theme, panel: QWidget, stage: QWidget) -> None:
-        """``panel`` is in the window whose middle is covered; ``stage`` is what is shown."""
+    def __init__(self, theme: Theme, panel: QWidget, stage: QWidget, tools: Sequence[QWidget] = ()) -> None:
+        """``panel`` is in the window whose middle is covered; ``stage`` is what is shown.
+
+        ``tools`` are the buttons of the panel's title that have a twin here, beside those of the size.
+        """
         over = _middle_of(panel)
         super().__init__(over)
         self._theme, self._over = theme, over
@@ -31,8 +36,9 @@ class LargeRoom(QWidget):
         row.setContentsMargins(10, 6, 10, 6)
         row.addWidget(label(_("Room"), "title"))
         row.addStretch(1)
-        row.addWidget(self.screen_button)
-        row.addWidget(self.back)
+        row.setSpacing(8)
+        for button in (*tools, self.screen_button, self.back):
+            row.addWidget(button)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)

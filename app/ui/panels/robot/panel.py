@@ -71,16 +71,13 @@ class RobotPanel(OneRobotPanel):
         self._told: Mapping[str, object] | None = None
         self._told_s = 0.0
         self.chip = Chip(self.theme)
-        self.reset = IconButton(self.theme, "rotate-cw", _("Put the robot and its room back"), size=30)
-        self.reset.clicked.connect(self._put_back)
+        self.add, self.reset = self._room_tools(size=30)
         self.reset.setVisible(False)
         self.choose = IconButton(self.theme, "chevron-down", _("Choose a robot"), size=26)
         self.choose.setProperty("place", "start")
         self.choose.clicked.connect(self._show_menu)
         self.choose.setVisible(False)
         self.chips = [self.choose, self.chip]
-        self.add = IconButton(self.theme, "plus", _("Add something to the room"), size=30)
-        self.add.clicked.connect(lambda: self._show_room_menu("", None))
         self.add.setVisible(False)
         self.large = IconButton(self.theme, "maximize-2", _("Large room"), size=30)
         self.large.clicked.connect(self.enlarge)
@@ -93,6 +90,14 @@ class RobotPanel(OneRobotPanel):
         self.empty = EmptyState(self.theme, "bot", title, text, [start])
         self._no_robot = NoRobot(self.empty, title, text, [start])
         self.pages = self.show_one_of(self.empty, self.stage)
+
+    def _room_tools(self, size: int) -> tuple[IconButton, IconButton]:
+        """The buttons that add to the room and put it back: in the title, and once more in the large room."""
+        add = IconButton(self.theme, "plus", _("Add something to the room"), size=size)
+        add.clicked.connect(lambda: self._show_room_menu("", None, add))
+        reset = IconButton(self.theme, "rotate-cw", _("Put the robot and its room back"), size=size)
+        reset.clicked.connect(self._put_back)
+        return add, reset
 
     def _make_stage(self) -> None:
         """The drawing and what is below it."""
@@ -256,8 +261,8 @@ class RobotPanel(OneRobotPanel):
         for name in ("", *(name for name, _state in self.view.others)):
             self._change({"reset": True}, name)
 
-    def _show_room_menu(self, thing: str, place: QPoint | None) -> None:
-        """What a person adds to the room, or takes away."""
+    def _show_room_menu(self, thing: str, place: QPoint | None, button: QWidget | None = None) -> None:
+        """What a person adds to the room, or takes away; at a place, else below a button."""
         menu = Menu(self.theme, self)
         if thing:
             words = plain.entry(_("Remove {thing}").format(thing=thing))
@@ -272,7 +277,7 @@ class RobotPanel(OneRobotPanel):
         menu.addAction(self.theme.icon("rotate-cw"), _("Put the room back")).triggered.connect(self._put_back)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         if place is None:
-            drop_below(menu, self.add)
+            drop_below(menu, button or self.add)
         else:
             menu.popup(place)
 
@@ -295,7 +300,7 @@ class RobotPanel(OneRobotPanel):
         if self._large is not None:
             self._large.shut()
             return
-        self._large = LargeRoom(self.theme, self, self.stage)
+        self._large = LargeRoom(self.theme, self, self.stage, self._room_tools(size=26))
         self._large.closed.connect(self._give_back)
         self.large.set_icon("minimize-2")
 

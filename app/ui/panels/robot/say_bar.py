@@ -20,6 +20,8 @@ from nep.i18n import _
 HEARS = "heard"
 """The event of a robot that hears what is said to it."""
 MOST_ENTRIES = 24
+MOST_WIDTH = 720
+"""Wider, the field in the large room would be a line from edge to edge."""
 Awaited: TypeAlias = Callable[[Event, str], Sequence[str]]
 Happening: TypeAlias = dict[str, object]
 
@@ -35,6 +37,7 @@ class SayField(SearchField):
         super().__init__(theme, _("Say something"))
         self.setMaxLength(200)
         self.setMinimumWidth(60)
+        self.setMaximumWidth(MOST_WIDTH)
         self._last = ""
 
     def sizeHint(self) -> QSize:
@@ -80,15 +83,17 @@ class SayBar(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(8, 6, 8, 6)
         row.setSpacing(4)
+        row.addStretch(0)
         row.addWidget(self.field, 1)
         for button in (self.words, self.events):
             row.addWidget(button)
+        row.addStretch(0)
         self._row = row
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def add(self, button: QWidget) -> None:
         """A further button, at the right."""
-        self._row.addWidget(button)
+        self._row.insertWidget(self._row.count() - 1, button)
 
     def show_robot(self, robot: Robot) -> None:
         """Speak to this robot from now on."""
