@@ -395,6 +395,13 @@ class SocketSubscriber(Generic[R]):
 class NativeSubscriber(SocketSubscriber[SubSocket]):
     """See `SocketSubscriber`. The methods for publishers are called by the link to the master."""
 
+    def __init__(
+        self, readable: SubSocket, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
+    ) -> None:
+        super().__init__(readable, io, spec, on_close)
+        self._closed_early: set[int] | None = set()
+        """Publishers that closed before `begin`; None since."""
+
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
         """Wait until these publishers have echoed.
 
@@ -422,13 +429,26 @@ class NativeSubscriber(SocketSubscriber[SubSocket]):
         """Where it is connected."""
         return tuple(source.endpoint for _each, source in self._readable.sources.items() if source.endpoint)
 
+    def begin(self, remotes: Iterable[RemotePublisher]) -> None:
+        """Connect to the publishers that there were when it was registered, and have not closed since.
+
+        The master's word of that is read in another thread than its list, and may be known before.
+        """
+        with self._turn():
+            closed, self._closed_early = self._closed_early or set(), None
+            self._connect(each for each in remotes if each.publisher.id not in closed)
+
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to these publishers; twice is once."""
         with self._turn():
-            if not self.is_closed:
-                for remote in remotes:
-                    self._readable.connect(remote)
-                self._after_use()
+            self._connect(remotes)
+
+    def _connect(self, remotes: Iterable[RemotePublisher]) -> None:
+        """With the lock held."""
+        if not self.is_closed:
+            for remote in remotes:
+                self._readable.connect(remote)
+            self._after_use()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """These are all publishers of the topic: connect to new ones; others are silent."""
@@ -443,6 +463,8 @@ class NativeSubscriber(SocketSubscriber[SubSocket]):
     def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:
         """A publisher is unlisted. Its connection stays until its bye comes, or it is replaced."""
         with self._turn():
+            if is_closed and self._closed_early is not None:
+                self._closed_early.add(publisher)
             source = self._readable.sources.find(publisher)
             if source is not None and is_closed:
                 self._readable.sources.closing(publisher, final, time.monotonic())

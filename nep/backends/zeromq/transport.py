@@ -170,7 +170,7 @@ class ZeromqTransport:
             reply = session.add_subscriber(
                 SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number), subscriber, spec.wait_s
             )
-            subscriber.connect(reply.publishers)
+            subscriber.begin(reply.publishers)
             io.add(subscriber)
             with self._waker() as waker:
                 subscriber.wait_for((each.publisher.id for each in reply.publishers), HANDSHAKE_S, waker)

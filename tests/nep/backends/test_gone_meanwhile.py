@@ -1,0 +1,39 @@
+"""Who goes while somebody comes is not waited for: the master's two answers may overtake each other."""
+
+from __future__ import annotations
+
+import pytest
+
+import nep
+from nep.backends.zeromq.master_session import MasterSession
+from nep.backends.zeromq.subscriber import NativeSubscriber
+from nep.masters.master import Master
+from nep.protocol.requests import Found, SubscriberRecord
+from tests.nep.programs import eventually
+
+
+@pytest.mark.usefixtures("patient")
+def test_a_publisher_that_closes_before_its_subscriber_connects_is_not_waited_for(
+    master: Master, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[Found] = []
+    with nep.node("goes", master=master.address) as goes, nep.node("comes", master=master.address) as comes:
+        goes.new_pub("stays")
+        closing = goes.new_pub("topic")
+
+        def slow(
+            self: MasterSession, record: SubscriberRecord, made: NativeSubscriber, wait_s: float | None
+        ) -> Found:
+            """The thread that subscribes goes on only when the master's next words have been read."""
+            told.append(known(self, record, made, wait_s))
+            closing.close(0.0)
+            eventually(lambda: not comes.graph().topics["topic"].publishers)
+            comes.graph()  # its answer is read after what came before the last one has been obeyed
+            return told[-1]
+
+        known = MasterSession.add_subscriber
+        monkeypatch.setattr(MasterSession, "add_subscriber", slow)
+        subscriber = comes.new_sub("topic")
+        assert [each.publisher.id for each in told[0].publishers] == [closing.id]
+        assert isinstance(subscriber._transport, NativeSubscriber)
+        assert subscriber._transport.endpoints == ()
