@@ -22,6 +22,27 @@ UNKNOWN = json.loads((DATA / "unknown.json").read_text("utf-8"))
 TOKENS = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
 START = {"type": "events_started", "id": "start", "x": 56, "y": 56}
 WAIT_MS = 30_000
+LOOK = """selector => {
+    let before = '';
+    const moves = e => e.getAnimations().some(each => isFinite(each.effect.getComputedTiming().endTime))
+        || (e.parentElement ? moves(e.parentElement) : false);
+    const look = () => {
+        if (window.nepLook !== look) return;
+        const found = document.querySelector(selector);
+        const {left, top, right, bottom} = found?.getBoundingClientRect() ?? {};
+        const now = right > left && !moves(found) ? JSON.stringify([left, top, right, bottom]) : '';
+        if (now && now === before) window.nepStill = JSON.parse(now);
+        else requestAnimationFrame(look);
+        before = now;
+    };
+    window.nepStill = null;
+    window.nepLook = look;
+    requestAnimationFrame(look);
+}"""
+"""Notes where an element is, once nothing moves it and it is there in two pictures of the page.
+
+Between two questions of ours there may be no picture, on a busy computer; what just begins to move stands.
+"""
 
 
 def workspace(*blocks: dict) -> dict:
@@ -75,20 +96,15 @@ class Person:
 
     def box(self, selector: str) -> dict:
         """Where an element is on the screen of the page, once it is there and has stopped moving."""
-        script = (
-            f"(e => e && (r => r.width > 0 && [r.left, r.top, r.right, r.bottom])(e.getBoundingClientRect()))"
-            f"(document.querySelector({json.dumps(selector)}))"
-        )
-        before: list = []
+        self.ask(f"({LOOK})({json.dumps(selector)})")
+        found: list = []
 
-        def still() -> bool:
-            now = self.ask(script)
-            same = bool(now) and now == (before[-1] if before else None)
-            before.append(now)
-            return same
+        def is_still() -> bool:
+            found[:] = [self.ask("window.nepStill")]
+            return bool(found[0])
 
-        self._qtbot.waitUntil(still, timeout=WAIT_MS)
-        left, top, right, bottom = before[-1]
+        self._qtbot.waitUntil(is_still, timeout=WAIT_MS)
+        left, top, right, bottom = found[0]
         return {"left": left, "top": top, "right": right, "bottom": bottom}
 
     @property

@@ -57,7 +57,9 @@ def test_on_a_wide_page_the_first_category_is_open_and_stays(qtbot, opened):
 def test_what_floats_over_the_canvas_leaves_the_open_blocks_free(opened):
     them = opened(860)
     them.open_category("Movement")
-    them.click(".nepTab:not([hidden]) .nepFlyoutHead.nepCategory button", 8, 8)
+    pin = ".nepTab:not([hidden]) .nepFlyoutHead.nepCategory button"
+    them.click(pin, 8, 8)
+    them.wait_for(f"document.querySelector('{pin}').getAttribute('aria-pressed')", "true")
     them.view.open_find()
     them.wait_for("!!document.querySelector('.nepFind:not([hidden])')")
     assert them.ask(SHOWN) == "block"

@@ -124,7 +124,8 @@ def test_a_robots_block_is_found_by_its_words_and_put_in_its_place(qtbot, view, 
     press(them, Qt.Key_Return)
     them.wait_for("!!document.querySelector('.blocklyDragging')")
     press(them, Qt.Key_Return)
-    qtbot.waitUntil(lambda: them.tops()[0]["next"]["block"]["type"] == "robot_pepper_do_say", timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "next" in them.tops()[0], timeout=WAIT_MS)
+    assert them.tops()[0]["next"]["block"]["type"] == "robot_pepper_do_say"
     them.wait_for("!document.querySelector('.blocklyDragging')")
     QTest.qWait(PACE_MS)
     assert them.ask("document.querySelector('.nepSearch input').value") == ""

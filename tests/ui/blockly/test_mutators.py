@@ -93,7 +93,7 @@ def test_a_list_gets_and_loses_gaps_and_undo_knows(qtbot, view, person):
     them.click("[data-id=l] .nepButton", dx=8, dy=8)
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)  # “b” is beside it now, not lost
     view.undo()
-    qtbot.waitUntil(lambda: len(them.tops()) == 1 and len(them.tops()[0]["inputs"]) == 2, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: [len(top.get("inputs", ())) for top in them.tops()] == [2], timeout=WAIT_MS)
 
 
 def test_the_number_is_there_only_for_an_item_by_number(qtbot, view, person):
