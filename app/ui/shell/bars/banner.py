@@ -266,6 +266,9 @@ class BannerSpacer(QWidget):
     def follow(self) -> None:
         """Put the banner where it may be now, and make room when nothing moves under the mouse; each tick."""
         wanted = self.height_wanted
+        if not wanted and not self.height():
+            self._said = ""
+            return  # where the mouse is costs a way to the screen and back, 30 times a second
         mouse = self._mouse()
         if wanted:
             self._note_change(mouse)
