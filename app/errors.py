@@ -7,6 +7,7 @@
     ├── CompileError         a workspace that can't become a program
     ├── RunnerError          a program that can't be started or reached
     ├── SettingsError        settings that can't be kept
+    ├── BackpackError        a backpack that can't be read or kept
     ├── DescriptionError     a robot's description that can't be understood
     │   └── DeclarationError one that a driver's Python declares
     ├── RobotInputError      an action's input that the robot would refuse
@@ -73,6 +74,10 @@ class SettingsError(AppError):
         self.path = path
         self.reason = reason
         super().__init__(_("settings can't be kept in '{path}': {reason}").format(path=path, reason=reason))
+
+
+class BackpackError(AppError):
+    """The backpack can't be read or kept, or it is full."""
 
 
 class DescriptionError(AppError):

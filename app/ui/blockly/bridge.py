@@ -40,6 +40,7 @@ class BlocklyBridge(QObject):
     carried_out = Signal(int, int, bool)  # a block is outside of the page, at x, y; False: not any more
     let_go_outside = Signal(int, int)  # and was let go there
     carried_over = Signal(int, str)  # so many blocks are in this tab now: "moved", "copied", "added"
+    backpack_asked = Signal(str)  # what is to be done with the backpack, as JSON (`backpack.ts`)
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -109,6 +110,10 @@ class BlocklyBridge(QObject):
     @Slot(int, str)
     def brought(self, count: int, how: str) -> None:
         self.carried_over.emit(count, how)
+
+    @Slot(str)
+    def backpack(self, what: str) -> None:
+        self.backpack_asked.emit(what)
 
     @Slot(str)
     def copy(self, blocks: str) -> None:

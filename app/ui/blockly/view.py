@@ -41,6 +41,7 @@ class BlocklyView(BlocklyHost):
     block_carried = Signal(object)  # outside of the page, at this place of the screen (QPoint); None: no more
     block_dropped = Signal(QPoint)  # it was let go there; unless `bring_blocks` follows it is where it was
     blocks_brought = Signal(int, str)  # so many are in the shown tab now: "moved", "copied" or "added"
+    backpack_asked = Signal(str)  # what a person wants done with the backpack, as JSON: `BackpackKeeper`
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
         super().__init__(parent, language or i18n.language())
@@ -50,6 +51,7 @@ class BlocklyView(BlocklyHost):
         self._alarms: Json = {}
         self._values: Json = {}
         self._first_step: Json | None = None
+        self._backpack: list[Json] = []
         self._waiting: dict[int, Callable[[WorkspaceJson], None]] = {}
         self._pictures: dict[int, Callable[[bytes], None]] = {}
         self._tokens = 0
@@ -69,6 +71,7 @@ class BlocklyView(BlocklyHost):
         )
         self._bridge.let_go_outside.connect(lambda x, y: self.block_dropped.emit(self._on_screen(x, y)))
         self._bridge.carried_over.connect(self.blocks_brought)
+        self._bridge.backpack_asked.connect(self.backpack_asked)
         self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(_pairs(text)))
 
     # -- the program ------------------------------------------------------------------------------
@@ -211,6 +214,11 @@ class BlocklyView(BlocklyHost):
             self._alarms = told
             self._tell("alarms", told)
 
+    def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None:
+        """Say what is in the backpack, the newest first: ``{"id", "at", "block"}`` of each."""
+        self._backpack = [dict(item) for item in items]
+        self._tell("backpack", self._backpack)
+
     def set_first_step(self, first: str, robot: bool) -> None:
         """Say on an empty canvas to drag the block ``first`` there; ``robot``: one is connected."""
         told: Json = {"first": first, "robot": robot}
@@ -305,6 +313,7 @@ class BlocklyView(BlocklyHost):
         self._tell("definitions", self._definitions)
         self._tell("alarms", self._alarms)
         self._tell("begin", self._first_step)
+        self._tell("backpack", self._backpack)
         self._tabs.page_gone()
         self._send_tab()
 

@@ -34,6 +34,7 @@ class Editor(QWidget):
     block_carried = Signal(object)
     block_dropped = Signal(QPoint)
     blocks_brought = Signal(int, str)
+    backpack_asked = Signal(str)
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)

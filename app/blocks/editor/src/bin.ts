@@ -1,14 +1,12 @@
 // What was deleted in a behaviour while it is open: it waits in the bin, newest first, and can be taken back.
 import * as Blockly from 'blockly/core';
-import {Flyout} from './flyout';
 import {iconElement} from './icons';
+import {Sheet, disposeSheet, openable} from './sheet';
 import {t} from './words';
 
 const MOST = 50;
 /** Deletions that belong together come within this time. */
 const TOGETHER_MS = 60;
-/** Room for the buttons below the sheet. */
-const FOOT = 64;
 const APART = 40;
 const TRIES = 40;
 
@@ -36,26 +34,16 @@ class BinArea extends Blockly.DeleteArea {
   }
 }
 
-/** The sheet with what was deleted, at the right of the canvas. */
-class BinSheet extends Flyout {
-  /** It is open for a moment only. */
-  protected override leaveRoom(): void {}
+/** The sheet with what was deleted. */
+class BinSheet extends Sheet {
+  onTake: (id: string) => void = () => undefined;
 
-  protected override readonly foot = FOOT;
-  protected override readonly name = 'nepSheet';
-
-  override autoHide(onlyClosePopups: boolean): void {
-    if (!onlyClosePopups) this.hide();
+  override take(block: Blockly.BlockSvg): void {
+    this.onTake(block.id);
   }
 
-  protected override makeButton(): HTMLButtonElement {
-    const close = document.createElement('button');
-    close.type = 'button';
-    close.title = t('Close (Esc)');
-    close.setAttribute('aria-label', t('Close the bin'));
-    close.append(iconElement('x', 16));
-    close.onclick = () => this.hide();
-    return close;
+  protected override get closes(): string {
+    return t('Close the bin');
   }
 }
 
@@ -111,9 +99,7 @@ export class Bin {
 
   dispose(): void {
     window.clearTimeout(this.timer);
-    if (!this.sheet) return;
-    bins.delete(this.sheet.getWorkspace());
-    this.sheet.dispose();
+    disposeSheet(this.sheet);
   }
 
   /** This block goes to another behaviour: its deletion here is no loss. */
@@ -138,10 +124,7 @@ export class Bin {
     }
     this.workspace.hideChaff();
     this.fill(sheet);
-    const first = sheet.getWorkspace().getTopBlocks(true)[0];
-    if (!byKey || !first) return;
-    Blockly.keyboardNavigationController.setIsActive(true);
-    Blockly.getFocusManager().focusNode(first);
+    if (byKey) sheet.focusFirst();
   }
 
   /** What was deleted last comes back to where it was. */
@@ -191,12 +174,8 @@ export class Bin {
   }
 
   private makeSheet(): BinSheet {
-    const options = this.workspace.copyOptionsForFlyout();
-    options.toolboxPosition = Blockly.utils.toolbox.Position.RIGHT;
-    const sheet = new BinSheet(options);
-    this.workspace.getParentSvg().after(sheet.createDom('svg'));
-    sheet.init(this.workspace);
-    bins.set(sheet.getWorkspace(), this);
+    const sheet = openable(this.workspace, (options) => new BinSheet(options));
+    sheet.onTake = (id) => this.takeBack(id);
     return sheet;
   }
 
@@ -257,26 +236,8 @@ export class Bin {
   }
 }
 
-/** The bin of each sheet. */
-const bins = new Map<Blockly.WorkspaceSvg, Bin>();
-
 /** How many blocks a person sees in it: the grey values in the gaps are part of what holds them. */
 export function countOf(state: State): number {
   const held = Object.values(state.inputs ?? {}).map((input) => input.block);
   return [...held, state.next?.block].reduce((sum, each) => sum + (each ? countOf(each) : 0), 1);
-}
-
-/** Enter on a block in the sheet takes it back. */
-const act = Blockly.BlockSvg.prototype.performAction;
-Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, event?: KeyboardEvent) {
-  const bin = bins.get(this.workspace);
-  if (bin) bin.takeBack(this.getRootBlock().id);
-  else act.call(this, event);
-};
-
-/** So does a click: whether this block was one in a sheet. */
-export function takeBackClicked(block: Blockly.BlockSvg | null): boolean {
-  const bin = block && bins.get(block.workspace);
-  if (bin) bin.takeBack(block.getRootBlock().id);
-  return Boolean(bin);
 }

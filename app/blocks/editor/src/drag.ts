@@ -1,7 +1,9 @@
 // A block in the hand: how near is near, where letting go deletes, and how it leaves the flyout.
 import * as Blockly from 'blockly/core';
+import {aimAtBackpack, isOverBackpack, isPacked, pack} from './backpack';
 import {Carried} from './carry';
 import {chosenWith, runsOf} from './selection';
+import {sheetOf} from './sheet';
 import {type Leaving, isOutside, leaving, leavingTogether} from './carrying';
 
 /** How near a gap has to be, in pixels of the screen; one that is offered already holds a little further. */
@@ -35,6 +37,9 @@ class Dragger extends Blockly.dragging.Dragger {
   /** The zoom of the flyout that the block came from; 0: it was on the canvas. */
   private readonly cameFrom = this.draggable instanceof Blockly.BlockSvg && this.draggable.workspace.isFlyout ?
     this.draggable.workspace.scale : 0;
+  /** What it came out of: it closes, so that all of the canvas is there for it. */
+  private readonly sheet = this.draggable instanceof Blockly.BlockSvg ? sheetOf(this.draggable) : null;
+  private readonly wasPacked = this.draggable instanceof Blockly.BlockSvg && isPacked(this.draggable);
   private placed = false;
   /** The other blocks that were chosen go along. */
   private carried: Carried | null = null;
@@ -44,6 +49,7 @@ class Dragger extends Blockly.dragging.Dragger {
     // Ctrl takes one block out of its script; of several each is out already.
     const dragged = super.onDragStart(this.carried && event instanceof PointerEvent ? undefined : event);
     this.carried?.start();
+    this.sheet?.hide();
     this.setRadius();
     return dragged;
   }
@@ -74,7 +80,8 @@ class Dragger extends Blockly.dragging.Dragger {
     this.carried?.move(this.pixelsToWorkspaceUnits(delta));
     if (!(event instanceof PointerEvent)) return;
     this.tellDelete(this.wouldDelete(event) ? mouseOf(event) : null);
-    this.listener?.outside(this.leaves(mouseOf(event)) ? mouseOf(event) : null);
+    this.listener?.outside(this.isOut(mouseOf(event)) ? mouseOf(event) : null);
+    aimAtBackpack(this.goesIntoBackpack(mouseOf(event)));
   }
 
   override onDragEnd(event?: PointerEvent | KeyboardEvent): void {
@@ -96,7 +103,8 @@ class Dragger extends Blockly.dragging.Dragger {
       forgetSoon(draggable.workspace, Blockly.Events.getGroup());
       Blockly.Events.setGroup(false);
     }
-    if (leaves && mouse) listener?.letGoOutside(leaves, mouse);
+    if (leaves && mouse && isOutside(mouse)) listener?.letGoOutside(leaves, mouse);
+    else if (leaves && !this.wasPacked) pack(leaves.copied);
     if (leaves) return;
     if (carried) {
       Blockly.Events.setGroup(group);
@@ -123,7 +131,7 @@ class Dragger extends Blockly.dragging.Dragger {
     Blockly.Events.setGroup(group);
   }
 
-  /** Outside of the page nothing is deleted: it goes back to where it was, to the toolbox if it came from there. */
+  /** Outside of the page, and on the backpack, nothing is deleted: it goes back to where it was, to the toolbox if it came from there. */
   protected override wouldDeleteDraggable(mouse: Blockly.utils.Coordinate,
     draggable: Blockly.IDraggable & Blockly.IDeletable): boolean {
     return this.leaves(mouse) ? this.cameFrom > 0 : super.wouldDeleteDraggable(mouse, draggable);
@@ -133,8 +141,17 @@ class Dragger extends Blockly.dragging.Dragger {
     return this.leaves(mouse) ? !this.cameFrom : super.shouldReturnToStart(mouse, draggable);
   }
 
-  /** Whether it is outside of the page there, as blocks and notes may be. */
+  /** Whether what is let go there goes elsewhere, and back to where it was here. */
   private leaves(mouse: Blockly.utils.Coordinate): boolean {
+    return this.isOut(mouse) || this.goesIntoBackpack(mouse);
+  }
+
+  private goesIntoBackpack(mouse: Blockly.utils.Coordinate): boolean {
+    return this.draggable instanceof Blockly.BlockSvg && isOverBackpack(mouse);
+  }
+
+  /** Whether it is outside of the page there, as blocks and notes may be. */
+  private isOut(mouse: Blockly.utils.Coordinate): boolean {
     return isOutside(mouse) && (this.draggable instanceof Blockly.BlockSvg ||
       this.draggable instanceof Blockly.comments.RenderedWorkspaceComment);
   }
@@ -159,6 +176,7 @@ class Dragger extends Blockly.dragging.Dragger {
     Object.assign(Blockly.config, USUAL);
     this.tellDelete(null);
     this.listener?.outside(null);
+    aimAtBackpack(false);
   }
 
   /** The flyout has a zoom of its own: what is under the mouse there is under it here. */

@@ -20,7 +20,7 @@ export class Flyout extends Blockly.VerticalFlyout {
   override readonly CORNER_RADIUS: number = 0;
   /** Calls when a person wants it to stay open, or not. */
   onPin: (keeps: boolean) => void = () => undefined;
-  private readonly head = document.createElement('div');
+  protected readonly head = document.createElement('div');
   private readonly title = document.createElement('span');
   private readonly button = this.makeButton();
   /** So much below it is left free. */

@@ -4,6 +4,7 @@ import './blockly_patches';
 import './fields';
 import './focus_after_delete';
 import './mutators';
+import {type Packed, backpackButton, registerBackpack, showContents} from './backpack';
 import {Carrying} from './carrying';
 import {Clipboard} from './clipboard';
 import {type Begin, EmptyCanvas, Pointer, type Wanted} from './guidance';
@@ -49,6 +50,7 @@ interface Bridge {
   carried(x: number, y: number, out: boolean): void;
   dropped(x: number, y: number): void;
   brought(count: number, how: string): void;
+  backpack(asked: string): void;
 }
 
 declare const QWebChannel: new (transport: unknown, done: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
@@ -105,6 +107,7 @@ class Editor {
     this.clipboard = new Clipboard({write: (text) => bridge.copy(text), read: () => bridge.copied()});
     useClipboard(this.clipboard);
     registerMenu(this.clipboard);
+    registerBackpack((asked) => bridge.backpack(asked), () => this.shown.backpack);
     registerPictureMenu((command) => bridge.command(command));
     // Keys that come while nothing in the page has them, as after a change of tabs, are the canvas's.
     document.addEventListener('keydown', (event) => {
@@ -161,6 +164,7 @@ class Editor {
     undo: () => this.shown.program.undo(false),
     bring: () => this.carrying.bring(this.shown),
     giveBack: () => this.carrying.giveBack(),
+    backpack: (items: Packed[]) => showContents(items),
     undelete: () => this.shown.bin.undoLast() && this.shown.program.undo(false),
     redo: () => this.shown.program.undo(true),
     zoom: (steps: number) => this.shown.workspace.zoomCenter(steps),
@@ -255,7 +259,9 @@ class Editor {
     }
     const bin = binButton();
     bin.onclick = (event) => this.shown.bin.toggle(event.detail === 0);
-    box.prepend(frameButton(), bin);
+    const backpack = backpackButton();
+    backpack.onclick = (event) => this.shown.backpack.toggle(event.detail === 0);
+    box.prepend(frameButton(), bin, backpack);
     document.body.append(box);
     this.dressBin();
   }

@@ -173,6 +173,33 @@ export function registerMenu(clipboard: Clipboard): void {
     when: () => true, run: (it) => it.comment && step(() => it.comment!.dispose())});
 }
 
+/** The shortcut that puts blocks into the backpack. */
+export const PACK = 'nepPack';
+
+/** What the menus need of the backpack. */
+interface BackpackMenu {
+  may(block: Blockly.BlockSvg | undefined): boolean;
+  pack(block: Blockly.BlockSvg): void;
+  isPacked(block: Blockly.BlockSvg): boolean;
+  remove(block: Blockly.BlockSvg): void;
+  count(): number;
+  open(): void;
+  empty(): void;
+}
+
+export function addToMenus(backpack: BackpackMenu): void {
+  add(ScopeType.BLOCK, {id: 'nepPack', weight: 14, icon: 'backpack', words: t('Put into the backpack'), shortcut: PACK,
+    when: ({block}) => backpack.may(block), run: ({block}) => block && backpack.pack(block)});
+  add(ScopeType.BLOCK, {id: 'nepUnpack', weight: 99, icon: 'trash-2', words: t('Remove from the backpack'),
+    shortcut: names.DELETE, when: ({block}) => block !== undefined && backpack.isPacked(block),
+    run: ({block}) => block && backpack.remove(block)});
+  add(ScopeType.WORKSPACE, {id: 'nepOpenBackpack', weight: 13, icon: 'backpack',
+    words: () => t('Open the backpack ({count})', {count: backpack.count()}),
+    when: () => backpack.count() > 0, run: () => backpack.open()});
+  add(ScopeType.WORKSPACE, {id: 'nepEmptyBackpack', weight: 14, icon: 'trash-2', words: t('Empty the backpack'),
+    when: () => backpack.count() > 0, run: () => backpack.empty()});
+}
+
 export function registerPictureMenu(command: (name: string) => void): void {
   const canvas = (entry: Omit<Entry, 'when'>) => add(ScopeType.WORKSPACE,
     {...entry, when: ({workspace}) => (workspace?.getTopBlocks(false).length ?? 0) > 0});
@@ -216,7 +243,7 @@ function all(block: Blockly.BlockSvg): Blockly.BlockSvg[] {
 }
 
 /** Where several blocks are chosen, only what is done to all of them. */
-const FOR_SEVERAL = new Set(['nepDuplicate', 'nepCopy', 'nepCut', 'nepPaste', 'nepCollapse', 'nepExpand', 'nepOff', 'nepOn', 'nepDelete']);
+const FOR_SEVERAL = new Set(['nepDuplicate', 'nepCopy', 'nepCut', 'nepPaste', 'nepCollapse', 'nepExpand', 'nepOff', 'nepOn', 'nepDelete', 'nepPack']);
 
 /** Who adds an entry that is done to all chosen blocks says so. */
 export function forSeveral(id: string): void {

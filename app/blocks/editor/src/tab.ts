@@ -1,5 +1,6 @@
 // One behaviour in the page: a workspace of its own, with its undo, zoom, scroll position and open category.
 import * as Blockly from 'blockly/core';
+import {Backpack} from './backpack';
 import {Bin} from './bin';
 import type {Leaving} from './carrying';
 import {CHECKER} from './checker';
@@ -52,6 +53,7 @@ export class Tab {
   readonly overlays: Overlays;
   readonly watched: WatchedValues;
   readonly bin: Bin;
+  readonly backpack: Backpack;
   private readonly functions: Functions;
   private readonly variables: Variables;
   private readonly culling: Culling;
@@ -92,6 +94,7 @@ export class Tab {
     new TryHandle(this.workspace);
     this.variables = new Variables(this.workspace);
     this.bin = new Bin(this.workspace, {deleted: (count) => listener.deleted(this, count), changed: () => listener.binned(this)});
+    this.backpack = new Backpack(this.workspace);
     this.wrongDrops = new WrongDrops(this.workspace);
     listenToDrags(this.workspace, {
       overDelete: (mouse) => this.bin.showHint(mouse),
@@ -168,6 +171,7 @@ export class Tab {
     this.letGo();
     this.program.dispose();
     this.bin.dispose();
+    this.backpack.dispose();
     this.wrongDrops.dispose();
     this.workspace.dispose();
     this.frame.remove();

@@ -1,10 +1,10 @@
 // Trying blocks at once, as in Scratch: a click on a block of the toolbox, "Run from here" for one in the behaviour.
 import * as Blockly from 'blockly/core';
-import {takeBackClicked} from './bin';
 import {focusedBlock} from './help';
 import {drawIcon} from './icons';
 import {ctrl} from './keys';
 import {menuIcon} from './menu';
+import {takeClicked} from './sheet';
 import {t} from './words';
 
 const SVG = 'http://www.w3.org/2000/svg';
@@ -79,7 +79,7 @@ export function registerTries(tell: Tell): void {
   const click = gestures.doBlockClick;
   // Blockly puts a copy into the program; a person who clicks wants to see what the block does.
   gestures.doBlockClick = function (this: Clicks) {
-    if (takeBackClicked(this.targetBlock)) return;
+    if (takeClicked(this.targetBlock)) return;
     const block = this.flyout ? meant(this.targetBlock) : null;
     if (canTry(block)) tryBlock(block);
     else if (!this.flyout) click.call(this);

@@ -12,11 +12,13 @@ from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.core.documents.backpack import Backpack
 from app.core.documents.rename import why_not
 from app.core.documents.titles import told_apart
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.behaviour.backpack_keeper import BackpackKeeper
 from app.ui.panels.behaviour.carried_blocks import CarriedBlocks
 from app.ui.panels.behaviour.live_values import live_words
 from app.ui.panels.behaviour.program_view import ProgramView
@@ -62,6 +64,7 @@ class Editor(Protocol):
     block_carried: SignalInstance
     block_dropped: SignalInstance
     blocks_brought: SignalInstance
+    backpack_asked: SignalInstance
 
     @property
     def is_ready(self) -> bool: ...
@@ -83,6 +86,7 @@ class Editor(Protocol):
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None: ...
     def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None: ...
     def edit_variable(self, edit: Json) -> None: ...
+    def set_backpack(self, items: Sequence[Json]) -> None: ...
     def set_first_step(self, first: str, robot: bool) -> None: ...
     def point_at(self, block: str, name: str = "", then: str = "") -> None: ...
     def undo(self) -> None: ...
@@ -140,6 +144,7 @@ class BehaviourPanel(PanelWidget):
         self._watched: tuple[str, ...] = ()  # the variables whose values the page shows
         self._ticks = 0
         self._carried: CarriedBlocks | None = None
+        self._backpack: BackpackKeeper | None = None
 
     def replaces_title(self) -> QWidget:
         return self._bar
@@ -178,6 +183,8 @@ class BehaviourPanel(PanelWidget):
             )
         if self._ticks % LIVE_EVERY == 0:
             self._show_live()
+        if self._backpack is not None:
+            self._backpack.tick()
         self.waiting.tell(ready=self.editor.is_ready)
         robot = bool(self.session.fleet.connected or self.session.coming)
         self.editor.set_first_step(pgettext("block", "when started"), robot)
@@ -233,6 +240,8 @@ class BehaviourPanel(PanelWidget):
         self._carried = CarriedBlocks(
             self.context, self.session, self._bar.tabs, editor, self.flush, self.show_current
         )
+        backpack = Backpack(self.session.settings.path.parent)
+        self._backpack = BackpackKeeper(self.context, backpack, editor)
         pinned: object = self.session.settings.get(PINNED, None)
         editor.set_toolbox_pinned(pinned if isinstance(pinned, bool) else None)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)

@@ -61,6 +61,7 @@ FIXED: tuple[Fixed, ...] = (
     Fixed(lazy("Blocks"), lazy("Run from the block, or show its value"), "Ctrl+Enter"),
     Fixed(lazy("Blocks"), lazy("Open the menu of the block or of the canvas"), "Shift+F10"),
     Fixed(lazy("Blocks"), lazy("Copy, cut, paste blocks"), "Ctrl+C, Ctrl+X, Ctrl+V"),
+    Fixed(lazy("Blocks"), lazy("Put the block, with all below it, into the backpack"), "Ctrl+Shift+P"),
     Fixed(lazy("Blocks"), lazy("Choose all blocks"), "Ctrl+A"),
     Fixed(lazy("Blocks"), lazy("Duplicate the block"), "Ctrl+D"),
     Fixed(lazy("Blocks"), lazy("Delete the block"), "Delete, Backspace"),

@@ -1,0 +1,295 @@
+// The backpack: stacks of blocks that a person keeps for other files, other Studios and the next start. The window
+// keeps what is in it (`app/core/documents/backpack.py`); all behaviours show the same.
+import * as Blockly from 'blockly/core';
+import {countOf} from './bin';
+import {withoutTypeChecks} from './checker';
+import {type Copied, type CopiedBlocks, add, stateOf, stateOfRun} from './clipboard';
+import {inSight} from './free_place';
+import {focusedBlock} from './help';
+import {drawIcon, iconElement} from './icons';
+import {ctrl} from './keys';
+import {PACK, addToMenus} from './menu';
+import {chosenWith, runsOf} from './selection';
+import {Sheet, disposeSheet, openable, sheetOf} from './sheet';
+import {type BlockState, wrapUnknown, wrapWholeStack} from './unknown_blocks';
+import {withOwnVariables} from './own_variables';
+import {t} from './words';
+
+const SVG = 'http://www.w3.org/2000/svg';
+/** Room at the left of each stack for the button that takes it out, in units of the sheet. */
+const GUTTER = 40;
+const SIDE = 30;
+const BUSY_MS = 60;
+
+/** A stack of blocks in the backpack. */
+export interface Packed {
+  id: string;
+  at: number;
+  block: BlockState;
+}
+
+type BlockInfo = Blockly.utils.toolbox.BlockInfo;
+
+type Asked = {do: 'put'; blocks: BlockState[]; count: number} | {do: 'remove'; id: string} | {do: 'empty' | 'look'};
+
+let contents: readonly Packed[] = [];
+let tell: (asked: Asked) => void = () => undefined;
+let button: HTMLButtonElement | null = null;
+const all = new Set<Backpack>();
+
+/** Beside the bin; one for all behaviours. */
+export function backpackButton(): HTMLButtonElement {
+  if (button) return button;
+  button = document.createElement('button');
+  button.type = 'button';
+  button.className = 'nepBackpack';
+  button.append(iconElement('backpack', 18));
+  dress();
+  return button;
+}
+
+/** The button says how many stacks are in it. */
+function dress(): void {
+  const count = contents.length;
+  const words = count ? t('Backpack ({count})', {count}) : t('Backpack: keeps blocks for other files');
+  if (!button) return;
+  button.title = words;
+  button.setAttribute('aria-label', words);
+  button.classList.toggle('nepFull', count > 0);
+}
+
+/** The window says what is in it, the newest first. */
+export function showContents(items: readonly Packed[]): void {
+  contents = items;
+  dress();
+  for (const each of all) each.refresh();
+}
+
+/** Whether letting go there puts it into the backpack. */
+export function isOverBackpack({x, y}: {x: number; y: number}): boolean {
+  const box = button?.getBoundingClientRect();
+  return box !== undefined && box.width > 0 && x >= box.left && x < box.right && y >= box.top && y < box.bottom;
+}
+
+/** Shows that letting go there puts it in. */
+export function aimAtBackpack(aims: boolean): void {
+  button?.classList.toggle('nepOver', aims);
+}
+
+/** Whether this block is one of the backpack's own. */
+export function isPacked(block: Blockly.Block): boolean {
+  return sheetOf(block) instanceof BackpackSheet;
+}
+
+export function pack(copied: Copied | CopiedBlocks): void {
+  if (copied.nepStudio === 'note') return;
+  const states = copied.nepStudio === 'blocks' ? copied.states : [copied.state];
+  const blocks = states.map(({id: _id, x: _x, y: _y, ...rest}) => rest as BlockState);
+  const count = blocks.reduce((sum, each) => sum + countOf(each as Blockly.serialization.blocks.State), 0);
+  if (blocks.length) tell({do: 'put', blocks, count});
+}
+
+/** The block with what hangs below it, or all blocks that are chosen with it. */
+function packBlock(block: Blockly.BlockSvg): void {
+  const chosen = chosenWith(block);
+  const one = chosen.length ? null : stateOf(block, true);
+  const states = chosen.length ? runsOf(chosen).map(stateOfRun) : [one?.state ?? null];
+  pack({nepStudio: 'blocks', states: states.filter((each) => each !== null)});
+}
+
+/** Once for the page: the menus and the key; `ask` tells the window what is to be done with the backpack. */
+export function registerBackpack(ask: (asked: string) => void, shown: () => Backpack): void {
+  tell = (asked) => ask(JSON.stringify(asked));
+  const may = (block: Blockly.BlockSvg | null | undefined): block is Blockly.BlockSvg =>
+    Boolean(block) && !block!.isInFlyout && !block!.isShadow();
+  Blockly.ShortcutRegistry.registry.register({
+    name: PACK, keyCodes: [ctrl(Blockly.utils.KeyCodes.P, Blockly.utils.KeyCodes.SHIFT)], displayText: () => t('Put into the backpack'),
+    preconditionFn: (workspace) => !workspace.isDragging() && may(focusedBlock()),
+    callback: (_workspace, event) => {
+      event.preventDefault();
+      const block = focusedBlock();
+      if (may(block)) packBlock(block);
+      return true;
+    },
+  });
+  addToMenus({
+    may, pack: packBlock,
+    isPacked, remove: (block) => sheetOf(block)?.remove(block.getRootBlock()),
+    count: () => contents.length, open: () => shown().toggle(true), empty: () => tell({do: 'empty'}),
+  });
+}
+
+/** A stack that can't be made here, whatever is wrong with it, is shown grey and kept as it is. */
+class CarefulInflater extends Blockly.BlockFlyoutInflater {
+  override createBlock({kind, ...state}: BlockInfo, workspace: Blockly.WorkspaceSvg): Blockly.BlockSvg {
+    const before = new Set(workspace.getTopBlocks(false));
+    const make = (made: BlockState) => super.createBlock({kind, ...made} as BlockInfo, workspace);
+    try {
+      return make(wrapUnknown(state as unknown as BlockState));
+    } catch (error) {
+      console.warn(`kept whole: ${String(error)}`);
+      for (const block of workspace.getTopBlocks(false)) if (!before.has(block)) block.dispose(false);
+      return make(wrapWholeStack(state as unknown as BlockState));
+    }
+  }
+}
+
+class BackpackSheet extends Sheet {
+  protected override readonly tabWidth_: number = GUTTER;
+  private readonly inflater = new CarefulInflater();
+  private readonly ids = new Map<Blockly.BlockSvg, string>();
+  onTake: (block: Blockly.BlockSvg) => void = () => undefined;
+
+  override init(target: Blockly.WorkspaceSvg): void {
+    super.init(target);
+    this.svgGroup_?.classList.add('nepPacked');
+    this.svgGroup_?.addEventListener('keydown', (event) => {
+      const block = ['Delete', 'Backspace'].includes(event.key) ? focusedBlock() : null;
+      if (!block || sheetOf(block) !== this) return;
+      event.preventDefault();
+      event.stopPropagation();
+      this.remove(block.getRootBlock() as Blockly.BlockSvg);
+    }, true);
+    const empty = document.createElement('button');
+    empty.type = 'button';
+    empty.className = 'nepEmpty';
+    empty.title = t('Empty the backpack');
+    empty.setAttribute('aria-label', empty.title);
+    empty.append(iconElement('trash-2', 16));
+    empty.onclick = () => tell({do: 'empty'});
+    this.head.lastElementChild?.before(empty);
+  }
+
+  override take(block: Blockly.BlockSvg): void {
+    this.onTake(block);
+  }
+
+  override remove(block: Blockly.BlockSvg): void {
+    const id = this.ids.get(block);
+    if (id !== undefined) tell({do: 'remove', id});
+  }
+
+  /** Shows what is in it; what was scrolled to stays in sight, and the keys stay at their place. */
+  fill(): void {
+    const inside = this.getWorkspace();
+    const place = this.isVisible() ? this.focusedPlace : -1;
+    const {scrollY} = inside;
+    const names = new Map<string, string>();
+    const shown = contents.map(({block}) => {
+      const {id: _id, x: _x, y: _y, ...rest} = withOwnVariables(structuredClone(block), this.targetWorkspace, names);
+      return {kind: 'block', ...rest};
+    });
+    const none = [t('The backpack is empty.'), t('Drag blocks onto its button:'), t('they are kept for other files'),
+      t('and for the next start.')].map((text) => ({kind: 'label', text}));
+    this.setTitle(shown.length ? t('Backpack ({count})', {count: shown.length}) : t('Backpack'));
+    this.head.querySelector('.nepEmpty')?.toggleAttribute('hidden', !shown.length);
+    withoutTypeChecks(() =>
+      this.show((shown.length ? shown : none) as unknown as Blockly.utils.toolbox.FlyoutItemInfoArray));
+    const blocks = this.getContents().map((item) => item.getElement()).filter((each) => each instanceof Blockly.BlockSvg);
+    this.ids.clear();
+    blocks.forEach((block, number) => {
+      this.ids.set(block, contents[number]?.id ?? '');
+      block.getSvgRoot().append(this.outButton(block));
+    });
+    if (place < 0) {
+      this.scrollToStart();
+      return;
+    }
+    inside.scrollbar?.setY(-scrollY);
+    const next = blocks[Math.min(place, blocks.length - 1)];
+    Blockly.getFocusManager().focusNode(next ?? this.targetWorkspace);
+  }
+
+  protected override getInflaterForType(type: string): Blockly.IFlyoutInflater | null {
+    return type.toLowerCase() === 'block' ? this.inflater : super.getInflaterForType(type);
+  }
+
+  protected override get closes(): string {
+    return t('Close the backpack');
+  }
+
+  /** Which of its stacks has the keys; -1: none. */
+  private get focusedPlace(): number {
+    const block = focusedBlock()?.getRootBlock();
+    return block ? [...this.ids.keys()].indexOf(block as Blockly.BlockSvg) : -1;
+  }
+
+  /** By keys it is Delete, or the menu. */
+  private outButton(block: Blockly.BlockSvg): SVGGElement {
+    const group = document.createElementNS(SVG, 'g');
+    group.setAttribute('class', 'nepTakeOut');
+    group.setAttribute('aria-hidden', 'true');
+    group.setAttribute('transform', `translate(${-GUTTER}, 6)`);
+    const title = document.createElementNS(SVG, 'title');
+    title.textContent = t('Remove from the backpack');
+    const back = document.createElementNS(SVG, 'circle');
+    for (const name of ['cx', 'cy', 'r']) back.setAttribute(name, String(SIDE / 2));
+    const icon = document.createElementNS(SVG, 'g');
+    drawIcon(icon, 'x', 18);
+    icon.setAttribute('transform', 'translate(6, 6)');
+    group.append(title, back, icon);
+    // The press is not the block's.
+    group.addEventListener('pointerdown', (event) => {
+      event.stopPropagation();
+      event.preventDefault();
+    });
+    group.addEventListener('click', (event) => {
+      event.stopPropagation();
+      this.remove(block);
+    });
+    return group;
+  }
+}
+
+/** The backpack as one behaviour shows it. */
+export class Backpack {
+  private sheet: BackpackSheet | null = null;
+  private timer = 0;
+
+  constructor(private readonly workspace: Blockly.WorkspaceSvg) {
+    all.add(this);
+  }
+
+  dispose(): void {
+    window.clearTimeout(this.timer);
+    all.delete(this);
+    disposeSheet(this.sheet);
+  }
+
+  /** Opens the sheet, or closes it; `byKey`: the keys go to what is on top. */
+  toggle(byKey: boolean): void {
+    const sheet = this.sheet ??= this.makeSheet();
+    if (sheet.isVisible()) {
+      sheet.hide();
+      return;
+    }
+    this.workspace.hideChaff();
+    sheet.fill();
+    if (byKey) sheet.focusFirst();
+    tell({do: 'look'});
+  }
+
+  /** There are other things in it: an open sheet shows them, but not while the mouse holds one of them. */
+  refresh(): void {
+    window.clearTimeout(this.timer);
+    if (!this.sheet?.isVisible()) return;
+    if (Blockly.Gesture.inProgress()) this.timer = window.setTimeout(() => this.refresh(), BUSY_MS);
+    else this.sheet.fill();
+  }
+
+  private makeSheet(): BackpackSheet {
+    const sheet = openable(this.workspace, (options) => new BackpackSheet(options));
+    sheet.onTake = (block) => this.take(block);
+    return sheet;
+  }
+
+  /** Lays a copy free on the canvas, where it can be seen; it stays in the backpack. */
+  private take(block: Blockly.BlockSvg): void {
+    const copied = stateOf(block, true);
+    this.sheet?.hide();
+    if (!copied) return;
+    const {left, right, top, bottom} = inSight(this.workspace);
+    const wanted = new Blockly.utils.Coordinate(left + (right - left) / 4, top + (bottom - top) / 4);
+    add({...copied, state: withOwnVariables(copied.state, this.workspace)}, this.workspace, wanted);
+  }
+}

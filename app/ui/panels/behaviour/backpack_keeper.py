@@ -1,0 +1,104 @@
+"""The backpack of the block editor: the page asks, its file is changed, and the page hears what is in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+from PySide6.QtCore import SignalInstance
+
+from app.core.documents.backpack import Backpack, Packed
+from app.core.storage import deep_json
+from app.errors import BackpackError
+from app.ui.panels.base import PanelContext
+from nep.i18n import _, ngettext
+
+LOOK_EVERY = 30  # refreshes of 30 a second: what another Studio has put in shows within a second
+
+
+class Shows(Protocol):
+    """The editor, as far as it shows the backpack."""
+
+    backpack_asked: SignalInstance
+
+    def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None: ...
+
+
+class BackpackKeeper:
+    """Does what the page asks, as JSON whose "do" is put (blocks, count), remove (id), empty or look.
+
+    Each change offers to undo it.
+    """
+
+    def __init__(self, context: PanelContext, backpack: Backpack, editor: Shows) -> None:
+        self._context, self._backpack, self._editor = context, backpack, editor
+        self._shown = -1
+        self._ticks = 0
+        editor.backpack_asked.connect(self._asked)
+        self.look()
+
+    def tick(self) -> None:
+        """Look now and then whether another Studio has changed it; call it with every refresh."""
+        self._ticks += 1
+        if self._ticks % LOOK_EVERY == 0:
+            self.look()
+
+    def look(self) -> None:
+        """Show what is in it now."""
+        self._backpack.look()
+        self._show()
+
+    def _show(self) -> None:
+        trouble = self._backpack.take_trouble()
+        if trouble:
+            self._context.toast(_sentence(trouble))
+        if self._shown != self._backpack.revision:
+            self._shown = self._backpack.revision
+            self._editor.set_backpack([item.to_json() for item in self._backpack.items])
+
+    def _asked(self, what: str) -> None:
+        asked = deep_json.loads(what)
+        if not isinstance(asked, Mapping):
+            return
+        if asked.get("do") == "look":
+            self.look()
+        elif asked.get("do") == "put":
+            blocks, count = asked.get("blocks"), asked.get("count")
+            if isinstance(blocks, list) and isinstance(count, int):
+                self._put(blocks, count)
+        elif asked.get("do") == "remove":
+            self._take_out(lambda: self._backpack.remove([str(asked.get("id"))]), emptied=False)
+        elif asked.get("do") == "empty":
+            self._take_out(self._backpack.empty, emptied=True)
+
+    def _put(self, blocks: Sequence[Mapping[str, object]], count: int) -> None:
+        made: list[Packed] = []
+        if blocks and self._try(lambda: made.extend(self._backpack.put(blocks))):
+            words = ngettext(
+                "Put {count} block into the backpack", "Put {count} blocks into the backpack", count
+            )
+            ids = [item.id for item in made]
+            self._context.toast(
+                words.format(count=count), _("Undo"), lambda: self._try(lambda: self._backpack.remove(ids))
+            )
+
+    def _take_out(self, take: Callable[[], list[Packed]], *, emptied: bool) -> None:
+        gone: list[Packed] = []
+        if self._try(lambda: gone.extend(take())) and gone:
+            words = _("Emptied the backpack") if emptied else _("Removed from the backpack")
+            self._context.toast(words, _("Undo"), lambda: self._try(lambda: self._backpack.restore(gone)))
+
+    def _try(self, change: Callable[[], object]) -> bool:
+        """Whether it could be done; a person is told why not."""
+        try:
+            change()
+        except BackpackError as error:
+            self._context.toast(_sentence(str(error)))
+            return False
+        finally:
+            self._show()
+        return True
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:]

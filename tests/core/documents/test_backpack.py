@@ -1,0 +1,149 @@
+"""The backpack: kept across starts, shared by several Studios, and nothing in it is ever thrown away."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from app.core.documents import backpack as module
+from app.core.documents.backpack import Backpack
+from app.core.storage.file_lock import FileLock
+from app.errors import BackpackError
+
+WAIT = {"type": "control_wait"}
+SAY = {"type": "robot_pepper_do_say", "fields": {"TEXT": "Ñandú 🎈"}}
+
+
+def types(backpack: Backpack) -> list[object]:
+    return [item.block["type"] for item in backpack.items]
+
+
+def deep(levels: int) -> dict[str, object]:
+    block: dict[str, object] = {"type": "control_wait"}
+    for _ in range(levels):
+        block = {"type": "control_wait", "next": {"block": block}}
+    return block
+
+
+def test_what_was_put_in_is_there_at_the_next_start_the_newest_first(tmp_path: Path) -> None:
+    first = Backpack(tmp_path)
+    first.put([WAIT])
+    first.put([SAY, deep(600)])
+    again = Backpack(tmp_path)
+    again.look()
+    assert types(again) == ["robot_pepper_do_say", "control_wait", "control_wait"]
+    assert again.items[0].block == SAY
+    assert [item.id for item in again.items] == [item.id for item in first.items]
+
+
+def test_two_studios_do_not_lose_each_others(tmp_path: Path) -> None:
+    one, other = Backpack(tmp_path), Backpack(tmp_path)
+    one.put([WAIT])
+    other.put([SAY])  # has not looked since
+    one.look()
+    assert types(one) == types(other) == ["robot_pepper_do_say", "control_wait"]
+    before = one.revision
+    one.look()
+    assert one.revision == before
+    (gone,) = one.remove([item.id for item in one.items if item.block["type"] == "control_wait"])
+    other.put([deep(1)])
+    assert types(other) == ["control_wait", "robot_pepper_do_say"]
+    one.restore([gone])
+    assert types(one) == ["control_wait", "robot_pepper_do_say", "control_wait"], "where it was"
+    assert one.remove(["nobody"]) == []
+
+
+def test_emptied_and_brought_back(tmp_path: Path) -> None:
+    backpack = Backpack(tmp_path)
+    backpack.put([WAIT, SAY])
+    gone = backpack.empty()
+    assert (types(backpack), len(gone)) == ([], 2)
+    backpack.restore(gone)
+    backpack.restore(gone)
+    assert types(backpack) == ["control_wait", "robot_pepper_do_say"]
+
+
+@pytest.mark.parametrize(
+    "content", [b"{", b"\xff\xfe", b"[]", b'{"backpack": 2, "items": []}', b'{"backpack": 1}']
+)
+def test_a_file_that_is_no_backpack_is_kept_aside_and_said_once(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "backpack.json").write_bytes(content)
+    (tmp_path / "backpack.damaged.json").write_text("an earlier one")
+    backpack = Backpack(tmp_path)
+    backpack.look()
+    kept = tmp_path / "backpack.damaged-2.json"
+    assert kept.read_bytes() == content
+    assert (tmp_path / "backpack.damaged.json").read_text() == "an earlier one"
+    assert str(kept) in backpack.take_trouble()
+    assert backpack.take_trouble() == ""
+    backpack.put([WAIT])
+    assert types(backpack) == ["control_wait"]
+
+
+def test_what_is_not_understood_in_it_is_counted_and_stays(tmp_path: Path) -> None:
+    strange: list[object] = [
+        7,
+        {"id": "x"},
+        {"id": "y", "at": float("inf"), "block": WAIT},
+        {"id": "z", "new": 1},
+    ]
+    good = {"id": "a", "at": 5, "block": WAIT}
+    (tmp_path / "backpack.json").write_text(json.dumps({"backpack": 1, "items": [*strange, good]}))
+    backpack = Backpack(tmp_path)
+    backpack.look()
+    assert types(backpack) == ["control_wait"]
+    assert "4 things" in backpack.take_trouble()
+    backpack.put([SAY])
+    backpack.empty()
+    assert json.loads((tmp_path / "backpack.json").read_text())["items"] == strange
+    assert backpack.take_trouble() == ""
+
+
+def test_it_has_bounds_that_lose_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST", 3)
+    monkeypatch.setattr(module, "MOST_BYTES", 2000)
+    backpack = Backpack(tmp_path)
+    backpack.put([WAIT, WAIT])
+    with pytest.raises(BackpackError, match="take something out"):
+        backpack.put([SAY, SAY])
+    with pytest.raises(BackpackError, match="at most 0 MB"):
+        backpack.put([{"type": "x" * 3000}])
+    assert types(backpack) == ["control_wait"] * 2
+    again = Backpack(tmp_path)
+    again.look()
+    assert types(again) == ["control_wait"] * 2
+    monkeypatch.setattr(module, "MOST", 1)
+    backpack.remove([backpack.items[0].id])  # less than it holds is always possible
+    assert len(backpack.items) == 1
+
+
+def test_one_that_cannot_be_read_or_written_is_left_as_it_is(tmp_path: Path) -> None:
+    (tmp_path / "backpack.json").mkdir()
+    backpack = Backpack(tmp_path)
+    backpack.look()
+    assert "can't be read" in backpack.take_trouble()
+    with pytest.raises(BackpackError, match="can't be read"):
+        backpack.put([WAIT])
+    (tmp_path / "backpack.json").rmdir()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BackpackError, match="can't be kept"):
+        Backpack(tmp_path / "file").put([WAIT])
+
+
+@pytest.mark.skipif(os.name != "posix", reason="modes are POSIX's")
+def test_it_is_for_its_owner_alone(tmp_path: Path) -> None:
+    backpack = Backpack(tmp_path)
+    backpack.put([WAIT])
+    assert backpack.path.stat().st_mode & 0o077 == 0
+
+
+def test_a_lock_that_somebody_holds_for_long_stops_nobody(tmp_path: Path) -> None:
+    lock = FileLock(tmp_path / "backpack.json")
+    assert lock.acquire()
+    backpack = Backpack(tmp_path)
+    backpack.put([WAIT])
+    lock.release()
+    assert types(backpack) == ["control_wait"]

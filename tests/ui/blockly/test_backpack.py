@@ -1,0 +1,261 @@
+"""The backpack: blocks kept for other files, by mouse and by keys."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from app.core.documents.backpack import Backpack
+from app.ui.panels.behaviour.backpack_keeper import BackpackKeeper
+from tests.ui.blockly_person import START, Person, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+WAITS = {
+    "type": "control_wait",
+    "id": "one",
+    "x": 280,
+    "y": 224,
+    "next": {"block": {"type": "control_wait", "id": "two"}},
+}
+SHOWN = "document.querySelector('.nepTab:not([hidden])')"
+SHEET = f"getComputedStyle({SHOWN}.querySelector('.blocklyFlyout.nepPacked')).display"
+STACKS = f"[...{SHOWN}.querySelectorAll('.nepPacked .blocklyBlockCanvas > .blocklyBlock')]"
+IN_SHEET = ".nepTab:not([hidden]) .nepPacked .blocklyBlockCanvas > .blocklyBlock"
+BLOCK = ".nepTab:not([hidden]) .blocklyBlockCanvas [data-id='{}'] > .blocklyPath"
+FREE = QPoint(300, 260), QPoint(520, 420)
+
+
+class Window:
+    """Stands for the window: keeps the backpack in a file and says what was done."""
+
+    def __init__(self, view, folder: Path) -> None:
+        self.said: list[str] = []
+        self.undo: list = []
+        self.backpack = Backpack(folder)
+        self.keeper = BackpackKeeper(self, self.backpack, view)  # type: ignore[arg-type]
+
+    def toast(self, words: str, _button: str = "", run=None) -> None:
+        self.said.append(words)
+        self.undo.append(run)
+
+    @property
+    def types(self) -> list[list[str]]:
+        return [chain(item.block) for item in self.backpack.items]
+
+
+def chain(top: dict) -> list[str]:
+    below = top.get("next", {}).get("block")
+    return [top["type"].rpartition("_")[2], *(chain(below) if below else [])]
+
+
+def chains(them: Person) -> list[list[str]]:
+    return [chain(each) for each in them.tops()]
+
+
+@pytest.fixture
+def window(view, tmp_path: Path) -> Window:
+    return Window(view, tmp_path)
+
+
+@pytest.fixture
+def them(view, person, window) -> Person:
+    """Tab "a" is shown, "b" was shown before."""
+    view.show_tab("b", workspace(START))
+    person_there = person(state=workspace(START))
+    view.show_tab("a", workspace(START, WAITS))
+    person_there.wait_for(f"!!{SHOWN}.querySelector('[data-id=two]')")
+    return person_there
+
+
+def centre(them: Person, selector: str) -> QPoint:
+    box = them.box(selector)
+    return QPoint(round(box["left"] + box["right"]) // 2, round(box["top"] + box["bottom"]) // 2)
+
+
+def put_in(them: Person, window: Window, block: str) -> None:
+    before = len(window.backpack.items)
+    end = centre(them, ".nepBackpack")
+    start = them.hold(BLOCK.format(block))
+    them.move(start, end)
+    them.wait_for("document.querySelector('.nepBackpack').classList.contains('nepOver')")
+    them.drop(end)
+    them.until(lambda: len(window.backpack.items) == before + 1, "it is in the backpack")
+
+
+def open_it(them: Person, count: int) -> None:
+    them.click(".nepBackpack")
+    them.wait_for(SHEET, "block")
+    them.wait_for(f"{STACKS}.length", count)
+
+
+def show(them: Person, key: str) -> None:
+    them.view.show_tab(key, {})
+    them.wait_for(f"{SHOWN} !== null && true")
+
+
+def test_a_stack_dropped_on_it_is_kept_and_stays_where_it_was(qtbot, view, them, window) -> None:
+    before, edits = them.newest(), []
+    view.changed.connect(lambda key, _program: edits.append(key))
+    put_in(them, window, "one")
+    assert window.types == [["wait", "wait"]]
+    assert window.said == ["Put 2 blocks into the backpack"]
+    assert them.newest() == before
+    assert edits == []
+    them.wait_for("document.querySelector('.nepBackpack').title", "Backpack (1)")
+    assert not them.ask("document.querySelector('.nepBackpack').classList.contains('nepOver')")
+    assert "id" not in window.backpack.items[0].block
+    window.undo[0]()
+    them.wait_for("document.querySelector('.nepBackpack').classList.contains('nepFull')", False)
+
+
+def test_it_is_dragged_into_another_file_and_another_program_as_often_as_wanted(
+    qtbot, view, them, window
+) -> None:
+    put_in(them, window, "one")
+    show(them, "b")
+    for count in (1, 2):
+        open_it(them, 1)
+        them.drag(f"{IN_SHEET} > .blocklyPath", FREE[count - 1])
+        them.until(lambda: len(chains(them)) == 1 + count, "it is on the canvas")  # noqa: B023
+        them.wait_for(SHEET, "none")
+    assert chains(them) == [["started"], ["wait", "wait"], ["wait", "wait"]]
+    ids = {each["id"] for each in them.tops()}
+    assert len(ids) == 3
+    assert not ids & {"one", "two"}
+    assert window.types == [["wait", "wait"]], "it stays in the backpack"
+
+
+def test_a_click_lays_it_free_as_one_step(qtbot, view, them, window) -> None:
+    put_in(them, window, "two")
+    show(them, "b")
+    open_it(them, 1)
+    them.click(f"{IN_SHEET} > .blocklyPath")
+    them.until(lambda: chains(them) == [["started"], ["wait"]], "it is on the canvas")
+    them.wait_for(SHEET, "none")
+    view.undo()
+    them.until(lambda: chains(them) == [["started"]], "one step")
+
+
+def test_with_keys_alone(qtbot, view, them, window) -> None:
+    them.click(BLOCK.format("two"))
+    held = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
+    them.press(Qt.Key.Key_P, held)
+    them.until(lambda: window.types == [["wait"]], "the key puts it in")
+    them.click(BLOCK.format("one"))
+    them.press(Qt.Key.Key_P, held)
+    them.until(lambda: window.types == [["wait", "wait"], ["wait"]], "with what hangs below")
+    show(them, "b")
+    them.ask("document.querySelector('.nepBackpack').focus()")
+    them.press(Qt.Key.Key_Return)
+    them.wait_for(f"{STACKS}.length", 2)
+    on = f"{STACKS}.findIndex(each => each.contains(document.activeElement))"
+    them.wait_for(on, 0)
+    them.press(Qt.Key.Key_Down)
+    them.wait_for(on, 1)
+    them.press(Qt.Key.Key_Delete)
+    them.until(lambda: window.types == [["wait", "wait"]], "Delete takes it out")
+    them.wait_for(on, 0)
+    them.press(Qt.Key.Key_Return)
+    them.until(lambda: chains(them) == [["started"], ["wait", "wait"]], "Enter puts it on the canvas")
+    them.wait_for(SHEET, "none")
+
+
+def test_one_is_removed_all_are_removed_and_undo_brings_them_back(qtbot, view, them, window) -> None:
+    put_in(them, window, "one")
+    put_in(them, window, "two")
+    open_it(them, 2)
+    them.click(f"{IN_SHEET}:first-child .nepTakeOut")
+    them.wait_for(f"{STACKS}.length", 1)
+    assert window.types == [["wait", "wait"]]
+    assert window.said[-1] == "Removed from the backpack"
+    window.undo[-1]()
+    them.wait_for(f"{STACKS}.length", 2)
+    assert window.types == [["wait"], ["wait", "wait"]], "where it was"
+    them.click(".nepTab:not([hidden]) .nepFlyoutHead:not([hidden]) .nepEmpty")
+    them.wait_for(f"{STACKS}.length", 0)
+    assert window.said[-1] == "Emptied the backpack"
+    window.undo[-1]()
+    them.wait_for(f"{STACKS}.length", 2)
+
+
+def test_its_menus(qtbot, view, them, window) -> None:
+    them.click(BLOCK.format("one"))
+    them.press(Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
+    row = "[...document.querySelectorAll('.blocklyMenuItem')].find(e => e.textContent.includes({}))"
+    label = json.dumps("Put into the backpack")
+    them.wait_for(f"!!{row.format(label)}")
+    assert "Ctrl+Shift+P" in them.ask(f"{row.format(label)}.textContent")
+    them.ask(f"{row.format(label)}.setAttribute('data-test', 'row')")
+    them.click("[data-test=row]")
+    them.until(lambda: window.types == [["wait", "wait"]], "it is in the backpack")
+    open_it(them, 1)
+    box = them.box(f"{IN_SHEET} > .blocklyPath")
+    QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(round(box["left"]) + 14, round(box["top"]) + 14))
+    label = json.dumps("Remove from the backpack")
+    them.wait_for(f"!!{row.format(label)}")
+    assert not them.ask(f"!!{row.format(json.dumps('Put into'))}")
+
+
+def test_variables_are_meant_by_their_names(qtbot, view, them, window) -> None:
+    def gets(id: str, name: str, block: str, y: int) -> dict:
+        field = {"id": id, "name": name, "type": ""}
+        return {"type": "variables_get", "id": block, "x": 300, "y": y, "fields": {"VAR": field}}
+
+    variables = [{"id": "v1", "name": "score"}, {"id": "v2", "name": "lives"}]
+    blocks = workspace(gets("v1", "score", "g1", 100), gets("v2", "lives", "g2", 200))
+    view.show_tab("from", {**blocks, "variables": variables})
+    them.wait_for(f"!!{SHOWN}.querySelector('[data-id=g2]')")
+    put_in(them, window, "g1")
+    put_in(them, window, "g2")
+    # The other file has one of that name with another id, and the id belongs to another name.
+    other = [{"id": "own", "name": "score"}, {"id": "v2", "name": "other"}]
+    view.show_tab("to", {**workspace(START), "variables": other})
+    them.wait_for(f"{STACKS}.length === 0 && !{SHOWN}.querySelector('[data-id=g2]')")
+    for number in (1, 2):
+        open_it(them, 2)
+        them.click(f"{IN_SHEET}:nth-child({number}) > .blocklyPath")
+        them.until(lambda: len(them.tops()) == 1 + number, "it is on the canvas")  # noqa: B023
+    used = {top["fields"]["VAR"]["id"] for top in them.tops() if "fields" in top and "VAR" in top["fields"]}
+    names = {each["id"]: each["name"] for each in them.newest()["variables"]}
+    assert sorted(names[id] for id in used) == ["lives", "score"]
+    assert sorted(names.values()) == ["lives", "other", "score"]
+    assert names["v2"] == "other"
+    assert names["own"] == "score"
+
+
+def test_what_another_studio_puts_in_comes_and_what_is_strange_is_shown_and_kept(
+    qtbot, view, them, window, tmp_path
+) -> None:
+    strange = {
+        "type": "robot_none_do_fly",
+        "fields": {"HOW": "far"},
+        "next": {"block": {"type": "control_wait"}},
+    }
+    wrong = {"type": "control_wait", "inputs": {"SECONDS": {"block": {"type": "control_wait"}}}}
+    Backpack(tmp_path).put([strange, wrong, {"type": "control_wait", "extraState": 5, "icons": 7}])
+    open_it(them, 3)  # opening it looks
+    them.wait_for("document.querySelector('.nepBackpack').title", "Backpack (3)")
+    them.click(f"{IN_SHEET}:first-child > .blocklyPath")
+    them.until(lambda: len(chains(them)) == 3, "it is on the canvas")
+    made = next(top for top in them.tops() if top["type"] == "robot_none_do_fly")
+    assert made["fields"] == {"HOW": "far"}
+    assert set(made) == {"type", "fields", "next", "id", "x", "y"}
+
+
+def test_nothing_of_the_backpack_itself_goes_into_it_again(qtbot, view, them, window) -> None:
+    put_in(them, window, "two")
+    open_it(them, 1)
+    end = centre(them, ".nepBackpack")
+    start = them.hold(f"{IN_SHEET} > .blocklyPath")
+    them.move(start, QPoint(500, 300))
+    them.move(QPoint(500, 300), end)
+    them.drop(end)
+    them.wait_for("!document.querySelector('.blocklyDragging')")
+    assert chains(them) == [["started"], ["wait", "wait"]]
+    assert window.types == [["wait"]]
