@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtWidgets import QApplication, QTabBar, QWidget
 
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.docking.workbench import Workbench
+from app.ui.widgets.keyboard import tab_stops
 
 
 class PanelFocus(QObject):
@@ -38,6 +39,35 @@ class PanelFocus(QObject):
         names = bench.open_names() if bench is not None else ()
         if bench is not None and 0 < number <= len(names):
             bench.focus_panel(bench.docks[names[number - 1]])
+
+    def give(self, dock: Dock | None) -> None:
+        """Bring a panel to the front and give it the keyboard."""
+        bench = self._bench()
+        if bench is not None and dock is not None:
+            bench.focus_panel(dock)
+
+    def skip_hidden(self, window: QWidget, *, forward: bool) -> bool:
+        """Go on by Tab past what Qt takes for visible and nobody sees; False: none of it comes.
+
+        That is what stands behind another panel, and Qt's own tab bars, in whose place titles have tabs.
+        """
+        focus = QApplication.focusWidget()
+        if focus is None:
+            return False
+        skipped = False
+        for stop in tab_stops(window, focus, forward=forward):
+            if not isinstance(stop, QTabBar) and not self._is_behind(stop):
+                if skipped:
+                    reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
+                    stop.setFocus(reason)
+                return skipped
+            skipped = True
+        return False
+
+    def _is_behind(self, widget: QWidget) -> bool:
+        bench = self._bench()
+        docks = bench.docks.values() if bench is not None else ()
+        return any(dock.isAncestorOf(widget) and not dock.front for dock in docks)
 
     def dock(self) -> Dock | None:
         """The panel that has the keyboard."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from PySide6.QtCore import QKeyCombination, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence
+from PySide6.QtGui import QCloseEvent, QContextMenuEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QMainWindow, QMenuBar, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.documents.titles import recent_titles
@@ -54,6 +54,7 @@ BLOCK_KEYS = {
     QKeySequence.StandardKey.Cut: "cut",
     QKeySequence.StandardKey.Paste: "paste",
 }
+MENU = QKeyCombination(Qt.KeyboardModifier.ShiftModifier, Qt.Key.Key_F10)
 DUPLICATE = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_D)
 SOON_WORDS = {"behaviour": lazy("Getting the blocks ready.")}
 OTHER_SOON_WORDS = lazy("Getting the panels ready.")
@@ -339,8 +340,17 @@ class MainWindow(QMainWindow):
             what = "duplicate"
         if what:
             self._run(f"blocks.edit:{what}")
+        elif event.keyCombination() == MENU and (focus := QApplication.focusWidget()) is not None:
+            # Qt itself knows only the key with a menu on it, which many keyboards lack.
+            place = focus.rect().center()
+            asked = QContextMenuEvent.Reason.Keyboard
+            QApplication.sendEvent(focus, QContextMenuEvent(asked, place, focus.mapToGlobal(place)))
         else:
             super().keyPressEvent(event)
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        """Tab leads only to what a person can see."""
+        return self.panel_focus.skip_hidden(self, forward=forward) or super().focusNextPrevChild(forward)
 
     # -- the tick ---------------------------------------------------------------------------------
 

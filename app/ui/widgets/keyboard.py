@@ -66,6 +66,15 @@ def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Itera
         step = following(step, forward=forward)
 
 
+def stops_of(widget: QWidget) -> list[QWidget]:
+    """What takes the keyboard by Tab of a widget and in it, in the order in which it was made."""
+    return [
+        each
+        for each in (widget, *widget.findChildren(QWidget))
+        if each.focusPolicy() & Qt.FocusPolicy.TabFocus
+    ]
+
+
 def _own_again(found: QWidget) -> QWidget:
     """Tell PySide whose child this is: Qt, which knows it, finds nothing to do."""
     QObject.setParent(found, found.parentWidget())

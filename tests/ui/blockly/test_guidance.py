@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
 import pytest
@@ -12,6 +13,7 @@ from tests.ui.blockly_person import START, Person
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
+MANY = 12
 SHOWN = "!document.querySelector('.nepBegin').hidden"
 SAID = "document.querySelector('.nepBeginPlace').textContent"
 BUTTONS = "[...document.querySelectorAll('.nepBegin button')].filter(e => !e.hidden).map(e => e.textContent)"
@@ -89,6 +91,22 @@ def test_show_me_leads_to_the_category_then_to_the_block_and_ends_with_it(empty:
     empty.drag(FIRST, middle_of(empty, ".nepBeginPlace"))
     empty.wait_for("document.querySelector('.nepRing') === null")
     assert len(empty.tops()) == 1
+
+
+def test_who_uses_the_keys_is_told_of_keys_and_led_to_the_category(empty: Person) -> None:
+    said = "document.querySelector('.nepBeginKeys').textContent"
+    assert empty.ask(said).startswith("Without the mouse: Ctrl+B and the arrow keys find it")
+    empty.view.setFocus()
+    empty.wait_for("document.hasFocus()")
+    for _ in range(MANY):
+        if empty.ask("document.activeElement.textContent") == "Show me":
+            break
+        before = empty.ask("document.activeElement.outerHTML")
+        empty.press(Qt.Key.Key_Tab)
+        empty.wait_for(f"document.activeElement.outerHTML !== {json.dumps(before)}")
+    empty.press(Qt.Key.Key_Return)
+    empty.wait_for("document.activeElement.id.toLowerCase().includes('events')")
+    empty.wait_for(f"({BUBBLE}).startsWith('Enter takes it')")
 
 
 def test_escape_and_the_window_take_the_ring_away(empty: Person, view: BlocklyView) -> None:

@@ -19,6 +19,7 @@ pytestmark = pytest.mark.web
 
 FOUND = (("append", "lists_add"), ("loop", "control_repeat"), ("rep fore", "control_forever"))
 PACE_MS = 80
+EDGE = 40
 CARD = "document.querySelector('.nepHelp')?.textContent ?? ''"
 FOCUSED = (
     "(it => [it.getAttribute('class') ?? '', it.getAttribute('aria-label') ?? '', it.id])"
@@ -88,6 +89,7 @@ def test_a_behaviour_is_built_with_keys_alone(qtbot, view, person):
     them.wait_for("!!document.querySelector('.blocklyDragging')")
     press(them, Qt.Key_Return)  # puts it down
     qtbot.waitUntil(lambda: [top["type"] for top in them.tops()] == ["events_started"], timeout=WAIT_MS)
+    assert min(them.tops()[0]["x"], them.tops()[0]["y"]) >= EDGE, "its signs at the left are whole"
     hold(them, Qt.Key_B)
     goes_to(them, "events")
     press(them, Qt.Key_Down)
@@ -283,3 +285,23 @@ def test_enter_on_a_text_opens_it(qtbot, view, person):
     QTest.keyClicks(them.target, "Good day")
     press(them, Qt.Key_Return)
     qtbot.waitUntil(lambda: "Good day" in str(them.tops()), timeout=WAIT_MS)
+
+
+def test_a_value_that_does_not_fit_where_the_keys_were_says_why(qtbot, view, them):
+    to_the_canvas(them)
+    press(them, Qt.Key_Down, Qt.Key_Down, Qt.Key_Right)
+    goes_to(them, "Edit number: 5")
+    begin_to_search(them)
+    QTest.keyClicks(them.target, "empty list")
+    them.wait_for("document.querySelector('.blocklyFlyout .lists_empty') !== null")
+    press(them, Qt.Key_Return)
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    press(them, Qt.Key_Return)
+    them.wait_for("document.querySelector('.nepWhy').textContent", "“wait” needs a number here")
+    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
+
+
+def test_shift_tab_leads_out_of_the_search(them):
+    begin_to_search(them)
+    them.press(Qt.Key_Tab, Qt.ShiftModifier)
+    them.wait_for("document.activeElement.closest('.blocklyToolbox') === null")

@@ -129,6 +129,15 @@ def test_the_next_step_has_its_hint_and_its_button(panel, window) -> None:
     assert panel.chip.text == "1 of 6"
 
 
+def test_the_keyboard_goes_on_at_the_next_step(qtbot, panel, window) -> None:
+    panel.activateWindow()
+    qtbot.waitUntil(panel.isActiveWindow)
+    panel.rows[0].button.setFocus()
+    window.session.join(pepper())
+    panel.refresh()
+    assert panel.rows[1].button.hasFocus()
+
+
 def test_show_me_knows_the_block_of_the_robot_that_is_there(panel, window) -> None:
     window.session.join(pepper())
     build(panel, block("events_started"))

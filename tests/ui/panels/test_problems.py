@@ -6,6 +6,7 @@ from PySide6.QtTest import QTest
 
 from app.blocks import Problem
 from app.ui.panels.problems import PANEL, ProblemsPanel
+from app.ui.widgets.keyboard import tab_stops
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press
 from tests.ui.sample_data import pepper
@@ -102,6 +103,18 @@ def test_the_arrow_keys_go_along_the_problems(panel, window) -> None:
     assert panel.rows[1].hasFocus()
     QTest.keyClick(panel.rows[1], Qt.Key.Key_Up)
     assert panel.rows[0].hasFocus()
+
+
+def test_tab_goes_along_the_problems_also_those_that_came_later(qtbot, panel, window) -> None:
+    document = window.session.document
+    document.found = (Problem("error", None, None, "x", "x is not known."), *document.found)
+    document.edits += 1
+    panel.refresh()
+    qtbot.waitUntil(lambda: all(row.isVisible() for row in panel.rows))
+    stops = list(tab_stops(panel, panel))
+    places = [stops.index(stop) for row in panel.rows for stop in (row, *row.buttons)]
+    assert places == sorted(places)
+    assert len(places) > len(panel.rows), "buttons come behind their rows"
 
 
 def test_while_a_long_behaviour_is_checked_the_old_problems_stay(panel, window, monkeypatch) -> None:

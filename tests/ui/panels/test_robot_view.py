@@ -4,9 +4,10 @@ import time
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QFocusEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QApplication, QLabel
 
 from app.ui.panels.robot.panel import PANEL, STALE_AFTER_S, RobotPanel
 from tests.ui.fakes import Session
@@ -99,6 +100,18 @@ def test_the_keyboard_can_touch_it_too(panel, window) -> None:
     QTest.keyPress(panel.view, Qt.Key.Key_H)
     QTest.keyRelease(panel.view, Qt.Key.Key_H)
     assert [change["down"] for change in window.session.changes("Pepper")] == [True, False]
+
+
+def test_space_touches_the_head_as_long_as_it_is_held(panel, window) -> None:
+    QTest.keyPress(panel.view, Qt.Key.Key_Space)
+    assert window.session.changes("Pepper") == [{"touch": "head", "down": True}]
+    QTest.keyRelease(panel.view, Qt.Key.Key_Space)
+    assert window.session.changes("Pepper") == [{"touch": "head", "down": False}]
+    QTest.keyPress(panel.view, Qt.Key.Key_L)
+    QApplication.sendEvent(panel.view, QFocusEvent(QEvent.Type.FocusOut))
+    assert window.session.changes("Pepper")[-1] == {"touch": "left_hand", "down": False}
+    QTest.keyRelease(panel.view, Qt.Key.Key_L)
+    assert window.session.changes("Pepper") == [], "it is let go once"
 
 
 def test_the_ball_is_dragged_over_the_floor(panel, window) -> None:

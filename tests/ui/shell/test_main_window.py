@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton, QTabBar, QWidget
 
 from app.core.documents.journal import Journal, left_behind
 from app.core.faults import RepeatFilter
@@ -28,6 +28,7 @@ from app.ui.shell.main_window import MainWindow, Placeholder
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 from app.ui.widgets.file_dialogs import SystemDialogs
+from app.ui.widgets.keyboard import tab_stops
 from tests.ui.shell_parts import PANELS, PlainPanel, free_address
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -221,6 +222,39 @@ def test_esc_leaves_a_field_and_stops_nothing(qtbot, window: MainWindow, command
     QTest.keyClick(field, Qt.Key.Key_Escape)
     assert not field.hasFocus()
     assert stops == []
+
+
+@pytest.mark.parametrize("held", [Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier])
+def test_tab_never_leads_behind_another_panel(qtbot, window: MainWindow, commands: Commands, held) -> None:
+    show(qtbot, window)
+    commands.run("layout.developer")
+    bench = window.benches["developer"]
+    qtbot.waitUntil(bench.docks["console"].shown)
+    behind = [dock for dock in bench.docks.values() if not dock.front]
+    assert any(list(tab_stops(dock, dock)) for dock in behind), "Qt would go there"
+    bench.focus_panel(bench.docks["console"])
+    seen = []
+    for _ in range(60):
+        focus = QApplication.focusWidget()
+        QTest.keyClick(focus, Qt.Key.Key_Tab if not held else Qt.Key.Key_Backtab, held)
+        seen.append(QApplication.focusWidget())
+    assert len(set(map(id, seen))) > 10
+    assert not any(isinstance(each, QTabBar) for each in seen)
+    assert not any(dock.isAncestorOf(each) for dock in behind for each in seen)
+
+
+def test_shift_f10_opens_the_menu_of_what_has_the_keyboard(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    show(qtbot, window)
+    commands.run("layout.developer")
+    field = panel(window, "developer", "topics").filter
+    field.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+    asked: list[QPoint] = []
+    field.customContextMenuRequested.connect(asked.append)
+    field.setFocus()
+    QTest.keyClick(field, Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
+    assert asked == [field.rect().center()]
 
 
 def test_f6_and_numbers_go_through_the_panels(qtbot, window: MainWindow, commands: Commands) -> None:

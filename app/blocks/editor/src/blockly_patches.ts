@@ -81,6 +81,22 @@ Blockly.WorkspaceSvg.prototype.lookUpFocusableNode = function (id) {
   return lookUp.call(this, id);
 };
 
+// ---- a block that is taken with the keys and hangs on nothing lies as far from the edge as a hand would put it
+
+/** The signs at the left of a block are 20 wide. */
+const FROM_EDGE = 48;
+
+interface Placing {
+  WORKSPACE_MARGIN: number;
+  positionNewBlock(from: Blockly.BlockSvg, made: Blockly.BlockSvg): void;
+}
+const placing = Blockly.dragging.BlockDragStrategy.prototype as unknown as Placing;
+const place = placing.positionNewBlock;
+placing.positionNewBlock = function (from, made) {
+  this.WORKSPACE_MARGIN = FROM_EDGE;
+  place.call(this, from, made);
+};
+
 // ---- words for screen readers
 
 type Told = (Blockly.Field | Blockly.BlockSvg) & Tells;

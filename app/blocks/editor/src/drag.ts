@@ -16,6 +16,8 @@ export interface DragListener {
   overDelete(mouse: Blockly.utils.Coordinate | null): void;
   /** A block was let go on the canvas and joined nothing; where the mouse was on the page. */
   letGo(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void;
+  /** A block was put down with the keys and joined nothing; what had them when it was taken from the toolbox. */
+  putDown(block: Blockly.BlockSvg, meant: Blockly.IFocusableNode): void;
   /** Where the mouse is with something in the hand while it is outside of the page; null: it is not. */
   outside(mouse: Blockly.utils.Coordinate | null): void;
   /** It was let go there, and went back to where it was. */
@@ -41,11 +43,14 @@ class Dragger extends Blockly.dragging.Dragger {
   private readonly sheet = this.draggable instanceof Blockly.BlockSvg ? sheetOf(this.draggable) : null;
   private readonly wasPacked = this.draggable instanceof Blockly.BlockSvg && isPacked(this.draggable);
   private placed = false;
+  /** What had the keys on the canvas when a block was taken from the toolbox with them. */
+  private meant: Blockly.IFocusableNode | null = null;
   /** The other blocks that were chosen go along. */
   private carried: Carried | null = null;
 
   override onDragStart(event?: PointerEvent | KeyboardEvent): Blockly.IDraggable {
     this.takeChosen();
+    if (this.cameFrom && event instanceof KeyboardEvent) this.meant = waiting(this.draggable.workspace);
     // Ctrl takes one block out of its script; of several each is out already.
     const dragged = super.onDragStart(this.carried && event instanceof PointerEvent ? undefined : event);
     this.carried?.start();
@@ -92,7 +97,7 @@ class Dragger extends Blockly.dragging.Dragger {
     const joins = Boolean((draggable as unknown as Strategy).dragStrategy?.connectionCandidate);
     const loose = mouse && !joins && !this.wouldDelete(event as PointerEvent);
     const group = Blockly.Events.getGroup();
-    const {carried, way} = this;
+    const {carried, way, meant} = this;
     const free = leaves ? keepPlace(draggable) : null;
     super.onDragEnd(event);
     this.end();
@@ -112,6 +117,9 @@ class Dragger extends Blockly.dragging.Dragger {
       else carried.end(joins ? way : this.way);
       Blockly.Events.setGroup(false);
       return;
+    }
+    if (!mouse && meant && !joins && draggable instanceof Blockly.BlockSvg && !draggable.isDeadOrDying()) {
+      listener?.putDown(draggable, meant);
     }
     if (!loose || !(draggable instanceof Blockly.BlockSvg) || draggable.isDeadOrDying()) return;
     const before = Blockly.Events.getGroup();
@@ -199,6 +207,12 @@ class Dragger extends Blockly.dragging.Dragger {
   private tellDelete(mouse: Blockly.utils.Coordinate | null): void {
     this.listener?.overDelete(this.cameFrom ? null : mouse);
   }
+}
+
+/** What has the keys on the canvas of a flyout as soon as they come back to it. */
+function waiting(flyout: Blockly.WorkspaceSvg): Blockly.IFocusableNode | null {
+  const canvas = flyout.targetWorkspace;
+  return canvas && Blockly.FocusableTreeTraverser.findFocusedNode(canvas);
 }
 
 /** What was put back is nothing to undo. Blockly lists edits after the next frame. */

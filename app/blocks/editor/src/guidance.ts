@@ -1,6 +1,8 @@
 // What helps a person begin: the words on an empty canvas, and a ring round the block that comes next.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
+import {keyWords} from './keys';
+import {isKeyboardLed} from './modality';
 import {t} from './words';
 
 const LOOK_MS = 120;
@@ -40,6 +42,7 @@ export class EmptyCanvas {
   private readonly box = element('aside', 'nepBegin');
   private readonly place = element('div', 'nepBeginPlace');
   private readonly where = element('p', '');
+  private readonly byKeys = element('p', 'nepBeginKeys');
   private readonly robot: HTMLButtonElement;
   private begin: Begin | null = null;
   private frame = 0;
@@ -49,9 +52,11 @@ export class EmptyCanvas {
     const buttons = element('div', 'nepBeginButtons');
     this.robot = this.button(buttons, 'bot', t('Use the virtual robot'), () => ask('robot'));
     this.robot.classList.add('primary');
-    this.button(buttons, 'lightbulb', t('Show me'), () => this.showMe());
+    this.button(buttons, 'lightbulb', t('Show me'), (event) => this.showMe(event.detail === 0));
     this.button(buttons, 'blocks', t('Open an example'), () => ask('examples'));
-    this.box.append(this.place, this.where, buttons);
+    this.byKeys.textContent = t('Without the mouse: {toolbox} and the arrow keys find it, Enter takes it, Enter again puts it down.',
+      {toolbox: keyWords(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)});
+    this.box.append(this.place, this.where, this.byKeys, buttons);
     this.box.hidden = true;
     document.body.append(this.box);
     window.addEventListener('resize', () => this.lookSoon());
@@ -92,11 +97,12 @@ export class EmptyCanvas {
     this.where.textContent = events ? t('It is in {category}, on the left.', {category: events.getName()}) : '';
   }
 
-  private showMe(): void {
+  private showMe(byKey: boolean): void {
     this.pointer.show({block: FIRST, name: this.begin?.first ?? '', then: t('Drag it onto the page')});
+    if (byKey) this.pointer.lead();
   }
 
-  private button(place: HTMLElement, icon: string, words: string, action: () => void): HTMLButtonElement {
+  private button(place: HTMLElement, icon: string, words: string, action: (event: MouseEvent) => void): HTMLButtonElement {
     const made = element('button', '');
     made.type = 'button';
     made.append(iconElement(icon, 16), element('span', '', words));
@@ -135,6 +141,14 @@ export class Pointer {
     this.look();
   }
 
+  /** The keys go to the category that has it. */
+  lead(): void {
+    const category = this.wanted && categoryOf(this.shown(), this.wanted.block);
+    if (!category) return;
+    Blockly.keyboardNavigationController.setIsActive(true);
+    Blockly.getFocusManager().focusNode(category);
+  }
+
   private count(type: string): number {
     return this.shown().getBlocksByType(type, false).length;
   }
@@ -153,9 +167,16 @@ export class Pointer {
     this.ring.hidden = this.bubble.hidden = !seen;
     if (!seen) return;
     this.put(rect);
-    const words = block ? wanted.then : t('“{block}” is in {category}',
-      {block: wanted.name, category: category?.getName() ?? ''});
+    const words = this.words(block !== null, wanted, category?.getName() ?? '');
     if (this.bubble.textContent !== words) this.bubble.textContent = words;
+  }
+
+  /** Who uses the keys is told of keys. */
+  private words(isOpen: boolean, {name, then}: Wanted, category: string): string {
+    const byKeys = isKeyboardLed();
+    if (isOpen) return byKeys ? t('Enter takes it, Enter again puts it down') : then;
+    const where = t('“{block}” is in {category}', {block: name, category});
+    return byKeys ? `${where} (${keyWords(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)})` : where;
   }
 
   private put(rect: DOMRect): void {

@@ -9,6 +9,10 @@ export function setKeyboardLed(led: boolean): void {
   Blockly.keyboardNavigationController.setIsActive(led);
 }
 
+export function isKeyboardLed(): boolean {
+  return document.documentElement.classList.contains('nepKeys') || Blockly.keyboardNavigationController.getIsActive();
+}
+
 /** Follows what the person uses from now on. */
 export function followModality(): void {
   document.addEventListener('pointerdown', () => setKeyboardLed(false), true);

@@ -91,9 +91,20 @@ export class SearchItem extends Blockly.ToolboxItem {
     } else if (event.key === 'Enter' || event.key === 'ArrowDown') {
       this.toolbox.enterFound(event.key === 'Enter' ? event : null);
     } else {
+      if (event.key === 'Tab' && event.shiftKey) this.leaveBackwards();
       return;
     }
     event.preventDefault();
+  }
+
+  /** The toolbox around the field would get the keys next and give them to a category, which leads back to here. */
+  private leaveBackwards(): void {
+    const box = this.div.closest<HTMLElement>('.blocklyToolbox');
+    if (!box) return;
+    box.tabIndex = -1;
+    window.setTimeout(() => {
+      box.tabIndex = 0;
+    });
   }
 }
 

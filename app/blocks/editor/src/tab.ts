@@ -99,6 +99,7 @@ export class Tab {
     listenToDrags(this.workspace, {
       overDelete: (mouse) => this.bin.showHint(mouse),
       letGo: (block, mouse) => this.wrongDrops.explain(block, mouse),
+      putDown: (block, meant) => this.wrongDrops.explainAt(block, meant),
       outside: (mouse) => listener.outside(mouse),
       letGoOutside: (what, mouse) => listener.letGoOutside(this, what, mouse),
     });

@@ -46,7 +46,15 @@ export class WrongDrops {
 
   /** Says why it did not join, if it was let go at something; moves it aside when it covers that. */
   explain(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void {
-    const refusal = this.refusal(block, Blockly.utils.svgMath.screenToWsCoordinates(this.workspace, mouse));
+    this.tell(block, this.refusal(block, Blockly.utils.svgMath.screenToWsCoordinates(this.workspace, mouse)));
+  }
+
+  /** The same for a value that was put down with the keys: ``meant`` had them before, a gap, a field or a block. */
+  explainAt(block: Blockly.BlockSvg, meant: Blockly.IFocusableNode): void {
+    if (block.outputConnection) this.tell(block, refusedBy(block, meant));
+  }
+
+  private tell(block: Blockly.BlockSvg, refusal: Refusal | null): void {
     if (!refusal) return;
     const at = Blockly.utils.svgMath.wsToScreenCoordinates(this.workspace, refusal.place);
     this.say(refusal.sentence, at);
@@ -111,6 +119,25 @@ export class WrongDrops {
     }
     return best;
   }
+}
+
+/** Why a value does not go where the keys were. */
+function refusedBy(block: Blockly.BlockSvg, meant: Blockly.IFocusableNode): Refusal | null {
+  if (meant instanceof Blockly.RenderedConnection) return atGap(block, meant.getSourceBlock(), meant);
+  const held = meant instanceof Blockly.Field ? meant.getSourceBlock() : meant;
+  if (!(held instanceof Blockly.BlockSvg)) return null;
+  if (held.isShadow() && held.outputConnection?.targetConnection) {
+    const gap: Blockly.RenderedConnection = held.outputConnection.targetConnection;
+    return atGap(block, gap.getSourceBlock(), gap);
+  }
+  const gaps = held.inputList.map((input) => input.connection as Blockly.RenderedConnection | null)
+    .filter((gap): gap is Blockly.RenderedConnection => gap?.type === Blockly.ConnectionType.INPUT_VALUE);
+  for (const gap of gaps) {
+    const refusal = atGap(block, held, gap);
+    if (refusal) return refusal;
+  }
+  const end = below(held);
+  return end && under(block, held, end);
 }
 
 function shift(block: Blockly.BlockSvg, by: number, box: Blockly.utils.Rect): void {

@@ -206,6 +206,7 @@ class FirstStepsPanel(PanelWidget):
 
     def _show(self) -> None:
         step = self.following()
+        held = any(row.button.hasFocus() for row in self.rows)
         for row in self.rows:
             state = "done" if row.step.id in self.done else "next" if row.step is step else "later"
             row.show_state(state)
@@ -214,6 +215,9 @@ class FirstStepsPanel(PanelWidget):
             _("{done} of {all}").format(done=count, all=len(STEPS)), "ok" if count == len(STEPS) else "off"
         )
         self.pages.setCurrentIndex(0 if step is not None else 1)
+        button = next((row.button for row in self.rows if row.step is step), None)
+        if held and button is not None:  # who pressed the last button goes on here
+            button.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _keep(self) -> None:
         kept = [step.id for step in STEPS if step.id in self.done]

@@ -171,6 +171,7 @@ class RobotPanel(OneRobotPanel):
         self.set_title(link.name)
         for button in (self.reset, self.add, self.large):
             button.setVisible(link.virtual)
+        self.view.robot_name = link.name
         self.say.show_robot(link.robot)
         self._say_nothing(link)
 

@@ -6,7 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QContextMenuEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import (
+    QColor,
+    QContextMenuEvent,
+    QFocusEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+)
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.robot_drawing.bubble import paint_heard
@@ -14,6 +22,8 @@ from app.ui.robot_drawing.scene import TURTLE, Marks, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.keyboard import is_plain
 from nep.i18n import _
 
 TOUCHABLE = ("head", "left_hand", "right_hand")
@@ -42,7 +52,8 @@ class RoomView(QWidget):
     """The drawing. A press on head or hands touches them; robots and things are dragged over the floor.
 
     A tap on a robot with a bumper presses it. With the keyboard Tab goes from one to the next, arrows move
-    it, Space presses its bumper, Delete takes a thing away.
+    it, Space presses a bumper or touches a head as long as it is held, H, L, R touch head and hands, Delete
+    takes a thing away.
     """
 
     touched = Signal(str, str, bool)  # robot (empty: the shown one), part, down
@@ -69,6 +80,9 @@ class RoomView(QWidget):
         self._dragging = False
         self._hovered: str | None = None
         self.chosen: str | None = None
+        self.robot_name = ""
+        """Of the robot that the picture is about."""
+        self._keys: dict[int, tuple[str, str]] = {}  # what each key that is held down touches
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(160, 120)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
@@ -77,7 +91,8 @@ class RoomView(QWidget):
         self.setAccessibleName(_("The robots in their room"))
         words = _(
             "Press a head, a hand or the small robot to touch it; drag robots and things; "
-            "double click for a large room"
+            "double click for a large room\n"
+            "Keys: Tab chooses, arrows move it, Space touches it, H L R touch head and hands"
         )
         self.setToolTip(plain.tip(words))
         theme.changed.connect(self.update)
@@ -271,6 +286,9 @@ class RoomView(QWidget):
         at += 1 if forward else -1
         if 0 <= at < len(choices):
             self.chosen = choices[at]
+            thing = self._thing(self.chosen)
+            name = split(self.chosen)[0] or self.robot_name
+            paint.announce(self, thing.name if thing is not None else name)
             self.update()
             return True
         self.chosen = None
@@ -286,19 +304,37 @@ class RoomView(QWidget):
             self._move(self.chosen, where[0] + ahead * step, where[1] + aside * step)
         elif key in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self._thing(self.chosen) is not None:
             self.removed.emit(self.chosen)
-        elif key in PRESSES and self._has_bumper(self.chosen) and not event.isAutoRepeat():
-            self.bumped.emit(split(self.chosen or "")[0], "front")
+        elif key in PRESSES and self._has_bumper(self._pressed_by_keys()) and is_plain(event):
+            if not event.isAutoRepeat():
+                self.bumped.emit(split(self.chosen or "")[0], "front")
         else:
-            self._key(event, down=True)
+            self._touch_by(event, key)
 
-    def keyReleaseEvent(self, event: QKeyEvent) -> None:
-        self._key(event, down=False)
+    def _pressed_by_keys(self) -> str:
+        """What Space presses: what is chosen, else the robot that the picture is about."""
+        return self.chosen or BODY
 
-    def _key(self, event: QKeyEvent, *, down: bool) -> None:
-        nothing_held = not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
-        part = KEYS.get(Qt.Key(event.key())) if nothing_held else None
+    def _touch_by(self, event: QKeyEvent, key: Qt.Key) -> None:
+        part = KEYS.get(key) if is_plain(event) else None
+        if key in PRESSES and is_plain(event) and self._robot(self._pressed_by_keys()) is not None:
+            part = "head"
         if part is None:
             event.ignore()
-        elif not event.isAutoRepeat():
-            name = split(self.chosen or "")[0]
-            self.touched.emit(name, part, down)
+        elif not event.isAutoRepeat() and event.key() not in self._keys:
+            self._keys[event.key()] = split(self.chosen or "")[0], part
+            self.touched.emit(*self._keys[event.key()], True)
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
+        if event.isAutoRepeat():
+            return
+        held = self._keys.pop(event.key(), None)
+        if held is None:
+            event.ignore()
+        else:
+            self.touched.emit(*held, False)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """The release of a key goes to who has the keyboard then: nothing stays touched."""
+        while self._keys:
+            self.touched.emit(*self._keys.popitem()[1], False)
+        super().focusOutEvent(event)

@@ -77,6 +77,12 @@ FIXED: tuple[Fixed, ...] = (
     Fixed(
         lazy("Blocks"), lazy("Let a screen reader say the block, or what it is inside"), "Alt+I, Alt+Shift+I"
     ),
+    Fixed(lazy("Room"), lazy("Next robot or thing"), "Tab"),
+    Fixed(lazy("Room"), lazy("Move the chosen one; with Shift a little"), "Up, Down, Left, Right"),
+    Fixed(lazy("Room"), lazy("Touch the robot: its head, or its bumper"), "Space"),
+    Fixed(lazy("Room"), lazy("Touch its head, its left hand, its right hand"), "H, L, R"),
+    Fixed(lazy("Room"), lazy("Take the chosen thing away"), "Delete"),
+    Fixed(lazy("Room"), lazy("Open the menu of the room or of the chosen thing"), "Shift+F10"),
     Fixed(lazy("Palette"), lazy("Choose"), "Up, Down"),
     Fixed(lazy("Palette"), lazy("Do it"), "Enter"),
     Fixed(lazy("Palette"), lazy("Change the shortcut"), "Ctrl+Enter"),

@@ -56,7 +56,8 @@ class RobotCommands:
     def virtual_pepper(self) -> None:
         """Start the virtual Pepper and show the Behaviour layout."""
         self.start_pepper()
-        self._shell.show_layout("behaviour")
+        if self._shell.showing != "behaviour":  # else the keyboard stays where it is
+            self._shell.show_layout("behaviour")
 
     def virtual_turtle(self) -> None:
         """Start the virtual Turtle."""

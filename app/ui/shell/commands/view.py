@@ -284,7 +284,7 @@ class ViewCommands:
         """Show the card with the first steps beside the blocks."""
         self.show_layout("behaviour")
         self._shell.open_panel("behaviour")
-        self._shell.open_panel("first_steps")
+        self._shell.panel_focus.give(self._shell.open_panel("first_steps"))
 
     def open_guide(self) -> None:
         """Open the guide at the page where it was left."""

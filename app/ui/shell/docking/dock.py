@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
     QLineEdit,
+    QScrollArea,
     QStackedLayout,
     QVBoxLayout,
     QWidget,
@@ -292,7 +293,12 @@ class Dock(QDockWidget):
         about = proxy_of(self.panel)
         if about is not None and about.isVisible():
             return about
-        return next(tab_stops(self.panel, self.panel), self.panel)
+        stops = tab_stops(self.panel, self.panel)
+        first = next(stops, self.panel)
+        if isinstance(first, QScrollArea):  # its first row says more than all of them
+            inside = next(stops, None)
+            return inside if inside is not None and first.isAncestorOf(inside) else first
+        return first
 
     def _float(self) -> None:
         self._let_go()

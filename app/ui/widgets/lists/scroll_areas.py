@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtGui import QFontMetricsF
-from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QFrame,
+    QScrollArea,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.ui.widgets.keyboard import stops_of
 
 
 class Scrolled(QScrollArea):
@@ -42,6 +51,28 @@ class Scrolled(QScrollArea):
         return super().viewportEvent(event)
 
 
+class RowsLayout(QVBoxLayout):
+    """Rows in whose order Tab goes: Qt puts a row that comes later behind everything else in the window."""
+
+    def __init__(self, inside: QWidget, before: QWidget) -> None:
+        """``before`` has the keyboard before the first row."""
+        super().__init__(inside)
+        self._before = before
+
+    def insertWidget(self, place: int, row: QWidget) -> None:  # type: ignore[override]
+        super().insertWidget(place, row)
+        before = self._before
+        above = (item.widget() for number in reversed(range(place)) if (item := self.itemAt(number)))
+        for other in above:
+            stops = stops_of(other) if other is not None else []
+            if stops:
+                before = stops[-1]
+                break
+        for stop in stops_of(row):
+            QWidget.setTabOrder(before, stop)
+            before = stop
+
+
 class ScrollColumn(QScrollArea):
     """Rows below each other, which scroll; put them into `column`, whose end is a stretch."""
 
@@ -50,7 +81,7 @@ class ScrollColumn(QScrollArea):
         super().__init__()
         inside = QWidget()
         inside.setProperty("bare", "true")
-        self.column = QVBoxLayout(inside)
+        self.column = RowsLayout(inside, self)
         self.column.setContentsMargins(*margins)
         self.column.setSpacing(gap)
         self.column.addStretch(1)
