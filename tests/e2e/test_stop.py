@@ -9,9 +9,10 @@ import pytest
 
 import nep
 from tests.e2e.behaviours import block, forever, say, started, turn, write
-from tests.e2e.person import middle
+from tests.e2e.person import Seen, middle
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
+from tests.e2e.x11 import RIGHT
 
 pytestmark = pytest.mark.timeout(240)
 
@@ -122,6 +123,79 @@ def test_stop_while_something_of_a_block_is_open_or_in_the_hand(turning: Studio)
     turning.spot(".blocklyDropDownDiv .blocklyMenuItem")
     turning.screen.click(*middle(turning.find(kind="StopButton")["rect"]))
     stands_still_again(turning)
+
+
+def menus(studio: Studio) -> list[Seen]:
+    """The menus of ours that are open."""
+    return [each for each in studio.look() if each.get("menu") == "popup"]
+
+
+def a_menu_in_a_menu(studio: Studio) -> None:
+    studio.choose("View", "Panels")
+    until(lambda: any("Console" in str(each["entries"]) for each in menus(studio)), "it is open")
+
+
+def the_menu_of_a_tab(studio: Studio) -> None:
+    studio.screen.click(*middle(studio.find("Turning", kind="BehaviourTab")["rect"]), RIGHT)
+    until(lambda: menus(studio), "the tab's menu is open")
+
+
+def the_menu_of_a_block(studio: Studio) -> None:
+    left, top, _, _ = studio.spot("[data-id='say Round and round'] > .blocklyPath")
+    studio.screen.click(left + 12, top + 18, RIGHT)
+    studio.spot(".blocklyContextMenu")
+
+
+def a_menu_in_the_palette(studio: Studio) -> None:
+    studio.screen.key("k", ["Ctrl"])
+    field = studio.find(kind="_Field", focus=True)
+    studio.screen.click(*middle(field["rect"]), RIGHT)
+    until(lambda: menus(studio), "the field's menu is open")
+
+
+def settings(studio: Studio) -> None:
+    studio.screen.key(",", ["Ctrl"])
+    studio.find(kind="SettingsSheet")
+
+
+def a_name_that_is_typed(studio: Studio) -> None:
+    studio.screen.key("s", ["Ctrl", "Shift"])
+    studio.find("Name of the file", focus=True)
+    studio.screen.key("a", ["Ctrl"])
+    studio.screen.type("Half")
+
+
+def test_one_press_on_stop_whatever_is_open(turning: Studio) -> None:
+    """X gives the mouse to what pops up: the first press beside it must do more than close it."""
+    answers: list[nep.Message] = []
+    with nep.node("listener", master=turning.master) as node:
+        node.new_sub("/Pepper/answer", "robot/answer", sink=answers.extend)
+        opened = (
+            a_menu_in_a_menu, the_menu_of_a_tab, the_menu_of_a_block, a_menu_in_the_palette, settings,
+            a_name_that_is_typed,
+        )  # fmt: skip
+        for number, open_it in enumerate(opened):
+            open_it(turning)
+            place = middle(turning.find(kind="StopButton")["rect"])
+            for press in (lambda: turning.screen.key("F12"), lambda at=place: turning.screen.click(*at)):
+                before = len(stops_of(answers))
+                press()
+                until(lambda before=before: len(stops_of(answers)) > before, f"Stop, with {open_it.__name__}")
+            if number == 0:
+                stands_still(turning)
+            if open_it is not a_name_that_is_typed:
+                turning.screen.key("Escape")
+                until(lambda: not menus(turning) and not turning.all(kind="Scrim"), "all is closed")
+    turning.screen.type("way")
+    assert turning.find("Name of the file", focus=True)["text"] == "Halfway", "it is typed where it was"
+    turning.screen.key("Escape")
+    until(lambda: not turning.all(kind="FileSheet"), "the sheet has the keys")
+
+
+def stops_of(messages: list[nep.Message]) -> list[str]:
+    """The stops that the robot has carried out."""
+    told = [message.payload for message in messages]
+    return [each["id"] for each in told if each["op"] == "stop" and each["state"] == "succeeded"]
 
 
 def test_stop_ends_a_program_that_hangs(turning: Studio) -> None:

@@ -4,32 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-from PySide6.QtCore import QEvent, QObject, QPoint, Qt
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QMouseEvent, QWindow
-from PySide6.QtWidgets import QAbstractButton, QApplication
+from PySide6.QtWidgets import QApplication
 
-from app.ui.widgets import Button, StopButton
+from app.ui.widgets.menus import press_stop
 
 _KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
-
-
-def stop_at(place: QPoint) -> QAbstractButton | None:
-    """The button that stops, all robots or one, at a place of the screen that nothing popped up over."""
-    windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
-    inside = [window for window in windows if window.rect().contains(window.mapFromGlobal(place))]
-    if any(window.windowType() == Qt.WindowType.Popup for window in inside):
-        return None
-    for window in inside:
-        under = window.childAt(window.mapFromGlobal(place))
-        if isinstance(under, StopButton) or (isinstance(under, Button) and under.kind == "stop"):
-            return under
-    return None
-
-
-def shut_popups() -> None:
-    """Close every menu and list that is open."""
-    while (popup := QApplication.activePopupWidget()) is not None and popup.close():
-        continue
 
 
 class StopKeys(QObject):
@@ -72,9 +53,4 @@ class StopKeys(QObject):
         """Whether a press beside what pops up was on a button that stops, and is done with."""
         if event.button() != Qt.MouseButton.LeftButton or QApplication.activePopupWidget() is None:
             return False
-        stop = stop_at(event.globalPosition().toPoint())
-        if stop is None:
-            return False
-        shut_popups()
-        stop.click()
-        return True
+        return press_stop(event.globalPosition().toPoint())

@@ -391,6 +391,8 @@ class StopButton(PaintedButton):
         self._place: Place = place
         self._ring = False
         self.filled = True
+        # A press takes the keyboard from nothing: a sheet stays open, what is typed goes on where it was.
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         name_command(self, "run.stop")
         self.setProperty("focusInset", RING)
 

@@ -14,6 +14,7 @@ from PySide6.QtGui import (
     QGuiApplication,
     QIcon,
     QKeySequence,
+    QMouseEvent,
     QPainter,
     QPainterPath,
     QPaintEvent,
@@ -21,12 +22,12 @@ from PySide6.QtGui import (
     QResizeEvent,
     QShowEvent,
 )
-from PySide6.QtWidgets import QLineEdit, QMenu, QPlainTextEdit, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QMenu, QPlainTextEdit, QWidget
 
 from app.ui.text.numbers import spoken_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets.buttons import StopButton
+from app.ui.widgets.buttons import Button, StopButton
 from app.ui.widgets.paint import RIGHT, box, words
 
 CUT_ON = frozenset({"xcb"})
@@ -64,6 +65,30 @@ def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
     return next((place for place in (left, low) if screen.contains(place)), menu)
 
 
+def stop_at(place: QPoint) -> QAbstractButton | None:
+    """The button that stops, all robots or one, at a place of the screen that nothing popped up over."""
+    windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
+    inside = [window for window in windows if window.rect().contains(window.mapFromGlobal(place))]
+    if any(window.windowType() == Qt.WindowType.Popup for window in inside):
+        return None
+    for window in inside:
+        under = window.childAt(window.mapFromGlobal(place))
+        if isinstance(under, StopButton) or (isinstance(under, Button) and under.kind == "stop"):
+            return under
+    return None
+
+
+def press_stop(place: QPoint) -> bool:
+    """Press the button that stops at this place, if there is one, and close every menu and list."""
+    stop = stop_at(place)
+    if stop is None:
+        return False
+    while (popup := QApplication.activePopupWidget()) is not None and popup.close():
+        continue
+    stop.click()
+    return True
+
+
 class Menu(QMenu):
     """A menu in the design's look: icons and checks in one column, shortcuts quiet at the right."""
 
@@ -89,6 +114,15 @@ class Menu(QMenu):
             if stop.isVisible():
                 place = QRect(stop.mapToGlobal(QPoint()), stop.size())
                 self.move(beside(self.geometry(), place, screen).topLeft())
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """A press beside a menu only closes it, but for Stop.
+
+        `app.ui.shell.stop_keys` hears the windows that get the keyboard first; a menu in a menu never does.
+        """
+        left = event.button() == Qt.MouseButton.LeftButton
+        if not (left and press_stop(event.globalPosition().toPoint())):
+            super().mousePressEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

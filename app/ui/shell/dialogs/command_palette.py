@@ -16,6 +16,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Finder, Match
+from app.ui.widgets.menus import EditMenu
 from nep.i18n import _, lazy, ngettext
 
 WIDE, TOP, FIELD, FOOT = 640, 128, 56, 36
@@ -35,6 +36,7 @@ class _Field(QLineEdit):
         self.setProperty("bare", "true")
         self.setProperty("ownFocus", True)
         self.setFrame(False)
+        EditMenu(theme, self)
         self.restyle()
 
     def restyle(self) -> None:
