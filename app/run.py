@@ -25,7 +25,8 @@ from app.blocks.runtime.publishing import guarded
 from app.core.documents.document import read
 from app.core.robots.launcher import VIRTUAL_ROBOTS, VirtualProcesses
 from app.core.robots.motion_permission import risky, wanted_by
-from app.core.robots.stop import RobotStopper, StopTarget
+from app.core.robots.stop import RobotStopper
+from app.core.robots.stop_lines import StopTarget
 from app.core.robots.stop_report import StopReport
 from app.core.run.runner import Runner, RunnerEvent
 from app.errors import AppError, DescriptionError

@@ -45,6 +45,8 @@ EARNED = {
     "nep.masters.rates": "pure, and tested alone",
     "app.core.run.edits_since_run": "pure, and tested alone",
     "app.core.run.run_warnings": "pure, and tested alone",
+    "app.core.run.trial": "pure, and tested alone",
+    "app.ui.shell.stop_keys": "hears keys before all else, and is tested alone",
     "app.ui.panels.registry": "a seam: panels, ours and those of plug-ins, are found through it",
     "app.ui.widgets.inputs.switch": "one of a list: the widgets; two use it through their face",
 }

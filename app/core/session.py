@@ -45,7 +45,8 @@ from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
 from app.core.robots.launcher import VIRTUAL_ROBOTS, Launcher, LaunchFailed, VirtualProcesses
 from app.core.robots.room import SessionRoom
-from app.core.robots.stop import RobotStopper, StopTarget
+from app.core.robots.stop import RobotStopper
+from app.core.robots.stop_lines import StopTarget
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
 from app.core.robots.voices import RobotVoices
 from app.core.run.control import Runs

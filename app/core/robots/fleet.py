@@ -17,7 +17,7 @@ from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
 from app.core.robots.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
-from app.core.robots.stop import MOST_TOPICS
+from app.core.robots.stop_lines import MOST_TOPICS
 from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S
 from app.core.robots.tries import Tries
 from app.core.storage.settings import Settings

@@ -14,14 +14,13 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 from app.core.faults import error_words
+from app.core.robots.stop_lines import StopLine, StopNode, StopTarget, StopWay
 from app.core.robots.stop_report import RobotStop, StopReport
 from app.robots import rize
 from app.robots.description.description import Robot, RobotTopics
 from app.robots.identity import (
-    Identity,
     Senders,
     first_to_announce,
     hearing,
@@ -37,8 +36,6 @@ from nep.protocol.graph_view import GraphView
 _log = logging.getLogger("studio")
 RIZE = "rize"
 NO_NETWORK = lazy("there is no connection to the network yet")
-MOST_TOPICS = 8
-"""So many command topics of one robot are kept, of earlier descriptions too."""
 LATE_S = 120.0
 """How long an answer that comes too late is still taken."""
 LATE_KEPT = 64
@@ -62,95 +59,6 @@ def patience_s(robots: Iterable[Robot]) -> float:
     return min(LONGEST_STOP_S, max(STOP_TIMEOUT_S, needed_s))
 
 
-class StopPublisher(Protocol):
-    """What is needed of NEP's publisher."""
-
-    def publish(self, payload: object) -> None:
-        """Send one message."""
-        ...
-
-    def close(self) -> None:
-        """Stop publishing."""
-        ...
-
-
-class StopSubscriber(Protocol):
-    """What is needed of NEP's subscriber."""
-
-    def close(self) -> None:
-        """Stop subscribing."""
-        ...
-
-
-class StopNode(Protocol):
-    """What is needed of NEP's node."""
-
-    id: str
-
-    def new_pub(self, topic: str, msg_type: str = "json") -> StopPublisher:
-        """A publisher."""
-        ...
-
-    def new_sub(
-        self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
-    ) -> StopSubscriber:
-        """A subscriber whose messages go to `sink`, in the node's thread."""
-        ...
-
-    def graph(self, timeout_s: float = 2.0) -> GraphView:
-        """Who publishes what."""
-        ...
-
-
-@dataclass(frozen=True)
-class StopTarget:
-    """A robot that is to be stopped.
-
-    ``identity`` is the program that it is (None: whoever announced it first), ``earlier`` are programs of
-    this name that may still run and move it, ``topics`` those of its earlier descriptions.
-    """
-
-    robot: Robot
-    identity: Identity | None = None
-    earlier: tuple[Identity, ...] = ()
-    topics: tuple[RobotTopics, ...] = ()
-
-    @property
-    def ways(self) -> tuple[RobotTopics, ...]:
-        """Where it is told to stop: the topics of its description first, then those that it had before."""
-        return tuple(dict.fromkeys((self.robot.topics, *self.topics)))[:MOST_TOPICS]
-
-
-@dataclass
-class _Way:
-    """Where one robot is told to stop, and where it answers."""
-
-    publisher: StopPublisher
-    subscriber: StopSubscriber | None
-
-    def close(self) -> None:
-        self.publisher.close()
-        if self.subscriber is not None:
-            self.subscriber.close()
-
-
-@dataclass
-class _Line:
-    """The ways to one robot; ``error`` says why one of them is missing."""
-
-    target: StopTarget
-    ways: dict[RobotTopics, _Way] = field(default_factory=dict)
-    error: str = ""
-
-    @property
-    def name(self) -> str:
-        return self.target.robot.name
-
-    @property
-    def is_whole(self) -> bool:
-        return self.ways.keys() >= set(self.target.ways)
-
-
 @dataclass
 class _Asked:
     """A stop of one robot that is under way: what is known of each program that serves it, by node.
@@ -159,7 +67,7 @@ class _Asked:
     told of yet.
     """
 
-    line: _Line
+    line: StopLine
     id: str
     sent_s: float
     late: Callable[[RobotStop], object] | None
@@ -202,7 +110,7 @@ class RobotStopper:
         self._changed = threading.Condition()
         self._making = threading.Lock()  # one thread at a time makes ways
         self._makers: list[threading.Thread] = []
-        self._lines: dict[str, _Line] = {}
+        self._lines: dict[str, StopLine] = {}
         self._asked: dict[str, _Asked] = {}
         self._view: GraphView | None = None
         self._looked_s = 0.0
@@ -234,12 +142,12 @@ class RobotStopper:
         """
         made = (each if isinstance(each, StopTarget) else StopTarget(each) for each in robots)
         wanted = {target.robot.name: target for target in made}
-        left: list[_Way] = []
+        left: list[StopWay] = []
         with self._changed:
             for name in self._lines.keys() - wanted.keys():
                 left += self._lines.pop(name).ways.values()
             for name, target in wanted.items():
-                line = self._lines.setdefault(name, _Line(target))
+                line = self._lines.setdefault(name, StopLine(target))
                 left += [line.ways.pop(topics) for topics in line.ways.keys() - set(target.ways)]
                 line.target = target
             lines = list(self._lines.values())
@@ -325,7 +233,7 @@ class RobotStopper:
 
     # ---- inside
 
-    def _make(self, line: _Line) -> None:
+    def _make(self, line: StopLine) -> None:
         """Make the ways of a line that are missing; what goes wrong is its error. Under `_making`."""
         error = ""
         for topics in line.target.ways:
@@ -347,12 +255,12 @@ class RobotStopper:
         with self._changed:
             line.error = error
 
-    def _connect(self, robot: Robot, topics: RobotTopics) -> _Way:
+    def _connect(self, robot: Robot, topics: RobotTopics) -> StopWay:
         if robot.dialect == RIZE:
-            return _Way(self._node.new_pub(topics.command, "json"), None)
+            return StopWay(self._node.new_pub(topics.command, "json"), None)
         publisher = self._node.new_pub(topics.command, "robot/command")
         try:
-            return _Way(publisher, self._node.new_sub(topics.answer, "robot/answer", sink=self._answers))
+            return StopWay(publisher, self._node.new_sub(topics.answer, "robot/answer", sink=self._answers))
         except NepError:
             publisher.close()
             raise
@@ -369,7 +277,7 @@ class RobotStopper:
                 with self._making:
                     self._make(each.line)
                 new = each.line.ways.keys() - before
-                error = self._tell(each.line, each.id, ends, new) if new else _untold(each.line)
+                error = self._tell(each.line, each.id, ends, new) if new else each.line.untold
                 with self._changed:
                     each.error = error if not before else each.error
                     self._changed.notify_all()
@@ -380,13 +288,13 @@ class RobotStopper:
         self._makers.append(threading.Thread(target=make, name="studio-stop-line", daemon=True))
         self._makers[-1].start()
 
-    def _chosen(self, names: Iterable[str] | None) -> list[_Line]:
+    def _chosen(self, names: Iterable[str] | None) -> list[StopLine]:
         with self._changed:
             if names is None:
                 return list(self._lines.values())
             return [self._lines[name] for name in dict.fromkeys(names) if name in self._lines]
 
-    def _ask(self, line: _Line, ends: str | None, late: Callable[[RobotStop], object] | None) -> _Asked:
+    def _ask(self, line: StopLine, ends: str | None, late: Callable[[RobotStop], object] | None) -> _Asked:
         asked = _Asked(line, _id(), self._clock(), late)
         with self._changed:
             self._forget_old()
@@ -394,7 +302,9 @@ class RobotStopper:
         asked.error = self._tell(line, asked.id, ends)
         return asked
 
-    def _tell(self, line: _Line, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None) -> str:
+    def _tell(
+        self, line: StopLine, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None
+    ) -> str:
         """Send a stop on every topic of a robot; the sentence when it went out on none, or nothing."""
         robot = line.target.robot
         stop = robot.safe_stop.action
@@ -406,7 +316,7 @@ class RobotStopper:
                 command["ends"] = ends
         with self._changed:
             ways = [way for topics, way in line.ways.items() if only is None or topics in only]
-        sent, error = False, _untold(line)
+        sent, error = False, line.untold
         for way in ways:
             try:
                 way.publisher.publish(command)
@@ -561,11 +471,6 @@ def _stop_answer(message: Message) -> Mapping[str, object] | None:
     except NepError:
         return None
     return payload if isinstance(payload, Mapping) and payload.get("op") == "stop" else None
-
-
-def _untold(line: _Line) -> str:
-    why = line.error or _("there is no way to it yet; press Stop again")
-    return _("{robot} can't be told: {why}").format(robot=line.name, why=why)
 
 
 def _id() -> str:

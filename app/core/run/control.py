@@ -5,14 +5,13 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
 from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Variable
-from app.blocks.runtime.publishing import guarded
 from app.blocks.runtime.variables import VariableValue
 from app.core.alerts import Alerts
 from app.core.console import Console
@@ -25,8 +24,10 @@ from app.core.robots.stop import RobotStopper, report_of
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
 from app.core.run.asking import Asking
 from app.core.run.edits_since_run import EditsSinceRun
+from app.core.run.program_robots import ProgramRobots, owners_of
 from app.core.run.run_warnings import RunWarnings
 from app.core.run.runner import Runner, RunnerEvent
+from app.core.run.trial import Trial
 from app.core.run.view import (
     STOP_AGAIN,
     RunState,
@@ -42,7 +43,6 @@ from app.core.run.view import (
 from app.core.run.view import unanswered_words as unanswered_words_of
 from app.core.run.wanted import Wanted
 from app.errors import AppError
-from app.robots.description.description import Robot
 from nep.i18n import _
 
 PRESSED_TWICE_S = 0.5
@@ -95,9 +95,8 @@ class Runs:
         self.document: Document | None = None  # which the run belongs to: its blocks glow, fail and stop
         self.pace_s = 0.0
         self._runner: Runner | None = None
-        self._unit = ""  # of the value that is tried
         self._now: Wanted | None = None  # what runs, or ran last
-        self.tried_value: tuple[str, str] | None = None  # a block that was tried, and the value it had
+        self._trial = Trial()
         self.asking = Asking()
         self._next: Wanted | None = None  # once what runs has been stopped, proven
         self._edits = EditsSinceRun()
@@ -105,9 +104,7 @@ class Runs:
         self._program_key: str | None = None  # the last one's: robots refuse what still comes from it
         self.kept: frozenset[str] = frozenset()  # robots it used, until proven still; a stop reaches them
         self._labels: Mapping[str, str] = {}
-        self._wanted: list[tuple[Robot, Sequence[str]]] = []  # what the program asks of its robots
-        self._told_owners: Mapping[str, str] = {}  # the programs that its robots are, as it knows them
-        self._robots_told = -1
+        self._robots = ProgramRobots(fleet)
         self._run = RunState()
         self._view: tuple[RunState, Document, RunView] | None = None
         self._stop_number = 0
@@ -130,6 +127,11 @@ class Runs:
     def active(self) -> bool:
         """Whether a program runs or is paused."""
         return self._run.state in {"running", "paused"}
+
+    @property
+    def tried_value(self) -> tuple[str, str] | None:
+        """The block that was tried last, and the value that it had."""
+        return self._trial.value
 
     @property
     def block_warnings(self) -> Mapping[str, str]:
@@ -278,36 +280,8 @@ class Runs:
 
     def follow_robots(self) -> None:
         """Robots came, or were started anew: the program is told, of what moves after the question."""
-        if self._runner is None or not self.active or self._fleet.revision == self._robots_told:
-            return
-        self._robots_told, owners = self._fleet.revision, self._owners()
-        links = [self._fleet.link(robot.name) for robot, _asked in self._wanted]
-        asked = {robot.name: actions for robot, actions in self._wanted}
-        anew = [
-            link
-            for link in links
-            if link is not None
-            and link.name in owners
-            and owners[link.name] != self._told_owners.get(link.name)
-        ]
-        if self._fleet.permission.permits(
-            [(link.robot, asked[link.name]) for link in anew], self._tell_robots
-        ):
-            self._tell_robots()
-        else:
-            self._tell_robots(without=[link.name for link in anew])
-
-    def _tell_robots(self, without: Collection[str] = ()) -> None:
-        if self._runner is None:
-            return
-        owners = {name: id for name, id in self._owners().items() if name not in without}
-        self._told_owners = {**self._told_owners, **owners}
-        self._runner.set_robots(owners, guarded(link.robot for link in self._fleet.connected))
-
-    def _owners(self) -> dict[str, str]:
-        """The nodes that the connected robots are."""
-        there = self._fleet.connected
-        return {link.name: link.identity.node_id for link in there if link.identity is not None}
+        if self.active:
+            self._robots.follow()
 
     def confirm_still(self) -> None:
         """A person says that the robot that did not answer stands still."""
@@ -400,8 +374,9 @@ class Runs:
     # -- inside ------------------------------------------------------------------------------------------
 
     def _begin(self, wanted: Wanted) -> None:
-        document, self._now, self.tried_value = wanted.document, wanted, None
+        document, self._now = wanted.document, wanted
         self.document = document
+        self._trial.begin(wanted)
         self._alerts.resolve("program")
         self._warnings.begin()
         self._set_errors({})
@@ -423,7 +398,7 @@ class Runs:
                 return  # a person is asked first; the question stands in the window
             runner = self._make_runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
-            owners = self._owners()
+            owners = owners_of(self._fleet)
             runner.start(
                 program,
                 robots,
@@ -438,13 +413,13 @@ class Runs:
             return
         self.asking.begin(runner)
         self._runner, self._used, self._labels = runner, program.robots, program.labels
-        self._wanted, self._told_owners, self._robots_told = asked, owners, self._fleet.revision
+        self._robots.begin(runner, asked, owners)
         self.kept, self._program_key = frozenset(program.robots), runner.program_key
         self._variables = {variable.id: variable for variable in program.variables}
         self._show_values({})
         self._console.leave_out(runner.pid)
         self._edits.ran(document if wanted.stack is None else None, program)
-        trying, self._unit = wanted.words(program), wanted.unit(program, used)
+        trying = self._trial.start(program, used)
         last = self._run.last_words
         title = self._documents.title(document)
         self._run = RunState("running", title, started_s=self._clock(), last_words=last, trying=trying)
@@ -458,12 +433,11 @@ class Runs:
 
     def _on_print(self, event: RunnerEvent) -> None:
         """A line of the program; of a value that is tried it is what a person wants to know."""
-        if self._now is None or self._now.stack is None or not self._now.gives_value:
+        words = self._trial.take(event.text)
+        if words is None:
             self._console.add("info", self._run.name, event.text)
-            return
-        words = f"{event.text} {self._unit}".strip() if event.text else _("not known yet")
-        self.tried_value = (self._now.stack.id, words)
-        self._run = replace(self._run, value=words)
+        else:
+            self._run = replace(self._run, value=words)
 
     def _on_error(self, event: RunnerEvent) -> None:
         self._console.add("error", self._run.name, event.text)
@@ -474,6 +448,7 @@ class Runs:
 
     def _on_end(self, event: RunnerEvent) -> None:
         self._runner = None
+        self._robots.end()
         if not self.active:
             return  # Stop was first
         finished = event.ok and not self.block_errors

@@ -1,0 +1,114 @@
+"""The ways to a robot on which it is told to stop and answers, of its description and of earlier ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from app.robots.description.description import Robot, RobotTopics
+from app.robots.identity import Identity
+from nep.i18n import _
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
+
+MOST_TOPICS = 8
+"""So many command topics of one robot are kept, of earlier descriptions too."""
+
+
+class StopPublisher(Protocol):
+    """What is needed of NEP's publisher."""
+
+    def publish(self, payload: object) -> None:
+        """Send one message."""
+        ...
+
+    def close(self) -> None:
+        """Stop publishing."""
+        ...
+
+
+class StopSubscriber(Protocol):
+    """What is needed of NEP's subscriber."""
+
+    def close(self) -> None:
+        """Stop subscribing."""
+        ...
+
+
+class StopNode(Protocol):
+    """What is needed of NEP's node."""
+
+    id: str
+
+    def new_pub(self, topic: str, msg_type: str = "json") -> StopPublisher:
+        """A publisher."""
+        ...
+
+    def new_sub(
+        self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
+    ) -> StopSubscriber:
+        """A subscriber whose messages go to `sink`, in the node's thread."""
+        ...
+
+    def graph(self, timeout_s: float = 2.0) -> GraphView:
+        """Who publishes what."""
+        ...
+
+
+@dataclass(frozen=True)
+class StopTarget:
+    """A robot that is to be stopped.
+
+    ``identity`` is the program that it is (None: whoever announced it first), ``earlier`` are programs of
+    this name that may still run and move it, ``topics`` those of its earlier descriptions.
+    """
+
+    robot: Robot
+    identity: Identity | None = None
+    earlier: tuple[Identity, ...] = ()
+    topics: tuple[RobotTopics, ...] = ()
+
+    @property
+    def ways(self) -> tuple[RobotTopics, ...]:
+        """Where it is told to stop: the topics of its description first, then those that it had before."""
+        return tuple(dict.fromkeys((self.robot.topics, *self.topics)))[:MOST_TOPICS]
+
+
+@dataclass
+class StopWay:
+    """Where one robot is told to stop, and where it answers."""
+
+    publisher: StopPublisher
+    subscriber: StopSubscriber | None
+
+    def close(self) -> None:
+        """Let go of it."""
+        self.publisher.close()
+        if self.subscriber is not None:
+            self.subscriber.close()
+
+
+@dataclass
+class StopLine:
+    """The ways to one robot; ``error`` says why one of them is missing."""
+
+    target: StopTarget
+    ways: dict[RobotTopics, StopWay] = field(default_factory=dict)
+    error: str = ""
+
+    @property
+    def name(self) -> str:
+        """The robot's."""
+        return self.target.robot.name
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether no way is missing."""
+        return self.ways.keys() >= set(self.target.ways)
+
+    @property
+    def untold(self) -> str:
+        """Why the robot can't be told, in a sentence."""
+        why = self.error or _("there is no way to it yet; press Stop again")
+        return _("{robot} can't be told: {why}").format(robot=self.name, why=why)

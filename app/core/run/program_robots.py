@@ -1,0 +1,62 @@
+"""Which robots a program that runs knows of: those that came, or were started anew, are told to it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from app.blocks.runtime.publishing import guarded
+from app.core.robots.fleet import Fleet
+from app.core.run.runner import Runner
+from app.robots.description.description import Robot
+
+
+def owners_of(fleet: Fleet) -> dict[str, str]:
+    """The nodes that the connected robots are, by the robots' names."""
+    return {link.name: link.identity.node_id for link in fleet.connected if link.identity is not None}
+
+
+class ProgramRobots:
+    """Tells a program about its robots. One that may move is told of after a person was asked."""
+
+    def __init__(self, fleet: Fleet) -> None:
+        """No program yet: `begin`."""
+        self._fleet = fleet
+        self._runner: Runner | None = None
+        self._asked: Mapping[str, Sequence[str]] = {}
+        self._told: Mapping[str, str] = {}
+        self._revision = -1
+
+    def begin(
+        self, runner: Runner, asked: Sequence[tuple[Robot, Sequence[str]]], owners: Mapping[str, str]
+    ) -> None:
+        """A program runs that knows these ``owners``; ``asked`` is what it asks of its robots."""
+        self._runner, self._told, self._revision = runner, owners, self._fleet.revision
+        self._asked = {robot.name: actions for robot, actions in asked}
+
+    def end(self) -> None:
+        """The program has ended: it is told nothing more."""
+        self._runner = None
+
+    def follow(self) -> None:
+        """Tell the program which robots there are now, if that has changed."""
+        if self._runner is None or self._fleet.revision == self._revision:
+            return
+        self._revision, owners = self._fleet.revision, owners_of(self._fleet)
+        links = [self._fleet.link(name) for name in self._asked]
+        anew = [
+            link
+            for link in links
+            if link is not None and link.name in owners and owners[link.name] != self._told.get(link.name)
+        ]
+        moving = [(link.robot, self._asked[link.name]) for link in anew]
+        if self._fleet.permission.permits(moving, self._tell):
+            self._tell()
+        else:
+            self._tell(without=[link.name for link in anew])
+
+    def _tell(self, without: Collection[str] = ()) -> None:
+        if self._runner is None:
+            return
+        owners = {name: id for name, id in owners_of(self._fleet).items() if name not in without}
+        self._told = {**self._told, **owners}
+        self._runner.set_robots(owners, guarded(link.robot for link in self._fleet.connected))

@@ -1,0 +1,54 @@
+"""A stack that is tried: its words, and what its program writes as its value."""
+
+from __future__ import annotations
+
+from app.blocks.compiler.stack import Stack
+from app.core.documents.document import Document
+from app.core.run.trial import Trial
+from app.core.run.wanted import Wanted
+from tests.blocks.samples import block, robot, say, started, workspace
+
+BATTERY = Stack("bat", "value", block("robot_pepper_get_battery", "bat", ROBOT="Pepper"))
+
+
+def began(stack: Stack | None) -> tuple[Trial, str]:
+    """A trial whose program runs, and the words of its block."""
+    document = Document()
+    document.set_connected([robot("Pepper")])
+    document.edited(workspace(started(say("Hi") | {"id": "hi"})))
+    wanted = Wanted(document, stack=stack)
+    program = wanted.program()
+    assert program is not None
+    made = Trial()
+    made.begin(wanted)
+    return made, made.start(program, [robot("Pepper")])
+
+
+def test_a_value_is_the_line_with_its_unit() -> None:
+    trial, words = began(BATTERY)
+    assert words == "battery"
+    assert trial.value is None
+    assert trial.take("84") == "84 %"
+    assert trial.value == ("bat", "84 %")
+
+
+def test_an_empty_line_is_a_value_that_is_not_known() -> None:
+    trial, _words = began(BATTERY)
+    assert trial.take("") == "not known yet"
+
+
+def test_the_next_run_forgets_the_value() -> None:
+    trial, _words = began(BATTERY)
+    trial.take("84")
+    trial.begin(Wanted(Document()))
+    assert trial.value is None
+    assert trial.take("printed") is None
+
+
+def test_what_a_stack_or_a_behaviour_prints_is_no_value() -> None:
+    for stack, words in ((Stack("hi"), "say"), (None, "")):
+        trial, said = began(stack)
+        assert said == words
+        assert trial.take("printed") is None
+        assert trial.value is None
+    assert Trial().take("early") is None
