@@ -113,10 +113,16 @@ class Chip(QWidget):
         font.setWeight(font.Weight.Medium)
         return font
 
-    def sizeHint(self) -> QSize:
+    def bare_width(self) -> int:
+        """The width with its icon alone."""
+        return max(self._high(), round(self._side()) + CHIP_PADDING)
+
+    def _high(self) -> int:
         least = CHIP_HEIGHT + (4 if self._large else 0)
-        high = max(least, round(paint.height_of(self._font())) + 6)
-        return QSize(max(high, round(self._side()) + CHIP_PADDING) if self._bare else self.full_width(), high)
+        return max(least, round(paint.height_of(self._font())) + 6)
+
+    def sizeHint(self) -> QSize:
+        return QSize(self.bare_width() if self._bare else self.full_width(), self._high())
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()

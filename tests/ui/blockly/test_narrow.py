@@ -34,7 +34,7 @@ def first_tile(them: Person, number: int = 0) -> QPoint:
 
 
 @pytest.mark.parametrize(
-    ("width", "percent", "tiles"), [(700, 100, False), (620, 100, True), (900, 150, True)]
+    ("width", "percent", "tiles"), [(780, 100, False), (740, 100, True), (900, 150, True)]
 )
 def test_a_narrow_page_or_large_text_leaves_a_column_of_tiles(view, person, width, percent, tiles) -> None:
     them = person(START)

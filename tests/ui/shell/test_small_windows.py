@@ -24,7 +24,7 @@ from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.theme.theme import Mode, Theme
-from app.ui.widgets import StopButton
+from app.ui.widgets import Chip, StopButton
 from app.ui.widgets.menus import beside
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
@@ -39,7 +39,7 @@ SIZES = (
     (1920, 1080),
 )
 TEXT = (100, 150, 200)
-TILES, NAMES, NARROW = 52, 196, 655  # px: the toolbox of a narrow page, of a wide one, and which is narrow
+TILES, NAMES, NARROW = 52, 196, 760  # px: the toolbox of a narrow page, of a wide one, and which is narrow
 LEAST_CANVAS = 420
 SETTLE_MS = 15
 # The blocks without their web view, which has tests of its own.
@@ -252,6 +252,60 @@ def test_the_app_bar_shortens_its_words_before_its_menus(qtbot, window: MainWind
     settle(qtbot, window)
     assert bar.switch.width() == wide
     assert button.toolTip() == ""
+
+
+def test_a_field_right_of_the_menus_has_the_room_that_is_there(qtbot, window: MainWindow) -> None:
+    window.resize(1024, 600)
+    window.show_start()
+    settle(qtbot, window)
+    assert window.bar.search.width() >= window.bar.search.sizeHint().width()
+    window.resize(1440, 900)
+    window.show_layout("behaviour")
+    settle(qtbot, window)
+    bar = window.bar
+    assert abs(place(bar.switch).center().x() - place(bar).center().x()) < 3, "in the middle"
+
+
+def test_the_question_of_the_start_page_is_higher_in_a_low_window(qtbot, window: MainWindow) -> None:
+    window.show_start()
+    tops = []
+    for height in (600, 900, 600):
+        window.resize(1024, height)
+        settle(qtbot, window)
+        tops.append(place(window.start._question).y())
+    assert tops[0] == tops[2] < tops[1]
+
+
+def test_a_chip_beside_tabs_loses_its_words_before_they_lose_theirs(
+    qtbot, theme: Theme, window: MainWindow
+) -> None:
+    chip = Chip(theme, "ready")
+
+    class WithChip(PanelWidget):
+        def header_widgets(self) -> list[QWidget]:
+            return [chip]
+
+    panel = WithChip(window.show_layout("behaviour").docks["robot"].panel.context, "Pepper")
+    title = DockTitle(theme, panel, "comfortable")
+    qtbot.addWidget(panel)
+    qtbot.addWidget(title)
+    title.set_tabs([("Pepper", "bot", True, lambda: None), ("Camera", "camera", False, lambda: None)])
+    title.resize(320, 40)
+    title.show()
+    front, behind = title.findChildren(TitleTab)
+    names = front.full_width(), behind.full_width()
+    qtbot.waitUntil(lambda: (front.width(), behind.width()) == names)
+    assert chip.width() == chip.full_width()
+
+    chip.set("virtual, ready, and moving")  # longer, in a title that keeps its size
+    qtbot.waitUntil(lambda: chip.width() == chip.bare_width())
+    assert (front.width(), behind.width()) == names
+    assert chip.toolTip() == "virtual, ready, and moving"
+    title.resize(195, 40)
+    qtbot.waitUntil(lambda: behind.width() == behind.bare_width())
+    assert front.width() >= front.full_width()
+    title.resize(500, 40)
+    qtbot.waitUntil(lambda: chip.width() == chip.full_width())
 
 
 SCREEN = QRect(0, 0, 1024, 600)

@@ -85,6 +85,7 @@ export class EmptyCanvas {
     const workspace = this.shown();
     const dragged = workspace.isDragging() ? 1 : 0;
     const empty = workspace.getTopBlocks(false).length <= dragged && !workspace.getTopComments().length;
+    document.body.classList.toggle('nepEmpty', empty);
     this.box.hidden = !empty || this.begin === null;
     if (this.box.hidden) return;
     this.box.classList.toggle('dragging', dragged > 0);

@@ -91,7 +91,7 @@ class AppBar(QWidget):
         grid.addWidget(self.switch, 0, 1)
         grid.addWidget(right, 0, 2)
         grid.setColumnStretch(0, 1)
-        grid.setColumnStretch(2, 1)
+        self._grid = grid
 
     def _restyle(self) -> None:
         font = self._theme.font("body")
@@ -104,13 +104,19 @@ class AppBar(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """Where the menus have no room: the switch loses its words, then the chip, then the field its key."""
+        """Where the menus have no room: the switch loses its words, then the chip, then the field its key.
+
+        The switch is in the middle as long as what is right of it has room in its half.
+        """
         for bare in range(4):
             self.switch.set_bare(bare > 0)
             self.chip.set_bare(bare > 1)
             self.search.set_bare(bare > 2)
             if self._needed() <= self.width():
-                return
+                break
+        taken = 0 if self.switch.isHidden() else self.switch.sizeHint().width() + EDGE
+        half = (self.width() - 2 * EDGE - taken - EDGE) / 2
+        self._grid.setColumnStretch(2, int(self._halves[1].sizeHint().width() <= half))
 
     def _needed(self) -> int:
         """The width at which nothing of the bar is shortened more than it is now."""
@@ -165,7 +171,7 @@ class AppBar(QWidget):
 class PaletteField(PaintedButton):
     """Opens the command palette; it looks like a field, with its key at the right.
 
-    In narrow windows only icon and key are left.
+    In narrow windows it says less, or only icon and key are left.
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
@@ -215,7 +221,8 @@ class PaletteField(PaintedButton):
         room = rect.width() - left - self._key_room() - 4
         if room >= self._theme.scaled(LEAST_ROOM):
             area = QRectF(left, 0, room, rect.height())
-            paint.words(painter, area, self.text(), font, theme.colour("textSecondary"))
+            whole = paint.width_of(font, self.text()) <= room
+            paint.words(painter, area, self.text() if whole else _("Find"), font, theme.colour("textSecondary"))
         if self._key and not self._bare:
             paint.key_cap(painter, theme, rect.right() - 6, middle, self._key)
 

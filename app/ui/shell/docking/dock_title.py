@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
@@ -12,7 +12,7 @@ from app.ui.panels.base import Density, PanelWidget
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import ElidedLabel, IconButton, paint, set_role
+from app.ui.widgets import Chip, ElidedLabel, IconButton, paint, set_role
 from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _
 
@@ -131,6 +131,7 @@ class DockTitle(QWidget):
         self._shared.hide()
         column.addWidget(self._shared)
         own = QWidget()  # not a layout in a layout, which would tell its old size until the next turn
+        own.installEventFilter(self)
         self._row = QHBoxLayout(own)
         column.addWidget(own, 1)
         self._fill()
@@ -210,30 +211,48 @@ class DockTitle(QWidget):
         return self._row if self._whole is None else self._shared_row
 
     def fit_tabs(self) -> None:
-        """Where the names have no room, that of the panel in front is left, and the icons of the others.
+        """Where not all names have room, chips lose their words first, then the panels behind their names.
 
-        In still less room all are icons.
+        In still less room also the panel in front is an icon.
         """
+        chips = [chip for chip in self._others() if isinstance(chip, Chip)]
         if not self._tabs:
+            for chip in chips:
+                chip.set_bare(False)
             return
-        row = self._tab_row
-        margins, others, count = row.contentsMargins(), 0, 0
-        for place in range(row.count()):
-            item = row.itemAt(place)
-            widget = item.widget() if item is not None else None
-            if widget is not None and not widget.isHidden() and widget not in self._tabs:
-                others += (
-                    widget.minimumSizeHint().width()
-                    if widget is self._subtitle
-                    else widget.sizeHint().width()
-                )
-                count += 1
-        room = self.width() - margins.left() - margins.right() - others
-        room -= row.spacing() * (count + len(self._tabs) - 1)
-        bare = sum(tab.full_width() for tab in self._tabs) > room
-        front = room - sum(tab.bare_width() for tab in self._tabs if not tab.isChecked())
+        room = self._room_for_tabs()
+        words = sum(chip.full_width() - chip.bare_width() for chip in chips)
+        whole = sum(tab.full_width() for tab in self._tabs)
+        behind = sum(tab.bare_width() for tab in self._tabs if not tab.isChecked())
+        front = behind + sum(tab.full_width() for tab in self._tabs if tab.isChecked())
+        silent = whole > room and (whole <= room + words or front > room)
+        room += words if silent else 0
+        bare = whole > room
+        least = room - behind < self._theme.scaled(LEAST_NAME)
+        for chip in chips:
+            chip.set_bare(silent)
         for tab in self._tabs:
-            tab.set_bare(bare and (not tab.isChecked() or front < self._theme.scaled(LEAST_NAME)))
+            tab.set_bare(bare and (not tab.isChecked() or least))
+
+    def _others(self) -> list[QWidget]:
+        """What stands in the row of the tabs beside them and is shown."""
+        row = self._tab_row
+        items = (row.itemAt(place) for place in range(row.count()))
+        widgets = (item.widget() for item in items if item is not None)
+        return [each for each in widgets if each and not each.isHidden() and each not in self._tabs]
+
+    def _room_for_tabs(self) -> int:
+        """So much is left for the tabs beside chips with all their words, in px."""
+        row, others = self._tab_row, self._others()
+        margins, taken = row.contentsMargins(), 0
+        for each in others:
+            if isinstance(each, Chip):
+                taken += each.full_width()
+            else:
+                hint = each.minimumSizeHint() if each is self._subtitle else each.sizeHint()
+                taken += hint.width()
+        gaps = row.spacing() * (len(others) + len(self._tabs) - 1)
+        return self.width() - margins.left() - margins.right() - taken - gaps
 
     def show_badges(self, badges: Sequence[tuple[str, str] | None]) -> None:
         """What waits in the panels of this place, one for each tab."""
@@ -245,6 +264,12 @@ class DockTitle(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.fit_tabs()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """A chip says something longer, or a button came: the tabs have less room now."""
+        if event.type() is QEvent.Type.LayoutRequest and watched is not self:
+            self.fit_tabs()
+        return super().eventFilter(watched, event)
 
     def _left(self) -> int:
         if self._whole is not None:

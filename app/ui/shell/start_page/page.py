@@ -35,7 +35,7 @@ from app.ui.widgets.buttons import LinkButton
 from nep.i18n import _, lazy, ngettext, translate
 
 WIDTH, MARGIN, CARD_GAP = 1080, 24, 16
-BANNER_ROOM = 40
+BANNER_ROOM, HIGH = 40, 640
 """More room above the question, where the page is high enough: a banner that may not move the page covers no
 words there."""
 EXAMPLES_SHOWN = 4
@@ -150,12 +150,11 @@ class StartPage(QWidget):
         content = QWidget()
         content.setProperty("bare", "true")
         content.setMaximumWidth(WIDTH)
-        column = QVBoxLayout(content)
+        column = self._content = QVBoxLayout(content)
         column.setContentsMargins(0, 35, 0, 24)
         column.setSpacing(0)
-        column.addSpacerItem(
-            QSpacerItem(0, BANNER_ROOM, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Maximum)
-        )
+        self._banner_room = QSpacerItem(0, 0, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
+        column.addSpacerItem(self._banner_room)
         self._question = label(_("What would you like to do?"), "display", wrap=True)
         column.addWidget(self._question)
         column.addSpacing(7)
@@ -210,6 +209,10 @@ class StartPage(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
+        room = BANNER_ROOM if self.height() >= HIGH else 0
+        if room != self._banner_room.sizeHint().height():
+            self._banner_room.changeSize(0, room, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
+            self._content.invalidate()
         self._fit_cards()
 
     def event(self, event: QEvent) -> bool:
