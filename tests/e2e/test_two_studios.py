@@ -48,7 +48,8 @@ def test_both_work_both_stop_and_the_second_outlives_the_first(
     assert not any(state["moving"] for state in heard)
     assert len(robots(first)) == 1  # the second uses the one that is there
 
-    second.choose("View", "Dark")
+    second.choose("View", "Look")
+    second.pick("Dark")
     (firsts,) = robots(first)
     first.process.terminate()
     assert first.process.wait(10) == 0

@@ -9,6 +9,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
+from PySide6.QtWidgets import QMenu
 
 import app
 from app.ui.shell.actions.actions import ROLES, STOP
@@ -163,3 +164,12 @@ def test_no_command_is_twice_in_the_table_and_each_menu_is_one_of_the_bar() -> N
     assert len(IDS) == len(COMMANDS)
     assert len(ABOUT) == len(ARGUMENT_COMMANDS)
     assert {command.menu for command in COMMANDS} <= {*MENUS, ""}
+
+
+def test_the_longest_menu_fits_a_low_screen(window: MainWindow, commands: Commands) -> None:
+    for menu in window.bar.menus.findChildren(QMenu):
+        rows = [each for each in menu.actions() if each.isVisible() and not each.isSeparator()]
+        assert len(rows) <= 18, f"{menu.title()} has {len(rows)} entries"
+    view = next(menu for menu in window.bar.menus.findChildren(QMenu) if menu.title() == "View")
+    look = next(each.menu() for each in view.actions() if each.text() == "Look")
+    assert commands.actions["theme.dark"] in look.actions()

@@ -50,6 +50,7 @@ def test_each_language_has_each_page_with_the_same_keys_and_parts(language: str,
 
 def test_what_english_pages_call_commands_is_what_they_are_called() -> None:
     called = {words for command in COMMANDS for words in (command.text, command.text.format(number=""))}
+    called |= {command.under for command in COMMANDS}
     for page in PAGES:
         for menu, entry in re.findall(r"\*(File|Edit|View|Run|Robots|Help) > ([^*]+)\*", text("en", page)):
             assert " ".join(entry.split()) in called, (page, menu, entry)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPoint
-from PySide6.QtGui import QAction, QContextMenuEvent
+from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QWidget
 
 from app.core.session import Session
@@ -169,7 +169,7 @@ def test_the_menus_of_the_bar_and_what_they_list(window: MainWindow) -> None:
     opened(window, "topics")
 
     def open_all() -> None:
-        for action in window.bar.findChildren(QAction):
+        for action in window.bar.menus.actions():
             menu = action.menu()
             if isinstance(menu, QMenu):
                 menu.popup(QPoint(10, 10))

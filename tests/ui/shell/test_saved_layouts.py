@@ -45,7 +45,7 @@ def keep_as(window: MainWindow, commands: Commands, name: str) -> NameSheet:
 def menu(window: MainWindow, commands: Commands) -> dict[str, bool]:
     commands.menus._refresh("View")
     entries = commands.menus._layouts.actions()
-    return {entry.text(): entry.isChecked() for entry in entries if not entry.isSeparator()}
+    return {entry.text(): entry.isChecked() for entry in entries if entry.isCheckable()}
 
 
 def use(window: MainWindow, commands: Commands, name: str) -> None:

@@ -71,6 +71,8 @@ export class EmptyCanvas {
 
   /** Looks after what may have made the canvas empty, or ended that; once a frame at most. */
   watch(workspace: Blockly.WorkspaceSvg): void {
+    const toolbox = workspace.getInjectionDiv().querySelector('.blocklyToolbox');
+    if (toolbox) new ResizeObserver(() => this.lookSoon()).observe(toolbox);
     workspace.addChangeListener((event) => {
       if (TOUCHING.has(event.type)) this.lookSoon();
     });
@@ -91,7 +93,8 @@ export class EmptyCanvas {
     this.box.classList.toggle('dragging', dragged > 0);
     const flyout = workspace.getFlyout();
     const open = flyout?.isVisible() ? flyout.getWidth() : 0;
-    const left = (workspace.getToolbox()?.getWidth() ?? 0) + open;
+    const toolbox = workspace.getInjectionDiv().querySelector<HTMLElement>('.blocklyToolbox');
+    const left = (toolbox?.offsetWidth ?? 0) + open;
     this.box.style.left = `${left}px`;
     this.box.classList.toggle('narrow', document.body.clientWidth - left < 320);
     const events = categoryOf(workspace, FIRST);

@@ -106,14 +106,23 @@ class Actions:
         self[name].setChecked(True)
 
     def fill(self, bar: QMenuBar, menus: Sequence[str]) -> dict[str, Menu]:
-        """Make these menus in a menu bar; they are returned by name, and say it in the language of now."""
+        """Make these menus in a menu bar; they are returned by name, and say it in the language of now.
+
+        Those in them are returned as "View/Look".
+        """
         made: dict[str, Menu] = {name: Menu(self._theme, bar, _(name)) for name in menus}
         for menu in made.values():
             bar.addMenu(menu)
         for command in self._commands:
             if not command.menu:
                 continue
+            place = command.menu
+            if command.under:
+                place = f"{command.menu}/{command.under}"
+                if place not in made:
+                    made[place] = Menu(self._theme, made[command.menu], _(command.under))
+                    made[command.menu].addMenu(made[place])
             if command.above:
-                made[command.menu].addSeparator()
-            made[command.menu].addAction(self._actions[command.id])
+                made[place].addSeparator()
+            made[place].addAction(self._actions[command.id])
         return made

@@ -31,7 +31,8 @@ class Command(Generic[T]):
     ``text``, ``menu`` and ``tip`` are marked with `lazy`; people read `words`, in which ``number`` fills the
     hole of that name, and ``menu`` and ``tip`` by `_`. ``tip`` is what a button of it says under the mouse.
     ``group`` makes it one of several choices; ``above`` puts a line over it in its ``menu``; without a menu
-    it is only in the palette and among the shortcuts, if it is there. ``check`` makes it something that is on
+    it is only in the palette and among the shortcuts, if it is there. ``under`` names a menu in its ``menu``
+    that has it, also marked with `lazy`. ``check`` makes it something that is on
     or off, ``everywhere`` a key that works in all windows. ``mac`` are the keys of a Mac in place of
     ``keys``: Ctrl is written there for Cmd, Meta for the key that says Ctrl.
     """
@@ -43,6 +44,7 @@ class Command(Generic[T]):
     keys: tuple[str, ...] = ()
     icon: str | None = None
     tip: str = ""
+    under: str = ""
     group: str = ""
     above: bool = False
     everywhere: bool = False

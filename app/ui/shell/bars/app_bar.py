@@ -222,7 +222,9 @@ class PaletteField(PaintedButton):
         if room >= self._theme.scaled(LEAST_ROOM):
             area = QRectF(left, 0, room, rect.height())
             whole = paint.width_of(font, self.text()) <= room
-            paint.words(painter, area, self.text() if whole else _("Find"), font, theme.colour("textSecondary"))
+            paint.words(
+                painter, area, self.text() if whole else _("Find"), font, theme.colour("textSecondary")
+            )
         if self._key and not self._bare:
             paint.key_cap(painter, theme, rect.right() - 6, middle, self._key)
 

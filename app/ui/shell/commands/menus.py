@@ -17,7 +17,7 @@ from app.ui.text import plain
 from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
-ARRANGING = ("layout.keep", "layout.rename", "layout.delete", "layout.reset")
+ARRANGING = ("layout.keep", "layout.rename", "layout.delete")
 
 
 class MenuLists:
@@ -39,10 +39,11 @@ class MenuLists:
         self._recent = Menu(theme, surface, _("Recent"))
         menus["File"].insertMenu(actions["file.save"], self._recent)
         self._panels = Menu(theme, surface, _("Panels"))
-        self._layouts = Menu(theme, surface, _("Layouts"))
-        menus["View"].insertMenu(actions["layout.keep"], self._panels)
-        menus["View"].insertMenu(actions["layout.keep"], self._layouts)
+        self._layouts = menus["View/Layouts"]
+        menus["View"].insertMenu(self._layouts.menuAction(), self._panels)
         for name, menu in menus.items():
+            if "/" in name:
+                continue
             menu.aboutToShow.connect(lambda name=name: self._refresh(name))
             menu.aboutToHide.connect(actions.enable_all)
         self._arranging = Menu(theme, surface, _("Layouts"))
@@ -52,9 +53,7 @@ class MenuLists:
         """Open below a button which layouts there are, and what can be done with this one."""
         self.actions.disable()
         self._list_layouts(self._arranging)
-        self._arranging.addSeparator()
-        for name in ARRANGING:
-            self._arranging.addAction(self.actions[name])
+        self._arranging.addAction(self.actions["layout.reset"])
         drop_below(self._arranging, anchor)
 
     def drop_panels(self, anchor: QWidget) -> None:
@@ -101,6 +100,9 @@ class MenuLists:
             entry.setCheckable(True)
             entry.setChecked(shown == each.base and arrangements.own(each.base) == each.name)
             entry.triggered.connect(lambda _on=False, name=each.name: self._view.show_own_layout(name))
+        menu.addSeparator()
+        for name in ARRANGING:
+            menu.addAction(self.actions[name])
 
     def _list_panels(self) -> None:
         self._panels.clear()

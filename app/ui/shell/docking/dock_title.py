@@ -213,9 +213,9 @@ class DockTitle(QWidget):
     def fit_tabs(self) -> None:
         """Where not all names have room, chips lose their words first, then the panels behind their names.
 
-        In still less room also the panel in front is an icon.
+        In still less room also the panel in front is an icon. A chip whose icon says nothing keeps its words.
         """
-        chips = [chip for chip in self._others() if isinstance(chip, Chip)]
+        chips = [chip for chip in self._others() if isinstance(chip, Chip) and chip.status != "off"]
         if not self._tabs:
             for chip in chips:
                 chip.set_bare(False)
