@@ -146,7 +146,8 @@ def first_steps(window: MainWindow, options: Options) -> list[Callable[[], objec
     asked = bool(options.files or options.demo)
     if options.self_drive is not None:
         window.begin()
-        open_asked(window, StartRequest(options.files, options.demo))
+        # It begins the demonstration itself, after the start page: twice would be two robots' worth of tabs.
+        open_asked(window, StartRequest(options.files, demo=False))
         return []
     if not asked and not left:
         return [window.begin]

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
+from app import resources
 from app.blocks import editor_definitions
+from app.robots.description.description import parse, td_for
+from app.robots.simulated import ROBOT as PEPPER
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import robot, workspace
 from tests.ui.blockly.test_block_menu import ROWS, choose, looked_at, program
@@ -150,3 +155,29 @@ def test_a_note_on_the_canvas_is_saved_and_removed_by_its_menu(qtbot, them):
     them.wait_for("document.activeElement.classList.contains('blocklyComment')")
     them.press(Qt.Key_Delete)
     qtbot.waitUntil(lambda: "workspaceComments" not in them.newest(), timeout=WAIT_MS)
+
+
+NOTES = "[...document.querySelectorAll('.nepTab:not([hidden]) .blocklyComment')]"
+
+
+def test_no_note_of_an_example_lies_over_its_blocks_or_under_them(qtbot):
+    pepper = parse(td_for(PEPPER.thing_model, "Pepper"))
+    view = editor(qtbot, editor_definitions([pepper]), 1320, 760)
+    view.set_toolbox_pinned(False)
+    them = Person(qtbot, view)
+    with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
+        view.show()
+    places = f"{NOTES}.map(e => (r => [r.left, r.top, r.right, r.bottom])(e.getBoundingClientRect()))"
+    for path in sorted((resources.folder() / "examples").glob("*.nepb")):
+        state = json.loads(path.read_text("utf-8"))["workspace"]
+        view.load(state)
+        first = state["blocks"]["blocks"][0]["id"]
+        them.wait_for(f"!!document.querySelector('.nepTab:not([hidden]) [data-id={json.dumps(first)}]')")
+        them.wait_for(f"{NOTES}.length", 1)
+        ((left, top, right, bottom),) = them.ask(places)
+        hidden = [
+            box
+            for box in boxes_of_blocks(them)
+            if box[0] < right and box[2] > left and box[1] < bottom and box[3] > top
+        ]
+        assert hidden == [], path.name

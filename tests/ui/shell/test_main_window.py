@@ -741,6 +741,20 @@ def test_a_start_shows_what_was_left(
     assert [step.__name__ for step in first_steps(window, Options(new_window=True))] == ["<lambda>"]
 
 
+def test_who_drives_the_window_alone_begins_the_demonstration_and_nobody_else_does(
+    window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[str] = []
+    monkeypatch.setattr(window, "begin", lambda: None)
+    monkeypatch.setattr(commands.behaviours, "demo", lambda: begun.append("demo"))
+    for step in first_steps(window, Options(demo=True, self_drive=tmp_path)):
+        step()
+    assert begun == []
+    for step in first_steps(window, Options(demo=True)):
+        step()
+    assert begun == ["demo"]
+
+
 def test_panels_made_ahead_are_those_that_a_layout_shows(theme: Theme, session: Session) -> None:
     made: list[str] = []
     seen: dict[str, PlainPanel] = {}

@@ -102,6 +102,16 @@ def test_help_leads_to_all_examples(page: StartPage) -> None:
     assert all(card.isVisible() for card in page.example_cards)
 
 
+def test_help_leads_to_examples_that_are_in_sight(qtbot, page: StartPage) -> None:
+    page.resize(1280, 700)
+    page.show_open([OpenWork("a", "Greeting")])
+    page.hide()
+    page.show()
+    page.focus_examples()
+    for card in page.example_cards:
+        qtbot.waitUntil(lambda card=card: card.visibleRegion().boundingRect() == card.rect())
+
+
 def test_open_rows_stay_while_nothing_changed(page: StartPage) -> None:
     work = [OpenWork("a", "Greeting")]
     page.show_open(work)

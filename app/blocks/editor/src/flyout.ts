@@ -11,6 +11,8 @@ const LEAST_WIDTH = 312;
 const PINNED_WIDTH = 400;
 /** As much of the page it has from the start while it stays open. */
 const PINNED_SHARE = 1 / 3;
+/** What is wider, as a list with its items, widens it for its own category only. */
+const KEPT_WIDTH = 500;
 /** As much of the page it takes at most; what is wider is scrolled to. */
 const MOST = 0.45;
 const HEAD = 40;
@@ -28,7 +30,7 @@ export class Flyout extends Blockly.VerticalFlyout {
   /** A class for the style sheet. */
   protected readonly name: string = 'nepCategory';
   private across: Blockly.Scrollbar | null = null;
-  /** While it stays open, the width that its widest category wanted: a narrow one would pull the canvas along. */
+  /** While it stays open, the width that its widest usual category wanted: a narrow one would pull the canvas along. */
   private kept = 0;
 
   override init(target: Blockly.WorkspaceSvg): void {
@@ -123,9 +125,9 @@ export class Flyout extends Blockly.VerticalFlyout {
     const wanted = widest * this.getFlyoutScale() + Blockly.Scrollbar.scrollbarThickness;
     const page = this.targetWorkspace.getCachedParentSvgSize().width;
     if (!this.isPinned || !this.isVisible()) return Math.round(Math.max(LEAST_WIDTH, Math.min(wanted, page * MOST)));
-    this.kept = Math.max(this.kept, wanted);
-    const started = Math.max(this.kept, Math.min(PINNED_WIDTH, page * PINNED_SHARE));
-    return Math.round(Math.max(LEAST_WIDTH, Math.min(started, page * MOST)));
+    if (wanted <= KEPT_WIDTH) this.kept = Math.max(this.kept, wanted);
+    const pinned = Math.max(wanted, this.kept, Math.min(PINNED_WIDTH, page * PINNED_SHARE));
+    return Math.round(Math.max(LEAST_WIDTH, Math.min(pinned, page * MOST)));
   }
 
   protected override setMetrics_(ratio: {x: number; y: number}): void {

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -39,6 +39,7 @@ BANNER_ROOM, HIGH = 40, 640
 """More room above the question, where the page is high enough: a banner that may not move the page covers no
 words there."""
 EXAMPLES_SHOWN = 4
+EXAMPLES_MARGIN = 60  # so much around them, that their heading is in sight, too
 ALL_WORDS = {
     5: lazy("All five examples"),
     6: lazy("All six examples"),
@@ -266,8 +267,14 @@ class StartPage(QWidget):
         """Show all examples, and give the keyboard to the first."""
         self.show_all(True)
         if self.example_cards:
-            self._area.ensureWidgetVisible(self.example_cards[-1])
             self.example_cards[0].setFocus(Qt.FocusReason.OtherFocusReason)
+            # Later: the cards that came, and a page that showed only now, have no place before.
+            QTimer.singleShot(0, self, self._scroll_to_examples)
+
+    def _scroll_to_examples(self) -> None:
+        """Have as many of the examples in sight as there is room for, the first ones above all."""
+        for card in (self.example_cards[-1], self.example_cards[0]):
+            self._area.ensureWidgetVisible(card, 0, EXAMPLES_MARGIN)
 
     def show_recent(self, recent: Sequence[RecentFile], now: dt.datetime | None = None) -> None:
         """The files opened lately; without any the section is not there."""
