@@ -136,17 +136,19 @@ class Hands:
 
     # -- blocks out of the toolbox --------------------------------------------------------------------
 
-    def take(self, category: str, kind: str, corner: Place, within: str = "") -> str:
-        """Drag a block out of the toolbox until its corner is there; its id."""
+    def take(self, category: str, kind: str, corner: Place, place: int = 0) -> str:
+        """Drag a block out of the toolbox until its corner is there; its id.
+
+        ``place`` is that of the category among those of this name: each robot has its own.
+        """
         before = set(kind_of(self.studio, kind))
-        if self.studio.page(OPEN) != category:
-            self.studio.open_category(category)
-        offered = f"{FLYOUT} .blocklyDraggable.{kind}{within}"
+        offered = f"{FLYOUT} .blocklyDraggable.{kind}"
+        if self.studio.page(OPEN) != category or not self.studio.page(f"!!{_first(offered)}"):
+            self.studio.open_category(category, place)
         self._bring_into_sight(offered)
         self.studio.drag(offered, corner[0] + GRIP[0], corner[1] + GRIP[1])
-        (made,) = until(
-            lambda: self._still() and set(kind_of(self.studio, kind)) - before, f"{kind} is on the page"
-        )
+        (made,) = until(lambda: set(kind_of(self.studio, kind)) - before, f"{kind} is on the page")
+        until(lambda: not self._dragging(), f"{kind} is let go")
         return str(made)
 
     def _bring_into_sight(self, offered: str) -> None:
@@ -172,17 +174,21 @@ class Hands:
 
         until(in_sight, f"{offered} does not come into sight")
 
-    def _still(self) -> bool:
-        return bool(self.studio.page("!document.querySelector('.blocklyDragging')"))
+    def _dragging(self) -> bool:
+        return bool(self.studio.page("!!document.querySelector('.blocklyDragging')"))
 
-    def put(self, category: str, kind: str, dx: float, dy: float) -> str:
+    def put(self, category: str, kind: str, dx: float, dy: float, place: int = 0) -> str:
         """Drag a block onto a free place of the page; its id."""
-        return self.take(category, kind, self.free(dx, dy))
+        return self.take(category, kind, self.free(dx, dy), place)
 
-    def below(self, above: str, category: str, kind: str) -> str:
+    def below(self, above: str, category: str, kind: str, place: int = 0) -> str:
         """Drag a block out of the toolbox to below another one; its id."""
+        return self._into(above, category, kind, self.end(above), place)
+
+    def end(self, above: str) -> Place:
+        """Where the block below another one has its corner."""
         left, top, _, height = self.rect(above)
-        return self._into(above, category, kind, (left, top + height))
+        return left, top + height
 
     def inside(self, outer: str, category: str, kind: str) -> str:
         """Drag a block out of the toolbox into the empty mouth of another one; its id."""
@@ -197,8 +203,8 @@ class Hands:
         left, top, _, height = self.rect(outer)
         return left + INDENT, top + max(height / 2 - 12, 40)
 
-    def _into(self, outer: str, category: str, kind: str, corner: Place) -> str:
-        made = self.take(category, kind, corner)
+    def _into(self, outer: str, category: str, kind: str, corner: Place, place: int = 0) -> str:
+        made = self.take(category, kind, corner, place)
         until(lambda: holds(self.studio, outer, made), lambda: f"{kind} is at its place")
         return made
 
@@ -211,11 +217,12 @@ class Hands:
         self.studio.screen.press()
         self.studio.screen.glide(left + 60, top + 40, 6)
         self.studio.screen.glide(x, y)
+        until(self._dragging, "the page has seen that it is held")
 
     def drop(self) -> None:
         """Let go what is held."""
         self.studio.screen.release()
-        until(self._still, "it is let go")
+        until(lambda: not self._dragging(), "it is let go")
 
     def move(self, block: str, corner: Place) -> None:
         """Drag a block, with what hangs below it, until its corner is there."""

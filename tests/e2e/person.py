@@ -151,19 +151,20 @@ class Person:
         rect = self.spot(selector)
         self.screen.click(rect[0] + dx, rect[1] + dy)
 
-    def open_category(self, name: str) -> None:
-        """Open a category of the toolbox and wait for its blocks."""
+    def open_category(self, name: str, place: int = 0) -> None:
+        """Open a category of the toolbox and wait for its blocks; ``place`` among those of this name."""
         self.find(kind="QWebEngineView")
         shown = "document.querySelector('.nepTab:not([hidden]) .blocklyToolbox')"
         labels = f"[...({shown}?.querySelectorAll('.blocklyToolboxCategoryLabel') ?? [])]"
-        until(lambda: name in (self.page(f"{labels}.map(e => e.textContent)") or []), f"no category {name}")
+        named = f"{labels}.filter(e => e.textContent == {json.dumps(name)})"
+        until(lambda: self.page(f"!!{named}[{place}]"), f"no category {name}")
         view = self.find(kind="QWebEngineView")["rect"]
         before: list[object] = []
 
         def in_sight() -> list[float] | None:
             """Where the category is, once the wheel has brought it into the toolbox and it stands still."""
             rect, box = self.page(
-                f"[{labels}.find(e => e.textContent == {json.dumps(name)}), {shown}]"
+                f"[{named}[{place}], {shown}]"
                 ".map(e => (r => [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
             )
             x, y = view[0] + box[0] + box[2] / 2, view[1] + box[1] + box[3] / 2

@@ -66,6 +66,17 @@ def test_a_new_message_is_typed_and_offered_to_the_other_blocks(qtbot, person):
     them.press(Qt.Key_Escape)
 
 
+def test_the_name_that_is_suggested_can_be_taken_with_the_mouse(qtbot, person):
+    them = person(state=scripts())
+    for name in ("message 1", "message 2"):
+        them.click("[data-id=b] .blocklyDropdownField", dx=8, dy=8)
+        them.wait_for(f"{OFFERED}.includes('New message…')")
+        choose(them, "New message…")
+        them.wait_for("document.querySelector('.blocklyDialogInput')?.value", name)
+        them.click(".blocklyDialogConfirmButton")
+        qtbot.waitUntil(lambda name=name: name_of(them, 0) == name, timeout=WAIT_MS)
+
+
 def test_an_empty_name_changes_nothing(qtbot, person):
     them = person(state=scripts())
     them.click("[data-id=b] .blocklyDropdownField", dx=8, dy=8)

@@ -60,16 +60,25 @@ def test_a_new_variable_is_asked_for_and_made(shown: MainWindow, commands: Comma
     commands.run("variable.new")
     sheet = sheet_of(shown)
     assert sheet.heading.text() == "Name of the new variable"
-    assert not sheet.button.isEnabled()
+    assert (sheet.field.text(), sheet.field.selectedText()) == ("count", "count"), "it can be taken as it is"
+    assert sheet.button.isEnabled()
+    assert not typed(sheet, "").button.isEnabled()
     typed(sheet, " points ")
     assert sheet.button.isEnabled()
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
     assert not sheet.isVisible()
     assert editor(shown).edited == [{"do": "new", "name": "points", "list": False}]
     commands.run("variable.new_list")
-    assert sheet.heading.text() == "Name of the new list"
+    assert (sheet.heading.text(), sheet.field.text()) == ("Name of the new list", "list")
     QTest.keyClick(typed(sheet, "names").field, Qt.Key.Key_Return)
     assert editor(shown).edited[1] == {"do": "new", "name": "names", "list": True}
+
+
+def test_a_name_that_is_used_is_not_suggested(shown: MainWindow, commands: Commands) -> None:
+    used = [{"id": str(number), "name": name} for number, name in enumerate(["count", "Count 2"])]
+    shown.session.document.edited({**SAVED, "variables": used})
+    commands.run("variable.new")
+    assert sheet_of(shown).field.text() == "count 3"
 
 
 @pytest.mark.parametrize("name", ["score", "SCORE", "名前"])

@@ -60,6 +60,11 @@ export class FieldChoice extends Blockly.FieldDropdown {
     return (this.source && sources.get(this.source)) || this.given;
   }
 
+  /** What stands in the question for another one: it can be taken as it is, without a keyboard. */
+  protected suggested(): string {
+    return this.value_ ?? '';
+  }
+
   /** Present options, always with the present value among them and never empty. */
   private choices(): Option[] {
     const options: Option[] = [...this.offered()];
@@ -98,7 +103,7 @@ export class FieldChoice extends Blockly.FieldDropdown {
       super.onItemSelected_(menu, item);
       return;
     }
-    Blockly.dialog.prompt(TYPED[this.typed || 'topic'].name(), this.typed === 'message' ? '' : this.value_ ?? '', (words) => {
+    Blockly.dialog.prompt(TYPED[this.typed || 'topic'].name(), this.suggested(), (words) => {
       const name = words?.trim().replace(/\s+/g, ' ');
       if (name) this.setValue(name);
     });
@@ -135,6 +140,14 @@ export class FieldBroadcast extends FieldChoice {
     const blocks = FieldBroadcast.types.flatMap((type) => main?.getBlocksByType(type, false) ?? []);
     const names = new Set(blocks.map((block) => String(block.getFieldValue('NAME') ?? '')));
     return [...names].filter(Boolean).sort((one, other) => one.localeCompare(other)).map((name) => [name, name]);
+  }
+
+  /** The first of “message 1”, “message 2” and so on that no block has. */
+  protected override suggested(): string {
+    const used = new Set(this.offered().map(([, name]) => name));
+    let number = 1;
+    while (used.has(t('message {number}', {number}))) number += 1;
+    return t('message {number}', {number});
   }
 
   static override fromJson(config: Blockly.FieldConfig): FieldBroadcast {

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import chain, count
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from app.blocks.model.workspace import Placed, Workspace, parse_workspace
 from app.core.session import Session
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
-from nep.i18n import _, ngettext
+from nep.i18n import _, ngettext, pgettext
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -43,9 +44,14 @@ class VariableCommands:
 
         def asked() -> None:
             take = lambda name: self._edit({"do": "new", "name": name, "list": is_list})  # noqa: E731
-            self._ask().ask(question, verb, self.refusal, take)
+            self._ask().ask(question, verb, self.refusal, take, self._free_name(is_list=is_list))
 
         self._with_newest(asked)
+
+    def _free_name(self, *, is_list: bool) -> str:
+        """A name that can be taken as it is, without a keyboard: "count", else "count 2", "count 3"."""
+        first = pgettext("variable", "list") if is_list else pgettext("variable", "count")
+        return next(n for n in chain([first], (f"{first} {n}" for n in count(2))) if not self.refusal(n))
 
     def ask_other_name(self, id: str) -> None:
         """Ask for another name of a variable."""
