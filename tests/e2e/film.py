@@ -21,6 +21,7 @@ from tests.e2e.person import Person, Reaction, middle
 from tests.e2e.x11 import LEFT, Picture, Screen
 
 WHEEL_UP, WHEEL_DOWN = 4, 5
+PLAIN = str.maketrans("“”", '""')  # the letters of a caption are those of ASCII
 STRIP, MARGIN, TEXT_PX = 44, 16, 20  # the caption's strip below the picture
 PAPER, INK = (0x22, 0x1C, 0x18), (0xF5, 0xF2, 0xF0)  # blue, green, red
 STILL_LOOKS, STILL_S = 4, 0.12  # how often, and how far apart, it is looked whether the picture stands still
@@ -62,6 +63,10 @@ class Film:
             old.unlink()
         self.pictures: list[Path] = []
         self.slowest: dict[str, Reaction] = {}
+
+    def follow(self, studio: Person) -> None:
+        """Go on with another window."""
+        self._studio = studio
 
     @contextmanager
     def step(self, caption: str) -> Iterator[None]:
@@ -112,7 +117,7 @@ def with_caption(picture: Picture, words: str) -> Picture:
     """The picture (red, green, blue) with a strip below that says the words; as blue, green, red."""
     strip = np.full((STRIP, picture.shape[1], 3), PAPER, np.uint8)
     scale = TEXT_PX / cv2.getTextSize("Xg", cv2.FONT_HERSHEY_DUPLEX, 1.0, 1)[0][1] * 0.75
-    plain = words.encode("ascii", "replace").decode()
+    plain = words.translate(PLAIN).encode("ascii", "replace").decode()
     place = (MARGIN, STRIP // 2 + TEXT_PX // 2 - 3)
     cv2.putText(strip, plain, place, cv2.FONT_HERSHEY_DUPLEX, scale, INK, 1, cv2.LINE_AA)
     return np.vstack([picture[:, :, ::-1], strip])

@@ -58,6 +58,11 @@ def kind_of(studio: Person, kind: str) -> list[str]:
     return studio.page(f"{found}.map(e => e.dataset.id)") or []
 
 
+def blocks_of(studio: Person) -> set[str]:
+    """The ids of all blocks of the behaviour that shows."""
+    return set(kind_of(studio, "blocklyDraggable"))
+
+
 def problems(studio: Person) -> list[str]:
     """The sentences of the panel Problems."""
     return [str(each["name"]) for each in studio.all(kind="ProblemRow")]
@@ -234,7 +239,7 @@ class Hands:
         left, top, wide, height = self.studio.spot(f"{TAB} .blocklyToolbox")
         self.carry(block, left + wide / 2, top + height / 2)
         self.drop()
-        until(lambda: block not in self.studio.blocks(), f"{block} is deleted")
+        until(lambda: block not in blocks_of(self.studio), f"{block} is deleted")
 
     def choose(self, block: str, shows: str, wanted: str) -> None:
         """Choose from the drop-down of a block that shows these words."""
@@ -248,6 +253,12 @@ class Hands:
         """Choose from the drop-down that is open."""
         words = f"e => e.textContent.includes({json.dumps(wanted)})"
         self._press(f"{_all('.blocklyMenuItem')}.find({words})")
+
+    def press_button(self, category: str, words: str) -> None:
+        """Press a button above the blocks of a category."""
+        self.studio.open_category(category)
+        same = f"e => e.textContent.replaceAll('\\u00a0', ' ') == {json.dumps(words)}"
+        self._press(f"{_all(f'{FLYOUT} .blocklyFlyoutButton')}.find({same})")
 
     def menu(self, block: str, entry: str) -> None:
         """Choose from the menu of a block."""

@@ -15,11 +15,12 @@ Seen = Mapping[str, object]
 
 
 class Reaction(NamedTuple):
-    """One press, and when its answer was on the screen."""
+    """One press, and when its answer was on the screen; ``work_ms`` the window's thread was at it."""
 
     where: str
     what: str
     took_ms: float
+    work_ms: float = 0.0
 
 
 def middle(rect: Sequence[float]) -> tuple[float, float]:
@@ -179,7 +180,7 @@ class Person:
 
         rect = until(in_sight, f"{name} does not come into sight")
         self.screen.click(view[0] + rect[0] + rect[2] / 2, view[1] + rect[1] + rect[3] / 2)
-        self.spot(".blocklyFlyout .blocklyDraggable")
+        self.spot(".nepTab:not([hidden]) .blocklyFlyout .blocklyDraggable")
 
     def drag(self, selector: str, x: float, y: float) -> None:
         """Drag a block by its left edge; the place under the mouse ends at (x, y)."""

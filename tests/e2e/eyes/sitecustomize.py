@@ -16,6 +16,14 @@ CELL_ROLE = 0x0100  # Qt.UserRole: what a cell of our tables shows
 TABLE_ROWS = 200
 
 
+_looked = [0.0, 0.0]  # the seconds that these eyes took, and their work in them
+
+
+def _spent() -> tuple[float, float]:
+    """Seconds of the clock and of this thread's work, without those of these eyes."""
+    return time.monotonic() - _looked[0], time.thread_time() - _looked[1]
+
+
 def _open() -> None:
     told = os.environ.pop("NEP_E2E_EYES", "")
     if not told:
@@ -59,6 +67,7 @@ def _looker(reply):
         def look(self, line: str) -> None:
             request = json.loads(line)
             reactions.watch()
+            began_s, began_work_s = time.monotonic(), time.thread_time()
             try:
                 if request["do"] == "script":
                     _script(request, reply)
@@ -68,6 +77,8 @@ def _looker(reply):
                     reply(request["n"], _widgets(application))
             except Exception as error:  # noqa: BLE001  the tests are told, Studio goes on
                 reply(request["n"], {"error": f"{type(error).__name__}: {error}"})
+            _looked[0] += time.monotonic() - began_s
+            _looked[1] += time.thread_time() - began_work_s
 
     looker = Looker()
     looker.asked.connect(looker.look)
@@ -80,7 +91,8 @@ def _reactions(application):
     """Measures how long after each press of a key or button the window has answered it on the screen.
 
     From the time that the X server gave the event (its clock is the monotonic one) until the window has
-    handled it and painted what it asked for. The page of the editor measures its own (Event Timing API).
+    handled it and painted what it asked for, without the time that these eyes took. The page of the editor
+    measures its own (Event Timing API).
     """
     from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt
 
@@ -91,6 +103,7 @@ def _reactions(application):
         def __init__(self, since_ms: int, what: str) -> None:
             super().__init__(painted)
             self.since_ms, self.what = since_ms, what
+            self.seen_s, self.spent = time.monotonic(), _spent()
 
     class Reactions(QObject):
         def __init__(self) -> None:
@@ -113,8 +126,10 @@ def _reactions(application):
             return False
 
         def customEvent(self, event) -> None:
-            took_ms = time.monotonic() * 1000 % 2**32 - event.since_ms
-            self.seen.append(["window", event.what, round(took_ms, 1)])
+            looked_s = time.monotonic() - event.seen_s - (_spent()[0] - event.spent[0])
+            took_ms = time.monotonic() * 1000 % 2**32 - event.since_ms - looked_s * 1000
+            work_ms = (_spent()[1] - event.spent[1]) * 1000
+            self.seen.append(["window", event.what, round(took_ms, 1), round(work_ms, 1)])
 
         def told(self) -> list[list]:
             told, self.seen = self.seen, []
