@@ -117,6 +117,11 @@ class Person:
             self.target, Qt.LeftButton, pos=QPoint(round(box["left"] + dx), round(box["top"] + dy))
         )
 
+    def hover(self, at: QPoint) -> None:
+        """Move the mouse there from elsewhere: where it is already, as another test left it, nothing is told."""
+        QTest.mouseMove(self.target, at + QPoint(9, 9))
+        QTest.mouseMove(self.target, at)
+
     def press(self, key: Qt.Key, modifiers=Qt.NoModifier) -> None:
         QTest.keyClick(self.target, key, modifiers)
 

@@ -23,6 +23,19 @@ SVGElement.prototype.appendChild = function <T extends Node>(this: SVGElement & 
   return append.call(this, child) as T;
 };
 
+/**
+ * Before the next picture Blockly puts what lies over a block below it, one by one. Who copies several times within
+ * one picture, by a key that is held, would lose the keys with the newest copy.
+ */
+const insert = SVGElement.prototype.insertBefore;
+SVGElement.prototype.insertBefore = function <T extends Node>(this: SVGElement & Moves, child: T, before: Node | null): T {
+  if (child.isConnected && this.moveBefore && this.isConnected) {
+    this.moveBefore(child, before);
+    return child;
+  }
+  return insert.call(this, child, before) as T;
+};
+
 // ---- who has the keys
 
 interface Marks {
