@@ -17,6 +17,7 @@ from tests.interop.conftest import FIXED_PORTS
 pytestmark = [pytest.mark.ports, pytest.mark.interop, pytest.mark.timeout(600)]
 
 ROUNDS = 60
+"""So many messages at least each hears of the other; more until every attack has been made once."""
 GARBAGE = (b"GET / HTTP/1.1\r\n\r\n", b"\xff" * 4000, b"\xff\x00\x00")
 
 
@@ -139,13 +140,14 @@ def test_originals_and_native_programs_hear_each_other_under_attack(
                 flood.begin(f"frames {port}", frames_into(port, context))
             flood.begin(f"deaf {port}", deaf_subscriber_of(port + 1, context))
             flood.begin(f"garbage {port}", garbage_into(port + 1))
-        for number in range(ROUNDS):
-            publisher.tell({"n": number})
-            answering.tell({"n": number})
-            assert native.hears({"n": number}), f"{number} of {kind} after {flood.rounds}"
-            assert receiver.hears({"n": number}), f"{number} for {kind} after {flood.rounds}"
-        assert all(flood.rounds.values()), flood.rounds
+        rounds = 0
+        while rounds < ROUNDS or not all(flood.rounds.values()):  # on a busy computer an attack takes its time
+            publisher.tell({"n": rounds})
+            answering.tell({"n": rounds})
+            assert native.hears({"n": rounds}), f"{rounds} of {kind} after {flood.rounds}"
+            assert receiver.hears({"n": rounds}), f"{rounds} for {kind} after {flood.rounds}"
+            rounds += 1
     finally:
         flood.close()
         context.destroy(linger=0)
-    assert [message for message in native.got if message["n"] >= 0] == [{"n": n} for n in range(ROUNDS)]
+    assert [message for message in native.got if message["n"] >= 0] == [{"n": n} for n in range(rounds)]
