@@ -141,7 +141,7 @@ def test_originals_and_native_programs_hear_each_other_under_attack(
             flood.begin(f"deaf {port}", deaf_subscriber_of(port + 1, context))
             flood.begin(f"garbage {port}", garbage_into(port + 1))
         rounds = 0
-        while rounds < ROUNDS or not all(flood.rounds.values()):  # on a busy computer an attack takes its time
+        while rounds < ROUNDS or not all(flood.rounds.values()):  # an attack may take its time
             publisher.tell({"n": rounds})
             answering.tell({"n": rounds})
             assert native.hears({"n": rounds}), f"{rounds} of {kind} after {flood.rounds}"

@@ -118,7 +118,7 @@ class Person:
         )
 
     def hover(self, at: QPoint) -> None:
-        """Move the mouse there from elsewhere: where it is already, as another test left it, nothing is told."""
+        """Move the mouse there from elsewhere: where another test has left it already, nothing is told."""
         QTest.mouseMove(self.target, at + QPoint(9, 9))
         QTest.mouseMove(self.target, at)
 

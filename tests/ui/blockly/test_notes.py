@@ -132,9 +132,10 @@ def test_a_note_can_be_read_from_afar(view, them):
     add_note(them)
     for _ in range(8):
         view.zoom_out()
+    note = "document.querySelector('.nepNote textarea')"
     seen = "(e => parseFloat(getComputedStyle(e).fontSize) * e.getBoundingClientRect().width / e.offsetWidth)"
-    them.wait_for("document.querySelector('.nepNote textarea').getBoundingClientRect().width < 120")
-    assert them.ask(f"{seen}(document.querySelector('.nepNote textarea'))") > 8.5
+    # The page is told of each step by itself, and its letters follow one picture later.
+    them.wait_for(f"{note}.getBoundingClientRect().width < 120 && {seen}({note}) > 8.5")
 
 
 def test_a_note_on_the_canvas_is_saved_and_removed_by_its_menu(qtbot, them):
