@@ -12,6 +12,7 @@ from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session
+from tests.ui.shell_parts import Answers
 
 
 @dataclass
@@ -24,6 +25,7 @@ class Window:
     toasts: list[str] = field(default_factory=list)
     toast_buttons: list[tuple[str, Callable[[], object] | None]] = field(default_factory=list)
     commands: list[str] = field(default_factory=list)
+    answers: Answers = field(default_factory=Answers)
 
     def context(self) -> PanelContext:
         return PanelContext(
@@ -32,6 +34,7 @@ class Window:
             self.opened.append,
             self.say,
             self.commands.append,
+            self.answers,
         )
 
     def say(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:

@@ -111,6 +111,16 @@ class Answers:
         if self.path is not None:
             take(self.path)
 
+    def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
+        self.asked.append(f"picture {folder}")
+        if self.path is not None:
+            take(self.path)
+
+    def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+        self.asked.append(f"folder {folder}")
+        if self.path is not None:
+            take(self.path)
+
 
 def robots_in(*states: str, run: str = "ready", silent: str | None = None) -> fakes.Session:
     """Robots named "Robot 1" and so on, each in its state, while a program has come so far.

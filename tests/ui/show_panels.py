@@ -29,6 +29,7 @@ from app.ui.theme import fonts
 from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session
 from tests.ui.sample_data import blackboard
+from tests.ui.shell_parts import Answers
 
 SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "topics": (topics.PANEL, 640, 461, "compact"),
@@ -58,7 +59,7 @@ def wait(milliseconds: int) -> None:
 def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -> None:
     """Paint one panel in its dock."""
     panel, width, height, density = SIZES[name]
-    context = PanelContext(session, theme, lambda _name: None, lambda _words: None, lambda _name: None)  # type: ignore[arg-type]
+    context = PanelContext(session, theme, lambda _name: None, lambda _words: None, str, Answers())  # type: ignore[arg-type]
     widget = panel.make(context)
     dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
     dock.resize(width, height)
@@ -82,7 +83,7 @@ def shown_panel(
 ) -> Iterator[tuple[Dock, PanelWidget]]:
     """A panel alone in its dock, at its size in the design, after three ticks of what the session has."""
     panel, width, height, density = SIZES[name]
-    widget = panel.make(PanelContext(session, theme, str, str, str))  # type: ignore[arg-type]
+    widget = panel.make(PanelContext(session, theme, str, str, str, Answers()))  # type: ignore[arg-type]
     dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
     qtbot.addWidget(dock)
     dock.resize(width, height)

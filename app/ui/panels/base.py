@@ -16,6 +16,7 @@ from PySide6.QtGui import QAction, QFont
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.theme.theme import Theme
+from app.ui.widgets.file_dialogs import FileDialogs
 
 if TYPE_CHECKING:
     from app.core.network.watches import Suspendable
@@ -47,7 +48,7 @@ class PanelContext:
     """What a panel may use of the window.
 
     ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run``
-    does one of the window's commands by its name (`app.ui.shell.commands.table`).
+    does one of the window's commands by its name (`app.ui.shell.commands.table`), ``files`` asks for files.
     """
 
     session: Session
@@ -55,6 +56,7 @@ class PanelContext:
     open_topic: Callable[[str], None]
     toast: ShowToast
     run: Callable[[str], None]
+    files: FileDialogs
 
 
 @dataclass(frozen=True, slots=True)

@@ -62,7 +62,7 @@ class DocumentController:
         clock: Callable[[], float] = time.time,
     ) -> None:
         """``editor`` gives the behaviour panel, or None while there is none."""
-        self._session, self._asks, self._say, self._shown = session, asks, say, shown
+        self._session, self.asks, self._say, self._shown = session, asks, say, shown
         self._documents = session.documents
         self._editor, self._clock = editor, clock
 
@@ -74,7 +74,7 @@ class DocumentController:
         """Let a person choose a file and open it."""
         self._session.alerts.resolve("strange")
         path = self._session.document.path
-        self._asks.open(str(path.parent if path is not None else Path.home()), self.open)
+        self.asks.open(str(path.parent if path is not None else Path.home()), self.open)
 
     def open(self, path: Path) -> None:
         """Open a behaviour file in a tab; what is wrong with it becomes an alert."""
@@ -195,7 +195,7 @@ class DocumentController:
         own = document.path
         folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
         suggestion = str(folder / f"{document.name}{SUFFIX}")
-        self._asks.save(suggestion, lambda path: self.with_newest(lambda: self._save(path)))
+        self.asks.save(suggestion, lambda path: self.with_newest(lambda: self._save(path)))
 
     def mend(self, action: str) -> bool:
         """Change the blocks as a problem's button says; False when it says nothing about blocks."""

@@ -95,14 +95,15 @@ class MainWindow(QMainWindow):
         self._shut = False
         self._flush_before_close = FlushBeforeClose(self, self.editor, self.close)
         self._build(examples)
-        self.context = PanelContext(session, theme, self.open_topic, self.say, self._run)
+        files = asks if asks is not None else self._file_dialogs()
+        self.context = PanelContext(session, theme, self.open_topic, self.say, self._run, files)
         self.ring = FocusRing(theme, self)
         self.timer = QTimer(self)
         self.timer.setInterval(TICK_MS)
         self.timer.timeout.connect(self._half_tick)
         self.gc_freeze = GcFreezeTimer(self)
         self.panel_focus = PanelFocus(lambda: None if self._shut else self.bench, self)
-        self.commands = Commands(self, session, asks if asks is not None else self._file_dialogs())
+        self.commands = Commands(self, session, files)
         self._connect()
         self.show_start()
 

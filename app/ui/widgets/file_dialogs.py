@@ -6,11 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QStandardPaths, Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.core.documents.file_format import SUFFIX
-from nep.i18n import _
+from nep.i18n import _, lazy
 
 
 class FileDialogs(Protocol):
@@ -21,6 +21,21 @@ class FileDialogs(Protocol):
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
         """Where to save."""
+
+    def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Which picture; "" for the folder where this computer keeps pictures."""
+
+    def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Which folder pictures are to be kept in."""
+
+
+PICTURE_ENDINGS = (".png", ".jpg", ".jpeg")
+
+
+def pictures_folder() -> str:
+    """Where this computer keeps pictures; the person's own folder where it has no such place."""
+    place = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
+    return place if place and Path(place).is_dir() else str(Path.home())
 
 
 def show_free(dialog: QFileDialog) -> None:
@@ -35,6 +50,11 @@ def show_free(dialog: QFileDialog) -> None:
     dialog.activateWindow()  # the keys go there, also where no window manager sees to it
 
 
+BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
+PICTURES = (lazy("Pictures"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
+"""What a dialog offers, in words, and the patterns of the names."""
+
+
 class SystemDialogs:
     """The system's own file dialogs: of Windows, of macOS, of a Linux desktop by its portal.
 
@@ -45,20 +65,32 @@ class SystemDialogs:
         self._window = window
 
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Open a behaviour"), folder, take)
+        dialog = self._dialog(_("Open a behaviour"), folder, take, BEHAVIOURS)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Save the behaviour"), str(Path(suggestion).parent), take)
+        dialog = self._dialog(_("Save the behaviour"), str(Path(suggestion).parent), take, BEHAVIOURS)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(SUFFIX.lstrip("."))
         dialog.selectFile(Path(suggestion).name)
         dialog.show()
 
-    def _dialog(self, title: str, folder: str, take: Callable[[Path], None]) -> QFileDialog:
-        kind = _("Behaviours")
-        dialog = QFileDialog(self._window, title, folder, f"{kind} (*{SUFFIX})")
+    def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Choose a picture"), folder or pictures_folder(), take, PICTURES)
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.show()
+
+    def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Folder for pictures"), folder, take)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.show()
+
+    def _dialog(
+        self, title: str, folder: str, take: Callable[[Path], None], kind: tuple[str, str] | None = None
+    ) -> QFileDialog:
+        offered = f"{_(kind[0])} ({kind[1]})" if kind is not None else ""
+        dialog = QFileDialog(self._window, title, folder, offered)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setWindowModality(Qt.WindowModality.NonModal)
         dialog.fileSelected.connect(lambda chosen: take(Path(chosen)))

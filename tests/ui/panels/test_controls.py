@@ -20,8 +20,8 @@ from app.robots.description.inputs import Parameter, parameter_of
 from app.robots.description.model import Action
 from app.ui.panels.robots.controls.angle import AngleDial
 from app.ui.panels.robots.controls.colour import ColourChoice, ColourSwatches, HueStrip
-from app.ui.panels.robots.controls.picture import PictureChoice
-from app.ui.panels.robots.controls.picture_file import MOST_FILE_BYTES, encoded, file_filter, read_picture
+from app.ui.panels.robots.controls.picture import NoPictures, PictureChoice
+from app.ui.panels.robots.controls.picture_file import MOST_FILE_BYTES, encoded, read_picture
 from app.ui.panels.robots.form import ActionForm
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SliderWithUnit
@@ -339,8 +339,24 @@ def test_a_bomb_is_refused_with_a_sentence_as_a_file_and_as_an_address(qtbot, th
     assert choice.thumbnail.image is None
 
 
-def test_only_what_is_read_is_offered_and_a_pipe_is_not_opened(tmp_path) -> None:
-    assert file_filter() == "Pictures (*.png *.jpg *.jpeg)"
+def test_the_button_asks_for_a_picture_and_begins_where_the_last_one_was(theme, qtbot, tmp_path) -> None:
+    folders: list[str] = []
+
+    class Asked(NoPictures):
+        def ask_file(self, folder, take) -> None:
+            folders.append(folder)
+            take(tmp_path / "no.png")
+
+    choice = PictureChoice(theme, Parameter("p", "picture", "image"), Asked())
+    qtbot.addWidget(choice)
+    choice.choose.click()
+    assert choice.field.text() == str(tmp_path / "no.png")
+    assert choice.sentence
+    choice.choose.click()
+    assert folders == ["", str(tmp_path)]
+
+
+def test_a_folder_and_a_pipe_are_not_opened(tmp_path) -> None:
     assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” is no file."
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.png")

@@ -10,16 +10,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.core.documents.folder import entries_of, free_name, name_refusal
 from app.core.session import Session
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.dialogs.file_sheet import (
-    FileSheet,
-    FolderPlace,
-    entries_of,
-    free_name,
-    known_places,
-    name_refusal,
-)
+from app.ui.shell.dialogs.file_sheet import FileSheet, FolderPlace, known_places
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
@@ -256,3 +250,50 @@ def test_the_window_asks_with_it(qtbot: QtBot, theme: Theme, session: Session, f
     assert "work" in [button.text() for button in sheet.places.findChildren(Button)]
     sheet.shut()
     window.close()
+
+
+def test_a_picture_is_chosen_among_pictures(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+    for name in ("cat.PNG", "dog.jpg", "song.mp3"):
+        (folder / name).write_bytes(b"")
+    sheet.ask_picture(folder, taken.append)
+    assert rows(sheet) == ["class 3", "cat.PNG", "dog.jpg"]
+    sheet.list.setCurrentItem(sheet.list.topLevelItem(2))
+    sheet.done.click()
+    assert taken == [folder / "dog.jpg"]
+    sheet.ask_open(folder, taken.append)
+    assert rows(sheet) == ["class 3", "a quiz", "Greeting"], "the next question is for behaviours again"
+
+
+def test_a_folder_is_chosen_or_made(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+    sheet.ask_folder(folder, taken.append)
+    assert rows(sheet) == ["class 3"]
+    assert sheet.said.text() == "Pictures will be kept in “work”.", "no row is chosen by itself"
+    sheet.list.setCurrentItem(sheet.list.topLevelItem(0))
+    assert sheet.said.text() == "Pictures will be kept in “class 3”."
+    sheet.done.click()
+    sheet.ask_folder(folder, taken.append)
+    sheet.new_folder.click()
+    sheet.folder_name.setText("album")
+    sheet.make_folder.click()
+    assert sheet.list.hasFocus()
+    assert sheet.said.text() == "Pictures will be kept in “album”."
+    sheet.done.click()
+    assert taken == [folder / "class 3", folder / "album"]
+
+
+def test_the_settings_stay_open_below_the_sheet_and_get_the_keys_back(
+    sheet: FileSheet, window: MainWindow, commands: Commands, folder: Path, taken: list[Path]
+) -> None:
+    commands.run("settings.open")
+    settings = commands.view._settings_sheet
+    assert settings is not None
+    settings.choose.setFocus()
+    sheet.ask_folder(folder, taken.append)
+    QApplication.processEvents()
+    assert settings.isVisible()
+    assert sheet.list.hasFocus()
+    QTest.keyClick(sheet.list, Qt.Key.Key_Escape)
+    assert not sheet.isVisible()
+    assert settings.isVisible()
+    assert settings.choose.hasFocus()
+    assert taken == []

@@ -17,6 +17,7 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ComboBox
+from tests.ui.shell_parts import Answers
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -63,10 +64,15 @@ def test_what_menus_change_shows_here(sheet: SettingsSheet, commands: Commands) 
     assert not commands.actions["theme.contrast"].isChecked()
 
 
-def test_the_folder_for_pictures_is_kept(sheet: SettingsSheet, window: MainWindow, tmp_path: Path) -> None:
+def test_the_folder_for_pictures_is_kept(
+    sheet: SettingsSheet, window: MainWindow, answers: Answers, tmp_path: Path
+) -> None:
     settings = window.session.settings
-    assert sheet.folder.text() == str(snapshots.folder(settings))
-    sheet.keep_folder(str(tmp_path))
+    before = snapshots.folder(settings)
+    assert sheet.folder.text() == str(before)
+    answers.path = tmp_path
+    sheet.choose.click()
+    assert answers.asked == [f"folder {before}"]
     assert snapshots.folder(settings) == tmp_path
     assert sheet.folder.text() == str(tmp_path)
 

@@ -13,11 +13,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMenu
 
 import app.ui
-from app.robots.description.inputs import Parameter
-from app.ui.panels.robots.controls.picture import NoPictures, PictureChoice
 from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.file_sheet import StudioDialogs
 from app.ui.shell.main_window import MainWindow
-from app.ui.theme.theme import Theme
 from app.ui.widgets.inputs.combo_box import ComboBox
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -78,11 +76,8 @@ def a_file_dialog(window: MainWindow) -> None:
     window.commands.run("file.open")
 
 
-def the_dialog_of_a_picture(window: MainWindow) -> None:
-    choice = PictureChoice(window.theme, Parameter("p", "picture", "image"), NoPictures())
-    choice.setParent(window)
-    choice.show()
-    choice.choose.click()
+def the_sheet_of_files(window: MainWindow) -> None:
+    StudioDialogs(window.theme, window, window.session.settings).open_picture("", lambda _path: None)
 
 
 def a_panel_that_floats(window: MainWindow) -> None:
@@ -110,7 +105,7 @@ OPENED = [
     a_context_menu_of_a_field,
     a_list_of_choices,
     a_file_dialog,
-    the_dialog_of_a_picture,
+    the_sheet_of_files,
     a_panel_that_floats,
     a_field_in_which_one_types,
     *map(
@@ -172,24 +167,6 @@ def test_stop_held_down_stops_once(window: MainWindow, stops: list[str]) -> None
     QTest.keyPress(handle, Qt.Key.Key_F12)
     QTest.keyRelease(handle, Qt.Key.Key_F12)
     assert stops == ["stop"]
-
-
-@pytest.fixture
-def choice(qtbot, theme: Theme) -> PictureChoice:
-    made = PictureChoice(theme, Parameter("p", "picture", "image"), NoPictures())
-    qtbot.addWidget(made)
-    made.show()
-    return made
-
-
-def test_a_file_dialog_gives_what_was_chosen(choice: PictureChoice, tmp_path: Path) -> None:
-    choice.choose.click()
-    (dialog,) = choice.findChildren(QFileDialog)
-    assert not dialog.isModal()
-    assert dialog.testOption(QFileDialog.Option.DontUseNativeDialog)
-    dialog.fileSelected.emit(str(tmp_path / "no.png"))
-    assert choice.field.text() == str(tmp_path / "no.png")
-    dialog.close()
 
 
 def test_nothing_in_the_window_is_modal() -> None:

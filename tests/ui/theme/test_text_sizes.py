@@ -109,7 +109,7 @@ def test_an_action_is_read_and_tried_without_scrolling_sideways(
     theme.set_text_percent(percent)
     session = FakeSession.full()
     panel = robots.PANEL
-    widget = panel.make(PanelContext(session, theme, str, str, str))  # type: ignore[arg-type]
+    widget = panel.make(PanelContext(session, theme, str, str, str, Answers()))  # type: ignore[arg-type]
     dock = Dock(theme, panel, widget, "comfortable")  # type: ignore[arg-type]
     qtbot.addWidget(dock)
     dock.resize(width, 600)

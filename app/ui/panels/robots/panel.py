@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
@@ -26,6 +27,7 @@ from app.ui.panels.robots.list import LIST_WIDTH, RobotList
 from app.ui.text.numbers import grouped
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, ElidedLabel, EmptyAction, EmptyState, SearchField, Separator, label
+from app.ui.widgets.file_dialogs import FileDialogs
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.indicators import ROBOT_STATUS
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
@@ -68,10 +70,10 @@ class RobotHead(QWidget):
 
 
 class SessionPictures:
-    """The picture topics and streams of the session, for forms that want a picture."""
+    """The picture topics and streams of the session, and picture files, for forms that want a picture."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, session: Session, files: FileDialogs) -> None:
+        self._session, self._files = session, files
         self._opened: list[ImageStream] = []
 
     @property
@@ -90,6 +92,10 @@ class SessionPictures:
         self._opened = [*self.streams, made]
         return made
 
+    def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Ask a person for a picture file."""
+        self._files.open_picture(folder, take)
+
 
 class RobotsPanel(OneRobotPanel):
     """The list of robots, and the actions of the chosen one."""
@@ -99,7 +105,7 @@ class RobotsPanel(OneRobotPanel):
         self._names: list[str] = []  # of the robots in the list
         self.cards: dict[str, ActionCard] = {}
         self._cards_of = ""
-        self._pictures = SessionPictures(self.session)
+        self._pictures = SessionPictures(self.session, self.context.files)
         self._seen: dict[str, tuple[object, ...]] = {}
         self._told: dict[tuple[str, str], list[str]] = {}
         self._lay_out()

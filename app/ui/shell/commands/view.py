@@ -156,7 +156,7 @@ class ViewCommands:
         if self._settings_sheet is None:
             shell = self._shell
             self._settings_sheet = settings_sheet.SettingsSheet(
-                shell.theme, shell.surface, shell.state, self._session.settings
+                shell.theme, shell.surface, shell.state, self._session.settings, self._files.asks
             )
             self._settings_sheet.shortcuts.clicked.connect(self.open_shortcuts)
         self._settings_sheet.open()

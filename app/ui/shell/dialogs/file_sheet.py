@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import datetime as dt
 import os
-import re
-import stat
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +25,15 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.documents.file_format import SUFFIX
+from app.core.documents.folder import (
+    LONGEST_NAME,
+    REFUSED,
+    FolderEntry,
+    entries_of,
+    free_name,
+    name_refusal,
+    whole_path,
+)
 from app.core.storage.settings import RecentFile, Settings, home
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text import plain
@@ -34,22 +41,47 @@ from app.ui.text.dates import when_words
 from app.ui.text.numbers import size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel, IconButton, label, paint
+from app.ui.widgets.file_dialogs import PICTURE_ENDINGS, pictures_folder
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _, lazy
 
 WIDE, HIGH, PLACES_WIDE, FOLDER_NAME_WIDE = 860, 560, 190, 200
-MOST_ENTRIES = 5000
 NAME, CHANGED, SIZE = range(3)
-REFUSED = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
-RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
-"""What one of the systems takes in no name: a file is to open on all of them."""
-LONGEST_NAME = 120
-EMPTY = {
-    False: lazy("No behaviours and no folders are in here."),
-    True: lazy("Nothing is in here yet."),
-}
-"""What is said of an empty folder when a file is to be opened, and when one is to be saved."""
+
+
+@dataclass(frozen=True)
+class FileQuestion:
+    """What a person is asked for: a file with one of the ``endings``, or a folder.
+
+    ``empty`` is said of a folder in which there is nothing to choose.
+    """
+
+    heading: str
+    verb: str
+    empty: str
+    endings: tuple[str, ...] = (SUFFIX,)
+    icon: str = "blocks"
+    saves: bool = False
+    wants_folder: bool = False
+
+
+OPEN = FileQuestion(lazy("Open a behaviour"), lazy("Open"), lazy("No behaviours and no folders are in here."))
+SAVE = FileQuestion(lazy("Save the behaviour"), lazy("Save"), lazy("Nothing is in here yet."), saves=True)
+PICTURE = FileQuestion(
+    lazy("Choose a picture"),
+    lazy("Choose"),
+    lazy("No pictures and no folders are in here."),
+    endings=PICTURE_ENDINGS,
+    icon="image",
+)
+FOLDER = FileQuestion(
+    lazy("Folder for pictures"),
+    lazy("Use this folder"),
+    "",
+    endings=(),
+    wants_folder=True,
+)
 
 
 @dataclass(frozen=True)
@@ -61,16 +93,6 @@ class FolderPlace:
     folder: Path
 
 
-@dataclass(frozen=True)
-class FolderEntry:
-    """One file or folder; ``changed_s`` in seconds since 1970, ``size`` in bytes."""
-
-    path: Path
-    is_folder: bool
-    changed_s: float = 0.0
-    size: int = 0
-
-
 def known_places(studio: Path, recent: Iterable[Path]) -> tuple[FolderPlace, ...]:
     """The person's folders that are there, the one of Studio, and those of files used lately."""
     kinds = QStandardPaths.StandardLocation
@@ -78,6 +100,7 @@ def known_places(studio: Path, recent: Iterable[Path]) -> tuple[FolderPlace, ...
         FolderPlace(_("Home"), "house", Path.home()),
         FolderPlace(_("Desktop"), "monitor", _standard(kinds.DesktopLocation)),
         FolderPlace(_("Documents"), "file-text", _standard(kinds.DocumentsLocation)),
+        FolderPlace(_("Pictures"), "image", Path(pictures_folder())),
         FolderPlace(_("Kept by Studio"), "archive", studio),
         *(FolderPlace(path.parent.name or str(path.parent), "history", path.parent) for path in recent),
     ]
@@ -92,63 +115,17 @@ def _standard(kind: QStandardPaths.StandardLocation) -> Path:
     return Path(QStandardPaths.writableLocation(kind) or Path.home())
 
 
-def entries_of(folder: Path, suffix: str = SUFFIX) -> tuple[FolderEntry, ...]:
-    """The folders and the files with this ending, without hidden ones. Raises OSError."""
-    made = []
-    with os.scandir(folder) as found:
-        for each in found:
-            if each.name.startswith("."):
-                continue
-            try:
-                facts = each.stat()
-            except OSError:
-                continue  # a link to nothing, or gone since
-            is_folder = stat.S_ISDIR(facts.st_mode)
-            if is_folder or each.name.lower().endswith(suffix):
-                made.append(FolderEntry(Path(each.path), is_folder, facts.st_mtime, facts.st_size))
-            if len(made) == MOST_ENTRIES:
-                break
-    return tuple(made)
-
-
-def name_refusal(name: str) -> str:
-    """Why a file or folder can't be called so, in a sentence; "" when it can."""
-    bad = REFUSED.search(name)
-    if bad:
-        return _("A name can't have “{sign}” in it.").format(sign=bad[0])
-    if name.startswith("."):
-        return _("A name that begins with a full stop hides the file.")
-    if RESERVED.fullmatch(name) or name.endswith((".", " ")):
-        return _("Some computers take no file of this name. Choose another one.")
-    if len(name) > LONGEST_NAME:
-        return _("This name is too long.")
-    return ""
-
-
-def whole_path(typed: str) -> Path | None:
-    """The path that somebody typed instead of a name; None for a name."""
-    path = Path(typed).expanduser() if typed.startswith("~") else Path(typed)
-    return path if path.is_absolute() and path.name else None
-
-
-def free_name(folder: Path, name: str) -> str:
-    """The name, or the first of its numbers that no file there has: "Greeting 2"."""
-    number, made = 2, name
-    while (folder / f"{made}{SUFFIX}").exists():
-        made, number = f"{name} {number}", number + 1
-    return made
-
-
 class _Row(QTreeWidgetItem):
     """A file or folder; folders stand first, whichever column sorts."""
 
-    def __init__(self, theme: Theme, entry: FolderEntry, now: dt.datetime) -> None:
+    def __init__(self, theme: Theme, entry: FolderEntry, now: dt.datetime, icon: str) -> None:
         then = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
-        name = entry.path.name if entry.is_folder else entry.path.name[: -len(SUFFIX)]
+        is_behaviour = not entry.is_folder and entry.path.name.lower().endswith(SUFFIX)
+        name = entry.path.name[: -len(SUFFIX)] if is_behaviour else entry.path.name
         size = "" if entry.is_folder else size_words(entry.size)
         super().__init__([name, when_words(then, now), size])
         self.entry = entry
-        self.setIcon(NAME, theme.icon("folder" if entry.is_folder else "blocks", "textSecondary"))
+        self.setIcon(NAME, theme.icon("folder" if entry.is_folder else icon, "textSecondary"))
         self.setTextAlignment(SIZE, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.setToolTip(NAME, plain.tip(entry.path.name))
 
@@ -171,6 +148,7 @@ class FileSheet(Overlay):
     """Asks for one file, to open or to save. ``take`` gets it; nothing is told when the person gives up."""
 
     top = 56
+    lies_over_others = True
 
     def __init__(self, theme: Theme, window: QWidget, places: Callable[[], Sequence[FolderPlace]]) -> None:
         """``places`` are asked for at each opening."""
@@ -178,7 +156,7 @@ class FileSheet(Overlay):
         self._scrim.pressed.disconnect(self.shut)  # a name that is half typed is not lost by a press beside
         self._places = places
         self._take: Callable[[Path], object] = lambda _path: None
-        self.saves = False
+        self.question = OPEN
         self.folder = Path.home()
         self.heading = label("", "heading")
         self.up = IconButton(theme, "arrow-up", _("To the folder above"), "Alt+Up")
@@ -230,6 +208,7 @@ class FileSheet(Overlay):
             tree.header().setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         tree.itemActivated.connect(self._opened)
         tree.currentItemChanged.connect(lambda item, _before: self._chose(item))
+        tree.itemSelectionChanged.connect(self._judge)
         tree.installEventFilter(self)
 
     def _lay_out(self) -> None:
@@ -277,26 +256,42 @@ class FileSheet(Overlay):
 
     def ask_open(self, folder: Path, take: Callable[[Path], object]) -> None:
         """Which behaviour to open."""
-        self._ask(_("Open a behaviour"), _("Open"), folder, take, saves=False)
+        self._ask(OPEN, folder, take)
+
+    def ask_picture(self, folder: Path, take: Callable[[Path], object]) -> None:
+        """Which picture to take."""
+        self._ask(PICTURE, folder, take)
+
+    def ask_folder(self, folder: Path, take: Callable[[Path], object]) -> None:
+        """Which folder to keep pictures in: the one that is chosen in the list, else the one that shows."""
+        self._ask(FOLDER, folder, take)
 
     def ask_save(self, suggestion: Path, take: Callable[[Path], object]) -> None:
         """Where to save, and under which name."""
         name = suggestion.name.removesuffix(SUFFIX)
         self.name.setText(REFUSED.sub(" ", name).strip(". ")[:LONGEST_NAME])
-        self._ask(_("Save the behaviour"), _("Save"), suggestion.parent, take, saves=True)
+        self._ask(SAVE, suggestion.parent, take)
         self.name.selectAll()
 
-    def _ask(
-        self, question: str, verb: str, folder: Path, take: Callable[[Path], object], *, saves: bool
-    ) -> None:
-        self.saves, self._take, self._verb = saves, take, verb
-        self.heading.setText(question)
-        self.setAccessibleName(question)
-        paint.show_when(self._naming, saves)
+    def _ask(self, question: FileQuestion, folder: Path, take: Callable[[Path], object]) -> None:
+        self.question, self._take = question, take
+        heading = _(question.heading)
+        self.heading.setText(heading)
+        self.setAccessibleName(heading)
+        paint.show_when(self._naming, question.saves)
         self._show_folder_field(False)
         self._show_places()
         self.go_to(folder if folder.is_dir() else Path.home())
         self.open()
+
+    @property
+    def saves(self) -> bool:
+        """Whether a name is asked for."""
+        return self.question.saves
+
+    @property
+    def _makes_folders(self) -> bool:
+        return self.saves or self.question.wants_folder
 
     def first(self) -> QWidget:
         return self.name if self.saves else self.list
@@ -326,7 +321,7 @@ class FileSheet(Overlay):
     def go_to(self, folder: Path) -> None:
         """Show what is in a folder; one that can't be read says why, and the one before stays."""
         try:
-            found = entries_of(folder)
+            found = entries_of(folder, self.question.endings)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             self._say(
@@ -343,7 +338,7 @@ class FileSheet(Overlay):
         side = round(self.theme.scaled(self.theme.size("icon", "normal")))
         self.list.setIconSize(QSize(side, side))
         for entry in found:
-            row = _Row(self.theme, entry, now)
+            row = _Row(self.theme, entry, now, self.question.icon)
             row.setSizeHint(NAME, QSize(0, high))
             self.list.addTopLevelItem(row)
         self.list.sortItems(self.list.sortColumn(), self.list.header().sortIndicatorOrder())
@@ -361,7 +356,9 @@ class FileSheet(Overlay):
     def chosen(self) -> FolderEntry | None:
         """The file or folder that is chosen in the list."""
         row = self.list.currentItem()
-        return row.entry if isinstance(row, _Row) else None
+        # The list makes its first row the current one as soon as it has the keyboard; nobody has chosen that.
+        meant = row is not None and (row.isSelected() or not self.question.wants_folder)
+        return row.entry if meant and isinstance(row, _Row) else None
 
     def _chose(self, item: QTreeWidgetItem | None) -> None:
         if self.saves and isinstance(item, _Row) and not item.entry.is_folder and self.list.hasFocus():
@@ -386,8 +383,8 @@ class FileSheet(Overlay):
         """The field for a folder's name in the place of the button that asks for it."""
         self.folder_name.setMinimumWidth(round(self.theme.scaled(FOLDER_NAME_WIDE)))
         for widget in (self.folder_name, self.make_folder):
-            paint.show_when(widget, shown and self.saves)
-        paint.show_when(self.new_folder, self.saves and not shown)
+            paint.show_when(widget, shown and self._makes_folders)
+        paint.show_when(self.new_folder, self._makes_folders and not shown)
 
     def _make_folder(self) -> None:
         name = self.folder_name.text().strip()
@@ -405,15 +402,17 @@ class FileSheet(Overlay):
             return
         self._show_folder_field(False)
         self.go_to(self.folder / name)
-        self.name.setFocus(Qt.FocusReason.OtherFocusReason)
+        self.first().setFocus(Qt.FocusReason.OtherFocusReason)
 
     # -- the answer -------------------------------------------------------------------------------
 
     @property
     def target(self) -> Path | None:
         """The file that is meant now; None while there is none."""
+        chosen = self.chosen
+        if self.question.wants_folder:
+            return chosen.path if chosen is not None else self.folder
         if not self.saves:
-            chosen = self.chosen
             return chosen.path if chosen is not None and not chosen.is_folder else None
         name = self.name.text().strip()
         if name.lower().endswith(SUFFIX):
@@ -428,10 +427,12 @@ class FileSheet(Overlay):
         target = self.target
         taken = self.saves and target is not None and target.exists()
         paint.show_when(self.keep_both, taken)
-        self.done.set_word(_("Replace") if taken else self._verb)
+        self.done.set_word(_("Replace") if taken else _(self.question.verb))
         chosen = self.chosen
-        into = not self.saves and chosen is not None and chosen.is_folder
-        writable = not self.saves or os.access(target.parent if target else self.folder, os.W_OK)
+        wants_folder = self.question.wants_folder
+        into = not self.saves and not wants_folder and chosen is not None and chosen.is_folder
+        inside = target if wants_folder else target.parent if target else self.folder
+        writable = not self._makes_folders or os.access(inside or self.folder, os.W_OK)
         self.done.setEnabled((target is not None and writable) or into)
         wrong = self._wrong() if self.saves else ""
         if wrong:
@@ -441,8 +442,11 @@ class FileSheet(Overlay):
         elif taken and target is not None:
             name = target.name.removesuffix(SUFFIX)
             self._say(_("“{name}” is there already. Replace it, or keep both.").format(name=name), "text")
+        elif wants_folder and target is not None:
+            name = target.name or str(target)
+            self._say(_("Pictures will be kept in “{folder}”.").format(folder=name), "text")
         elif not self.list.topLevelItemCount():
-            self._say(_(EMPTY[self.saves]), "textSecondary")
+            self._say(_(self.question.empty), "textSecondary")
         else:
             self._say("", "textSecondary")
 
@@ -522,6 +526,16 @@ class StudioDialogs:
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
         """Where to save."""
         self._made().ask_save(Path(suggestion), take)
+
+    def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Which picture to take."""
+        self._made().ask_picture(Path(folder or pictures_folder()), take)
+
+    def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Which folder to keep pictures in."""
+        wanted = Path(folder)
+        there = next((each for each in (wanted, *wanted.parents) if each.is_dir()), Path.home())
+        self._made().ask_folder(there, take)
 
     def _made(self) -> FileSheet:
         if self._sheet is None:

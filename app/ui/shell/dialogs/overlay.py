@@ -136,6 +136,8 @@ class Overlay(QWidget):
 
     closed = Signal()
     top = EDGE
+    lies_over_others = False
+    """Whether another one may ask by it: that stays open below, and gets the keyboard back."""
 
     def __init__(self, theme: Theme, window: QWidget, name: str) -> None:
         """An overlay called ``name`` for screen readers; `open` shows it."""
@@ -276,7 +278,10 @@ class Overlay(QWidget):
     def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
         if new is None or QApplication.activePopupWidget() is not None or new.window() is not self.window():
             return
-        if new is not self and not self.isAncestorOf(new):
+        above: QWidget | None = new
+        while above is not None and not (isinstance(above, Overlay) and above.lies_over_others):
+            above = above.parentWidget()
+        if above is None and new is not self and not self.isAncestorOf(new):
             self.shut()
 
     def _move_on(self, share: object) -> None:

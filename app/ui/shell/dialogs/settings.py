@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QFileDialog, QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from app.core.messages import snapshots
 from app.core.robots.last_robots import COME_BACK
@@ -15,7 +16,7 @@ from app.ui.shell.window_state import WindowState
 from app.ui.theme.system import PREFERENCES
 from app.ui.theme.theme import MODES, Theme
 from app.ui.widgets import Button, ComboBox, ElidedLabel, IconButton, Segments, Switch, label
-from app.ui.widgets.file_dialogs import show_free
+from app.ui.widgets.file_dialogs import FileDialogs
 from nep import i18n
 from nep.i18n import _, lazy, pgettext
 
@@ -36,9 +37,11 @@ class SettingsSheet(Overlay):
 
     top = 72
 
-    def __init__(self, theme: Theme, window: QWidget, state: WindowState, settings: Settings) -> None:
+    def __init__(
+        self, theme: Theme, window: QWidget, state: WindowState, settings: Settings, files: FileDialogs
+    ) -> None:
         super().__init__(theme, window, _("Settings"))
-        self._state, self._settings = state, settings
+        self._state, self._settings, self._files = state, settings, files
         self.language = self._language_input()
         self.from_next_start = label(_("From the next start of Studio"), "body", role="textSecondary")
         modes = [(mode, _(MODE_WORDS[mode][0]), MODE_WORDS[mode][1]) for mode in MODES]
@@ -187,12 +190,9 @@ class SettingsSheet(Overlay):
     def _choose(self) -> None:
         """Ask for a folder, while everything else goes on."""
         before = str(snapshots.folder(self._settings))
-        dialog = QFileDialog(self.window_below(), _("Folder for pictures"), before)
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.fileSelected.connect(self.keep_folder)
-        show_free(dialog)
+        self._files.choose_folder(before, self.keep_folder)
 
-    def keep_folder(self, folder: str) -> None:
+    def keep_folder(self, folder: Path) -> None:
         """Keep pictures there from now on."""
-        self._state.keep(snapshots.CHOSEN, folder)
+        self._state.keep(snapshots.CHOSEN, str(folder))
         self._show()

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Protocol
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage, QPainter, QPainterPath, QPaintEvent
-from PySide6.QtWidgets import QFileDialog, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
+from shiboken6 import isValid
 
 from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.base import Control, connect, line_field
-from app.ui.panels.robots.controls.picture_file import encoded, file_filter, image_of, read_picture
+from app.ui.panels.robots.controls.picture_file import encoded, image_of, read_picture
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
-from app.ui.widgets.file_dialogs import show_free
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.menus import Menu, drop_below
 from nep.errors import DecodeError
@@ -44,9 +44,12 @@ class Pictures(Protocol):
     def stream(self, topic: str) -> ImageStream:
         """Look at one until it is closed."""
 
+    def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Ask a person for a picture file; "" for the folder where this computer keeps pictures."""
+
 
 class NoPictures:
-    """No session, no topics."""
+    """No session, no topics, nobody to ask."""
 
     def topics(self) -> Sequence[str]:
         """None."""
@@ -55,6 +58,9 @@ class NoPictures:
     def stream(self, topic: str) -> ImageStream:
         """There is none to look at: KeyError."""
         raise KeyError(topic)
+
+    def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Nobody is asked."""
 
 
 class Thumbnail(QWidget):
@@ -174,14 +180,16 @@ class PictureChoice(QWidget):
     # -- a file -------------------------------------------------------------------------------------------
 
     def _ask(self) -> None:
-        dialog = QFileDialog(self, _("Choose a picture"), "", file_filter())
-        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-        dialog.fileSelected.connect(lambda chosen: self.use_file(Path(chosen)))
-        show_free(dialog)
+        self._pictures.ask_file(str(self._file.parent) if self._file is not None else "", self._take_file)
+
+    def _take_file(self, path: Path) -> None:
+        if isValid(self):  # the form may have gone while the person chose
+            self.use_file(path)
 
     def use_file(self, path: Path) -> None:
         """Take a picture file; one that can't be read is named and says why."""
         self.close_stream()
+        self._file = path
         self._image, said = read_picture(path)
         self.thumbnail.show_image(self._image)
         self.field.setText(path.name if self._image is not None else str(path))

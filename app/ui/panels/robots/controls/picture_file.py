@@ -19,14 +19,8 @@ from nep.errors import DecodeError
 from nep.i18n import _
 from nep.messages.image_files import MOST_BYTES, ImageFile, examine
 
-PATTERNS = "*.png *.jpg *.jpeg"
 LONGEST_SIDE, QUALITY = 1280, 85
 MOST_FILE_BYTES = 40_000_000
-
-
-def file_filter() -> str:
-    """What a file dialog offers: "Pictures (*.png …)"."""
-    return f"{_('Pictures')} ({PATTERNS})"
 
 
 def read_picture(path: Path) -> tuple[QImage | None, str]:

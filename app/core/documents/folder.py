@@ -1,0 +1,75 @@
+"""What is in a folder, and which names files and folders can have on every system."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.core.documents.file_format import SUFFIX
+from nep.i18n import _
+
+MOST_ENTRIES = 5000
+REFUSED = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
+RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+"""What one of the systems takes in no name: a file is to open on all of them."""
+LONGEST_NAME = 120
+
+
+@dataclass(frozen=True)
+class FolderEntry:
+    """One file or folder; ``changed_s`` in seconds since 1970, ``size`` in bytes."""
+
+    path: Path
+    is_folder: bool
+    changed_s: float = 0.0
+    size: int = 0
+
+
+def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[FolderEntry, ...]:
+    """The folders and the files with one of these endings, without hidden ones. Raises OSError."""
+    made = []
+    with os.scandir(folder) as found:
+        for each in found:
+            if each.name.startswith("."):
+                continue
+            try:
+                facts = each.stat()
+            except OSError:
+                continue  # a link to nothing, or gone since
+            is_folder = stat.S_ISDIR(facts.st_mode)
+            if is_folder or each.name.lower().endswith(endings):
+                made.append(FolderEntry(Path(each.path), is_folder, facts.st_mtime, facts.st_size))
+            if len(made) == MOST_ENTRIES:
+                break
+    return tuple(made)
+
+
+def name_refusal(name: str) -> str:
+    """Why a file or folder can't be called so, in a sentence; "" when it can."""
+    bad = REFUSED.search(name)
+    if bad:
+        return _("A name can't have “{sign}” in it.").format(sign=bad[0])
+    if name.startswith("."):
+        return _("A name that begins with a full stop hides the file.")
+    if RESERVED.fullmatch(name) or name.endswith((".", " ")):
+        return _("Some computers take no file of this name. Choose another one.")
+    if len(name) > LONGEST_NAME:
+        return _("This name is too long.")
+    return ""
+
+
+def whole_path(typed: str) -> Path | None:
+    """The path that somebody typed instead of a name; None for a name."""
+    path = Path(typed).expanduser() if typed.startswith("~") else Path(typed)
+    return path if path.is_absolute() and path.name else None
+
+
+def free_name(folder: Path, name: str) -> str:
+    """The name, or the first of its numbers that no file there has: "Greeting 2"."""
+    number, made = 2, name
+    while (folder / f"{made}{SUFFIX}").exists():
+        made, number = f"{name} {number}", number + 1
+    return made
