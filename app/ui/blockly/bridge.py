@@ -128,7 +128,7 @@ class BlocklyBridge(QObject):
 
     @Slot(str)
     def command(self, name: str) -> None:
-        if name.startswith(("variable.", "picture.")):
+        if name.startswith(("variable.", "picture.", "print.")):
             self.command_wanted.emit(name)
 
     @Slot(str)

@@ -10,7 +10,8 @@ import json
 from base64 import b64decode
 from collections.abc import Callable, Collection, Mapping, Sequence
 
-from PySide6.QtCore import QPoint, Signal
+from PySide6.QtCore import QByteArray, QMarginsF, QPoint, Signal
+from PySide6.QtGui import QPageLayout
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.documents.workspace_json import WorkspaceJson
@@ -19,6 +20,9 @@ from app.ui.blockly.host import BlocklyHost
 from app.ui.blockly.scheme import register_scheme as register_scheme
 from app.ui.blockly.tabs import Tabs
 from nep import i18n
+
+_PIXELS_PER_INCH = 96.0  # a page's own pixels
+_EDGE_INCH = 0.45
 
 
 class BlocklyView(BlocklyHost):
@@ -142,6 +146,38 @@ class BlocklyView(BlocklyHost):
         self._tokens += 1
         self._pictures[self._tokens] = done
         self._bridge.tell("picture", {"token": self._tokens, "kind": kind, "white": white})
+
+    def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+        """Make a PDF of all blocks of the shown tab on paper of this layout, each page with the title above.
+
+        `done` is called once, with b"" when there is nothing to be seen or no page.
+        """
+        if not self._up:
+            done(b"")
+            return
+        self._tokens += 1
+        token = self._tokens
+
+        def made(data: QByteArray) -> None:
+            self._tell("printed", None)
+            waiting = self._pictures.pop(token, None)
+            if waiting is not None:
+                waiting(bytes(data.data()))
+
+        def laid(count: bytes) -> None:
+            if not count or self.web is None:
+                done(b"")
+                return
+            self._pictures[token] = done  # until the PDF is made: the page may die meanwhile
+            bare = QPageLayout(layout.pageSize(), layout.orientation(), QMarginsF())
+            self.web.page.printToPdf(made, bare)
+
+        paper = layout.fullRect(QPageLayout.Unit.Inch)
+        edge = max(_EDGE_INCH, *_margins(layout))
+        pixels = {"width": paper.width(), "height": paper.height(), "edge": edge}
+        self._pictures[token] = laid
+        told: Json = {name: inches * _PIXELS_PER_INCH for name, inches in pixels.items()}
+        self._bridge.tell("pages", {"token": token, "title": title, "date": date, **told})
 
     def set_toolbox_pinned(self, pinned: bool | None) -> None:
         """Let the blocks of a category stay open, or close after each use; None: as the room allows."""
@@ -364,6 +400,12 @@ class BlocklyView(BlocklyHost):
         done = self._waiting.pop(token, None)
         if done is not None:
             done(WorkspaceJson(workspace))
+
+
+def _margins(layout: QPageLayout) -> tuple[float, float, float, float]:
+    """What the printer leaves empty, in inches."""
+    margins = layout.margins(QPageLayout.Unit.Inch)
+    return margins.left(), margins.top(), margins.right(), margins.bottom()
 
 
 def _texts(text: str) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ import {iconElement} from './icons';
 import {useClipboard, useOwnKeys} from './keys';
 import {registerMenu, registerPictureMenu, trimMenu} from './menu';
 import {asPng, pictureOf} from './picture';
+import {type Wanted as Paper, clearPages, layPages} from './print';
 import {FindBar} from './search';
 import {followModality, setKeyboardLed} from './modality';
 import {type Tab} from './tab';
@@ -98,7 +99,8 @@ class Editor {
       letGoOutside: (tab, what, mouse) => this.carrying.letGo(tab, what, mouse),
     });
     this.tabs.setPinned(pinned);
-    new ResizeObserver(() => this.tabs.resize()).observe(document.body);
+    // On paper the page has another size for a moment.
+    new ResizeObserver(() => window.matchMedia('print').matches || this.tabs.resize()).observe(document.body);
     // A hidden page draws no frames, and Blockly tells of edits only after a frame.
     document.addEventListener('visibilitychange', () => document.hidden && this.shown.program.flush());
     this.makeZoomButtons();
@@ -160,6 +162,8 @@ class Editor {
     live: (it: {values: Record<string, string>; old: string[]}) => this.shown.overlays.setLive(it.values, it.old),
     flush: (token: number) => this.bridge.flushed(token, this.shown.program.flush()),
     picture: (it: WantedPicture) => void this.takePicture(it),
+    pages: (it: Paper & {token: number}) => this.layPages(it),
+    printed: () => clearPages(),
     change: (state: Record<string, unknown>) => this.shown.change(state),
     undo: () => this.shown.program.undo(false),
     bring: () => this.carrying.bring(this.shown),
@@ -218,15 +222,32 @@ class Editor {
     if (offered !== this.offered) this.bridge.offers(this.offered = offered);
   }
 
+  /** The looks of the light theme while `draw` reads them. */
+  private inLight<T>(draw: () => T): T {
+    const {tokens, dark} = this.theme;
+    if (dark) this.setTheme(tokens, false);  // nobody sees it: all is as before when the page is painted
+    try {
+      return draw();
+    } finally {
+      if (dark) this.setTheme(tokens, true);
+    }
+  }
+
+  /** The window hears how many pages lie ready for the printer; "" when there is nothing to be seen. */
+  private layPages({token, ...paper}: Paper & {token: number}): void {
+    let count = 0;
+    try {
+      count = this.inLight(() => layPages(this.shown.workspace, paper));
+    } finally {
+      this.bridge.pictured(token, count ? `${count}` : '');
+    }
+  }
+
   /** The window gets "" when there is nothing to be seen. */
   private async takePicture({token, kind, white}: WantedPicture): Promise<void> {
     let data = '';
     try {
-      const {tokens, dark} = this.theme;
-      if (dark) this.setTheme(tokens, false);  // nobody sees it: all is as before when the page is painted
-      const taking = pictureOf(this.shown.workspace, white);
-      if (dark) this.setTheme(tokens, true);
-      const picture = await taking;
+      const picture = await this.inLight(() => pictureOf(this.shown.workspace, white));
       if (picture) data = kind === 'svg' ? picture.svg : await asPng(picture);
     } finally {
       this.bridge.pictured(token, data);

@@ -206,6 +206,7 @@ export function registerPictureMenu(command: (name: string) => void): void {
   line(ScopeType.WORKSPACE, 60);
   canvas({id: 'nepPicture', weight: 61, icon: 'image-down', words: t('Save a picture'), run: () => command('picture.save')});
   canvas({id: 'nepCopyPicture', weight: 62, icon: 'image', words: t('Copy as a picture'), run: () => command('picture.copy')});
+  canvas({id: 'nepPrintBlocks', weight: 63, icon: 'printer', words: t('Print'), run: () => command('print.ask')});
 }
 
 // ---- how a block is

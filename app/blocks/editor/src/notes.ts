@@ -104,6 +104,7 @@ interface Drawn {
   const sheet = this as unknown as Sheet;
   const block = (sheet.getOwner() as NoteSign | undefined)?.getSourceBlock();
   if (!(block instanceof Blockly.BlockSvg)) return;
+  this.tail.dataset['of'] = block.id;
   const at = sheet.getRelativeToSurfaceXY();
   const {left, right, top} = block.getBoundingRectangleWithoutChildren();
   const middle = top + HEAD / 2 - at.y;
@@ -113,6 +114,11 @@ interface Drawn {
   const to = isRight ? 0 : at.x + width <= left ? width : width / 2;
   this.tail.setAttribute('d', `M${from},${middle}L${to},${HEAD / 2}`);
 };
+
+/** The id of the block whose note this sheet is. */
+export function ownerOf(sheet: Element): string {
+  return sheet.querySelector<SVGElement>('[data-of]')?.dataset['of'] ?? '';
+}
 
 function element(name: string, kind: string): SVGElement {
   const made = document.createElementNS(SVG, name);

@@ -1,7 +1,7 @@
 // A picture of all blocks of a behaviour, also of those outside the view: SVG that needs nothing else (looks and fonts
 // are in it), or PNG made of that. The canvas that is seen stays as it is; states of a run and outlines are left out.
 import * as Blockly from 'blockly/core';
-import {keepTyped} from './notes';
+import {keepTyped, ownerOf} from './notes';
 
 const SVG = 'http://www.w3.org/2000/svg';
 /** Around the blocks; the signs at their left are 20 wide. */
@@ -28,23 +28,38 @@ export interface Picture {
   height: number;
 }
 
-/** null: there is nothing to be seen. Call it while the page has the light theme. */
-export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean): Promise<Picture | null> {
+/** What is on the canvas: a stack, a note, or the note of a block, which goes with its stack. */
+export interface Drawn {
+  item: unknown;
+  box: Blockly.utils.Rect;
+  drawn: SVGElement | null;
+}
+
+/** Each thing on the canvas with its looks written on it; `patterns` gets what they are filled with, by id. */
+export function drawings(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGElement>): Drawn[] {
   keepTyped();
   Blockly.renderManagement.triggerQueuedRenders();
   const items = [...workspace.getTopBlocks(true), ...workspace.getTopComments()] as (Blockly.IBoundedElement & {
     getSvgRoot?(): SVGElement; view?: {getSvgRoot(): SVGElement};
   })[];
-  const boxes = items.map((each) => each.getBoundingRectangle());
-  const patterns = new Map<string, SVGElement>();
-  const drawn = items.map((each) => copy(each.getSvgRoot?.() ?? each.view!.getSvgRoot(), patterns));
+  const found = items.map((item): Drawn => ({item, box: item.getBoundingRectangle(),
+    drawn: copy(item.getSvgRoot?.() ?? item.view!.getSvgRoot(), patterns)}));
   for (const sheet of workspace.getBubbleCanvas().querySelectorAll<SVGGElement>('.nepNote')) {
     const {x, y, width, height} = sheet.getBBox();
     const {e, f} = sheet.transform.baseVal.consolidate()?.matrix ?? {e: 0, f: 0};
-    boxes.push(new Blockly.utils.Rect(y + f, y + f + height, x + e, x + e + width));
-    drawn.push(copy(sheet, patterns));
+    found.push({item: workspace.getBlockById(ownerOf(sheet))?.getRootBlock(),
+      box: new Blockly.utils.Rect(y + f, y + f + height, x + e, x + e + width), drawn: copy(sheet, patterns)});
   }
-  if (!boxes.length) return null;
+  return found;
+}
+
+/** null: there is nothing to be seen. Call it while the page has the light theme. */
+export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean): Promise<Picture | null> {
+  const patterns = new Map<string, SVGElement>();
+  const found = drawings(workspace, patterns);
+  if (!found.length) return null;
+  const boxes = found.map(({box}) => box);
+  const drawn = found.map((each) => each.drawn);
   const left = Math.floor(Math.min(...boxes.map((box) => box.left)) - MARGIN);
   const top = Math.floor(Math.min(...boxes.map((box) => box.top)) - MARGIN);
   const width = Math.ceil(Math.max(...boxes.map((box) => box.right)) + MARGIN) - left;

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol, cast
 
 from PySide6.QtCore import Qt, SignalInstance
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QGuiApplication, QPageLayout
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.documents.backpack import Backpack
@@ -95,6 +95,7 @@ class Editor(Protocol):
     def bring_blocks(self) -> None: ...
     def give_blocks_back(self) -> None: ...
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None: ...
+    def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None: ...
     def open_find(self) -> None: ...
     def open_search(self) -> None: ...
     def redo(self) -> None: ...
@@ -354,6 +355,13 @@ class BehaviourPanel(PanelWidget):
             done(b"")
         else:
             self.editor.picture(kind, white, done)
+
+    def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+        """Make a PDF of all blocks on paper of this layout; b"" when there are none."""
+        if self.editor is None:
+            done(b"")
+        else:
+            self.editor.pdf(title, date, layout, done)
 
     def find_blocks(self, *, to_add: bool) -> None:
         """Let the keys go to the field that finds blocks in the behaviour, or blocks to add."""

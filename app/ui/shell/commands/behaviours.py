@@ -16,6 +16,7 @@ from app.core.session import Session
 from app.core.storage import deep_json
 from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
+from app.ui.shell.commands.printing import Printing
 from app.ui.shell.commands.program_pictures import ProgramPictures
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
@@ -133,6 +134,7 @@ class BehaviourCommands:
         self._shell, self._session, self._files = shell, session, files
         self._versions: version_history.VersionHistorySheet | None = None
         self.pictures = ProgramPictures(shell, session)
+        self.printing = Printing(shell, session)
 
     # -- run --------------------------------------------------------------------------------------
 

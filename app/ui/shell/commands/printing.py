@@ -1,0 +1,160 @@
+"""The blocks on paper: by a printer that this computer knows, or as a PDF."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QLocale, QMarginsF, QRectF, QSize, Qt
+from PySide6.QtGui import QPageLayout, QPageSize, QPainter
+from PySide6.QtWidgets import QDialog, QFileDialog
+
+from app.core.session import Session
+from app.core.storage.atomic_file import write_atomically
+from app.core.storage.settings import kept_folder
+from app.ui.shell.commands.shell import Shell
+from app.ui.widgets.file_dialogs import show_free
+from nep.i18n import _, day_text
+
+if TYPE_CHECKING:
+    from PySide6.QtPrintSupport import QPrinter
+
+MOST_DPI = 300
+"""Finer is not seen in blocks, and a page of 1200 dpi takes half a gigabyte."""
+
+
+@runtime_checkable
+class SupportsPrinting(Protocol):
+    """A panel whose contents can be printed."""
+
+    def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+        """Make a PDF on such paper; ``done`` gets b"" when there is nothing to print."""
+
+
+class Printing:
+    """Prints the blocks that are open."""
+
+    def __init__(
+        self, shell: Shell, session: Session, printers: Callable[[], list[str]] | None = None
+    ) -> None:
+        """``printers`` names those that this computer knows."""
+        printers = printers if printers is not None else known_printers
+        self._shell, self._session, self._printers = shell, session, printers
+
+    def ask(self) -> None:
+        """Ask on which printer and how; where there is none, where to save a PDF."""
+        if not self._printers():
+            self._shell.say(_("No printer is set up on this computer. The pages can be saved as a PDF."))
+            self.ask_pdf()
+            return
+        from PySide6.QtPrintSupport import QPrintDialog, QPrinter  # noqa: PLC0415 - only who prints needs it
+
+        printer = QPrinter(QPrinter.PrinterMode.HighResolution)
+        printer.setDocName(self._session.document.name)
+        printer.setPageLayout(usual_paper())
+        dialog = QPrintDialog(printer, self._shell.surface.window())
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setWindowModality(Qt.WindowModality.NonModal)  # Stop is free meanwhile
+        dialog.finished.connect(
+            lambda result: self.print(printer) if result == QDialog.DialogCode.Accepted else None
+        )
+        dialog.show()
+
+    def print(self, printer: QPrinter) -> None:
+        """Print on this one, as it is set."""
+
+        def paint(data: bytes) -> None:
+            if not data:
+                self._say_nothing_there()
+            elif paint_pdf(data, printer):
+                self._shell.say(_("Sent to the printer {name}").format(name=printer.printerName()))
+            else:
+                self._shell.say(_("The printer {name} does not answer").format(name=printer.printerName()))
+
+        self._make(printer.pageLayout(), paint)
+
+    def ask_pdf(self) -> None:
+        """Ask where, then save a PDF there."""
+        document = self._session.document
+        own = document.path
+        folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
+        dialog = QFileDialog(self._shell.surface.window(), _("Save the blocks as PDF"), str(folder))
+        dialog.setNameFilters(["PDF (*.pdf)"])
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix("pdf")
+        dialog.selectFile(document.name)
+        dialog.fileSelected.connect(lambda chosen: self.save(Path(chosen)))
+        show_free(dialog)
+
+    def save(self, path: Path) -> None:
+        """Write a PDF there; a name with another ending gets the right one."""
+        whole = path if path.suffix.lower() == ".pdf" else path.with_name(f"{path.name}.pdf")
+
+        def write(data: bytes) -> None:
+            if not data:
+                self._say_nothing_there()
+                return
+            try:
+                write_atomically(whole, data)
+            except OSError as error:
+                self._shell.say(_("The PDF can't be saved: {why}").format(why=error.strerror or str(error)))
+            else:
+                self._shell.say(_("Saved {name}").format(name=whole.name))
+
+        self._make(usual_paper(), write)
+
+    def _make(self, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+        editor = self._shell.editor()
+        if isinstance(editor, SupportsPrinting):
+            today = dt.datetime.now().astimezone()
+            date = day_text(today.day, today.month, today.year)
+            editor.pdf(self._session.document.name, date, layout, done)
+
+    def _say_nothing_there(self) -> None:
+        self._shell.say(_("There are no blocks to be seen"))
+
+
+def known_printers() -> list[str]:
+    """The names of the printers of this computer; none where Qt has no part that prints."""
+    try:
+        from PySide6.QtPrintSupport import QPrinterInfo  # noqa: PLC0415 - only who prints needs it
+    except ImportError:
+        return []
+    return list(QPrinterInfo.availablePrinterNames())
+
+
+def usual_paper() -> QPageLayout:
+    """A4, and Letter where people use that."""
+    inches = QLocale.system().measurementSystem() == QLocale.MeasurementSystem.ImperialUSSystem
+    size = QPageSize.PageSizeId.Letter if inches else QPageSize.PageSizeId.A4
+    return QPageLayout(QPageSize(size), QPageLayout.Orientation.Portrait, QMarginsF())
+
+
+def paint_pdf(data: bytes, printer: QPrinter) -> bool:
+    """Paint the pages that the printer was asked for; whether it took them."""
+    from PySide6.QtPdf import QPdfDocument  # noqa: PLC0415 - only who prints needs it
+
+    buffer = QBuffer()
+    buffer.setData(QByteArray(data))
+    buffer.open(QIODevice.OpenModeFlag.ReadOnly)
+    pages = QPdfDocument()
+    pages.load(buffer)
+    first = max(1, printer.fromPage())
+    last = min(printer.toPage() or pages.pageCount(), pages.pageCount())
+    printer.setFullPage(True)
+    painter = QPainter()
+    if not painter.begin(printer):
+        return False
+    for number in range(first, last + 1):
+        if number > first and not printer.newPage():
+            painter.end()
+            return False
+        points = pages.pagePointSize(number - 1)
+        dpi = min(printer.resolution(), MOST_DPI)
+        size = QSize(round(points.width() * dpi / 72), round(points.height() * dpi / 72))
+        scale = printer.resolution() / 72
+        target = QRectF(0, 0, points.width() * scale, points.height() * scale)
+        painter.drawImage(target, pages.render(number - 1, size))
+    return bool(painter.end())

@@ -1,0 +1,120 @@
+"""Printing: where there is no printer a PDF is offered, and a PDF goes to a printer page by page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+from PySide6.QtCore import QBuffer, QIODevice
+from PySide6.QtGui import QPageLayout, QPainter, QPdfWriter
+from PySide6.QtPdf import QPdfDocument
+from PySide6.QtPrintSupport import QPrintDialog, QPrinter
+from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
+
+from app.core.session import Session
+from app.ui.shell.commands.printing import Printing, paint_pdf, usual_paper
+from app.ui.shell.commands.shell import Shell
+
+
+class Editor:
+    """Has these pages."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self.asked: list[tuple[str, str]] = []
+
+    def pdf(self, title: str, date: str, _layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+        self.asked.append((title, date))
+        done(self.data)
+
+
+def pages(count: int) -> bytes:
+    buffer = QBuffer()
+    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    writer = QPdfWriter(buffer)
+    writer.setPageLayout(usual_paper())
+    painter = QPainter(writer)
+    for number in range(count):
+        if number:
+            writer.newPage()
+        painter.fillRect(0, 0, 3000, 3000 * (number + 1), "#ff0000")
+    painter.end()
+    return bytes(buffer.data().data())
+
+
+class Case:
+    def __init__(self, qtbot, data: bytes, printers: list[str]) -> None:
+        self.said: list[str] = []
+        self.editor, self.window = Editor(data), QWidget()
+        qtbot.addWidget(self.window)
+        surface = SimpleNamespace(window=lambda: self.window)
+        shell = SimpleNamespace(editor=lambda: self.editor, say=self.said.append, surface=surface)
+        session = SimpleNamespace(document=SimpleNamespace(name="Tea", path=None))
+        self.printing = Printing(cast("Shell", shell), cast("Session", session), lambda: printers)
+
+
+def dialogs(kind: type) -> list[QWidget]:
+    return [each for each in QApplication.topLevelWidgets() if isinstance(each, kind) and each.isVisible()]
+
+
+def test_without_a_printer_a_pdf_is_offered_in_a_sentence(qtbot, tmp_path: Path) -> None:
+    case = Case(qtbot, b"%PDF", [])
+    case.printing.ask()
+    assert "No printer" in case.said[0]
+    (dialog,) = dialogs(QFileDialog)
+    cast("QFileDialog", dialog).fileSelected.emit(str(tmp_path / "Tea 1.2"))
+    assert (tmp_path / "Tea 1.2.pdf").read_bytes() == b"%PDF"
+    assert case.said[1] == "Saved Tea 1.2.pdf"
+    assert case.editor.asked[0][0] == "Tea"
+    dialog.close()
+
+
+def test_with_a_printer_its_dialog_comes_and_the_window_stays_free(qtbot) -> None:
+    case = Case(qtbot, b"%PDF", ["Office"])
+    case.printing.ask()
+    (dialog,) = dialogs(QPrintDialog)
+    assert not dialog.isModal()
+    dialog.close()
+    assert case.editor.asked == []
+
+
+def test_what_cannot_be_written_or_is_empty_is_said(qtbot, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    case = Case(qtbot, b"%PDF", [])
+    case.printing.save(tmp_path / "file" / "a.pdf")
+    assert case.said[0].startswith("The PDF can't be saved")
+    case.editor.data = b""
+    case.printing.save(tmp_path / "b.pdf")
+    assert case.said[1] == "There are no blocks to be seen"
+    assert not (tmp_path / "b.pdf").exists()
+
+
+@pytest.mark.parametrize(("first", "last", "count"), [(0, 0, 3), (2, 3, 2), (2, 9, 2)])
+def test_the_pages_that_were_asked_for_are_painted(qtbot, tmp_path: Path, first, last, count) -> None:
+    printer = QPrinter(QPrinter.PrinterMode.HighResolution)
+    printer.setOutputFormat(QPrinter.OutputFormat.PdfFormat)
+    printer.setOutputFileName(str(tmp_path / "out.pdf"))
+    printer.setResolution(96)
+    printer.setPageLayout(usual_paper())
+    printer.setFromTo(first, last)
+    case = Case(qtbot, pages(3), ["Office"])
+    case.printing.print(printer)
+    assert case.said[0].startswith("Sent to the printer")
+    document = QPdfDocument()
+    document.load(str(tmp_path / "out.pdf"))
+    assert document.pageCount() == count
+    picture = document.render(0, document.pagePointSize(0).toSize())
+    document.close()
+    colour = picture.pixelColor(20, 20)
+    assert (colour.red() > 240, colour.green() < 15) == (True, True)
+
+
+@pytest.mark.qt_log_ignore("QPainter::begin")
+def test_a_printer_that_takes_nothing_is_said(qtbot, tmp_path: Path) -> None:
+    printer = QPrinter(QPrinter.PrinterMode.ScreenResolution)
+    printer.setOutputFormat(QPrinter.OutputFormat.PdfFormat)
+    printer.setOutputFileName(str(tmp_path / "no folder" / "out.pdf"))
+    assert not paint_pdf(pages(1), printer)
