@@ -71,6 +71,15 @@ def choose(them: Person, id: str, words: str) -> None:
     them.wait_for("document.querySelector('.blocklyContextMenu') === null")
 
 
+def test_the_menu_is_whole_where_it_has_no_room_above_nor_below(view, them) -> None:
+    view.resize(700, 480)
+    them.wait_for("innerHeight", 480)
+    open_menu(them, "b")  # in the middle of the page
+    menu = "document.querySelector('.blocklyContextMenu')"
+    them.wait_for(f"(e => e.scrollHeight <= e.clientHeight)({menu})")
+    assert them.ask(f"(r => r.top >= 0 && r.bottom <= innerHeight)({menu}.getBoundingClientRect())")
+
+
 def double_click(them: Person, id: str) -> None:
     box = them.box(f"[data-id={id}] > .blocklyPath")
     at = QPoint(round(box["left"] + 60), round(box["top"] + 8))

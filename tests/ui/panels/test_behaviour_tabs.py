@@ -115,6 +115,25 @@ def test_in_narrow_room_all_are_shorter_and_the_current_one_can_be_seen(tabs) ->
     assert all(tab.width() >= 76 for tab in tabs.tabs.values())
 
 
+@pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+def test_tabs_out_of_sight_are_reached_by_a_list_of_all(tabs) -> None:
+    tabs.show_tabs([TabFacts("0", "One"), TabFacts("1", "Two")], "1")
+    assert tabs.list.isHidden(), "all are in sight"
+    many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
+    tabs.show_tabs(many, "11")
+    assert not tabs.list.isHidden()
+    assert tabs.add.geometry().right() < tabs.list.geometry().left() <= tabs.width()
+    chosen = []
+    tabs.chosen.connect(chosen.append)
+    tabs.list.click()
+    (menu,) = tabs.findChildren(Menu)
+    assert [entry.text() for entry in menu.actions()] == [each.name for each in many]
+    assert [entry.isChecked() for entry in menu.actions()].index(True) == 11
+    menu.actions()[2].trigger()
+    assert chosen == ["2"]
+    menu.close()
+
+
 def test_the_wheel_moves_the_tabs_along(tabs) -> None:
     many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
     tabs.show_tabs(many, "0")

@@ -1,6 +1,6 @@
 // New, renamed and deleted variables: the window asks for names, and tells the page what to do.
 import * as Blockly from 'blockly/core';
-import {lazy, t} from './words';
+import {t} from './words';
 
 export type Variable = Blockly.IVariableModel<Blockly.IVariableState>;
 
@@ -97,7 +97,7 @@ Blockly.FieldVariable.dropdownCreate = function (this: Blockly.FieldVariable): B
   if (inFlyout) return all.filter((option) => !isOwn(option));
   const own = all.filter(isOwn);
   const names = all.filter((option) => !isOwn(option));
-  return [...names, [t(lazy('New variable')), NEW], ...own];
+  return [...names, [t('New variable'), NEW], ...own];
 };
 
 // ---- the menu of a block with a variable

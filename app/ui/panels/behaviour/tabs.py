@@ -9,9 +9,10 @@ from PySide6.QtGui import QContextMenuEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.ui.panels.behaviour.tab import BehaviourTab, NameField, TabFacts
+from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Segments
-from app.ui.widgets.menus import Menu
+from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
 SHORTEST = 76
@@ -22,7 +23,10 @@ NEW = "+"
 
 
 class BehaviourTabs(QWidget):
-    """All tabs side by side and "+"; narrow room shortens them, then the wheel moves them along."""
+    """All tabs side by side and "+"; narrow room shortens them, then the wheel moves them along.
+
+    While some are out of sight, a button lists all.
+    """
 
     chosen = Signal(str)
     closed = Signal(str)
@@ -44,6 +48,9 @@ class BehaviourTabs(QWidget):
         self._room = QWidget(self)  # cuts off what the wheel has moved out of sight
         self.add = IconButton(theme, "plus", _("New behaviour"), "Ctrl+N", parent=self)
         self.add.setProperty("command", "file.new")
+        self.list = IconButton(theme, "chevron-down", _("All open behaviours"), parent=self)
+        self.list.clicked.connect(self._list_all)
+        self.list.hide()
         self.setAccessibleName(_("Open behaviours"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self._restyle)
@@ -80,6 +87,17 @@ class BehaviourTabs(QWidget):
             tab.rename_wanted.connect(lambda: self.edit(key))
             tab.show()
         return self.tabs[key]
+
+    def _list_all(self) -> None:
+        """Open below the button what is open; who chooses one goes there."""
+        menu = Menu(self._theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        for each in self._facts:
+            entry = menu.addAction(plain.entry(each.name))
+            entry.setCheckable(True)
+            entry.setChecked(each.key == self._current)
+            entry.triggered.connect(lambda _on=False, key=each.key: self.chosen.emit(key))
+        drop_below(menu, self.list)
 
     # -- blocks from the page ---------------------------------------------------------------------
 
@@ -164,7 +182,7 @@ class BehaviourTabs(QWidget):
     def _widths(self) -> list[int]:
         """As wide as the names want; all but the current one shorter where that does not fit."""
         wanted = [self.tabs[each.key].sizeHint().width() for each in self._facts]
-        room = self.width() - self.add.sizeHint().width() - GAP * (len(wanted) + 1)
+        room = self._room_width(scrolls=False) - GAP * len(wanted)
         least = round(self._theme.scaled(SHORTEST))
         keys = [each.key for each in self._facts]
 
@@ -177,10 +195,16 @@ class BehaviourTabs(QWidget):
             most -= 4
         return cut(max(most, least))
 
+    def _room_width(self, *, scrolls: bool) -> int:
+        """What "+", and where tabs are out of sight the list of all, leave for tabs."""
+        taken = self.add.sizeHint().width() + GAP
+        return self.width() - taken - (self.list.sizeHint().width() + GAP if scrolls else 0)
+
     def _place(self, *, bring: bool = False) -> None:
         widths = self._widths()
-        room = self.width() - self.add.sizeHint().width() - GAP
         total = sum(widths) + GAP * max(0, len(widths) - 1)
+        scrolls = total > self._room_width(scrolls=False)
+        room = self._room_width(scrolls=scrolls)
         if bring:
             self._left = self._left_for_current(widths, room)
         self._left = max(0.0, min(self._left, float(total - room)))
@@ -194,6 +218,9 @@ class BehaviourTabs(QWidget):
         side = self.add.sizeHint().height()
         self.add.setGeometry(min(round(x), room + GAP), (self.height() - side) // 2, side, side)
         self.add.raise_()
+        self.list.setVisible(scrolls)
+        self.list.setGeometry(self.width() - side, (self.height() - side) // 2, side, side)
+        self.list.raise_()
         self._place_field()
 
     def _left_for_current(self, widths: list[int], room: int) -> float:
@@ -211,6 +238,8 @@ class BehaviourTabs(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         width = round(self._theme.scaled(SHORTEST)) + GAP + self.add.sizeHint().width()
+        if len(self._facts) > 1:
+            width += GAP + self.list.sizeHint().width()
         return QSize(width, self.sizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
