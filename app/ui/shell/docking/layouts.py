@@ -13,12 +13,13 @@ from nep.i18n import lazy
 class DockColumn:
     """Panels above each other: (names that share a place, height). ``width`` 0 takes the rest.
 
-    The width grows with the text, up to ``most`` of the window's.
+    The width grows with the text, up to ``most`` of the window's; in a large window it is ``share`` of it.
     """
 
     width: int
     rows: tuple[tuple[tuple[str, ...], int], ...]
     most: float = 1.0
+    share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -107,8 +108,8 @@ DEVELOPER = Layout(
     "activity",
     "compact",
     (
-        DockColumn(640, ((("topics",), 780),), most=0.62),
-        DockColumn(330, ((("inspector",), 780),), most=0.28),
+        DockColumn(640, ((("topics",), 780),), most=0.62, share=0.43),
+        DockColumn(330, ((("inspector",), 780),), most=0.28, share=0.22),
         DockColumn(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
     ),
     (

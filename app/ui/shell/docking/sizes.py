@@ -72,7 +72,9 @@ def fit(
     wide = bench.width() - margins.left() - margins.right() - gap * (len(columns) - 1)
     high = bench.height() - margins.top() - margins.bottom()
     wanted = [
-        round(min(column.width * scale, column.most * wide)) if column.width else LEAST_PX
+        round(min(max(column.width * scale, column.share * wide), column.most * wide))
+        if column.width
+        else LEAST_PX
         for column, _ in columns
     ]
     keep = [bool(column.width) for column, _ in columns]
