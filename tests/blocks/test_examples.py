@@ -26,7 +26,7 @@ def test_these_are_the_examples_of_the_start_page():
         ("Reaction to touch", "Laughs when its head is touched"),
         ("Tour guide", "Walks to three stations and speaks"),
         ("A quiz", "Asks; a touch on its head is “yes”"),
-        ("A dance", "Sways, blinks and waves, by functions"),
+        ("A dance", "Sways and blinks, by functions"),
         ("A careful walk", "Walks while nothing is in its way"),
         ("The finder", "Looks for the ball and for a face"),
         ("Weather station", "Sends messages and reacts to them"),
