@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtGui import QCursor, QGuiApplication, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app import resources
 from app.core.documents.workspace_json import WorkspaceJson
@@ -44,6 +44,19 @@ LOOK = """selector => {
 Between two questions of ours there may be no picture, on a busy computer; what just begins to move stands.
 """
 
+LISTEN = """
+window.nepEvents = [];
+for (const kind of ['pointerdown', 'pointerup', 'keydown', 'focusin', 'focusout', 'resize']) {
+    window.addEventListener(kind, event => {
+        const {target, clientX, clientY, button, key} = event;
+        const told = [Math.round(performance.now()), kind, clientX, clientY, button, key, target.tagName,
+            target.getAttribute?.('class'), target.closest?.('[data-id]')?.dataset.id];
+        window.nepEvents = [...window.nepEvents.slice(-39), told.filter(each => each !== undefined)];
+    }, true);
+}
+"""
+"""Keeps the last events of the page, for whoever asks why it does not come to what was waited for."""
+
 
 def workspace(*blocks: dict) -> dict:
     return {"blocks": {"languageVersion": 0, "blocks": list(blocks)}}
@@ -69,6 +82,8 @@ class Person:
     def __init__(self, qtbot, view: BlocklyView) -> None:
         self._qtbot = qtbot
         self.view = view
+        if view.web is not None:
+            view.web.page.runJavaScript(LISTEN)
 
     def ask(self, script: str):
         answers: list = []
@@ -77,7 +92,27 @@ class Person:
         return json.loads(answers[0]) if answers[0] else None
 
     def wait_for(self, script: str, expected: object = True) -> None:
-        self._qtbot.waitUntil(lambda: self.ask(script) == expected, timeout=WAIT_MS)
+        answers: list = []
+
+        def is_so() -> bool:
+            answers[:] = [self.ask(script)]
+            return answers[0] == expected
+
+        try:
+            self._qtbot.waitUntil(is_so, timeout=WAIT_MS)
+        except self._qtbot.TimeoutError as error:
+            raise AssertionError(f"{script} is {answers[0]!r}, not {expected!r}. {self.story()}") from error
+
+    def story(self) -> str:
+        """What the page was told of mouse, keys and focus, and what else may have taken them."""
+        windows = [
+            f"{each} {each.geometry()}" for each in QGuiApplication.topLevelWindows() if each.isVisible()
+        ]
+        taken = (QApplication.activePopupWidget(), QApplication.activeModalWidget(), QWidget.mouseGrabber())
+        events = "\n".join(map(str, self.ask("window.nepEvents ?? []")))
+        return (
+            f"The mouse is at {QCursor.pos()} over {windows}; taken by {taken}; the page was told:\n{events}"
+        )
 
     def until(self, true: Callable[[], object], what: str) -> None:
         def seen() -> None:
