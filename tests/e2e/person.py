@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from tests.e2e.waiting import until
 from tests.e2e.x11 import WHEEL_DOWN, WHEEL_UP, Picture, Screen
+from tests.still import LOOK
 
 STEP_S = 40.0
 RUNNING = (0xFF, 0xB3, 0x00)  # the token "running" of the light theme
@@ -133,19 +134,12 @@ class Person:
 
     def spot(self, selector: str) -> list[float]:
         """Where an element of the page is on the screen, once it stands still."""
-        script = (
-            "(e => e && (r => r.width > 0 && [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
-            f"(document.querySelector({json.dumps(selector)}))"
-        )
-        before: list[object] = []
-
-        def still() -> list[float] | None:
-            before.append(self.page(script))
-            return before[-1] if before[-1] and before[-1] == before[-2:][0] and len(before) > 1 else None
-
-        left, top, width, height = until(still, f"no {selector} in the page")
+        look = f"({LOOK})({json.dumps(selector)})"
+        self.page(look)
+        again = f"window.nepStill === undefined ? {look} : window.nepStill"  # the page may come anew
+        left, top, right, bottom = until(lambda: self.page(again), f"no {selector} in the page")
         view = self.find(kind="QWebEngineView")["rect"]
-        return [view[0] + left, view[1] + top, width, height]
+        return [view[0] + left, view[1] + top, right - left, bottom - top]
 
     def point(self, selector: str, dx: float = 14, dy: float = 14) -> None:
         """Click into an element of the page, near its corner."""

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from app import resources
 from app.core.documents.workspace_json import WorkspaceJson
 from app.ui.blockly.view import BlocklyView
+from tests.still import LOOK
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "blockly"
 DEFINITIONS = json.loads((DATA / "definitions.json").read_text("utf-8"))
@@ -22,28 +23,6 @@ UNKNOWN = json.loads((DATA / "unknown.json").read_text("utf-8"))
 TOKENS = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
 START = {"type": "events_started", "id": "start", "x": 56, "y": 56}
 WAIT_MS = 30_000
-LOOK = """selector => {
-    let before = '';
-    const moves = e => e.getAnimations().some(each => isFinite(each.effect.getComputedTiming().endTime))
-        || (e.parentElement ? moves(e.parentElement) : false);
-    const look = () => {
-        if (window.nepLook !== look) return;
-        const found = document.querySelector(selector);
-        const {left, top, right, bottom} = found?.getBoundingClientRect() ?? {};
-        const now = right > left && !moves(found) ? JSON.stringify([left, top, right, bottom]) : '';
-        if (now && now === before) window.nepStill = JSON.parse(now);
-        else requestAnimationFrame(look);
-        before = now;
-    };
-    window.nepStill = null;
-    window.nepLook = look;
-    requestAnimationFrame(look);
-}"""
-"""Notes where an element is, once nothing moves it and it is there in two pictures of the page.
-
-Between two questions of ours there may be no picture, on a busy computer; what just begins to move stands.
-"""
-
 LISTEN = """
 window.nepEvents = [];
 for (const kind of ['pointerdown', 'pointerup', 'keydown', 'focusin', 'focusout', 'resize']) {
