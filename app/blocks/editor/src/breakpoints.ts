@@ -42,8 +42,10 @@ class BreakpointChange extends Blockly.Events.BlockBase {
 
   override run(forward: boolean): void {
     const block = this.getEventWorkspace_().getBlockById(this.blockId ?? '') ?? this.block;
+    const before = block.data;
     block.data = forward ? this.to : this.from;
     showMark(block);
+    Blockly.Events.fire(new BreakpointChange(block, before, block.data));  // undo itself is told to nobody
   }
 }
 

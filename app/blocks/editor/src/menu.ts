@@ -9,6 +9,7 @@ import {canFold, fold} from './folding';
 import {CHOOSE_ALL_SHORTCUT, chooseAll, registerChooseAll} from './frame';
 import {iconElement} from './icons';
 import {ctrl, keyWords} from './keys';
+import {hiddenIn, leadTo} from './inside_marks';
 import {addCanvasNote, addNote, hasNote, removeNote} from './notes';
 import {registerRemoveMenu} from './remove_menu';
 import {chosenWith, countIn} from './selection';
@@ -135,6 +136,10 @@ export function registerMenu(clipboard: Clipboard): void {
   block({id: 'nepPause', weight: 75, icon: 'circle-pause',
     words: (it) => it.block && pausesHere(it.block) ? t('Do not pause here') : t('Pause here'),
     when: (it) => own(it) && canPause(it.block!), run: (it) => togglePause(it.block!)});
+  block({id: 'nepShowNote', weight: 71, icon: 'sticky-note', words: t('Show the note inside'),
+    when: (it) => own(it) && hiddenIn(it.block!, 'note') !== null, run: (it) => leadTo(hiddenIn(it.block!, 'note')!)});
+  block({id: 'nepShowPause', weight: 76, icon: 'circle-pause', words: t('Show where it pauses inside'),
+    when: (it) => own(it) && hiddenIn(it.block!, 'pause') !== null, run: (it) => leadTo(hiddenIn(it.block!, 'pause')!)});
   line(ScopeType.BLOCK, 80);
   line(ScopeType.BLOCK, 98);
   block({id: 'nepDelete', weight: 99, icon: 'trash-2', shortcut: names.DELETE,

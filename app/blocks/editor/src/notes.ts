@@ -1,6 +1,7 @@
 // Notes: sheets of text beside a block, or anywhere on the canvas. They are Blockly's comments and are saved as such;
 // here they get our look, take the keys when they are made, and keep what is typed.
 import * as Blockly from 'blockly/core';
+import {seenInPlaceOf} from './folding';
 import {freePlace, inSight, obstacles} from './free_place';
 import {drawIcon} from './icons';
 import {t} from './words';
@@ -58,6 +59,8 @@ document.addEventListener('keydown', (event) => {
 
 class Sheet extends Blockly.bubbles.TextInputBubble {
   private buttons: SVGGElement[] | undefined;
+  /** Before the person took it into the hand. */
+  private before: Shape | null = null;
 
   /** A head to take it by, with its buttons; made before the first size is set, which the parent does. */
   addHead(buttons: [icon: string, words: string, run: () => void][]): void {
@@ -82,6 +85,49 @@ class Sheet extends Blockly.bubbles.TextInputBubble {
     this.setSize(this.getSize());
   }
 
+  set isSeen(seen: boolean) {
+    this.svgRoot.style.display = seen ? '' : 'none';
+  }
+
+  private get sign(): NoteSign {
+    return this.getOwner() as NoteSign;
+  }
+
+  override startDrag(): Blockly.IBubble {
+    this.before = this.sign.shape;
+    return super.startDrag();
+  }
+
+  override endDrag(): void {
+    super.endDrag();
+    this.tell();
+  }
+
+  /** The corner is in the hand until the button is let go, wherever that is. */
+  watchCorner(): void {
+    this.svgRoot.querySelector('.blocklyResizeHandle')?.addEventListener('pointerdown', () => {
+      this.before = this.sign.shape;
+      const end = new AbortController();
+      for (const name of ['pointerup', 'pointercancel']) {
+        window.addEventListener(name, () => {
+          end.abort();
+          this.tell();
+        }, {signal: end.signal});
+      }
+    });
+  }
+
+  private tell(): void {
+    if (this.before && !this.disposed) this.sign.tellChange(this.before);
+    this.before = null;
+  }
+
+  protected override onKeyDown(event: KeyboardEvent): void {
+    const before = this.sign.shape;
+    super.onKeyDown(event);
+    this.sign.tellChange(before);
+  }
+
   override setSize(size: Blockly.utils.Size, relayout = false): void {
     super.setSize(size, relayout);
     const {width, height} = this.getSize();
@@ -90,6 +136,39 @@ class Sheet extends Blockly.bubbles.TextInputBubble {
     text.setAttribute('height', `${Math.max(10, height - HEAD - BORDER)}`);
     this.buttons?.forEach((button, at) =>
       button.setAttribute('transform', `translate(${width - 26 - 24 * at}, 3)`));
+  }
+}
+
+/** Where a sheet is, beside the corner of its block, how large, and whether it shows. */
+interface Shape {
+  open: boolean;
+  width: number;
+  height: number;
+  at: {x: number; y: number} | null;
+}
+
+/** A sheet was moved, resized, opened or closed by a person: one step of undo. Blockly itself tells nobody. */
+class NoteChange extends Blockly.Events.BlockBase {
+  override type = 'nep_note';
+
+  constructor(private readonly block: Blockly.Block, private readonly from: Shape, private readonly to: Shape) {
+    super(block);
+    this.recordUndo = Blockly.Events.getRecordUndo();
+  }
+
+  override isNull(): boolean {
+    return JSON.stringify(this.from) === JSON.stringify(this.to);
+  }
+
+  override run(forward: boolean): void {
+    const block = this.getEventWorkspace_().getBlockById(this.blockId ?? '') ?? this.block;
+    const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
+    if (!(sign instanceof NoteSign)) return;
+    // A sign that was made just now takes its sheet along when it comes to its place.
+    Blockly.renderManagement.triggerQueuedRenders(block.workspace as Blockly.WorkspaceSvg);
+    const before = sign.shape;
+    sign.shape = forward ? this.to : this.from;
+    sign.tellChange(before);  // undo itself is told to nobody, what it does is
   }
 }
 
@@ -128,6 +207,8 @@ function element(name: string, kind: string): SVGElement {
 
 /** The sign on a block that has a note: shows and hides it. */
 class NoteSign extends Blockly.icons.CommentIcon {
+  private wasHidden = false;
+
   constructor(block: Blockly.Block) {
     super(block);
     this.setBubbleSize(new Size(...FIRST_SIZE));
@@ -149,9 +230,64 @@ class NoteSign extends Blockly.icons.CommentIcon {
     return new Size(SIGN, SIGN);
   }
 
+  /** A folded block still has its own note. */
+  override isShownWhenCollapsed(): boolean {
+    return true;
+  }
+
+  override updateCollapsed(): void {}
+
+  /** Its sheet is seen, or not, as its block is. */
+  set isSeen(seen: boolean) {
+    const sheet = this.getBubble();
+    if (sheet instanceof Sheet) sheet.isSeen = seen;
+  }
+
   override async setBubbleVisible(visible: boolean): Promise<void> {
     keepTyped();
+    // A block that is folded up closes all sheets inside it: they are only not seen until it is unfolded.
+    if (!visible && this.getBubble() && this.isHidden()) return;
     await super.setBubbleVisible(visible);
+  }
+
+  private isHidden(): boolean {
+    const block = this.sourceBlock;
+    return block instanceof Blockly.BlockSvg && !block.isDeadOrDying() && seenInPlaceOf(block) !== block;
+  }
+
+  /** What is folded up has no place of its own: the sheet stays where it was until its block has one again. */
+  override onLocationChange(corner: Blockly.utils.Coordinate): void {
+    const kept = this.getBubbleLocation();
+    const unfolded = this.wasHidden && !this.isHidden();
+    this.wasHidden = this.isHidden();
+    super.onLocationChange(corner);
+    if (unfolded && kept) this.setBubbleLocation(kept);
+  }
+
+  override onClick(): void {
+    const before = this.shape;
+    super.onClick();
+    this.tellChange(before);
+  }
+
+  get shape(): Shape {
+    const {width, height} = this.getBubbleSize();
+    const at = this.getBubbleLocation();
+    const corner = (this.sourceBlock as Blockly.BlockSvg).getRelativeToSurfaceXY();
+    return {open: this.bubbleIsVisible(), width, height, at: at ? {x: at.x - corner.x, y: at.y - corner.y} : null};
+  }
+
+  set shape({open, width, height, at}: Shape) {
+    const corner = (this.sourceBlock as Blockly.BlockSvg).getRelativeToSurfaceXY();
+    this.setBubbleSize(new Size(width, height));
+    if (at) this.setBubbleLocation(new Coordinate(corner.x + at.x, corner.y + at.y));
+    void this.setBubbleVisible(open);
+  }
+
+  /** The file is another one now, and undo brings back how the sheet was. */
+  tellChange(before: Shape, now = this.shape): void {
+    // A sheet that was never open has found its place: that alone is nothing to undo.
+    Blockly.Events.fire(new NoteChange(this.sourceBlock, before.at ? before : {...before, at: now.at}, now));
   }
 
   protected override createBubble(): void {
@@ -163,7 +299,7 @@ class NoteSign extends Blockly.icons.CommentIcon {
     sheet.setText(this.getText());
     sheet.setSize(this.getBubbleSize(), true);
     sheet.addHead([
-      ['x', t('Hide the note'), () => void this.setBubbleVisible(false)],
+      ['x', t('Hide the note'), () => this.onClick()],
       ['trash-2', t('Remove the note'), () => removeNote(block)],
     ]);
     sheet.moveDuringDrag(this.getBubbleLocation() ?? placeOf(sheet, block));
@@ -172,6 +308,8 @@ class NoteSign extends Blockly.icons.CommentIcon {
     sheet.addLocationChangeListener(() => this.onBubbleLocationChange());
     sheet.setAriaLabelProvider(() => t('Note: {text}', {text: this.getText()}));
     this.watchKeys(sheet, block);
+    sheet.watchCorner();
+    sheet.isSeen = seenInPlaceOf(block) === block;
   }
 
   private watchKeys(sheet: Sheet, block: Blockly.BlockSvg): void {
@@ -217,7 +355,23 @@ export function hasNote(block: Blockly.BlockSvg): boolean {
 }
 
 export function removeNote(block: Blockly.BlockSvg): void {
-  if (hasNote(block)) inOneStep(() => block.setCommentText(null));
+  const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
+  if (!(sign instanceof NoteSign)) return;
+  inOneStep(() => {
+    sign.tellChange(sign.shape, {...sign.shape, open: false});  // undo brings it back as it was
+    block.setCommentText(null);
+  });
+}
+
+/** The words of its note; '' when it has none. */
+export function wordsOfNote(block: Blockly.BlockSvg): string {
+  return block.getIcon(Blockly.icons.IconType.COMMENT)?.getText() ?? '';
+}
+
+/** The sheet of a note goes and comes with the block that it is beside. */
+export function showNote(block: Blockly.BlockSvg, seen: boolean): void {
+  const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
+  if (sign instanceof NoteSign) sign.isSeen = seen;
 }
 
 /** An open note that has the keys. */

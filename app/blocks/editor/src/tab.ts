@@ -14,6 +14,7 @@ import {FLYOUT, Flyout, SCALE} from './flyout';
 import {WrongDrops} from './wrong_drop';
 import {Variables} from './variables';
 import {visibleSensors, observeFlyout} from './visible_sensors';
+import {keepInsideMarks} from './inside_marks';
 import {keepNotesReadable} from './notes';
 import {Program, holdsAny} from './program';
 import {RENDERER} from './renderer';
@@ -91,6 +92,7 @@ export class Tab {
     foldOnDoubleClick(this.workspace);
     new Frame(this.workspace, new Selection(this.workspace));
     keepNotesReadable(this.workspace);
+    keepInsideMarks(this.workspace);
     new TryHandle(this.workspace);
     this.variables = new Variables(this.workspace);
     this.bin = new Bin(this.workspace, {deleted: (count) => listener.deleted(this, count), changed: () => listener.binned(this)});
