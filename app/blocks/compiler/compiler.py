@@ -251,6 +251,8 @@ class _Compiler:
         return made
 
     def _statement(self, placed: Placed) -> list[ast.stmt]:
+        if placed.pauses:
+            self._breakpoints[placed.id] = None
         block = self._known(placed)
         if block is None:
             return []
@@ -299,8 +301,6 @@ class _Compiler:
 
     def _marked(self, made: list[ast.stmt], placed: Placed) -> list[ast.stmt]:
         self._marks[made[0]] = placed.id
-        if placed.pauses:
-            self._breakpoints[placed.id] = None
         return made
 
     # ---- values

@@ -3,10 +3,11 @@
 In, one per line: ``{"do": "start", "program": …, "robots": [descriptions], "owners": {robot: node's id},
 "master": …, "name": …, "paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" |
 "stop"}``, ``{"do": "pace", "pace_s": seconds}`` (slow motion), ``{"do": "variable", "python": name, "value":
-…}`` (a person gives it another value), ``{"do": "answer", "question": number, "text": …}``, or ``{"do":
-"robots", "owners": …, "guarded": {topic: [robots]}}`` when robots came or were started anew. Out: ``{"is":
-"ready" | "running" | "paused" | "error" | "warning" | "print" | "variables" | "ask" | "ended", …}``; question
-0 of "ask" is none any more. When its input ends, the program ends, and its robots are told.
+…}`` (a person gives it another value), ``{"do": "breakpoints", "blocks": [ids]}`` (a person marks others),
+``{"do": "answer", "question": number, "text": …}``, or ``{"do": "robots", "owners": …, "guarded": {topic:
+[robots]}}`` when robots came or were started anew. Out: ``{"is": "ready" | "running" | "paused" | "error" |
+"warning" | "print" | "variables" | "ask" | "ended", …}``; question 0 of "ask" is none any more. When its
+input ends, the program ends, and its robots are told.
 """
 
 from __future__ import annotations
@@ -262,6 +263,12 @@ class Run:
         else:
             self._runtime.step(block)
 
+    def set_breakpoints(self, order: Mapping[str, object]) -> None:
+        """The blocks before which it pauses from now on."""
+        blocks = order.get("blocks")
+        if isinstance(blocks, list):
+            self._breakpoints = frozenset(map(str, blocks))
+
     def put(self, order: Mapping[str, object]) -> None:
         """A person gives a variable another value."""
         value = order.get("value")
@@ -343,15 +350,17 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
 
 def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
     obeyed = run.orders()
+    told: dict[str, Callable[[Mapping[str, object]], None]] = {
+        "pace": run.set_pace,
+        "robots": run.know,
+        "variable": run.put,
+        "breakpoints": run.set_breakpoints,
+        "answer": run.answer,
+    }
     for order in incoming:
-        if order.get("do") == "pace":
-            run.set_pace(order)
-        elif order.get("do") == "robots":
-            run.know(order)
-        elif order.get("do") == "variable":
-            run.put(order)
-        elif order.get("do") == "answer":
-            run.answer(order)
+        take = told.get(str(order.get("do")))
+        if take is not None:
+            take(order)
         do = obeyed.get(str(order.get("do")))
         if do is not None:
             do()

@@ -101,6 +101,7 @@ class Runs:
         self._next: Wanted | None = None  # once what runs has been stopped, proven
         self._edits = EditsSinceRun()
         self._used: tuple[str, ...] = ()
+        self._breakpoints: tuple[str, ...] = ()  # as the program that runs knows them
         self._program_key: str | None = None  # the last one's: robots refuse what still comes from it
         self.kept: frozenset[str] = frozenset()  # robots it used, until proven still; a stop reaches them
         self._labels: Mapping[str, str] = {}
@@ -146,9 +147,19 @@ class Runs:
         if self.block_warnings and self.document is not None and self.document.edits != self._warned_edits:
             self._warnings.clear()
             self.blocks_revision += 1
+        if self.active:
+            self._follow_breakpoints()
         edited = self.active and self._edits.seen()
         if edited != self._run.edited:
             self._run = replace(self._run, edited=edited)
+
+    def _follow_breakpoints(self) -> None:
+        """“Pause here” counts at once, without another Run: the program is told where it pauses now."""
+        newest = self.document.newest() if self.document is not None else None
+        if newest is None or self._runner is None or newest.breakpoints == self._breakpoints:
+            return
+        self._breakpoints = newest.breakpoints
+        self._runner.set_breakpoints(newest.breakpoints)
 
     def view(self) -> RunView:
         """What the run bar says: made once a tick, and again when something was done since then."""
@@ -414,6 +425,7 @@ class Runs:
         self.asking.begin(runner)
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self._robots.begin(runner, asked, owners)
+        self._breakpoints = program.breakpoints
         self.kept, self._program_key = frozenset(program.robots), runner.program_key
         self._variables = {variable.id: variable for variable in program.variables}
         self._show_values({})

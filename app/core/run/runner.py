@@ -165,6 +165,10 @@ class Runner:
         """Give a variable another value while the program runs; ``python`` is its name there."""
         self._orders.put({"do": "variable", "python": python, "value": value})
 
+    def set_breakpoints(self, blocks: Sequence[str]) -> None:
+        """The program pauses before these blocks from now on, and before no others."""
+        self._orders.put({"do": "breakpoints", "blocks": list(blocks)})
+
     def pause(self) -> None:
         """Hold the program, and what its robots do; the event "paused" says when all stand still."""
         self._orders.put({"do": "pause"})

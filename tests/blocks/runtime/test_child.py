@@ -147,6 +147,21 @@ def test_a_breakpoint_pauses_before_its_block_and_going_on_passes_it(running, ma
     assert len([each for each in running.said if each["is"] == "paused"]) == 1
 
 
+def test_a_breakpoint_that_is_set_or_cleared_while_it_runs_counts_at_once(running, master):
+    wait, rest = block("control_wait", "one", SECONDS=number(0.01)), block("control_wait", "rest", SECONDS=number(0.01))
+    running.start(workspace(started(block("control_forever", BODY=[wait, rest]))), master=master.address)
+    running.until("running")
+    running.order(do="breakpoints", blocks=["one"])
+    assert running.until("paused")["block"] == "one"
+    running.order(do="breakpoints", blocks=["rest"])
+    running.order(do="go")
+    assert running.until("paused")["block"] == "rest"
+    assert [each["block"] for each in running.said if each["is"] == "paused"] == ["one", "rest"]
+    running.order(do="breakpoints", blocks="no list")
+    running.order(do="stop")
+    running.until("ended")
+
+
 @pytest.mark.parametrize("data", ['{"pause": false}', '{"pause": true', "[]", '["pause"]', "pause", 7, None])
 def test_other_data_of_a_block_are_no_breakpoint(data):
     made = compile_behaviour(workspace(started(write(text("one")) | {"data": data})), [])

@@ -56,6 +56,7 @@ class Runner:
         self.program_key = f"key of run {self.run}"
         self.state = "ready"
         self.pace_s = 0.0
+        self.breakpoints: tuple[str, ...] = ()
         self._on_event = on_event
         self._blocks: tuple[str, ...] = ()
         self._says = ""
@@ -73,7 +74,7 @@ class Runner:
     ) -> None:
         if self.state != "ready":
             raise RunnerError("this runner has run its program; make another one")
-        self.state, self.pace_s = "running", pace_s
+        self.state, self.pace_s, self.breakpoints = "running", pace_s, program.breakpoints
         self._tell("ready")
         if paused:
             block, says = next(iter(program.readings.items()), ("", ""))
@@ -102,6 +103,9 @@ class Runner:
 
     def set_pace(self, seconds: float) -> None:
         self.pace_s = seconds
+
+    def set_breakpoints(self, blocks: Sequence[str]) -> None:
+        self.breakpoints = tuple(blocks)
 
     def set_robots(self, owners: Mapping[str, str], guarded: Mapping[str, Sequence[str]]) -> None:
         """The program asks nobody."""

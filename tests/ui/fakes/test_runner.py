@@ -41,6 +41,9 @@ class Run(Protocol):
     def ends(self) -> None:
         """It comes to its end by itself."""
 
+    def pauses_at(self, block: str) -> None:
+        """It comes to this block, and pauses as it was told."""
+
     def is_killed(self) -> None:
         """Its process is killed."""
 
@@ -55,6 +58,10 @@ class RealRun:
 
     def make_runner(self, on_event: Callable[[RunnerEvent], object]) -> Runner:
         return Runner(on_event)
+
+    def pauses_at(self, block: str) -> None:
+        tick_until(self.session, lambda: self.session.runs.view().state == "paused")
+        assert self.session.runs.stopped_blocks == (block,)
 
     def works(self, block: str) -> None:
         tick_until(self.session, lambda: block in self.session.runs.running_blocks)
@@ -90,6 +97,12 @@ class MadeUpRun:
         runner = self.session.runner
         assert runner is not None
         return runner
+
+    def pauses_at(self, block: str) -> None:
+        tick_until(self.session, lambda: block in self._runner.breakpoints)
+        self._runner.does(block)
+        self._runner.pause()
+        self.session.tick()
 
     def works(self, block: str) -> None:
         self._runner.does(block)
@@ -167,6 +180,23 @@ def test_run_pause_step_go_on_and_stop(run: Run) -> None:
     assert runs.view().title.startswith("Stopped after ")
     assert runs.view().detail == "The dashed outline shows where"
     assert (runs.running_blocks, runs.stopped_blocks) == ((), ("c",))
+
+
+def test_pause_here_counts_at_once_and_is_no_edit_that_waits_for_a_run(run: Run) -> None:
+    runs, blocks = run.session.runs, endless()
+    run.session.document.edited(blocks)
+    runs.run()
+    run.works("c")
+    marked = block("variables_change", "c", VAR={"id": "n"}, BY=number(1)) | {"data": '{"pause":true}'}
+    loop = block("control_forever", "loop", BODY=[marked])
+    run.session.document.edited(workspace(started(loop), variables=("n",)))
+    run.pauses_at("c")
+    assert not runs.view().edited
+    run.session.document.edited(blocks)
+    tick_until(run.session, lambda: runs._breakpoints == ())
+    runs.go_on()
+    run.works("c")
+    assert runs.view().state == "running"
 
 
 def pressed_long_ago(run: Run) -> None:
