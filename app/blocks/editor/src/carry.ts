@@ -1,7 +1,9 @@
-// Chosen blocks that go somewhere together: taken out of their scripts, which close behind them, and moved by one hand.
+// Chosen blocks and notes that go somewhere together: taken out of their scripts, which close behind them, and moved by one hand.
 import * as Blockly from 'blockly/core';
 
 type Block = Blockly.BlockSvg;
+type Note = Blockly.comments.RenderedWorkspaceComment;
+type Item = Block | Note;
 type Point = Blockly.utils.Coordinate;
 
 const {Coordinate} = Blockly.utils;
@@ -27,49 +29,51 @@ export function takeOut(run: readonly Block[]): () => void {
 }
 
 /** Deletes them; the scripts that they were in close. */
-export function removeRuns(runs: readonly Block[][]): void {
+export function removeAll(runs: readonly Block[][], notes: readonly Note[]): void {
   for (const run of runs) {
     takeOut(run);
     run[0]!.dispose(false);
   }
+  for (const note of notes) note.dispose();
 }
 
 /** The first is in the hand, the others keep their places beside it. */
 export class Carried {
-  readonly head: Block;
-  private readonly others: {block: Block; from: Point}[];
+  readonly head: Item;
+  private readonly others: {item: Item; from: Point}[];
   private readonly putBack: (() => void)[];
 
-  constructor(readonly runs: readonly Block[][], held: Block) {
-    const first = runs.find((run) => run.includes(held)) ?? runs[0]!;
+  constructor(readonly runs: readonly Block[][], readonly notes: readonly Note[], held: Item) {
+    const heads = runs.map((run) => run[0]!);
+    this.head = notes.find((note) => note === held) ??
+      heads[runs.findIndex((run) => run.includes(held as Block))] ?? heads[0]!;
     this.putBack = runs.map(takeOut);
-    this.head = first[0]!;
     Blockly.renderManagement.triggerQueuedRenders();
-    this.others = runs.filter((run) => run !== first)
-      .map(([block]) => ({block: block!, from: block!.getRelativeToSurfaceXY()}));
+    this.others = [...heads, ...notes].filter((each) => each !== this.head)
+      .map((item) => ({item, from: item.getRelativeToSurfaceXY()}));
   }
 
   start(): void {
-    for (const {block} of this.others) {
-      block.bringToFront();
-      block.setDragging(true);
+    for (const {item} of this.others) {
+      if (item instanceof Blockly.BlockSvg) item.bringToFront();
+      item.setDragging(true);
     }
   }
 
   move(by: Point): void {
-    for (const {block, from} of this.others) block.moveDuringDrag(Coordinate.sum(from, by));
+    for (const {item, from} of this.others) item.moveDuringDrag(Coordinate.sum(from, by));
   }
 
   /** Where they are let go; undo takes back the whole way. */
   end(by: Point): void {
     this.goBack();
-    for (const {block} of this.others) block.moveBy(by.x, by.y, ['drag']);
+    for (const {item} of this.others) item.moveBy(by.x, by.y, ['drag']);
   }
 
   /** The head is gone already. Undo brings them back to where they were taken. */
   remove(): void {
     this.goBack();
-    for (const {block} of this.others) block.dispose(false);
+    for (const {item} of this.others) item.dispose(false);
   }
 
   /** As if nobody had touched them. */
@@ -81,9 +85,9 @@ export class Carried {
   /** Nobody is told of the way: it was only in the hand. */
   private goBack(): void {
     Blockly.Events.disable();
-    for (const {block, from} of this.others) {
-      block.setDragging(false);
-      block.moveTo(from);
+    for (const {item, from} of this.others) {
+      item.setDragging(false);
+      item.moveTo(from);
     }
     Blockly.Events.enable();
   }

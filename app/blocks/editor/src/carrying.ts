@@ -1,9 +1,10 @@
 // Blocks or a note carried out of the page: the window sees where they are, and may take them to another behaviour.
 import * as Blockly from 'blockly/core';
 import {countOf} from './bin';
-import {removeRuns} from './carry';
-import {type Copied, type CopiedBlocks, add, inOneStep, stateOf, stateOfRun} from './clipboard';
+import {removeAll} from './carry';
+import {type Copied, type CopiedBlocks, add, copyOfAll, inOneStep, stateOf} from './clipboard';
 import {inSight} from './free_place';
+import type {Note} from './selection';
 import type {Tab} from './tab';
 
 type Point = Blockly.utils.Coordinate;
@@ -58,19 +59,19 @@ export function leaving(item: unknown, fromToolbox: boolean, copies: boolean): L
   };
 }
 
-/** The same of blocks that were chosen together. */
-export function leavingTogether(runs: readonly Blockly.BlockSvg[][], copies: boolean): Leaving | null {
-  const states = runs.map(stateOfRun).filter((each) => each !== null);
+/** The same of blocks and notes that were chosen together. */
+export function leavingTogether(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[], copies: boolean): Leaving | null {
   const heads = runs.flatMap(([head]) => head ?? []);
-  const [first] = heads;
+  const first = heads[0] ?? notes[0];
   if (!first) return null;
+  const all = [...runs.flat(), ...notes];
   return {
-    copied: {nepStudio: 'blocks', states},
-    how: copies || !runs.flat().every((each) => each.isDeletable()) ? 'copied' : 'moved',
+    copied: copyOfAll(runs, notes),
+    how: copies || !all.every((each) => each.isDeletable()) ? 'copied' : 'moved',
     heads,
     place: first.getRelativeToSurfaceXY(),
-    isGone: () => runs.flat().some((each) => each.isDeadOrDying()),
-    remove: () => removeRuns(runs),
+    isGone: () => all.some((each) => each.isDeadOrDying()),
+    remove: () => removeAll(runs, notes),
   };
 }
 

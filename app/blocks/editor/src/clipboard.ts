@@ -4,7 +4,7 @@ import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import {freePlace, inSight, obstacles} from './free_place';
 import {focusedBlock} from './help';
-import {chosenWith, runsOf, selectionOf} from './selection';
+import {type Item, type Note, allChosenWith, chosenWith, notesChosenWith, removeChosenWith, runsOf, selectionOf} from './selection';
 import {type BlockState, unwrapUnknown, wrapUnknown} from './unknown_blocks';
 
 /** Every text of ours begins so; `app/ui/blockly/bridge.py` looks for it. */
@@ -15,13 +15,13 @@ export interface Copied {
   state: BlockState;
 }
 
-/** Several scripts, whose places beside each other stay. */
+/** Several scripts, and notes, whose places beside each other stay. */
 export interface CopiedBlocks {
   nepStudio: 'blocks';
   states: BlockState[];
+  notes?: BlockState[];
 }
 
-export type Item = Blockly.BlockSvg | Blockly.comments.RenderedWorkspaceComment;
 type Point = Blockly.utils.Coordinate;
 
 /** The computer's clipboard: the page itself may not read it. */
@@ -54,7 +54,7 @@ export class Clipboard {
   cut(item = focusedItem()): boolean {
     if (!item || item.workspace.isFlyout || !item.isDeletable() || !this.copy(item)) return false;
     if (item instanceof Blockly.BlockSvg) item.checkAndDelete();
-    else inOneStep(() => item.dispose());
+    else if (!removeChosenWith(item)) inOneStep(() => item.dispose());
     return true;
   }
 
@@ -97,12 +97,18 @@ export function stateOf(item: Item, stack = false): Copied | null {
   return data?.commentState ? {nepStudio: 'note', state: data.commentState as BlockState} : null;
 }
 
-/** The item, or all blocks that are chosen with it. */
+/** The item, or all that are chosen with it. */
 function copyOf(item: Item): Copied | CopiedBlocks | null {
-  const chosen = item instanceof Blockly.BlockSvg ? chosenWith(item) : [];
-  const [only, ...more] = runsOf(chosen).map(stateOfRun).filter((each) => each !== null);
-  if (!only) return stateOf(item);
-  return more.length ? {nepStudio: 'blocks', states: [only, ...more]} : {nepStudio: 'block', state: only};
+  if (!allChosenWith(item).length) return stateOf(item);
+  const copied = copyOfAll(runsOf(chosenWith(item)), notesChosenWith(item));
+  const [only, ...more] = copied.states;
+  return only && !more.length && !copied.notes ? {nepStudio: 'block', state: only} : copied;
+}
+
+export function copyOfAll(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[]): CopiedBlocks {
+  const states = runs.map(stateOfRun).filter((each) => each !== null);
+  const words = notes.map((each) => stateOf(each)?.state).filter((each) => each !== undefined);
+  return {nepStudio: 'blocks', states, ...(words.length && {notes: words})};
 }
 
 /** Blocks that hang below each other, without what hangs below them and is not chosen. */
@@ -123,10 +129,11 @@ function withoutPlace({x: _x, y: _y, ...rest}: BlockState): BlockState {
 function parse(text: string): Copied | CopiedBlocks | null {
   if (!text.startsWith(MARK)) return null;
   try {
-    const {nepStudio, state, states} = JSON.parse(text) as Copied & {states?: unknown};
+    const {nepStudio, state, states, notes} = JSON.parse(text) as Copied & {states?: unknown; notes?: unknown};
     if ((nepStudio as string) === 'blocks') {
       const good = (Array.isArray(states) ? states as unknown[] : []).filter(isBlock);
-      return good.length ? {nepStudio: 'blocks', states: good} : null;
+      const words = (Array.isArray(notes) ? notes as unknown[] : []).filter(isState);
+      return good.length || words.length ? {nepStudio: 'blocks', states: good, ...(words.length && {notes: words})} : null;
     }
     const isOne = ['block', 'note'].includes(nepStudio) && typeof state === 'object' && state !== null;
     return isOne && (nepStudio === 'note' || typeof state.type === 'string') ? {nepStudio, state} : null;
@@ -135,8 +142,12 @@ function parse(text: string): Copied | CopiedBlocks | null {
   }
 }
 
+function isState(state: unknown): state is BlockState {
+  return typeof state === 'object' && state !== null;
+}
+
 function isBlock(state: unknown): state is BlockState {
-  return typeof state === 'object' && state !== null && typeof (state as BlockState).type === 'string';
+  return isState(state) && typeof state.type === 'string';
 }
 
 function toCanvas(workspace: Blockly.WorkspaceSvg, {x, y}: {x: number; y: number}): Point {
@@ -184,13 +195,15 @@ export function add(copied: Copied | CopiedBlocks, workspace: Blockly.WorkspaceS
   });
   workspace.scroll(scrollX, scrollY);  // more on the canvas is no reason to move what is there
   if (made[0]) Blockly.getFocusManager().focusNode(made[0]);
-  if (made.length > 1) selectionOf(workspace)?.choose(made.flatMap(stackOf));
+  if (made.length > 1) selectionOf(workspace)?.choose(made.flatMap(allOf));
   return made;
 }
 
-function stackOf(top: Item): Blockly.BlockSvg[] {
+/** The note, or the blocks of the stack. */
+function allOf(top: Item): Item[] {
+  if (!(top instanceof Blockly.BlockSvg)) return [top];
   const blocks: Blockly.BlockSvg[] = [];
-  for (let each = top instanceof Blockly.BlockSvg ? top : null; each; each = each.getNextBlock()) blocks.push(each);
+  for (let each: Blockly.BlockSvg | null = top; each; each = each.getNextBlock()) blocks.push(each);
   return blocks;
 }
 
@@ -210,10 +223,11 @@ function layFree(made: Item[], wanted: Point): Item[] {
 
 function makeAll(copied: Copied | CopiedBlocks, workspace: Blockly.WorkspaceSvg, wanted: Point): Item[] {
   if (copied.nepStudio !== 'blocks') return [make(copied, workspace, wanted)];
-  return copied.states.map((state) => {
+  const each = (nepStudio: 'block' | 'note') => (state: BlockState) => {
     const place = new Blockly.utils.Coordinate(Number(state['x']) || 0, Number(state['y']) || 0);
-    return make({nepStudio: 'block', state}, workspace, place);
-  });
+    return make({nepStudio, state}, workspace, place);
+  };
+  return [...copied.states.map(each('block')), ...(copied.notes ?? []).map(each('note'))];
 }
 
 function make({nepStudio, state}: Copied, workspace: Blockly.WorkspaceSvg, {x, y}: Point): Item {

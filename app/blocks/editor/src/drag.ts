@@ -2,7 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {aimAtBackpack, isOverBackpack, isPacked, pack} from './backpack';
 import {Carried} from './carry';
-import {chosenWith, runsOf} from './selection';
+import {type Item, chosenWith, isNote, notesChosenWith, runsOf} from './selection';
 import {sheetOf} from './sheet';
 import {type Leaving, isOutside, leaving, leavingTogether} from './carrying';
 
@@ -45,7 +45,7 @@ class Dragger extends Blockly.dragging.Dragger {
   private placed = false;
   /** What had the keys on the canvas when a block was taken from the toolbox with them. */
   private meant: Blockly.IFocusableNode | null = null;
-  /** The other blocks that were chosen go along. */
+  /** The other blocks and notes that were chosen go along. */
   private carried: Carried | null = null;
 
   override onDragStart(event?: PointerEvent | KeyboardEvent): Blockly.IDraggable {
@@ -60,11 +60,12 @@ class Dragger extends Blockly.dragging.Dragger {
   }
 
   private takeChosen(): void {
-    const held = this.draggable instanceof Blockly.BlockSvg ? this.draggable : null;
+    const held: Item | null = this.draggable instanceof Blockly.BlockSvg || isNote(this.draggable) ? this.draggable : null;
     const chosen = chosenWith(held).filter((each) => each.isMovable());
-    if (!held || !chosen.length) return;
+    const notes = notesChosenWith(held).filter((each) => each.isMovable());
+    if (!held || !(chosen.length || notes.length)) return;
     if (!Blockly.Events.getGroup()) Blockly.Events.setGroup(true);
-    this.carried = new Carried(runsOf(chosen), held);
+    this.carried = new Carried(runsOf(chosen), notes, held);
     this.draggable = this.carried.head;
   }
 
@@ -166,7 +167,7 @@ class Dragger extends Blockly.dragging.Dragger {
 
   private leaving({ctrlKey, metaKey}: PointerEvent): Leaving | null {
     const copies = ctrlKey || metaKey;
-    return this.carried ? leavingTogether(this.carried.runs, copies) : leaving(this.draggable, this.cameFrom > 0, copies);
+    return this.carried ? leavingTogether(this.carried.runs, this.carried.notes, copies) : leaving(this.draggable, this.cameFrom > 0, copies);
   }
 
   private get listener(): DragListener | undefined {

@@ -1,8 +1,8 @@
-// A frame drawn on the canvas chooses the blocks that it touches: with Shift, or after a press of its button.
+// A frame drawn on the canvas chooses the blocks and notes that it touches: with Shift, or after a press of its button.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
 import {ctrl} from './keys';
-import {type Selection, areasOf, selectionOf} from './selection';
+import {type Item, type Selection, areasOf, isNote, selectionOf} from './selection';
 import {t} from './words';
 
 /** How near the edge of the canvas the view moves along, and how far a picture, in pixels. */
@@ -42,8 +42,8 @@ interface Drawing {
   mouse: {x: number; y: number};
   areas: ReturnType<typeof areasOf>;
   /** What was chosen before and stays: Ctrl or Shift adds. */
-  kept: Blockly.BlockSvg[];
-  found: Blockly.BlockSvg[];
+  kept: Item[];
+  found: Item[];
 }
 
 export class Frame {
@@ -74,7 +74,7 @@ export class Frame {
     this.workspace.hideChaff();
     Blockly.getFocusManager().focusNode(this.workspace);
     const mouse = {x: event.clientX, y: event.clientY};
-    const kept = event.shiftKey && !isArmed() || event.ctrlKey ? this.selection.blocks : [];
+    const kept = event.shiftKey && !isArmed() || event.ctrlKey ? this.selection.items : [];
     this.drawing = {pointer: event.pointerId, start: this.toCanvas(mouse), mouse, areas: areasOf(this.workspace), kept, found: []};
   }
 
@@ -127,7 +127,7 @@ export class Frame {
     const [left, right] = [Math.min(end.x, drawing.start.x), Math.max(end.x, drawing.start.x)];
     const [top, bottom] = [Math.min(end.y, drawing.start.y), Math.max(end.y, drawing.start.y)];
     drawing.found = drawing.areas.filter((area) => area.left < right && left < area.right && area.top < bottom && top < area.bottom)
-      .map((area) => area.block);
+      .map((area) => area.item);
     this.selection.show([...drawing.kept, ...drawing.found]);
   }
 
@@ -156,18 +156,18 @@ function isCanvas(target: EventTarget | null): boolean {
 
 const CHOOSE_ALL = 'nepChooseAll';
 
-/** All blocks of the shown behaviour: whole scripts, but for values that are inside of others. */
+/** All blocks and notes of the shown behaviour: whole scripts, but for values that are inside of others. */
 export function chooseAll(workspace: Blockly.WorkspaceSvg): void {
-  const blocks: Blockly.BlockSvg[] = [];
+  const items: Item[] = workspace.getTopComments().filter(isNote);
   for (const top of workspace.getTopBlocks(true)) {
-    for (let each: Blockly.BlockSvg | null = top; each; each = each.getNextBlock()) blocks.push(each);
+    for (let each: Blockly.BlockSvg | null = top; each; each = each.getNextBlock()) items.push(each);
   }
-  selectionOf(workspace)?.choose(blocks);
+  selectionOf(workspace)?.choose(items);
 }
 
 export function registerChooseAll(): void {
   Blockly.ShortcutRegistry.registry.register({
-    name: CHOOSE_ALL, keyCodes: [ctrl(Blockly.utils.KeyCodes.A)], displayText: () => t('Choose all blocks'),
+    name: CHOOSE_ALL, keyCodes: [ctrl(Blockly.utils.KeyCodes.A)], displayText: () => t('Choose all blocks and notes'),
     preconditionFn: (workspace) => !workspace.isDragging() && !Blockly.getFocusManager().ephemeralFocusTaken(),
     callback: (_workspace, event) => {
       event.preventDefault();

@@ -3,6 +3,7 @@
 // `app/ui/shell/actions/shortcuts.py` lists them for people.
 import * as Blockly from 'blockly/core';
 import type {Clipboard} from './clipboard';
+import {deleteByKey} from './selection';
 import {lazy, t} from './words';
 
 const {names} = Blockly.ShortcutItems;
@@ -108,6 +109,13 @@ export function useOwnKeys(): void {
   for (const [name, keys] of Object.entries(KEYS)) {
     give(name, keys, name === names.DISCONNECT ? {callback: takeOut} : {});
   }
+  const {callback} = registry.getRegistry()[names.DELETE]!;
+  give(names.DELETE, registry.getKeyCodesByShortcutName(names.DELETE), {
+    callback: (workspace, event, ...more) => {
+      event.preventDefault();
+      return deleteByKey() || (callback?.(workspace, event, ...more) ?? false);
+    },
+  });
   for (const [key, commands] of Object.entries(registry.getKeyMap())) {
     if (!isTyped(key)) continue;
     for (const name of commands) {

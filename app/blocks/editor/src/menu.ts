@@ -12,7 +12,7 @@ import {ctrl, keyWords} from './keys';
 import {hiddenIn, leadTo} from './inside_marks';
 import {addCanvasNote, addNote, hasNote, removeNote} from './notes';
 import {registerRemoveMenu} from './remove_menu';
-import {chosenWith, countIn} from './selection';
+import {allChosenWith, chosenWith, countIn, notesChosenWith, removeChosenWith} from './selection';
 import {lazy, t} from './words';
 
 const {names} = Blockly.ShortcutItems;
@@ -158,8 +158,9 @@ export function registerMenu(clipboard: Clipboard): void {
   });
 
   registerChooseAll();
-  add(ScopeType.WORKSPACE, {id: 'nepChooseAll', weight: 12, icon: 'square-dashed-mouse-pointer', words: t('Choose all blocks'),
-    shortcut: CHOOSE_ALL_SHORTCUT, when: ({workspace}) => (workspace?.getTopBlocks(false).length ?? 0) > 0,
+  add(ScopeType.WORKSPACE, {id: 'nepChooseAll', weight: 12, icon: 'square-dashed-mouse-pointer', words: t('Choose all'),
+    shortcut: CHOOSE_ALL_SHORTCUT,
+    when: ({workspace}) => (workspace ? workspace.getTopBlocks(false).length + workspace.getTopComments().length : 0) > 0,
     run: ({workspace}) => workspace && chooseAll(workspace)});
   add(ScopeType.WORKSPACE, {id: 'nepPasteHere', weight: 10, icon: 'clipboard-paste', words: t('Paste'),
     shortcut: names.PASTE, when: () => true, run: (_it, place) => clipboard.paste(place)});
@@ -174,8 +175,9 @@ export function registerMenu(clipboard: Clipboard): void {
     when: () => true, run: (it) => clipboard.duplicate(it.comment)});
   note({id: 'nepNoteCopy', weight: 11, icon: 'copy', words: t('Copy'), shortcut: names.COPY,
     when: () => true, run: (it) => clipboard.copy(it.comment)});
-  note({id: 'nepNoteDelete', weight: 99, icon: 'trash-2', words: t('Remove the note'), shortcut: names.DELETE,
-    when: () => true, run: (it) => it.comment && step(() => it.comment!.dispose())});
+  note({id: 'nepNoteDelete', weight: 99, icon: 'trash-2', shortcut: names.DELETE,
+    words: (it) => allChosenWith(it.comment).length ? t('Delete all that is chosen') : t('Remove the note'),
+    when: () => true, run: (it) => it.comment && !removeChosenWith(it.comment) && step(() => it.comment!.dispose())});
 }
 
 /** The shortcut that puts blocks into the backpack. */
@@ -237,6 +239,7 @@ function step(change: () => void): void {
 }
 
 function deleteWords(block: Blockly.BlockSvg): string {
+  if (notesChosenWith(block).length) return t('Delete all that is chosen');
   const count = countIn(all(block));
   return count === 1 ? Blockly.Msg['DELETE_BLOCK'] ?? '' :
     (Blockly.Msg['DELETE_X_BLOCKS'] ?? '').replace('%1', String(count));
@@ -291,7 +294,7 @@ function withoutSpareLines(options: Option[]): Option[] {
 const registryOf = Blockly.ContextMenuRegistry.prototype;
 const optionsOf = registryOf.getContextMenuOptions;
 registryOf.getContextMenuOptions = function (scope, event) {
-  const several = chosenWith(scope.block as Blockly.BlockSvg | undefined).length > 0;
+  const several = allChosenWith(scope.block as Blockly.BlockSvg | undefined).length > 0;
   const options = optionsOf.call(this, scope, event).filter((each) => each.separator || !several || FOR_SEVERAL.has(each.id));
   for (const each of options) {
     if (each.separator || typeof each.text !== 'string') continue;
