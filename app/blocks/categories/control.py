@@ -111,8 +111,10 @@ CATEGORY = Category(
             style="control",
             icon="split",
             tooltip="Runs the blocks inside only if this is so.",
+            help="The plus adds “else”, then “else if”; the minus beside a branch takes it away.",
             python="if %CONDITION:\n    %BODY",
             arguments=(_CONDITION, _BODY),
+            mutator="branches",
             words="if then, then, condition, when, check, decide, test, case, choose, branch, whether",
         ),
         Block(
@@ -122,8 +124,10 @@ CATEGORY = Category(
             style="control",
             icon="split",
             tooltip="Runs the first blocks if this is so, the others if not.",
+            help="The plus adds “else if”; the first branch whose condition is so runs, and no other.",
             python="if %CONDITION:\n    %BODY\nelse:\n    %ELSE",
             arguments=(_CONDITION, _BODY, StatementInput("ELSE")),
+            mutator="branches",
             words="if then else, then, otherwise, condition, decide, check, choose, branch, or else",
         ),
         Block(

@@ -92,7 +92,7 @@ class ConflictFinder:
             if found is not None:
                 used.append(UsedPart(placed, *found, when, endless))
                 when = max(when, LATER)  # it takes its time
-            is_condition = placed.type in _CONDITIONS
+            is_condition = placed.type.partition(":")[0] in _CONDITIONS
             loops = endless or placed.type in _ENDLESS
             for inner in placed.inputs.values():
                 inside, after = self._used(inner, PERHAPS if is_condition else when, endless=loops, deep=deep)

@@ -1,4 +1,4 @@
-"""Lowering: lists of n items and calls of functions, whose gaps people made, become plain blocks.
+"""Lowering: lists of n items, ifs of n branches and calls of functions, whose gaps people made, become plain blocks.
 
 A workspace is rewritten once before it is compiled: each such block gets a type of its own, which the
 catalogue then describes like any other block.
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from app.blocks.model.block import Block
 from app.blocks.model.fields import Argument, ValueInput
-from app.blocks.model.mutators import FunctionInput, Inputs, Items, inputs_of, name_of
+from app.blocks.model.mutators import Branches, FunctionInput, Inputs, Items, inputs_of, name_of
 from app.blocks.model.names import Names
 from app.blocks.model.workspace import Placed, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
@@ -79,6 +79,8 @@ class Lowering:
             return placed
         if block.mutator == "items":
             return self._listed(placed, block)
+        if block.mutator == "branches":
+            return self._branched(placed, block)
         return self._call(placed, block) if block.mutator == "call" else self._defined(placed, block)
 
     def _listed(self, placed: Placed, block: Block) -> Placed:
@@ -92,6 +94,26 @@ class Lowering:
             text=block.text.replace(hole, " ".join(holes)),
             python=str(block.python).replace(hole, ", ".join(holes)),
             arguments=gaps,
+        )
+        return self._as(placed, made)
+
+    def _branched(self, placed: Placed, block: Block) -> Placed:
+        """“if … else if … else …” as its plus and minus have made it."""
+        branches = Branches.of(placed.extra, has_else=block.argument("ELSE") is not None)
+        text, python = block.text.partition("%BODY")[0] + "%BODY", "if %CONDITION:\n    %BODY"
+        for number in range(1, branches.else_ifs + 1):
+            text += f" {_('else if')} %CONDITION{number} %BODY{number}"
+            python += f"\nelif %CONDITION{number}:\n    %BODY{number}"
+        if branches.has_else:
+            text += f" {_('else')} %ELSE"
+            python += "\nelse:\n    %ELSE"
+        first = tuple(each for each in block.arguments if each.name in ("CONDITION", "BODY"))
+        made = replace(
+            block,
+            type=f"{block.type}:{branches.else_ifs}{'+' if branches.has_else else ''}",
+            text=text,
+            python=python,
+            arguments=(*first, *branches.arguments()),
         )
         return self._as(placed, made)
 

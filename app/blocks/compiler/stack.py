@@ -63,6 +63,15 @@ class Stack:
         found = self.state if self.state is not None else self._found(behaviour)
         return str(found.get("type")) if found is not None else ""
 
+    def variable_in(self, behaviour: Saved) -> str | None:
+        """The id of the variable whose value it is, and nothing else; None for all others."""
+        found = self.state if self.state is not None else self._found(behaviour)
+        if not self.is_value or found is None or found.get("type") != "variables_get":
+            return None
+        fields = found.get("fields")
+        chosen = fields.get("VAR") if isinstance(fields, Mapping) else None
+        return str(chosen.get("id")) if isinstance(chosen, Mapping) else None
+
     def _found(self, workspace: Saved) -> dict[str, object] | None:
         return next((block for block in saved_blocks(workspace) if block.get("id") == self.id), None)
 

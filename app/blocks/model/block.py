@@ -56,7 +56,7 @@ class Block:
     needs_message: bool = False  # reads the message that started its script
     publishes: bool = False  # its topics are published on, not listened to
     python_in_function: str = ""  # its Python inside a function, when that differs
-    mutator: str = ""  # how the editor lets people change its gaps: "items", "function", "call"
+    mutator: str = ""  # how the editor lets people change its gaps: "items", "branches", "function", "call"
     extra: Mapping[str, object] = field(default_factory=dict)  # what the editor keeps of that, in the toolbox
     needs_function: str = ""  # stands only inside a function: "result" or "plain" ones
     calls: bool = False  # runs blocks of another place

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from app.blocks.model.fields import Argument, Say, ValueInput, VariableField
+from app.blocks.model.fields import Argument, Say, StatementInput, ValueInput, VariableField
 from app.blocks.model.workspace import Placed
 
 MOST_ITEMS = 50
 MOST_INPUTS = 12
+MOST_ELSE_IFS = 20
 LONGEST_NAME = 60
 
 
@@ -44,6 +45,29 @@ class Items(Argument):
         sound = isinstance(count, int) and not isinstance(count, bool)
         many = min(max(int(count), 0), MOST_ITEMS) if sound and isinstance(count, int) else self.count
         return tuple(ValueInput(f"{self.name}{number}") for number in range(many))
+
+
+@dataclass(frozen=True)
+class Branches:
+    """What an *if* has besides its first branch: so many “else if”, and whether an “else”."""
+
+    else_ifs: int = 0
+    has_else: bool = False
+
+    @classmethod
+    def of(cls, extra: Mapping[str, object], *, has_else: bool) -> Branches:
+        """What a block says; one that says nothing has no “else if”, and an “else” as its kind has."""
+        count, told = extra.get("elseIfs"), extra.get("else")
+        sound = isinstance(count, int) and not isinstance(count, bool)
+        many = min(max(int(count), 0), MOST_ELSE_IFS) if sound and isinstance(count, int) else 0
+        return cls(many, told if isinstance(told, bool) else has_else)
+
+    def arguments(self) -> tuple[Argument, ...]:
+        """The gaps and mouths of these branches, in their order."""
+        found: list[Argument] = []
+        for number in range(1, self.else_ifs + 1):
+            found += [ValueInput(f"CONDITION{number}", "Boolean"), StatementInput(f"BODY{number}")]
+        return (*found, StatementInput("ELSE")) if self.has_else else tuple(found)
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,7 @@ class Program:
     labels: Mapping[str, str] = field(default_factory=dict)
     variables: tuple[Variable, ...] = ()
     breakpoints: tuple[str, ...] = ()  # the blocks before which it pauses
+    shows_value: bool = False  # it is a value that a person tries: what it writes is said as people read it
     problems: tuple[Problem, ...] = ()
     starts: int = 0  # how many scripts something can start
     absent: tuple[str, ...] = ()  # the blocks of robots that are not connected, whether they would run or not
@@ -101,6 +102,7 @@ class Program:
             labels=_table(saved["labels"]),
             variables=_variables(saved.get("variables", ())),
             breakpoints=_texts(saved.get("breakpoints", ())),
+            shows_value=saved.get("shows_value") is True,
         )
 
 

@@ -244,6 +244,8 @@ class Run:
 
     def _begin(self, network: Network) -> None:
         names = self._runtime.namespace() | {"step": partial(self._step, network)}
+        if self._program.shows_value:
+            names["write"] = self._runtime.show
         self._variables = VariableWatch(names, self._program.variables)
         code = compile(self._program.runnable, "<behaviour>", "exec")
         exec(code, names)  # noqa: S102 (the compiler's own tree: no text of a file is in it but as a literal)

@@ -22,6 +22,7 @@ from app.blocks.runtime.questions import Asked, Questions
 from app.blocks.runtime.robot_handle import Replacements, RobotHandle, StatusText
 from app.blocks.runtime.scheduler import EndScript, Scheduler, Stopped
 from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
+from app.blocks.runtime.variables import brief_words
 from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
 
@@ -267,6 +268,10 @@ class Runtime:
     def write(self, value: object) -> None:
         """Write a line to the console."""
         self._printed(values.text(value))
+
+    def show(self, value: object) -> None:
+        """Write a value that a person tries: short, and as people say it; nothing while it is not known."""
+        self._printed("" if value is None else brief_words(value))
 
     # ---- questions
 

@@ -132,6 +132,11 @@ def brief(id: str, value: object) -> VariableValue:
     return VariableValue(id, kind, words(value, LONGEST_TEXT))
 
 
+def brief_words(value: object) -> str:
+    """A value as a person reads it: in short, yes and no."""
+    return words(value, LONGEST_TEXT)
+
+
 def words(value: object, most: int) -> str:
     """A value as text of so many characters at most; no part of it is read that is not shown."""
     if isinstance(value, str):
@@ -148,6 +153,8 @@ def words(value: object, most: int) -> str:
             if left < 0:
                 break
         return _cut("".join(parts), most)
+    if isinstance(value, bool):
+        return _("yes") if value else _("no")
     return _cut(values.text(value), most)
 
 

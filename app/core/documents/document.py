@@ -298,7 +298,8 @@ class Document:
         made = deep_json.deeply(lambda: stack.workspace(self.workspace))
         if made is None:
             return None
-        return _compile(WorkspaceJson.of(made), self._connected, self.absent, self.name)
+        program = _compile(WorkspaceJson.of(made), self._connected, self.absent, self.name)
+        return replace(program, shows_value=stack.is_value)
 
     def newest(self) -> Program | None:
         """The program of the newest edit that is compiled; a long one is compiled beside the window.

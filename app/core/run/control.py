@@ -27,7 +27,7 @@ from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.program_robots import ProgramRobots, owners_of
 from app.core.run.run_warnings import RunWarnings
 from app.core.run.runner import Runner, RunnerEvent
-from app.core.run.trial import Trial
+from app.core.run.trial import Trial, TriedValue
 from app.core.run.view import (
     STOP_AGAIN,
     RunState,
@@ -130,7 +130,7 @@ class Runs:
         return self._run.state in {"running", "paused"}
 
     @property
-    def tried_value(self) -> tuple[str, str] | None:
+    def tried_value(self) -> TriedValue | None:
         """The block that was tried last, and the value that it had."""
         return self._trial.value
 
@@ -191,10 +191,20 @@ class Runs:
 
     def try_stack(self, stack: Stack) -> None:
         """Run one stack of the behaviour that shows, at once; what runs is stopped first."""
+        variable = stack.variable_in(self._documents.current.workspace)
+        if variable is not None:
+            self._show_variable(stack, variable)
+            return
         wanted, run = Wanted(self._documents.current, stack=stack), self._run
         again = self.active and self._now == wanted
         if not again or self._clock() - run.started_s >= PRESSED_TWICE_S:
             self._want(wanted)
+
+    def _show_variable(self, stack: Stack, id: str) -> None:
+        """A variable is what the run gave it, now or at its end: a program of its own would know nothing of it."""
+        document = self._documents.current
+        value = self.values.get(id) if self.document is document else None
+        self._trial.show(document, stack, value.text if value is not None else _("no value yet"))
 
     def concerns(self, document: Document) -> bool:
         """Whether this behaviour runs, or is to run once what runs has been stopped."""
@@ -386,6 +396,7 @@ class Runs:
 
     def _begin(self, wanted: Wanted) -> None:
         document, self._now = wanted.document, wanted
+        same = self.document is document
         self.document = document
         self._trial.begin(wanted)
         self._alerts.resolve("program")
@@ -428,7 +439,8 @@ class Runs:
         self._breakpoints = program.breakpoints
         self.kept, self._program_key = frozenset(program.robots), runner.program_key
         self._variables = {variable.id: variable for variable in program.variables}
-        self._show_values({})
+        if wanted.stack is None or not same:
+            self._show_values({})  # what is tried leaves the other variables as they are
         self._console.leave_out(runner.pid)
         self._edits.ran(document if wanted.stack is None else None, program)
         trying = self._trial.start(program, used)

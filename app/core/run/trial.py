@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
+from dataclasses import dataclass
 
+from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program
+from app.core.documents.document import Document
 from app.core.run.wanted import Wanted
 from app.robots.description.description import Robot
 from nep.i18n import _
+
+
+@dataclass(frozen=True, slots=True)
+class TriedValue:
+    """What a value that was tried is, in words: of which block of which behaviour; the ``number`` of the try."""
+
+    document: Document
+    block: str
+    words: str
+    number: int
 
 
 class Trial:
     """What is known of the stack that is tried, or was tried last; of a whole behaviour nothing."""
 
     def __init__(self) -> None:
-        self.value: tuple[str, str] | None = None
-        """The block that was tried and the value it had, with its unit."""
+        self.value: TriedValue | None = None
+        self._tries = itertools.count(1)
         self._wanted: Wanted | None = None
         self._unit = ""
 
@@ -36,5 +50,9 @@ class Trial:
         if wanted is None or wanted.stack is None or not wanted.gives_value:
             return None
         words = f"{line} {self._unit}".strip() if line else _("not known yet")
-        self.value = (wanted.stack.id, words)
+        self.show(wanted.document, wanted.stack, words)
         return words
+
+    def show(self, document: Document, stack: Stack, words: str) -> None:
+        """This is the value of the block."""
+        self.value = TriedValue(document, stack.id, words, next(self._tries))

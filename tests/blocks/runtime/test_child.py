@@ -6,6 +6,7 @@ import io
 import json
 import queue
 import threading
+from dataclasses import replace
 
 import pytest
 
@@ -145,6 +146,18 @@ def test_a_breakpoint_pauses_before_its_block_and_going_on_passes_it(running, ma
     assert running.until("ended")["ok"] is True
     assert {"is": "print", "text": "three"} in running.said
     assert len([each for each in running.said if each["is"] == "paused"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("shown", "written"),
+    [(block("values_compare", A=number(2), B=number(1)), "no"), (text("true"), "true"), (number(2), "2")],
+)
+def test_a_value_that_is_tried_is_said_as_people_say_it(running, master, shown, written):
+    saved = workspace(started(write(shown)))
+    program = replace(compile_behaviour(saved, []), shows_value=True)
+    running.order(do="start", program=program.to_json(), robots=[], master=master.address)
+    assert running.until("print")["text"] == written
+    running.until("ended")
 
 
 def test_a_breakpoint_that_is_set_or_cleared_while_it_runs_counts_at_once(running, master):

@@ -13,6 +13,7 @@ import pytest
 
 from app.blocks import compile_behaviour
 from app.blocks.compiler.stack import Stack
+from app.blocks.runtime.variables import VariableValue
 from app.core.run.runner import Runner, RunnerEvent
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -309,6 +310,27 @@ def test_a_stack_is_tried_alone_and_never_beside_another_program(run: Run) -> No
     tick_until(run.session, lambda: runs.view().state == "proven")
     view = runs.view()
     assert (view.title, view.detail) == ("Tried “change by”", "It came to its end")
+
+
+def test_a_variable_that_is_tried_is_what_the_run_gave_it_and_stops_nothing(run: Run) -> None:
+    runs = run.session.runs
+    run.session.document.edited(endless())
+    tried = Stack("toolbox", "value", block("variables_get", VAR={"id": "n"}))
+
+    def words() -> str:
+        runs.try_stack(tried)
+        assert runs.tried_value is not None
+        return runs.tried_value.words
+
+    assert words() == "no value yet"
+    assert not runs.active
+    runs.run()
+    run.works("c")
+    first = runs._runner
+    runs._show_values({"n": VariableValue("n", "boolean", "yes")})
+    assert words() == "yes"
+    assert runs._runner is first
+    assert runs.active
 
 
 def test_stop_ends_a_try(run: Run) -> None:

@@ -135,7 +135,7 @@ def test_another_behaviour_shows_nothing_of_the_run(panel, window) -> None:
 
 @pytest.mark.parametrize(
     ("value", "words"),
-    [([], "empty"), (["x"], "1 item: x"), (None, "not known"), ("", ""), (True, "true"), ("a\nb", "a b")],
+    [([], "empty"), (["x"], "1 item: x"), (None, "not known"), ("", ""), (True, "yes"), ("a\nb", "a b")],
 )
 def test_a_value_in_the_words_of_a_row(value: object, words: str) -> None:
     (row,) = rows_of([Variable("v", "v", "v")], {"v": brief("v", value)}, (), Order())

@@ -62,6 +62,8 @@ export function trimMenu(language: string): void {
   }
   menuIcon('nepHelp', 'circle-question-mark');
   menuIcon('nepRemoveItem', 'list-minus');
+  menuIcon('nepAddElseIf', 'split');
+  menuIcon('nepAddElse', 'split');
   // Nothing asks: deleting can be undone.
   Blockly.dialog.setConfirm((_message, callback) => callback(true));
   // Blockly's own words stay where nobody has translated ours.

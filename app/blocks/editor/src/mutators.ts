@@ -1,6 +1,7 @@
-// Blocks whose gaps people make themselves: items of a list, inputs of a function.
+// Blocks whose gaps people make themselves: items of a list, branches of an "if", inputs of a function.
 import * as Blockly from 'blockly/core';
 import {FieldButton} from './fields';
+import {freePlace, inSight, obstacles} from './free_place';
 import {t} from './words';
 
 const MOST_ITEMS = 50;
@@ -71,6 +72,113 @@ function startItems(this: ItemsBlock): void {
   if (recording) Blockly.Events.disable();
   this.showItems(3);
   if (recording) Blockly.Events.enable();
+}
+
+// ---- the branches of an "if"
+
+const MOST_ELSE_IFS = 20;
+
+interface BranchesBlock extends Blockly.Block {
+  elseIfs: number;
+  hasElse: boolean;
+  /** How it is without another branch: nothing is kept in the file then. */
+  beginsWithElse: boolean;
+  showBranches(elseIfs: number, hasElse: boolean): void;
+}
+
+const BRANCHES = {
+  saveExtraState(this: BranchesBlock) {
+    return this.elseIfs || this.hasElse !== this.beginsWithElse ? {elseIfs: this.elseIfs, else: this.hasElse} : null;
+  },
+  loadExtraState(this: BranchesBlock, state: {elseIfs?: unknown; else?: unknown} | null) {
+    const count = state?.elseIfs;
+    this.showBranches(typeof count === 'number' && Number.isInteger(count) ? count : 0,
+      typeof state?.else === 'boolean' ? state.else : this.beginsWithElse);
+  },
+  showBranches(this: BranchesBlock, elseIfs: number, hasElse: boolean) {
+    const wanted = Math.min(Math.max(elseIfs, 0), MOST_ELSE_IFS);
+    for (let number = this.elseIfs; number > wanted; number -= 1) {
+      for (const name of ['CONDITION', 'LESS', 'BODY']) this.removeInput(`${name}${number}`);
+    }
+    for (let number = this.elseIfs + 1; number <= wanted; number += 1) {
+      this.appendValueInput(`CONDITION${number}`).setCheck('Boolean').appendField(t('else if'));
+      this.appendDummyInput(`LESS${number}`).appendField(lessButton(this, number));
+      this.appendStatementInput(`BODY${number}`);
+      if (this.hasElse) for (const name of ['CONDITION', 'LESS', 'BODY']) this.moveInputBefore(`${name}${number}`, 'LESS_ELSE');
+    }
+    this.elseIfs = wanted;
+    if (hasElse === this.hasElse) return;
+    this.hasElse = hasElse;
+    if (hasElse) {
+      this.appendDummyInput('LESS_ELSE').appendField(t('else')).appendField(lessButton(this, 0));
+      this.appendStatementInput('ELSE');
+    } else {
+      this.removeInput('LESS_ELSE');
+      this.removeInput('ELSE');
+    }
+  },
+};
+
+function lessButton(block: BranchesBlock, number: number): FieldButton {
+  return new FieldButton('minus', t('take this branch away'), () => removeBranch(block, number));
+}
+
+function startBranches(this: BranchesBlock): void {
+  this.elseIfs = 0;
+  this.hasElse = this.beginsWithElse = this.getInput('ELSE') !== null;
+  this.appendDummyInput('MORE').appendField(new FieldButton('plus', t('add another branch'), () => addBranch(this)));
+  this.moveInputBefore('MORE', 'BODY');
+  const row = this.inputList[this.inputList.findIndex((each) => each.name === 'ELSE') - 1];
+  if (!this.hasElse || !row) return;
+  row.name = 'LESS_ELSE';
+  row.appendField(lessButton(this, 0));
+}
+
+/** First an "else", then an "else if" above it. */
+export function addBranch(block: BranchesBlock, elseIf = block.hasElse): void {
+  reshape(block, () => block.showBranches(block.elseIfs + (elseIf ? 1 : 0), block.hasElse || !elseIf));
+}
+
+/** Takes the "else if" of that number away, 0: the "else". What was in it lies free. */
+function removeBranch(block: BranchesBlock, number: number): void {
+  reshape(block, () => {
+    const inside = (name: string) => block.getInput(name)?.connection?.targetBlock() ?? null;
+    const freed: Blockly.Block[] = [];
+    for (const name of number ? [`CONDITION${number}`, `BODY${number}`] : ['ELSE']) {
+      const held = inside(name);
+      held?.unplug(false);
+      if (held?.isShadow()) held.dispose(false);
+      else if (held) freed.push(held);
+    }
+    // The branches below move up.
+    for (let next = number + 1; number && next <= block.elseIfs; next += 1) {
+      for (const name of ['CONDITION', 'BODY']) {
+        const moved = inside(`${name}${next}`);
+        const own = moved?.outputConnection ?? moved?.previousConnection;
+        moved?.unplug(false);
+        if (own) block.getInput(`${name}${next - 1}`)?.connection?.connect(own);
+      }
+    }
+    block.showBranches(block.elseIfs - (number ? 1 : 0), block.hasElse && number > 0);
+    if (block instanceof Blockly.BlockSvg) for (const each of freed) layBeside(each as Blockly.BlockSvg, block);
+  });
+}
+
+/** Where it can be seen and covers nothing. */
+function layBeside(freed: Blockly.BlockSvg, block: Blockly.BlockSvg): void {
+  const {workspace} = block;
+  Blockly.renderManagement.triggerQueuedRenders(workspace);
+  const {right} = block.getRootBlock().getBoundingRectangle();
+  const {width, height} = freed.getHeightWidth();
+  const wanted = new Blockly.utils.Coordinate(right, freed.getRelativeToSurfaceXY().y);
+  const place = freePlace(wanted, {width, height}, obstacles(workspace, new Set([freed])), inSight(workspace));
+  const {x, y} = freed.getRelativeToSurfaceXY();
+  freed.moveBy(place.x - x, place.y - y);
+}
+
+/** An "if" that has branches; null: it is another block. */
+export function branchesOf(block: Blockly.Block | undefined): BranchesBlock | null {
+  return block && 'showBranches' in block ? block as BranchesBlock : null;
 }
 
 // ---- a function
@@ -246,5 +354,6 @@ export class FieldFunctionInput extends Blockly.FieldLabelSerializable {
 
 Blockly.fieldRegistry.register('field_function_input', FieldFunctionInput);
 Blockly.Extensions.registerMutator('nep_items', ITEMS, startItems);
+Blockly.Extensions.registerMutator('nep_branches', BRANCHES, startBranches);
 Blockly.Extensions.registerMutator('nep_function', FUNCTION, startFunction);
 Blockly.Extensions.registerMutator('nep_call', CALL, startCall);

@@ -2,8 +2,8 @@
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import {definitionOf} from './definitions';
-import {DEFINITIONS, type DefinitionBlock, MOST_INPUTS, changeInputs} from './mutators';
-import {t} from './words';
+import {DEFINITIONS, type DefinitionBlock, MOST_INPUTS, addBranch, branchesOf, changeInputs} from './mutators';
+import {lazy, t} from './words';
 
 interface Item {
   list: Blockly.BlockSvg;
@@ -90,6 +90,20 @@ export function registerRemoveMenu(): void {
     },
     callback: () => found && removeItem(found),
   });
+  for (const [id, isElseIf, words] of [['nepAddElseIf', true, lazy('Add “else if”')], ['nepAddElse', false, lazy('Add “else”')]] as const) {
+    Blockly.ContextMenuRegistry.registry.register({
+      id, weight: isElseIf ? 81.2 : 81.4, scopeType,
+      displayText: () => t(words),
+      preconditionFn: ({block}) => {
+        const branches = block && !block.isInFlyout && !block.isCollapsed() ? branchesOf(block) : null;
+        return branches && (isElseIf || !branches.hasElse) ? 'enabled' : 'hidden';
+      },
+      callback: ({block}) => {
+        const branches = branchesOf(block);
+        if (branches) addBranch(branches, isElseIf);
+      },
+    });
+  }
   for (let place = 0; place < MOST_INPUTS; place += 1) {
     const inputOf = (block?: Blockly.BlockSvg) =>
       block && DEFINITIONS.includes(block.type) && !block.isInFlyout ? (block as unknown as DefinitionBlock).own[place] : undefined;

@@ -120,6 +120,11 @@ function hasInput(state: BlockState, definition: BlockDefinition, name: string):
   if (inputKinds(definition).has(name)) return true;
   const extra = (state.extraState ?? {}) as {items?: unknown; inputs?: unknown};
   if (definition.mutator === 'nep_call') return readInputs(extra.inputs).some((each) => name === `IN_${each.id}`);
+  if (definition.mutator === 'nep_branches') {
+    const {elseIfs, else: hasElse} = extra as {elseIfs?: unknown; else?: unknown};
+    const branch = /^(?:CONDITION|BODY)([1-9]\d?)$/.exec(name)?.[1];
+    return name === 'ELSE' ? hasElse === true : branch !== undefined && typeof elseIfs === 'number' && Number(branch) <= Math.min(20, elseIfs);
+  }
   const number = /^ITEM(\d{1,3})$/.exec(name)?.[1];
   return definition.mutator === 'nep_items' && number !== undefined &&
     Number(number) < Math.min(50, typeof extra.items === 'number' ? extra.items : 3);

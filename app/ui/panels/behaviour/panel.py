@@ -172,8 +172,9 @@ class BehaviourPanel(PanelWidget):
             self.editor.mark_stopped(runs.stopped_blocks if mine else ())
             self.editor.set_errors(runs.block_errors if mine else {})
             self.editor.set_warnings(runs.block_warnings if mine else {})
-        if self._new("tried", runs.tried_value) and runs.tried_value is not None and mine:
-            self.editor.show_value(*runs.tried_value)
+        tried = runs.tried_value
+        if self._new("tried", tried) and tried is not None and tried.document is document:
+            self.editor.show_value(tried.block, tried.words)
         alarms = alarms_of(self.session.fleet.links)
         if self._new("alarms", alarms):
             self.editor.set_alarms(alarms)

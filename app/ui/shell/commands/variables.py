@@ -176,10 +176,13 @@ def _names(field: object, id: str) -> bool:
 
 
 def value_of(words: str) -> str | float | bool:
-    """What a person typed: a number where it is one, “true” and “false”, else the text."""
+    """What a person typed: a number where it is one, yes or no (also “true”, “false”), else the text."""
     plain = words.strip()
-    if plain.casefold() in ("true", "false"):
-        return plain.casefold() == "true"
+    said = plain.casefold()
+    if said in ("true", _("yes").casefold()):
+        return True
+    if said in ("false", _("no").casefold()):
+        return False
     try:
         return int(plain)
     except ValueError:

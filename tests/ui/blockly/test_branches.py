@@ -1,0 +1,126 @@
+"""An *if* gets and loses “else if” and “else” by its plus and minus, its menu, and by keys."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+
+from app.blocks import editor_definitions
+from app.blocks.compiler.compiler import compile_behaviour
+from app.ui.blockly.view import BlocklyView
+from tests.blocks.samples import block, boolean, started, text, workspace, write
+from tests.ui.blockly.test_block_menu import choose, looked_at, open_menu
+from tests.ui.blockly_person import WAIT_MS, Person, editor
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+BUTTONS = "document.querySelectorAll('[data-id=if] > .nepButton').length"
+
+
+@pytest.fixture
+def view(qtbot) -> BlocklyView:
+    return editor(qtbot, editor_definitions([]))
+
+
+def choice(extra: dict | None = None, kind: str = "control_if", **parts: object) -> dict:
+    made = block(kind, "if", CONDITION=boolean(True), BODY=[write(text("first"))], **parts)
+    return workspace(started(made | ({"extraState": extra} if extra else {})) | {"x": 40, "y": 40})
+
+
+def full() -> dict:
+    return choice(
+        {"elseIfs": 2, "else": True},
+        CONDITION1=boolean(False) | {"id": "c1"},
+        BODY1=[write(text("second")) | {"id": "b1"}],
+        CONDITION2=boolean(True) | {"id": "c2"},
+        BODY2=[write(text("third")) | {"id": "b2"}],
+        ELSE=[write(text("none")) | {"id": "last"}],
+    )
+
+
+def the_if(them: Person) -> dict:
+    return dict(them.tops()[0]["next"]["block"])
+
+
+def shape(them: Person) -> object:
+    return the_if(them).get("extraState")
+
+
+def press_button(them: Person, number: int) -> None:
+    """Press the button of that place: the plus is the first, then a minus for each branch."""
+    them.ask("document.querySelector('[data-test=button]')?.removeAttribute('data-test')")
+    script = f"[...document.querySelectorAll('[data-id=if] > .nepButton')].sort((a, b) => (r => r(a) - r(b))(e => e.getBoundingClientRect().top))[{number}]"
+    them.ask(f"{script}.setAttribute('data-test', 'button')")
+    them.click("[data-test=button]", dx=9, dy=9)
+
+
+def test_a_file_with_branches_comes_back_as_it_was_and_an_old_one_too(person):
+    them: Person = person(state=full())
+    assert the_if(them) == full()["blocks"]["blocks"][0]["next"]["block"] | the_if(them)
+    assert {"CONDITION2", "BODY2", "ELSE"} <= set(the_if(them)["inputs"])
+    looked_at(them, "branches")
+    old = choice(kind="control_if_else", ELSE=[write(text("none"))])
+    them.view.load(old)
+    them.wait_for(BUTTONS, 2)
+    assert "extraState" not in the_if(them)
+    assert "ELSE" in the_if(them)["inputs"]
+
+
+def test_the_plus_adds_else_then_else_if_above_it_and_undo_knows(qtbot, view, person):
+    them: Person = person(state=choice())
+    press_button(them, 0)
+    qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 0, "else": True}, timeout=WAIT_MS)
+    press_button(them, 0)
+    qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 1, "else": True}, timeout=WAIT_MS)
+    assert compile_behaviour(them.newest(), []).errors  # no condition yet: that is said, and nothing else
+    view.undo()
+    qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 0, "else": True}, timeout=WAIT_MS)
+    view.undo()
+    qtbot.waitUntil(lambda: shape(them) is None, timeout=WAIT_MS)
+    view.redo()
+    view.redo()
+    qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 1, "else": True}, timeout=WAIT_MS)
+
+
+def test_the_minus_takes_its_branch_away_and_what_was_in_it_lies_free(qtbot, view, person):
+    them: Person = person(state=full())
+    before = them.newest()
+    press_button(them, 1)
+    qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 1, "else": True}, timeout=WAIT_MS)
+    inputs = the_if(them)["inputs"]
+    assert inputs["CONDITION1"]["block"]["id"] == "c2"
+    assert inputs["BODY1"]["block"]["id"] == "b2"
+    assert inputs["ELSE"]["block"]["id"] == "last"
+    assert {top["id"] for top in them.tops()[1:]} == {"c1", "b1"}
+    looked_at(them, "branch-away")
+    shown = them.box("[data-id=if] > .blocklyPath")
+    assert them.box("[data-id=b1] > .blocklyPath")["left"] > shown["right"]
+    view.undo()
+    qtbot.waitUntil(lambda: them.newest() == before, timeout=WAIT_MS)
+    press_button(them, 3)
+    qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 2, "else": False}, timeout=WAIT_MS)
+    assert {top["id"] for top in them.tops()[1:]} == {"last"}
+
+
+def test_the_menu_adds_branches_by_keys_alone(qtbot, view, person):
+    them: Person = person(state=choice())
+    rows = open_menu(them, "if")
+    assert {"Add “else if”", "Add “else”"} <= set(rows)
+    for _ in range(rows.index("Add “else if”") + 1):
+        them.press(Qt.Key_Down)
+    them.press(Qt.Key_Return)
+    qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 1, "else": False}, timeout=WAIT_MS)
+    choose(them, "if", "Add “else”")
+    qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 1, "else": True}, timeout=WAIT_MS)
+    assert "Add “else”" not in open_menu(them, "if")
+    them.press(Qt.Key_Escape)
+
+
+def test_folded_up_it_still_says_its_branches(person):
+    them: Person = person(state=full())
+    choose(them, "if", "Fold up")
+    them.wait_for("document.querySelector('[data-id=if]').classList.contains('blocklyCollapsed')")
+    looked_at(them, "branches-folded")
+    words = str(them.ask("document.querySelector('[data-id=if] > .blocklyField').textContent"))
+    assert "branch" not in words
