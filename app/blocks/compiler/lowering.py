@@ -1,4 +1,4 @@
-"""Lowering: lists of n items, ifs of n branches and calls of functions, whose gaps people made, become plain blocks.
+"""Lowering: lists of n items, ifs of n branches and calls of functions become plain blocks.
 
 A workspace is rewritten once before it is compiled: each such block gets a type of its own, which the
 catalogue then describes like any other block.

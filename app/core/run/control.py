@@ -201,7 +201,7 @@ class Runs:
             self._want(wanted)
 
     def _show_variable(self, stack: Stack, id: str) -> None:
-        """A variable is what the run gave it, now or at its end: a program of its own would know nothing of it."""
+        """A variable is what the run gave it, now or at its end: a new program would know nothing of it."""
         document = self._documents.current
         value = self.values.get(id) if self.document is document else None
         self._trial.show(document, stack, value.text if value is not None else _("no value yet"))
@@ -396,8 +396,7 @@ class Runs:
 
     def _begin(self, wanted: Wanted) -> None:
         document, self._now = wanted.document, wanted
-        same = self.document is document
-        self.document = document
+        same, self.document = self.document is document, document
         self._trial.begin(wanted)
         self._alerts.resolve("program")
         self._warnings.begin()
@@ -436,8 +435,8 @@ class Runs:
         self.asking.begin(runner)
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self._robots.begin(runner, asked, owners)
-        self._breakpoints = program.breakpoints
-        self.kept, self._program_key = frozenset(program.robots), runner.program_key
+        self._breakpoints, self._program_key = program.breakpoints, runner.program_key
+        self.kept = frozenset(program.robots)
         self._variables = {variable.id: variable for variable in program.variables}
         if wanted.stack is None or not same:
             self._show_values({})  # what is tried leaves the other variables as they are

@@ -16,7 +16,7 @@ from nep.i18n import _
 
 @dataclass(frozen=True, slots=True)
 class TriedValue:
-    """What a value that was tried is, in words: of which block of which behaviour; the ``number`` of the try."""
+    """The value of a block that was tried, in words; ``number``: of the try."""
 
     document: Document
     block: str

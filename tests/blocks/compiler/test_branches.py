@@ -37,7 +37,16 @@ def test_else_if_becomes_elif_and_else_comes_last() -> None:
         ELSE=[write(text("none"))],
     )
     found = lines(made)
-    words = ["if ", "write('first')", "elif ", "write('second')", "elif ", "write('third')", "else:", "write('none')"]
+    words = [
+        "if ",
+        "write('first')",
+        "elif ",
+        "write('second')",
+        "elif ",
+        "write('third')",
+        "else:",
+        "write('none')",
+    ]
     assert [line[: len(word)] for line, word in zip(found, words, strict=False)] == words
 
 

@@ -161,7 +161,10 @@ def test_a_value_that_is_tried_is_said_as_people_say_it(running, master, shown, 
 
 
 def test_a_breakpoint_that_is_set_or_cleared_while_it_runs_counts_at_once(running, master):
-    wait, rest = block("control_wait", "one", SECONDS=number(0.01)), block("control_wait", "rest", SECONDS=number(0.01))
+    wait, rest = (
+        block("control_wait", "one", SECONDS=number(0.01)),
+        block("control_wait", "rest", SECONDS=number(0.01)),
+    )
     running.start(workspace(started(block("control_forever", BODY=[wait, rest]))), master=master.address)
     running.until("running")
     running.order(do="breakpoints", blocks=["one"])

@@ -50,7 +50,11 @@ def shape(them: Person) -> object:
 def press_button(them: Person, number: int) -> None:
     """Press the button of that place: the plus is the first, then a minus for each branch."""
     them.ask("document.querySelector('[data-test=button]')?.removeAttribute('data-test')")
-    script = f"[...document.querySelectorAll('[data-id=if] > .nepButton')].sort((a, b) => (r => r(a) - r(b))(e => e.getBoundingClientRect().top))[{number}]"
+    top = "(e => e.getBoundingClientRect().top)"
+    script = (
+        "[...document.querySelectorAll('[data-id=if] > .nepButton')]"
+        f".sort((a, b) => {top}(a) - {top}(b))[{number}]"
+    )
     them.ask(f"{script}.setAttribute('data-test', 'button')")
     them.click("[data-test=button]", dx=9, dy=9)
 

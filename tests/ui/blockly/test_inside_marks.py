@@ -14,7 +14,9 @@ from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
-MARKS = "[...document.querySelectorAll('.nepInsideMark')].map(e => [e.parentElement.dataset.id, e.classList[1]])"
+MARKS = (
+    "[...document.querySelectorAll('.nepInsideMark')].map(e => [e.parentElement.dataset.id, e.classList[1]])"
+)
 BOTH = [["loop", "nepInside-pause"], ["loop", "nepInside-note"]]
 TITLES = "[...document.querySelectorAll('.nepInsideMark title')].map(e => e.textContent)"
 FOCUSED = "document.activeElement.closest('[data-id]')?.dataset.id"

@@ -1,4 +1,4 @@
-"""A note that is moved, resized, opened or closed is an edit: told without another one, and one step of undo."""
+"""A note that is moved, resized, opened or closed is an edit: told by itself, and one step of undo."""
 
 from __future__ import annotations
 

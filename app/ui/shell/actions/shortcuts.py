@@ -61,12 +61,8 @@ FIXED: tuple[Fixed, ...] = (
     Fixed(lazy("Blocks"), lazy("Run from the block, or show its value"), "Ctrl+Enter"),
     Fixed(lazy("Blocks"), lazy("Open the menu of the block or of the canvas"), "Shift+F10"),
     Fixed(lazy("Blocks"), lazy("Copy, cut, paste blocks"), "Ctrl+C, Ctrl+X, Ctrl+V"),
-<<<<<<< HEAD
     Fixed(lazy("Blocks"), lazy("Put the block, with all below it, into the backpack"), "Ctrl+Shift+P"),
-    Fixed(lazy("Blocks"), lazy("Choose all blocks"), "Ctrl+A"),
-=======
     Fixed(lazy("Blocks"), lazy("Choose all blocks and notes"), "Ctrl+A"),
->>>>>>> f82b41b (Choose notes of the canvas together with blocks, and move, copy and delete them as one)
     Fixed(lazy("Blocks"), lazy("Duplicate the block"), "Ctrl+D"),
     Fixed(lazy("Blocks"), lazy("Delete the block"), "Delete, Backspace"),
     Fixed(lazy("Blocks"), lazy("Move the block with the arrow keys; Enter puts it down"), "Ctrl+M"),
