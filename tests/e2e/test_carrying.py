@@ -56,6 +56,7 @@ def test_blocks_that_are_let_go_on_another_tab_move_there(studio: Studio) -> Non
     assert not ringed(studio, "Greeting")
     studio.screen.release()
     studio.says("Moved 2 blocks to Quiz")
+    studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # it stays under the mouse
     until(lambda: alone < shown(studio), "its tab is open")
     until(lambda: studio.page(SENTENCES) == 3, "with both blocks")
     until(lambda: len(studio.page(SELECTED) or []) == 1, "what came is selected")
