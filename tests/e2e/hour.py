@@ -13,6 +13,7 @@ TAB = ".nepTab:not([hidden])"
 CANVAS = f"{TAB} .blocklySvg > .blocklyWorkspace > .blocklyBlockCanvas"
 FLYOUT = f"{TAB} .blocklyFlyout.nepCategory"
 PLACE = "(r => [r.left, r.top, r.width, r.height])(e.getBoundingClientRect())"
+BIN, BACKPACK = f"{TAB} .nepSheet:not(.nepPacked)", f"{TAB} .nepSheet.nepPacked"
 OPEN = (
     f"(e => e && e.style.display !== 'none')(document.querySelector('{FLYOUT}')) &&"
     f" document.querySelector('{TAB} .blocklyToolboxSelected .blocklyToolboxCategoryLabel')?.textContent"
@@ -280,9 +281,19 @@ class Hands:
         x, y = middle(place)
         self.studio.screen.click(view[0] + x, view[1] + y)
 
-    # -- the bin --------------------------------------------------------------------------------------
+    # -- the bin, and the backpack --------------------------------------------------------------------
 
     def open_bin(self) -> None:
         """Show what was deleted."""
         self.studio.point(".nepBin", 12, 12)
-        self.studio.spot(f"{TAB} .nepSheet")
+        self.studio.spot(BIN)
+
+    def open_backpack(self) -> None:
+        """Show what is kept for other behaviours."""
+        self.studio.point(".nepBackpack", 12, 12)
+        self.studio.spot(BACKPACK)
+
+    def pack(self, block: str) -> None:
+        """Drag a block, with what hangs below it, onto the backpack: it keeps a copy."""
+        self.carry(block, *middle(self.studio.spot(".nepBackpack")))
+        self.drop()

@@ -179,6 +179,21 @@ def test_what_an_undo_takes_away_was_not_deleted(qtbot, view, them, told):
     assert (them.ask(IN_BIN), told) == ([], [])
 
 
+def test_a_mend_that_hangs_blocks_elsewhere_deletes_nothing(qtbot, view, them, told):
+    hat = {**START, "id": "other", "x": 400, "next": {"block": {"type": "control_wait", "id": "three"}}}
+    view.change(workspace(START, WAITS, hat))
+    them.wait_for("!!document.querySelector('[data-id=other] [data-id=three]')")
+    view.change(workspace({**START, "next": hat["next"]}, WAITS))
+    them.wait_for("!!document.querySelector('[data-id=start] [data-id=three]')")
+    them.wait_for("!document.querySelector('[data-id=other]')")
+    them.click("[data-id=two] > .blocklyPath", dy=10)
+    them.press(Qt.Key_Delete)
+    qtbot.waitUntil(lambda: told != [], timeout=WAIT_MS)
+    assert told == [1]
+    open_bin(them)
+    them.wait_for(IN_BIN, ["two"])
+
+
 def test_what_was_deleted_comes_back_although_other_edits_came_after_it(qtbot, view, them, told):
     delete_the_hat(them)
     qtbot.waitUntil(lambda: told == [1], timeout=WAIT_MS)

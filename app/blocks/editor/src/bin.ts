@@ -210,7 +210,8 @@ export class Bin {
     const id = event.blockId ?? '';
     const state = event.oldJson;
     if (this.moves.delete(id)) return;
-    if (!state || event.wasShadow || this.workspace.getBlockById(id)) return;
+    // A mend that hangs what was in it elsewhere has arranged the blocks; who wants them back undoes it.
+    if (!state || event.wasShadow || idsOf({...state, id}).some((each) => this.workspace.getBlockById(each))) return;
     const cameBack = this.takenBack.delete(id);
     // What never was more than a block in the hand is no loss, and an undone addition can be done again.
     const loss = event.recordUndo && (this.made.get(id) !== event.group || !event.group);
@@ -234,6 +235,12 @@ export class Bin {
     this.listener.changed();
     if (this.sheet?.isVisible()) this.fill(this.sheet);
   }
+}
+
+/** The block, those in it and those below it. */
+function idsOf({id, inputs, next}: State): string[] {
+  const held = Object.values(inputs ?? {}).map((input) => input.block);
+  return [id ?? '', ...[...held, next?.block].flatMap((each) => each ? idsOf(each) : [])];
 }
 
 /** How many blocks a person sees in it: the grey values in the gaps are part of what holds them. */
