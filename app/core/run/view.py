@@ -13,7 +13,7 @@ MOST_NAMED = 4
 WIDEST_NAMES = 24
 """Longer names of robots are not repeated on the button beside the sentence that has them."""
 APPLIES_LATER = lazy("Your changes apply at the next Run")
-NOTHING = lazy("Take “when started” from Events and hang blocks below it")
+NOTHING = lazy("Take “when started” from Events and put blocks below it")
 RUN, GO_ON, RESTART = lazy("Run"), lazy("Go on"), lazy("Restart")
 STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.no_robot import NoRobot
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.pictures.boxes import boxes_on, camera_of
 from app.ui.pictures.view import SILENT_AFTER_S, PictureView, rate_sentence
@@ -35,18 +36,18 @@ class CameraPanel(OneRobotPanel):
         self.chips = [self.chip]
         self.view = PictureView(self.theme, fill=True, labelled=False)
         self.view.setAccessibleName(_("What the robot sees"))
-        self.empty = EmptyState(
-            self.theme,
-            "camera",
+        title, text = (
             _("No pictures yet"),
             _("Pictures appear here as soon as a robot with a camera is there."),
         )
-        self.empty.set_actions(
-            [EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")]
-        )
+        start = EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")
+        self.empty = EmptyState(self.theme, "camera", title, text, [start])
+        self._no_robot = NoRobot(self.empty, title, text, [start])
         self.pages = self.show_one_of(self.empty, self.view)
 
     def refresh_robot(self, link: RobotLink | None) -> None:
+        if link is None:
+            self._no_robot.tell(self.session.coming)
         if self._stream is None or link is None:
             return
         self.view.take(self._stream, boxes_on(link, self._topic))

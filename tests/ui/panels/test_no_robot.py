@@ -5,11 +5,12 @@ from __future__ import annotations
 import pytest
 from PySide6.QtWidgets import QLabel
 
-from app.ui.panels import health, robot, robots, sensors
+from app.ui.panels import camera, health, robot, robots, sensors
 from app.ui.shell.bars.app_bar import robots_chip
 from app.ui.shell.bars.status_bar import StatusFacts
 from app.ui.shell.bars.toast import Toast
 from app.ui.theme.theme import Theme
+from app.ui.widgets import Button
 from tests.ui import fakes
 from tests.ui.panel_case import Window
 
@@ -32,6 +33,25 @@ def test_a_panel_says_that_the_robot_is_coming(qapp, panel) -> None:
     assert "No robot" not in words()
     session.launcher.stop_virtual_robot("Pepper")
     assert words() == before, "it is not wanted any more"
+    made.shut()
+    made.close()
+
+
+def test_the_camera_offers_no_robot_that_is_already_coming(qtbot) -> None:
+    session = fakes.Session()
+    made = Window(session).make(camera.PANEL, (384, 300))
+
+    def words() -> list[str]:
+        made.refresh()
+        said = [*made.empty.findChildren(QLabel), *made.empty.findChildren(Button)]
+        return [each.text() for each in said if not each.isHidden()]
+
+    before = words()
+    assert "Use the virtual robot" in before
+    session.launcher.start_virtual_robot()
+    qtbot.waitUntil(lambda: words() == ["Pepper is coming", "A virtual robot takes some seconds to start."])
+    session.launcher.stop_virtual_robot("Pepper")
+    qtbot.waitUntil(lambda: words() == before)
     made.shut()
     made.close()
 
