@@ -134,6 +134,15 @@ def test_tabs_out_of_sight_are_reached_by_a_list_of_all(tabs) -> None:
     menu.close()
 
 
+def test_the_current_tab_is_never_wider_than_its_room(tabs) -> None:
+    facts = [TabFacts("0", "One"), TabFacts("1", "The rather long name of a behaviour")]
+    tabs.resize(180, 32)
+    tabs.show_tabs(facts, "1")
+    tab = tabs.tabs["1"]
+    assert tab.x() >= 0
+    assert tab.geometry().right() < tabs.add.x() < tabs.list.x() < tabs.width()
+
+
 def test_the_wheel_moves_the_tabs_along(tabs) -> None:
     many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
     tabs.show_tabs(many, "0")

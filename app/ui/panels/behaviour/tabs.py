@@ -180,15 +180,19 @@ class BehaviourTabs(QWidget):
         self._place(bring=True)
 
     def _widths(self) -> list[int]:
-        """As wide as the names want; all but the current one shorter where that does not fit."""
+        """As wide as the names want; all but the current one shorter where that does not fit.
+
+        The current one is never wider than the room for all.
+        """
         wanted = [self.tabs[each.key].sizeHint().width() for each in self._facts]
         room = self._room_width(scrolls=False) - GAP * len(wanted)
         least = round(self._theme.scaled(SHORTEST))
         keys = [each.key for each in self._facts]
+        alone = max(least, self._room_width(scrolls=len(keys) > 1))
 
         def cut(most: int) -> list[int]:
             pairs = zip(keys, wanted, strict=True)
-            return [width if key == self._current else min(width, most) for key, width in pairs]
+            return [min(width, alone if key == self._current else most) for key, width in pairs]
 
         most = max(wanted, default=least)
         while most > least and sum(cut(most)) > room:
