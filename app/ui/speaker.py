@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -23,6 +24,19 @@ if TYPE_CHECKING:
 
 LANGUAGES = {"en": lazy("English"), "fr": lazy("French"), "ja": lazy("Japanese"), "es": lazy("Spanish")}
 NO_SOUND = lazy("This computer plays no sound.")
+ADVICE = {
+    "linux": lazy(
+        "Install the packages “speech-dispatcher”, “espeak-ng” and “libpulse0”, then start Studio again."
+    ),
+    "win32": lazy(
+        "Add a voice in the settings of Windows, under “Time & language” and “Speech”, then start "
+        "Studio again."
+    ),
+    "darwin": lazy(
+        "Add a voice in System Settings, under “Accessibility” and “Spoken Content”, then start Studio again."
+    ),
+}
+"""What gives a computer a voice, by `sys.platform`."""
 MOST_TONES = 4
 RATE_HZ, EDGE_S, LOUDNESS = 44_100, 0.006, 0.5
 JOIN_S = 0.5
@@ -34,6 +48,27 @@ def no_voice(language: str) -> str:
     """The sentence that says that nobody here speaks a language."""
     name = _(LANGUAGES[language]) if language in LANGUAGES else QLocale(language).nativeLanguageName()
     return _("This computer has no voice for {language}.").format(language=name or language)
+
+
+def has_voice_engine() -> bool:
+    """Whether Qt knows a program here that speaks; none is started."""
+    try:
+        from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy, and needs a sound system)
+    except (ImportError, RuntimeError) as error:
+        _log.info("robots have no voice here: %s", error)
+        return False
+    return bool(set(QTextToSpeech.availableEngines()) - {"mock"})
+
+
+def voice_words(problem: str, *, has_engine: bool, platform: str = sys.platform) -> str:
+    """Whether robots are heard on this computer; if not, why, and what to install.
+
+    ``problem`` is why the last words were not heard, "" when they were.
+    """
+    if has_engine and not problem:
+        return _("Robots speak with the voice of this computer.")
+    why = problem or _("This computer has no voice: what robots say is only shown.")
+    return f"{why} {_(ADVICE.get(platform, ADVICE['linux']))}"
 
 
 def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
@@ -82,14 +117,14 @@ class QtEngine:
     def _found_voice(self) -> QTextToSpeech | None:
         if not self._voice_tried:
             self._voice_tried = True
-            try:
-                from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy, and needs a sound system)
+            if has_voice_engine():
+                from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy)
 
-                if set(QTextToSpeech.availableEngines()) - {"mock"}:
+                try:
                     self._voice = QTextToSpeech()
                     self._voice.stateChanged.connect(self._changed)
-            except (ImportError, RuntimeError) as error:
-                _log.info("robots have no voice here: %s", error)
+                except RuntimeError as error:
+                    _log.info("robots have no voice here: %s", error)
         return self._voice
 
     def _changed(self) -> None:

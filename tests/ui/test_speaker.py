@@ -11,7 +11,7 @@ from itertools import pairwise
 import pytest
 
 from app.core.robots.voices import Notes
-from app.ui.speaker import QtEngine, QtSpeaker, no_voice, samples
+from app.ui.speaker import QtEngine, QtSpeaker, no_voice, samples, voice_words
 
 
 class FakeEngine:
@@ -153,3 +153,15 @@ def test_a_tone_is_as_high_as_long_and_as_loud_as_asked_and_does_not_click() -> 
     quiet = array("h", samples(((441.0, 0.5),), 0.5))
     assert abs(max(made) - 2 * max(quiet)) < 5
     assert samples((), 1.0) == b""
+
+
+def test_why_robots_are_silent_is_said_with_what_to_install() -> None:
+    assert voice_words("", has_engine=True) == "Robots speak with the voice of this computer."
+    silent = voice_words("", has_engine=False, platform="linux")
+    assert silent.startswith(
+        "This computer has no voice: what robots say is only shown. Install the packages"
+    )
+    assert "Windows" in voice_words("", has_engine=False, platform="win32")
+    assert "System Settings" in voice_words("", has_engine=False, platform="darwin")
+    french = voice_words(no_voice("fr"), has_engine=True, platform="freebsd")
+    assert french.startswith("This computer has no voice for French. Install the packages")

@@ -172,3 +172,20 @@ def test_many_languages_are_a_list_to_open(
     QTest.keyClick(language, Qt.Key.Key_Down)
     assert Settings(home).get("language", "") == "es"
     assert sheet.from_next_start.isVisible()
+
+
+def test_it_says_whether_robots_are_heard(
+    sheet: SettingsSheet, window: MainWindow, commands: Commands
+) -> None:
+    class Silent:
+        problem = "This computer has no voice for French."
+        busy = False
+
+        def stop(self) -> None:
+            """Nobody speaks."""
+
+    assert sheet.voice.text()
+    sheet.shut()
+    window.session.voices.speaker = Silent()
+    commands.run("settings.open")
+    assert sheet.voice.text().startswith("This computer has no voice for French. ")

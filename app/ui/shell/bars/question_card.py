@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt
+from PySide6.QtCore import QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QApplication,
@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 from shiboken6 import isValid
 
 from app.core.run.asking import AskedQuestion
+from app.ui.shell.bars.floating_card import FloatingCard
 from app.ui.shell.dialogs.overlay import stops_in
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
@@ -29,7 +30,7 @@ LOWER = 0.8  # how far down the window its lower edge is: over the blocks, not o
 LONGEST_ANSWER = 10_000
 
 
-class QuestionCard(QWidget):
+class QuestionCard(FloatingCard):
     """The question, a field and a button. Enter answers; Esc answers nothing. While paused it is held."""
 
     def __init__(self, theme: Theme, window: QWidget, answer: Callable[[AskedQuestion, str], object]) -> None:
@@ -60,8 +61,6 @@ class QuestionCard(QWidget):
         shadow.setOffset(0, 8)
         shadow.setColor(theme.colour("shadow"))
         self.setGraphicsEffect(shadow)
-        window.installEventFilter(self)
-        self.hide()
 
     def show_question(self, question: AskedQuestion | None, *, held: bool) -> None:
         """Show this question, or none; ``held`` while the behaviour is paused. Called with every tick."""
@@ -127,17 +126,6 @@ class QuestionCard(QWidget):
         if covered:
             place.moveBottom(min(stop.top() for stop in covered) - MARGIN)
         self.setGeometry(place)
-
-    def event(self, event: QEvent) -> bool:
-        done = super().event(event)
-        if event.type() == QEvent.Type.LayoutRequest and self.isVisible():
-            self.place()
-        return done
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize and self.isVisible():
-            self.place()
-        return super().eventFilter(watched, event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QObject, QRectF, Qt, QTimer
+from PySide6.QtCore import QEvent, QRectF, Qt, QTimer
 from PySide6.QtGui import QEnterEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGraphicsDropShadowEffect, QHBoxLayout, QWidget
 
+from app.ui.shell.bars.floating_card import FloatingCard
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import Button
@@ -18,7 +19,7 @@ ABOVE_STATUS_BAR = 42
 CHECK_AGAIN_MS = 1000
 
 
-class Toast(QWidget):
+class Toast(FloatingCard):
     """One sentence and perhaps one button; it stays while the mouse or the focus is on it."""
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
@@ -42,8 +43,6 @@ class Toast(QWidget):
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.timeout.connect(self._time_is_up)
-        window.installEventFilter(self)
-        self.hide()
 
     @property
     def text(self) -> str:
@@ -93,17 +92,6 @@ class Toast(QWidget):
         layout = self.layout()
         high = layout.totalHeightForWidth(wide) if layout is not None else 0
         self.resize(wide, max(high, layout.minimumSize().height() if layout is not None else 0))
-
-    def event(self, event: QEvent) -> bool:
-        done = super().event(event)
-        if event.type() == QEvent.Type.LayoutRequest and self.isVisible():
-            self.place()
-        return done
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize and self.isVisible():
-            self.place()
-        return super().eventFilter(watched, event)
 
     def enterEvent(self, event: QEnterEvent) -> None:
         self._timer.stop()

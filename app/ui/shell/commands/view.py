@@ -23,6 +23,7 @@ from app.ui.shell.commands.shell import START, Shell
 from app.ui.shell.dialogs.about import AboutSheet
 from app.ui.shell.documents import DocumentController
 from app.ui.shell.hint_ring import HintRing
+from app.ui.speaker import has_voice_engine, voice_words
 from app.ui.theme.system import Preference
 from app.ui.theme.theme import Mode
 from app.ui.widgets.lists.fuzzy import Entry
@@ -156,10 +157,19 @@ class ViewCommands:
         if self._settings_sheet is None:
             shell = self._shell
             self._settings_sheet = settings_sheet.SettingsSheet(
-                shell.theme, shell.surface, shell.state, self._session.settings, self._files.asks
+                shell.theme,
+                shell.surface,
+                shell.state,
+                self._session.settings,
+                self._files.asks,
+                self._voice_words,
             )
             self._settings_sheet.shortcuts.clicked.connect(self.open_shortcuts)
         self._settings_sheet.open()
+
+    def _voice_words(self) -> str:
+        """Also what was found when a robot spoke: an engine may be there, and have no voice."""
+        return voice_words(self._session.voices.problem, has_engine=has_voice_engine())
 
     # -- layouts ----------------------------------------------------------------------------------
 

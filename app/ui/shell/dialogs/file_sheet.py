@@ -212,11 +212,7 @@ class FileSheet(Overlay):
         tree.installEventFilter(self)
 
     def _lay_out(self) -> None:
-        close = IconButton(self.theme, "x", _("Close"), "Esc")
-        close.clicked.connect(self.shut)
-        head = QHBoxLayout()
-        head.addWidget(self.heading, 1)
-        head.addWidget(close)
+        head = self.head(self.heading)
         way = QHBoxLayout()
         way.setSpacing(8)
         way.addWidget(self.up)

@@ -38,7 +38,7 @@ from app.core.storage.atomic_file import read_whole
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.numbers import spoken_key
 from app.ui.theme.theme import Theme
-from app.ui.widgets import IconButton, SearchField, label, paint
+from app.ui.widgets import SearchField, label, paint
 from nep.i18n import ENGLISH, _, ngettext
 
 WIDE, HIGH, LIST_WIDE = 920, 640, 220
@@ -104,12 +104,7 @@ class GuideSheet(Overlay):
         theme.changed.connect(self._again)
 
     def _lay_out(self) -> None:
-        close = IconButton(self.theme, "x", _("Close"), "Esc")
-        close.clicked.connect(self.shut)
-        head = QHBoxLayout()
-        head.addWidget(label(_("Guide"), "heading"))
-        head.addStretch(1)
-        head.addWidget(close)
+        head = self.head(label(_("Guide"), "heading"))
         left = QVBoxLayout()
         left.setSpacing(8)
         left.addWidget(self.search)

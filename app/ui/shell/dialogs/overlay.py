@@ -15,13 +15,14 @@ from PySide6.QtCore import (
     Signal,
 )
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QRegion
-from PySide6.QtWidgets import QApplication, QGraphicsOpacityEffect, QWidget
+from PySide6.QtWidgets import QApplication, QGraphicsOpacityEffect, QHBoxLayout, QWidget
 from shiboken6 import isValid
 
 from app.ui.theme.theme import Theme
-from app.ui.widgets import StopButton, paint
+from app.ui.widgets import IconButton, StopButton, paint
 from app.ui.widgets.keyboard import tab_stops
 from app.ui.widgets.menus import round_region
+from nep.i18n import _
 
 SHADOW_PX = 28
 SHADOW_DOWN = 10
@@ -192,6 +193,15 @@ class Overlay(QWidget):
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._focus_changed)
+
+    def head(self, heading: QWidget) -> QHBoxLayout:
+        """The row at the top: the heading, which may be long, and a button that closes."""
+        close = IconButton(self.theme, "x", _("Close"), "Esc")
+        close.clicked.connect(self.shut)
+        row = QHBoxLayout()
+        row.addWidget(heading, 1)
+        row.addWidget(close)
+        return row
 
     def shut(self) -> None:
         """Close it and give the keyboard back to where it was."""

@@ -15,7 +15,7 @@ from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.system import PREFERENCES
 from app.ui.theme.theme import MODES, Theme
-from app.ui.widgets import Button, ComboBox, ElidedLabel, IconButton, Segments, Switch, label
+from app.ui.widgets import Button, ComboBox, ElidedLabel, Segments, Switch, label
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep import i18n
 from nep.i18n import _, lazy, pgettext
@@ -38,10 +38,17 @@ class SettingsSheet(Overlay):
     top = 72
 
     def __init__(
-        self, theme: Theme, window: QWidget, state: WindowState, settings: Settings, files: FileDialogs
+        self,
+        theme: Theme,
+        window: QWidget,
+        state: WindowState,
+        settings: Settings,
+        files: FileDialogs,
+        voice: Callable[[], str],
     ) -> None:
+        """``voice`` says whether robots are heard, and if not, why; it is asked at each opening."""
         super().__init__(theme, window, _("Settings"))
-        self._state, self._settings, self._files = state, settings, files
+        self._state, self._settings, self._files, self._voice = state, settings, files, voice
         self.language = self._language_input()
         self.from_next_start = label(_("From the next start of Studio"), "body", role="textSecondary")
         modes = [(mode, _(MODE_WORDS[mode][0]), MODE_WORDS[mode][1]) for mode in MODES]
@@ -54,6 +61,7 @@ class SettingsSheet(Overlay):
         self.contrast = Segments(theme, wishes, check=True, size="form", name=_("High contrast"))
         self.motion = Segments(theme, wishes, check=True, size="form", name=_("Less motion"))
         self.robots = Switch(theme, _("Come back at the next start"))
+        self.voice = label("", "body", role="textSecondary", wrap=True)
         self.shortcuts = Button(theme, _("Change the shortcuts"), "keyboard", size="form")
         self.folder = ElidedLabel("bodyLarge", "textSecondary")
         self.choose = Button(theme, _("Choose a folder"), "folder-open", size="form")
@@ -80,13 +88,8 @@ class SettingsSheet(Overlay):
         return segments
 
     def _lay_out(self) -> None:
-        close = IconButton(self.theme, "x", _("Close"), "Esc")
-        close.clicked.connect(self.shut)
-        head = QHBoxLayout()
+        head = self.head(label(_("Settings"), "heading"))
         head.setContentsMargins(19, 0, 19, 0)
-        head.addWidget(label(_("Settings"), "heading"))
-        head.addStretch(1)
-        head.addWidget(close)
         self._inside = QWidget()
         self._inside.setProperty("bare", "true")
         self._fill(QGridLayout(self._inside))
@@ -114,6 +117,8 @@ class SettingsSheet(Overlay):
         spoken.addWidget(self.language)
         spoken.addWidget(self.from_next_start)
         spoken.addStretch(1)
+        heard = QHBoxLayout()
+        heard.addWidget(self.voice, 1)
         rows: tuple[tuple[str, QWidget | QHBoxLayout], ...] = (
             (_("Language"), spoken),
             (pgettext("colours of the window", "Look"), self.mode),
@@ -121,6 +126,7 @@ class SettingsSheet(Overlay):
             (_("High contrast"), self.contrast),
             (_("Less motion"), self.motion),
             (_("Virtual robots"), self.robots),
+            (_("Voice of robots"), heard),
             (_("Keyboard"), self.shortcuts),
             (_("Pictures"), pictures),
         )
@@ -145,6 +151,7 @@ class SettingsSheet(Overlay):
 
     def open(self) -> None:
         """Show what is chosen now."""
+        self.voice.setText(self._voice())
         self._show()
         super().open()
 

@@ -13,7 +13,7 @@ from app.ui.shell.actions.shortcuts import FIXED, Shortcuts, key_of
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.numbers import spoken_key
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, IconButton, SearchField, label, paint
+from app.ui.widgets import Button, SearchField, label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Match, match
 from nep.i18n import _, lazy
@@ -60,12 +60,7 @@ class ShortcutSheet(Overlay):
         shortcuts.changed.connect(self._show)
 
     def _lay_out(self) -> None:
-        close = IconButton(self.theme, "x", _("Close"), "Esc")
-        close.clicked.connect(self.shut)
-        head = QHBoxLayout()
-        head.addWidget(label(_("Keyboard shortcuts"), "heading"))
-        head.addStretch(1)
-        head.addWidget(close)
+        head = self.head(label(_("Keyboard shortcuts"), "heading"))
         foot = QHBoxLayout()
         foot.setSpacing(8)
         foot.addWidget(self.said, 1)

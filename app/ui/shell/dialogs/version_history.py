@@ -20,7 +20,7 @@ from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.dates import when_words
 from app.ui.text.numbers import grouped
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton, label, paint
+from app.ui.widgets import Button, EmptyAction, EmptyState, label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Match
 from nep.i18n import _, day_text, lazy, ngettext
@@ -84,12 +84,8 @@ class VersionHistorySheet(Overlay):
         self.button.clicked.connect(self.open_chosen)
 
     def _lay_out(self) -> None:
-        close = IconButton(self.theme, "x", _("Close"), "Esc")
-        close.clicked.connect(self.shut)
-        head = QHBoxLayout()
+        head = self.head(self.heading)
         head.setContentsMargins(19, 0, 19, 0)
-        head.addWidget(self.heading, 1)
-        head.addWidget(close)
         self._foot = QWidget()
         self._foot.setProperty("bare", "true")
         foot = QHBoxLayout(self._foot)
