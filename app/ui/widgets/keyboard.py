@@ -67,11 +67,14 @@ def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Itera
 
 
 def stops_of(widget: QWidget) -> list[QWidget]:
-    """What takes the keyboard by Tab of a widget and in it, in the order in which it was made."""
+    """What takes the keyboard by Tab of a widget and in it, in the order in which it was made.
+
+    The list that a combo box drops is its child, but a window of its own: Tab does not go there.
+    """
     return [
         each
         for each in (widget, *widget.findChildren(QWidget))
-        if each.focusPolicy() & Qt.FocusPolicy.TabFocus
+        if each.focusPolicy() & Qt.FocusPolicy.TabFocus and each.window() is widget.window()
     ]
 
 

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QVBoxLayout, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
@@ -29,7 +29,8 @@ from app.ui.widgets import (
 )
 from app.ui.widgets.indicators import paint_sparkline
 from app.ui.widgets.inputs.slider import decimals_of
-from app.ui.widgets.lists.scroll_areas import Scrolled
+from app.ui.widgets.keyboard import stops_of
+from app.ui.widgets.lists.scroll_areas import ScrollColumn, Scrolled
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -353,3 +354,14 @@ def test_what_scrolls_takes_the_height_of_longer_words(qtbot) -> None:
     assert about.height() >= words.heightForWidth(about.viewport().width())
     words.setText("short")
     qtbot.waitUntil(lambda: about.height() == before)
+
+
+def test_tab_goes_through_rows_and_not_into_the_window_of_a_dropped_list(qtbot) -> None:
+    column = ScrollColumn("Rows")
+    qtbot.addWidget(column)
+    choice = QComboBox()
+    choice.addItems(["left", "right"])
+    dropped = choice.view()
+    column.column.insertWidget(0, choice)  # a warning of Qt fails the test
+    assert dropped.window() is not choice.window()
+    assert stops_of(choice) == [choice]
