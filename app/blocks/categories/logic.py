@@ -46,7 +46,7 @@ CATEGORY = Category(
             ),
             variant="RELATION",
             check="Boolean",
-            words="compare, greater, less, equals, equal, smaller, larger, bigger, more than, less than, "
+            words="compare, greater!, less!, equals!, equal!, smaller, larger, bigger, more than, less than, "
             "greater than, same, different, between, =, <, >, ≠, ≤, ≥, ==, !=, <=, >=",
         ),
         Block(

@@ -71,8 +71,9 @@ _BASIC = (
         arguments=(*_TWO, ChoiceField("SIGN", _SIGNS)),
         variant="SIGN",
         check="Number",
-        words="calculate, sum, add, plus, addition, subtract, minus, difference, multiply, times, product, "
-        "divide, division, math, maths, mathematics, formula, remainder, modulo, power, operator, +, -, "
+        words="calculate, sum!, add!, plus!, addition, subtract, minus, difference, multiply, times, "
+        "product, divide, division, math, maths, "
+        "mathematics, formula, remainder, modulo, power, operator, +, -, "
         "*, /, %, ^",
     ),
     Block(
@@ -105,7 +106,7 @@ _BASIC = (
         ),
         variant="HOW",
         check="Number",
-        words="round, round up, round down, whole, integer, ceiling, floor, nearest, decimals",
+        words="round!, round up, round down, whole, integer, ceiling, floor, nearest, decimals",
     ),
 )
 

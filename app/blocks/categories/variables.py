@@ -24,7 +24,7 @@ CATEGORY = Category(
             tooltip="Gives the variable this value; all scripts see it.",
             python="%VAR = %VALUE",
             arguments=(VariableField("VAR"), ValueInput("VALUE", None, 0)),
-            words="variable, assign, store, save, put, remember, initialize, let, make, equals, =",
+            words="variable, assign, store, save, put!, remember, initialize, let, make, equals, =",
         ),
         Block(
             type="variables_change",
@@ -35,7 +35,7 @@ CATEGORY = Category(
             tooltip="Adds this number to the variable.",
             python="%VAR += %BY",
             arguments=(VariableField("VAR"), ValueInput("BY", "Number", 1)),
-            words="variable, increase, decrease, add, increment, decrement, count up, counter, score, "
+            words="variable, increase, decrease, add!, sum!, increment, decrement, count up, counter, score, "
             "points, +=",
         ),
         Block(

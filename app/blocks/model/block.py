@@ -64,7 +64,9 @@ class Block:
     in_toolbox: bool = True
     about: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> its name, more about it
     help: str = ""  # for people who ask: more than the tooltip, with an example
-    words: str = ""  # other words that people look for it by, with commas between
+    words: str = (
+        ""  # other words that people look for it by, with commas between; after one with ! it comes first
+    )
     english_words: str = ""  # the English ones, where its words are in another language
 
     def argument(self, name: str) -> Argument | None:

@@ -194,7 +194,7 @@ _TELLS: Mapping[str, _Ability] = {
         "touch touched touches bumper bump bumped pressed tactile button released hit collision contact",
         plazy(
             "words to find what a robot tells: touch",
-            "touch, press, button, bump, bumper, hit, crash, collision, tactile, contact, tap, pat",
+            "touch, touching, press, button, bump, bumper, hit, crash, collision, tactile, contact, tap, pat",
         ),
     ),
     "face": _ability(

@@ -116,6 +116,72 @@ SPANISH = {
     "random": "values_random",
 }
 
+# What people type who come from Scratch: these come first and second, in any order where both are meant.
+LEADING = {
+    "sum": ["values_arithmetic", "variables_change"],
+    "add": ["values_arithmetic", "variables_change"],
+    "plus": ["values_arithmetic"],
+    "times": ["control_repeat", "values_arithmetic"],
+    "multiply": ["values_arithmetic"],
+    "divide": ["values_arithmetic"],
+    "mod": ["values_arithmetic"],
+    "change": ["variables_change"],
+    "set": ["variables_set"],
+    "when flag clicked": ["events_started"],
+    "wait": ["control_wait", "control_wait_until"],
+    "repeat until": ["control_while"],
+    "if": ["control_if", "control_if_else"],
+    "else": ["control_if_else"],
+    "stop": ["control_stop_script"],
+    "broadcast": ["events_broadcast"],
+    "receive": ["events_received"],
+    "ask": ["asking_ask"],
+    "answer": ["asking_answer", "asking_ask"],
+    "touching": ["robot_pepper_when_touched"],
+    "timer": ["sensing_timer", "sensing_reset"],
+    "date": ["sensing_now"],
+    "pick random": ["values_random"],
+    "join": ["values_join"],
+    "letter": ["texts_letter"],
+    "length": ["values_length"],
+    "contains": ["texts_contains"],
+    "round": ["values_round"],
+    "not": ["values_not"],
+    "or": ["values_logic"],
+    "equals": ["values_compare"],
+    "greater": ["values_compare"],
+    "item": ["lists_get"],
+    "define": ["functions_define"],
+}
+LEADING_SPANISH = {
+    "suma": ["values_arithmetic", "variables_change"],
+    "sumar": ["values_arithmetic", "variables_change"],
+    "más": ["values_arithmetic"],
+    "restar": ["values_arithmetic"],
+    "dividir": ["values_arithmetic"],
+    "cambiar": ["variables_change"],
+    "poner": ["variables_set"],
+    "esperar": ["control_wait", "control_wait_until"],
+    "siempre": ["control_forever"],
+    "si": ["control_if", "control_if_else"],
+    "detener": ["control_stop_script"],
+    "recibir": ["events_received"],
+    "respuesta": ["asking_answer"],
+    "tocar": ["robot_pepper_when_touched"],
+    "fecha": ["sensing_now"],
+    "aleatorio": ["values_random"],
+    "unir": ["values_join"],
+    "letra": ["texts_letter"],
+    "longitud": ["values_length"],
+    "contiene": ["texts_contains"],
+    "redondear": ["values_round"],
+    "no": ["values_not"],
+    "o": ["values_logic"],
+    "igual": ["values_compare"],
+    "mayor": ["values_compare"],
+    "definir": ["functions_define"],
+}
+
 
 @pytest.fixture
 def opened(qtbot) -> Iterator[Callable[[str], Person]]:
@@ -136,6 +202,18 @@ def opened(qtbot) -> Iterator[Callable[[str], Person]]:
     install(before)
 
 
+def first_two(them: Person, words: str) -> list[str]:
+    """The types of the blocks that come first and second when the field holds these words."""
+    given = f"(f => {{ f.value = {json.dumps(words)}; f.dispatchEvent(new Event('input')); }})"
+    of_all = f"[...document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .blocklyDraggable')]"
+    top = "(e => e.getBoundingClientRect().top)"
+    return them.ask(
+        f"({given}(document.querySelector({FIELD!r})), {of_all}"
+        f".sort((a, b) => {top}(a) - {top}(b)).slice(0, 2)"
+        ".map(e => [...e.classList].find(name => /^[a-z]+_/.test(name))))"
+    )
+
+
 def found(them: Person, words: str) -> str:
     """The type of the block that comes first when the field holds these words."""
     given = f"(f => {{ f.value = {json.dumps(words)}; f.dispatchEvent(new Event('input')); }})"
@@ -149,6 +227,13 @@ def found(them: Person, words: str) -> str:
 def test_the_words_of_people_find_the_block_that_they_mean(opened, wanted, table):
     them = opened(wanted)
     assert {words: found(them, words) for words in table} == table
+
+
+@pytest.mark.parametrize(("wanted", "table"), [("en", LEADING), ("es", LEADING_SPANISH)])
+def test_what_a_person_from_scratch_types_is_among_the_first_two(opened, wanted, table):
+    them = opened(wanted)
+    first = {words: first_two(them, words) for words in table}
+    assert {words: types for words, types in first.items() if not set(table[words]) <= set(types)} == {}
 
 
 def test_typed_words_show_blocks_and_enter_takes_the_first(qtbot, opened):

@@ -38,10 +38,14 @@ function hasNear(text: string, wanted: string): boolean {
 interface Searched {
   title: string;
   choices: string[];
+  /** Words for which it comes before what is called so. */
+  leads: Set<string>;
   lists: [text: string, worth: number, ofBeginning: number, first: number][];
   told: string;
 }
 
+/** More than a block can have that is called so. */
+const LEADS = 15;
 /** Less than this is found in what is told about a block, not in what it is called. */
 const CALLED = 3;
 
@@ -53,10 +57,13 @@ function searched(entry: Entry): Searched {
   const gaps = /\([^)]*\)|%\d+/g;
   const title = plain(`${name} ${(help?.title ?? String(definitionOf(type)?.['message0'] ?? '')).replace(gaps, ' ')} ${shown}`);
   const choices = (help?.choices ?? []).map(plain);
-  const list = (words: string) => plain(words.replace(/,/g, ' '));
+  const list = (words: string) => plain(words.replace(/,/g, ' ').replace(/([^\s=])!/g, '$1'));
+  const leads = `${help?.words ?? ''}, ${help?.english ?? ''}`.split(',').map(plain)
+    .filter((each) => /[^!]!$/.test(each)).map((each) => each.slice(0, -1));
   return {
     title,
     choices,
+    leads: new Set(leads),
     lists: [[title, 7, 6.5, 9], [choices.join(' '), 7, 5, 7], [list(help?.words ?? ''), 6, 5.5, 8],
       [list(help?.english ?? ''), 4, 3.5, 5]],
     told: plain(`${help?.does ?? ''} ${help?.more ?? ''} ${help?.gaps.map(([, words]) => words).join(' ') ?? ''}`),
@@ -69,7 +76,8 @@ function searched(entry: Entry): Searched {
  * A whole word is worth more than the beginning of one, and the first word more than the others: what a block begins
  * with, and what most people call it instead.
  */
-function worthOf({title, lists, told}: Searched, word: string): number {
+function worthOf({title, leads, lists, told}: Searched, word: string): number {
+  if (leads.has(word)) return LEADS;
   const found = lists.map(([text, worth, ofBeginning, first]) => `${text} `.startsWith(`${word} `) ? first :
     ` ${text} `.includes(` ${word} `) ? worth : ` ${text}`.includes(` ${word}`) ? ofBeginning : 0);
   if (found.some(Boolean)) return Math.max(...found);

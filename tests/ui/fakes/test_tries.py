@@ -1,0 +1,62 @@
+"""A block that is tried from the toolbox asks before a real robot moves for the first time, and only then."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.blocks.compiler.stack import Stack
+from app.robots.description.description import parse, td_for
+from app.robots.turtle import ROBOT
+from tests.blocks.samples import block, number
+from tests.core.waiting import tick_until
+from tests.ui import fakes
+
+TURN = Stack("toolbox", "stack", block("robot_diffdrive_do_turn", ROBOT="Rover", ANGLE=number(20)))
+LIGHT = Stack("toolbox", "stack", block("robot_diffdrive_do_light", ROBOT="Rover"))
+ROVER = parse(td_for(ROBOT.thing_model, "Rover"))
+
+
+@pytest.fixture
+def session() -> fakes.Session:
+    return fakes.Session()
+
+
+def tried(session: fakes.Session, stack: Stack) -> str:
+    """The question that stands after the try; "" when it runs, and then it comes to its end."""
+    session.tick()  # takes over that robots have come
+    session.runs.try_stack(stack)
+    question = session.fleet.permission.question
+    if question is None:
+        ends(session)
+    return question.title if question is not None else ""
+
+
+def ends(session: fakes.Session) -> None:
+    assert session.runs.active
+    assert session.runner is not None
+    session.runner.ends()
+    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    session.runs.confirm_still()  # the robot of the test does not answer a stop
+
+
+def test_a_real_robot_is_asked_for_once_and_then_does_what_was_tried(session: fakes.Session) -> None:
+    session.join(ROVER, virtual=False)
+    assert tried(session, LIGHT) == "", "what does not move needs no answer"
+    assert tried(session, TURN) == "Let Rover move?"
+    assert not session.runs.active
+    session.fleet.permission.answer(let=True)
+    ends(session)  # the answer has begun what was tried
+    assert tried(session, TURN) == ""
+
+
+def test_after_a_no_nothing_moves_and_the_next_try_asks_again(session: fakes.Session) -> None:
+    session.join(ROVER, virtual=False)
+    assert tried(session, TURN) == "Let Rover move?"
+    session.fleet.permission.answer(let=False)
+    assert not session.runs.active
+    assert tried(session, TURN) == "Let Rover move?"
+
+
+def test_a_virtual_robot_is_never_asked_for(session: fakes.Session) -> None:
+    session.join(ROVER, virtual=True)
+    assert tried(session, TURN) == ""
