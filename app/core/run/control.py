@@ -113,6 +113,7 @@ class Runs:
         self._stop_thread: threading.Thread | None = None
         self.running_blocks: tuple[str, ...] = ()
         self.stopped_blocks: tuple[str, ...] = ()
+        self.ran_blocks: frozenset[str] = frozenset()  # so far, also those between two looks of a slow window
         self.block_errors: Mapping[str, str] = {}
         self._warnings = RunWarnings(lambda words: self._console.add("warn", self._run.name, words))
         self._warned_edits = 0
@@ -588,4 +589,5 @@ class Runs:
 
     def _mark(self, running: tuple[str, ...] = (), stopped: tuple[str, ...] = ()) -> None:
         self.running_blocks, self.stopped_blocks = running, stopped
+        self.ran_blocks |= set(running)
         self.blocks_revision += 1

@@ -54,8 +54,8 @@ def test_each_step_is_done_by_what_shows_it_and_stays_done() -> None:
         ({"can_speak": True}, "robot"),
         ({"built": Built(started=True)}, "start"),
         ({"built": Built(True, frozenset({"a"}))}, "say"),
-        ({"running": ("a",)}, "run"),
-        ({"built": Built(True, frozenset({"a"}), True), "running": ()}, "turn"),
+        ({"ran": ("a",)}, "run"),
+        ({"built": Built(True, frozenset({"a"}), True), "ran": ()}, "turn"),
         ({"stopped": True}, "stop"),
     ):
         now = replace(now, **change)

@@ -185,7 +185,7 @@ class FirstStepsPanel(PanelWidget):
                 action.name == "say" for link in self.session.fleet.connected for action in link.robot.actions
             ),
             built=self._built[1],
-            running=runs.running_blocks if mine else (),
+            ran=runs.ran_blocks,
             stopped=mine and bool(runs.stopped_blocks) and not runs.active,
         )
 

@@ -58,11 +58,11 @@ class Built:
 
 @dataclass(frozen=True)
 class Now:
-    """What can be seen now. ``running`` are the ids of the blocks that run, ``stopped``: by Stop."""
+    """What can be seen now. ``ran`` are the ids of the blocks that have run, ``stopped``: by Stop."""
 
     can_speak: bool = False
     built: Built = field(default_factory=Built)
-    running: Collection[str] = ()
+    ran: Collection[str] = ()
     stopped: bool = False
 
 
@@ -97,7 +97,7 @@ def shown_by(now: Now, done: Collection[str]) -> frozenset[str]:
         found.add("start")
     if now.built.says:
         found.add("say")
-    if now.built.says & set(now.running):
+    if now.built.says & set(now.ran):
         found.add("run")
     if now.built.turns:
         found.add("turn")
