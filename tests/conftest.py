@@ -27,6 +27,7 @@ USUAL_S = 0.2
 """What a test takes, all in all, ..."""
 LONG_S = {
     "ports": 210.0,
+    "tests/e2e/test_hour_keys.py": 110.0,
     "tests/core/run/test_run_file.py": 100.0,
     "tests/e2e/test_soak.py": 63.0,
     "tests/e2e/test_behaviour.py": 56.0,
@@ -37,7 +38,7 @@ LONG_S = {
     "tests/core/robots/test_robot_bad_days.py": 30.0,
     "tests/e2e/test_path_mouse.py": 26.0,
     "tests/core/robots/test_refused_stop.py": 25.0,
-    "tests/e2e/test_path_keys.py": 24.0,
+    "tests/e2e/test_path_keys.py": 20.0,
     "tests/core/network/test_no_network.py": 21.0,
     "tests/blocks/compiler/test_expressions.py": 20.0,
     "tests/e2e/test_two_studios.py": 20.0,

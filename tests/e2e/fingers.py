@@ -1,0 +1,135 @@
+"""A person who only has keys: fingers that press them, and eyes on what has the keyboard."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+
+from tests.e2e.hour import CANVAS, kind_of
+from tests.e2e.person import Person
+from tests.e2e.waiting import until
+
+PACE_S = 0.08  # the page moves its focus with the next picture, not with the key
+MANY = 40
+TAB = "document.querySelector('.nepTab:not([hidden])')"
+FOCUSED = (
+    "(it => [it.getAttribute('class') ?? '', it.getAttribute('aria-label') ?? '', it.id]"
+    ".join(' | '))(document.activeElement)"
+)
+DRAGGING = "!!document.querySelector('.blocklyDragging')"
+FIELD = "Find a command, panel, topic, robot or file"
+
+
+class Fingers:
+    """Presses keys, and finds with them what is on the screen."""
+
+    def __init__(self, studio: Person) -> None:
+        self.studio = studio
+        self._pause = threading.Event()
+
+    # -- keys -----------------------------------------------------------------------------------------
+
+    def press(self, *names: str, held: Sequence[str] = ()) -> None:
+        """Keys one after the other, at the pace of a quick person."""
+        for name in names:
+            self.studio.screen.key(name, held)
+            self._pause.wait(PACE_S)
+
+    def until_on(self, key: str, held: Sequence[str] = (), **wanted: object) -> None:
+        """Press a key until such a widget has the keyboard."""
+        for _ in range(MANY):
+            if self.studio.all(focus=True, **wanted):
+                return
+            self.press(key, held=held)
+        now = [(each["kind"], each["name"]) for each in self.studio.all(focus=True)]
+        raise AssertionError(f"{key} does not lead to {wanted}; the keyboard is on {now}")
+
+    def write(self, words: str) -> None:
+        """Write into the field that has the keyboard, in the place of what it says."""
+        self.press("a", held=["Ctrl"])
+        self.studio.screen.type(words)
+
+    def do(self, words: str, command: str) -> None:
+        """Ctrl+K, a few letters, Enter: a command or a panel."""
+        self.palette(words, command)
+        self.press("Return")
+
+    def palette(self, words: str, entry: str) -> None:
+        """Ctrl+K and a few letters: what is meant stands first."""
+        self.press("k", held=["Ctrl"])
+        self.studio.find(FIELD, focus=True)
+        self.studio.screen.type(words)
+        until(
+            lambda: entry in [row["texts"][0] for row in self.studio.rows("What fits")][1:2],
+            lambda: f"{entry} first: {[row['texts'][0] for row in self.studio.rows('What fits')][:4]}",
+        )
+
+    # -- in the block editor --------------------------------------------------------------------------
+
+    def to_page(self) -> None:
+        """Ctrl+1: the block editor has the keyboard."""
+        self.press("1", held=["Ctrl"])
+        until(lambda: self.studio.page("document.hasFocus()"), "the page has the keyboard")
+
+    def to_canvas(self) -> None:
+        """The canvas has the keyboard, none of its blocks."""
+        self.to_page()
+        self.press("b", held=["Ctrl", "Shift"])
+        self.page_says("stack")
+
+    def focused(self) -> str:
+        """What has the focus in the page."""
+        return str(self.studio.page(FOCUSED)).replace("\u00a0", " ")
+
+    def page_says(self, words: str) -> None:
+        """Wait until what has the focus in the page says these words."""
+        until(lambda: words in self.focused(), lambda: f"{words}: {self.focused()}")
+
+    def until_in_page(self, key: str, words: str, held: Sequence[str] = ()) -> None:
+        """Press a key in the block editor until what has the focus says these words."""
+        for _ in range(MANY):
+            if words in self.focused():
+                return
+            self.press(key, held=held)
+        raise AssertionError(f"{key} does not lead to {words!r} but to {self.focused()}")
+
+    def put_down(self, kind: str) -> str:
+        """Take the block that has the focus in the toolbox, and put it where the keys were; its id."""
+        before = set(kind_of(self.studio, kind))
+        self.press("Return")
+        until(lambda: self.studio.page(DRAGGING), "the block is taken")
+        self.press("Return")
+        until(lambda: not self.studio.page(DRAGGING), "it is put down")
+        made = until(lambda: set(kind_of(self.studio, kind)) - before, f"{kind} is in the workspace")
+        self._pause.wait(PACE_S)
+        return str(made.pop())
+
+    def find_block(self, words: str, kind: str) -> str:
+        """Find a block by its words and put it where the keys were; its id."""
+        self.press("f", held=["Ctrl", "Shift"])
+        self.page_says("Find a block")
+        self.write(words)
+        first = f"{TAB}.querySelector('.blocklyFlyout.nepCategory .blocklyBlock')"
+        until(
+            lambda: self.studio.page(f"{first}?.classList.contains('{kind}')"),
+            lambda: f"{kind} is found first: {self.studio.page(f'{first}?.className.baseVal')}",
+        )
+        return self.put_down(kind)
+
+    def go_to(self, block: str) -> None:
+        """Down until this block has the keys."""
+        node = f"document.querySelector(\"{CANVAS} [data-id='{block}'] > .blocklyPath\")"
+        for _ in range(MANY):
+            if self.studio.page(f"document.activeElement === {node}"):
+                return
+            self.press("Down")
+        raise AssertionError(f"Down does not lead to {block} but to {self.focused()}")
+
+    def reword(self, says: str, words: str) -> None:
+        """Right to the gap that says this, Enter, and other words in it."""
+        self.until_in_page("Right", f"| {says}")
+        self.press("Return")
+        self.page_says("blocklyHtmlInput")
+        self.write(words)
+        self.press("Return")
+        self.page_says(f"| {words}")
