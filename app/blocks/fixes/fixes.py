@@ -47,8 +47,7 @@ def _of_scripts(made: dict[str, object], verb: str, object_: str) -> dict[str, o
     if verb == "receive":
         return _added(made, {"type": "events_received", "fields": {"NAME": object_}})
     if verb == "after":
-        later, _colon, earlier = object_.partition(":")
-        return _one_after_other(made, later, earlier)
+        return _one_after_other(made, object_)
     if verb == "add":
         return _started(made, object_)
     return None
@@ -116,14 +115,20 @@ def _defined(workspace: dict[str, object], call: Mapping[str, object]) -> dict[s
     return workspace
 
 
-def _one_after_other(workspace: dict[str, object], later: str, earlier: str) -> dict[str, object] | None:
-    """The blocks below one hat come below the end of another script; the hat, which starts nothing, goes."""
+def _one_after_other(workspace: dict[str, object], hats: str) -> dict[str, object] | None:
+    """The blocks below one hat come below the end of another script; the hat, which starts nothing, goes.
+
+    ``hats`` are the ids of both with a colon between them; ids have colons in them, too.
+    """
     blocks = workspace.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, dict) else None
     if not isinstance(tops, list):
         return None
     by_id = {top.get("id"): top for top in tops if isinstance(top, dict)}
-    moved, end = by_id.get(later), by_id.get(earlier)
+    parts = hats.split(":")
+    pairs = ((":".join(parts[:at]), ":".join(parts[at:])) for at in range(1, len(parts)))
+    found = ((by_id[later], by_id[earlier]) for later, earlier in pairs if {later, earlier} <= by_id.keys())
+    moved, end = next(found, (None, None))
     if moved is None or end is None or moved is end or not isinstance(moved.get("next"), dict):
         return None
     while isinstance(below := end.get("next"), dict) and isinstance(below.get("block"), dict):

@@ -135,6 +135,11 @@ def test_the_mend_hangs_the_second_script_below_the_first_ones_end() -> None:
     assert conflicts(named(started(turn("a"), home("b")), "s1")) == []
 
 
+def test_ids_of_hats_may_have_colons_as_the_editor_makes_them() -> None:
+    first, second = named(started(turn("a")), ":s:1"), named(started(home("b")), "s::2:")
+    assert mended(first, second) == [[":s:1", "a", "b"]]
+
+
 def test_below_one_that_goes_on_for_ever_nothing_can_hang() -> None:
     first, second = named(started(forever(turn("a")) | {"id": "e"}), "s1"), named(started(home("b")), "s2")
     assert mended(first, second) == [["s2", "b", "e"]]
