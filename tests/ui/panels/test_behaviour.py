@@ -349,6 +349,30 @@ def test_a_block_let_go_on_its_own_tab_or_elsewhere_stays(panel, window) -> None
     assert editor(panel).count("bring_blocks") == 0
 
 
+def test_a_block_held_at_the_end_of_the_row_brings_tabs_until_there_are_no_more(
+    qtbot, panel, window, monkeypatch
+) -> None:
+    title = panel.replaces_title()
+    title.show()
+    asked: list[QPoint] = []
+    place = title.tabs.mapToGlobal(QPoint(4, 4))
+
+    def scroll_at(where: QPoint) -> bool:
+        asked.append(where)
+        return len(asked) < 3
+
+    monkeypatch.setattr(title.tabs, "scroll_at", scroll_at)
+    editor(panel).block_carried.emit(place)
+    qtbot.waitUntil(lambda: len(asked) == 3)
+    scrolling = panel._carried._scrolling
+    assert asked == [place] * 3
+    assert not scrolling.isActive(), "nothing moved: it waits for the mouse"
+    editor(panel).block_carried.emit(place)
+    assert scrolling.isActive()
+    editor(panel).block_carried.emit(None)
+    assert not scrolling.isActive()
+
+
 def test_plus_has_a_ring_while_a_block_is_over_it_and_makes_a_new_behaviour(panel, window) -> None:
     title = panel.replaces_title()
     title.resize(900, 34)

@@ -269,6 +269,24 @@ def test_a_tab_out_of_sight_is_nowhere(qtbot, tabs) -> None:
     assert tabs.target_at(hidden.mapToGlobal(hidden.rect().center())) in {"", NEW}
 
 
+def test_what_is_held_near_an_end_brings_the_tabs_that_are_out_of_sight_there(qtbot, tabs) -> None:
+    tabs.resize(180, 30)
+    tabs.show_tabs([A, B, C], "a")
+    last, first = tabs.tabs["c"], tabs.tabs["a"]
+    left, right = tabs.mapToGlobal(QPoint(2, 15)), tabs.mapToGlobal(QPoint(tabs._room.width() - 2, 15))
+    middle = tabs.mapToGlobal(QPoint(tabs._room.width() // 2, 15))
+    assert not tabs.scroll_at(middle)
+    assert not tabs.scroll_at(left), "nothing more is there"
+    while tabs.scroll_at(right):
+        pass
+    assert tabs.target_at(right) == "c"
+    assert last.geometry().right() <= tabs._room.width()
+    while tabs.scroll_at(left):
+        pass
+    assert first.geometry().left() == 0
+    assert not tabs.scroll_at(tabs.mapToGlobal(QPoint(2, 90))), "below the row nothing is brought"
+
+
 def test_the_ring_is_round_one_of_them(tabs) -> None:
     def ringed() -> list[bool]:
         return [tabs.tabs["a"].is_aimed, tabs.tabs["b"].is_aimed, tabs.add.is_aimed]

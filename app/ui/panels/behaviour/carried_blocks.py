@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from PySide6.QtCore import QPoint, SignalInstance
+from PySide6.QtCore import QPoint, QTimer, SignalInstance
 
 from app.core.session import Session
 from app.ui.panels.base import PanelContext
 from app.ui.panels.behaviour.tabs import NEW, BehaviourTabs
 from nep.i18n import _, ngettext
+
+SCROLL_MS = 16
 
 
 class Carrier(Protocol):
@@ -27,7 +29,8 @@ class Carrier(Protocol):
 class CarriedBlocks:
     """Marks the tab under a block that is carried out of the page, and lets it have the block there.
 
-    Let go on "+" a new behaviour takes it; let go elsewhere it is where it was.
+    Let go on "+" a new behaviour takes it; let go elsewhere it is where it was. Held near an end of the row
+    it brings the tabs that are out of sight there.
     """
 
     def __init__(
@@ -43,6 +46,10 @@ class CarriedBlocks:
         self._context, self._session, self._tabs, self._editor = context, session, tabs, editor
         self._flush, self._show = flush, show
         self._from = ""
+        self._held_at: QPoint | None = None
+        self._scrolling = QTimer(tabs)
+        self._scrolling.setInterval(SCROLL_MS)
+        self._scrolling.timeout.connect(self._scroll)
         editor.block_carried.connect(self._carried)
         editor.block_dropped.connect(self._dropped)
         editor.blocks_brought.connect(self._brought)
@@ -53,10 +60,24 @@ class CarriedBlocks:
         return found if found != self._session.document.key else ""
 
     def _carried(self, place: QPoint | None) -> None:
+        self._held_at = place
         self._tabs.aim(self._target(place) if place is not None else "")
+        if place is None:
+            self._scrolling.stop()
+        elif not self._scrolling.isActive():
+            self._scrolling.start()
+
+    def _scroll(self) -> None:
+        place = self._held_at
+        if place is not None and self._tabs.scroll_at(place):
+            self._tabs.aim(self._target(place))
+        else:
+            self._scrolling.stop()  # what is moved from here on starts it again
 
     def _dropped(self, place: QPoint) -> None:
         target = self._target(place)
+        self._held_at = None
+        self._scrolling.stop()
         self._tabs.aim("")
         if not target:
             return

@@ -18,6 +18,7 @@ from nep.i18n import _
 SHORTEST = 76
 GAP = 4
 NAME_WIDTH = 180  # to edit a name in
+SCROLL_NEAR, SCROLL_STEP = 32, 8  # px
 NEW = "+"
 """In the place of a tab's key: the button for a new one."""
 
@@ -111,6 +112,20 @@ class BehaviourTabs(QWidget):
         if not self._room.geometry().contains(here):
             return ""
         return next((key for key, tab in self.tabs.items() if tab.geometry().contains(here)), "")
+
+    def scroll_at(self, place: QPoint) -> bool:
+        """Move the tabs on while something is held near an end where more of them are; whether they moved."""
+        here, room = self.mapFromGlobal(place), self._room.geometry()
+        if not self.isVisible() or not room.contains(here):
+            return False
+        near = min(round(self._theme.scaled(SCROLL_NEAR)), room.width() // 3)
+        before = self._left
+        if here.x() < room.left() + near:
+            self._left -= SCROLL_STEP
+        elif here.x() > room.right() - near:
+            self._left += SCROLL_STEP
+        self._place()
+        return self._left != before
 
     def aim(self, key: str) -> None:
         """Put a ring round this tab, or "+" (`NEW`): what is in the hand goes there; "" takes it away."""
