@@ -121,6 +121,19 @@ def test_large_text_of_the_screen_is_not_larger_on_paper(qtbot, view, person) ->
     assert large.picture(0) == usual.picture(0)
 
 
+def test_notes_are_printed_with_all_their_words(qtbot, view, person) -> None:
+    words = " ".join(f"word{number:02}" for number in range(60))
+    sheet = {"text": f"{words} of the block", "pinned": True, "height": 60, "width": 160}
+    noted = stack(2) | {"id": "noted", "x": 60, "y": 60, "icons": {"comment": sheet}}
+    them: Person = person(state=workspace(noted) | {"workspaceComments": [NOTE | {"y": 600, "text": words}]})
+    them.wait_for("!!document.querySelector('.nepNote')")
+    pages = printed(qtbot, view)
+    assert pages is not None
+    assert pages.count == 1
+    assert all(pages.texts[0].count(word) == 2 for word in words.split())
+    assert "…" not in pages.texts[0]
+
+
 def test_an_empty_canvas_has_no_pages(qtbot, view, person) -> None:
     person(state=workspace())
     assert printed(qtbot, view) is None

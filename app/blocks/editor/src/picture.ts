@@ -7,6 +7,8 @@ const SVG = 'http://www.w3.org/2000/svg';
 /** Around the blocks; the signs at their left are 20 wide. */
 const MARGIN = 32;
 const SCALE = 2;
+/** What is higher is the sheet of a note, not the bar above it. */
+const HEAD = 30;
 /** What Chromium can draw at once: on a side, and in all. */
 const MOST_SIDE = 16_000;
 const MOST_PIXELS = 120_000_000;
@@ -60,6 +62,7 @@ export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean)
   if (!found.length) return null;
   const boxes = found.map(({box}) => box);
   const drawn = found.map((each) => each.drawn);
+  for (const each of drawn) if (each) cut(each);
   const left = Math.floor(Math.min(...boxes.map((box) => box.left)) - MARGIN);
   const top = Math.floor(Math.min(...boxes.map((box) => box.top)) - MARGIN);
   const width = Math.ceil(Math.max(...boxes.map((box) => box.right)) + MARGIN) - left;
@@ -154,14 +157,39 @@ function wordsOf(source: Element): SVGElement | null {
   made.setAttribute('fill', style.color);
   const lines = wrapped(area.value, width - 2 * inset, `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`);
   const room = Math.max(1, Math.floor((height - rise) / each));
-  lines.slice(0, room).forEach((line, at) => {
+  lines.forEach((line, at) => {
     const part = document.createElementNS(SVG, 'tspan');
     part.setAttribute('x', `${x + inset}`);
     part.setAttribute('y', `${y + rise + size + at * each}`);
-    part.textContent = at === room - 1 && lines.length > room ? `${line} …` : line;
+    part.textContent = line;
     made.append(part);
   });
+  if (lines.length > room) Object.assign(made.dataset, {room, more: Math.ceil((lines.length - room) * each)});
   return made;
+}
+
+/** How much higher a note has to be for all its words. */
+export function moreOf(note: SVGElement): number {
+  return Number(note.querySelector<SVGElement>('[data-more]')?.dataset['more'] ?? 0);
+}
+
+/** Makes a note as high as its words. */
+export function grow(note: SVGElement): void {
+  const more = moreOf(note);
+  for (const ground of note.querySelectorAll('rect')) {
+    const height = Number(ground.getAttribute('height'));
+    if (height > HEAD) ground.setAttribute('height', `${height + more}`);
+  }
+}
+
+/** Leaves out the words that do not fit into a note, and says so with “…”. */
+export function cut(note: SVGElement): void {
+  const words = note.querySelector<SVGElement>('[data-room]');
+  if (!words) return;
+  const lines = [...words.children];
+  const room = Number(words.dataset['room']);
+  for (const line of lines.splice(room)) line.remove();
+  lines[room - 1]?.append(' …');
 }
 
 function wrapped(words: string, width: number, font: string): string[] {

@@ -1,7 +1,7 @@
 // The program on paper: stacks in the order in which they are read, whole where they fit on a page, parted between two
 // blocks where they do not; in columns, as a newspaper. The pages lie in the page of the editor, which shows them only to the printer.
 import * as Blockly from 'blockly/core';
-import {drawings} from './picture';
+import {cut, drawings, grow, moreOf} from './picture';
 import {t} from './words';
 
 const SVG = 'http://www.w3.org/2000/svg';
@@ -78,6 +78,12 @@ function clustersOf(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGEl
   const clusters = new Map<unknown, Cluster>();
   for (const {item, box, drawn} of drawings(workspace, patterns)) {
     if (!drawn) continue;
+    const more = moreOf(drawn);
+    const whole = new Blockly.utils.Rect(box.top, box.bottom + more, box.left, box.right);
+    if (more && isFree(whole, box, item)) {
+      grow(drawn);
+      box.bottom = whole.bottom;
+    } else cut(drawn);
     const found = clusters.get(item);
     if (found) {
       found.box = around(found.box, box);
@@ -85,6 +91,13 @@ function clustersOf(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGEl
     } else clusters.set(item ?? drawn, {box, drawn: [drawn], cuts: item instanceof Blockly.BlockSvg ? cutsOf(item) : []});
   }
   return [...clusters.values()].sort((a, b) => a.box.top - b.box.top || a.box.left - b.box.left);
+}
+
+/** Whether a note may be so high: none of the blocks that it belongs to is below it. */
+function isFree(whole: Box, before: Box, item: unknown): boolean {
+  if (!(item instanceof Blockly.BlockSvg)) return true;
+  return item.getDescendants(false).map((each) => each.getBoundingRectangleWithoutChildren())
+    .every((each) => !each.intersects(whole) || each.intersects(before));
 }
 
 function around(a: Box, b: Box): Box {
