@@ -140,6 +140,8 @@ class RobotPanel(OneRobotPanel):
             self._no_robot.tell(self.session.coming)
             return
         self._show_sound()
+        if self._large is not None:
+            self._large.raise_()  # a panel that comes to the front of its tabs would lie over it
         self.chip.set(link.chip, ROBOT_STATUS.get(link.state, "ok"))
         if link.drawing is not None:
             now = time.monotonic()
