@@ -164,8 +164,6 @@ class Workbench(QMainWindow):
         dock.try_again()
         dock.show()
         dock.raise_()
-        # Before it is painted: an empty panel would say what is not true.
-        self._tell_failure(name, dock.refresh())
         self._tabs_soon()
         return dock
 
