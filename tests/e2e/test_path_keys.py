@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.behaviours import forever, say, started, write
 from tests.e2e.film import Film, KeysOnly
 from tests.e2e.fingers import Fingers
 from tests.e2e.studio import Studio
@@ -22,7 +21,6 @@ def test_a_persons_path_with_the_keyboard_alone(start: Callable[..., Studio], tm
     studio = start(HOME=str(home))
     studio.screen = KeysOnly(studio.screen.display)
     film, fingers = Film(studio, "keys", tmp_path), Fingers(studio)
-    write(home / "Speaks.nepb", started(forever(say("One", say("Two")))))
 
     with film.step("Tab goes over the start page"):
         studio.says("What would you like to do?")
@@ -32,13 +30,14 @@ def test_a_persons_path_with_the_keyboard_alone(start: Callable[..., Studio], tm
         fingers.press("Return")
         studio.says("Pepper ready", 40)
         studio.says("virtual, ready")
-    with film.step("Ctrl+O, a path and Enter: the behaviour is open"):
-        fingers.press("o", held=["Ctrl"])
-        studio.find(kind="QLineEdit", focus=True)
-        fingers.write(str(home / "Speaks.nepb"))
-        fingers.press("Return")
-        studio.find("Speaks", kind="BehaviourTab")
-        until(lambda: len(studio.blocks()) >= 4, "the blocks are there")
+    with film.step("Ctrl+N: a new behaviour; its blocks are found by their words"):
+        fingers.press("n", held=["Ctrl"])
+        studio.spot(".blocklyToolboxCategoryLabel")
+        fingers.to_canvas()
+        fingers.find_block("when started", "events_started")
+        fingers.find_block("forever", "control_forever")
+        fingers.find_block("say", "robot_pepper_do_say")
+        fingers.find_block("wait", "control_wait")
     run(studio, film, fingers)
     look_at_topics(studio, film, fingers)
     save(studio, film, fingers, home / "Keys.nepb")
@@ -78,10 +77,10 @@ def look_at_topics(studio: Studio, film: Film, fingers: Fingers) -> None:
 
 
 def save(studio: Studio, film: Film, fingers: Fingers, path: Path) -> None:
-    with film.step("Alt+1: back to the blocks; Ctrl+Shift+S asks for a place"):
+    with film.step("Alt+1: back to the blocks; Ctrl+S asks for a place"):
         fingers.press("1", held=["Alt"])
         until(lambda: len(studio.blocks()) >= 4, "the blocks are there")
-        fingers.press("s", held=["Ctrl", "Shift"])
+        fingers.press("s", held=["Ctrl"])
         studio.find(kind="FileSheet")
         studio.find(kind="QLineEdit", focus=True)
     with film.step("A name and Enter: saved"):
