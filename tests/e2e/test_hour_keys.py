@@ -337,7 +337,7 @@ def take_back(studio: Studio, film: Film, fingers: Fingers) -> None:
 def picture(studio: Studio, film: Film, fingers: Fingers, home: Path) -> None:
     with film.step("A picture of the blocks: Ctrl+K, its name, Enter"):
         fingers.do("picture", "Save a picture of the blocks")
-        studio.find(kind="QFileDialog")
+        studio.find(kind="FileSheet")
         studio.find(kind="QLineEdit", focus=True)
         fingers.press("Return")
         studio.says("Saved ")

@@ -348,9 +348,9 @@ def keep(hour: Hour) -> None:
     studio, film = hour.studio, hour.film
     with film.step("A picture of all blocks: where, and as what"):
         studio.choose("File", "Save a picture of the blocks")
-        studio.find(kind="QFileDialog")
+        studio.find(kind="FileSheet")
     with film.step("It is saved"):
-        studio.click(kind="QPushButton", text="&Save")
+        studio.click("Save", kind="Button")
         studio.says("Saved New behaviour.png")
         (picture,) = hour.home.glob("*.png")
         read = cv2.imread(str(picture))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from PySide6.QtWidgets import QLineEdit, QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.shell.start_page.page import Example
+from app.ui.widgets.file_dialogs import FileKind, meant
 from tests.blocks.fakes import until
 from tests.ui import fakes
 from tests.ui.sample_data import WORKSPACE, Invocation, pepper
@@ -110,6 +111,17 @@ class Answers:
         self.asked.append(f"save {suggestion}")
         if self.path is not None:
             take(self.path)
+
+    def save_as(
+        self,
+        title: str,
+        suggestion: Path,
+        kinds: Sequence[FileKind],
+        take: Callable[[Path, FileKind], None],
+    ) -> None:
+        self.asked.append(f"{title}: {suggestion}")
+        if self.path is not None:
+            take(*meant(self.path, kinds[0], kinds))
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
         self.asked.append(f"picture {folder}")

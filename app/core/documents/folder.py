@@ -67,9 +67,9 @@ def whole_path(typed: str) -> Path | None:
     return path if path.is_absolute() and path.name else None
 
 
-def free_name(folder: Path, name: str) -> str:
+def free_name(folder: Path, name: str, ending: str = SUFFIX) -> str:
     """The name, or the first of its numbers that no file there has: "Greeting 2"."""
     number, made = 2, name
-    while (folder / f"{made}{SUFFIX}").exists():
+    while (folder / f"{made}{ending}").exists():
         made, number = f"{name} {number}", number + 1
     return made

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -13,6 +14,23 @@ from app.core.documents.file_format import SUFFIX
 from nep.i18n import _, lazy
 
 
+@dataclass(frozen=True)
+class FileKind:
+    """As what something is saved: in words, which `lazy` marks, and by the ending of its name."""
+
+    words: str
+    ending: str
+
+
+def meant(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path, FileKind]:
+    """The whole name, and as what: an ending that was typed counts for more than the kind that was chosen."""
+    ending = chosen.suffix.lower()
+    if ending != kind.ending:
+        typed = next((each for each in kinds if each.ending == ending), None)
+        return (chosen, typed) if typed is not None else (chosen.with_name(chosen.name + kind.ending), kind)
+    return chosen, kind
+
+
 class FileDialogs(Protocol):
     """Asks a person for a file; ``take`` is called with the answer, never when the person gives up."""
 
@@ -21,6 +39,15 @@ class FileDialogs(Protocol):
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
         """Where to save."""
+
+    def save_as(
+        self,
+        title: str,
+        suggestion: Path,
+        kinds: Sequence[FileKind],
+        take: Callable[[Path, FileKind], None],
+    ) -> None:
+        """Where to save something that is no behaviour, and as which of these; the path has its ending."""
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
         """Which picture; "" for the folder where this computer keeps pictures."""
@@ -36,18 +63,6 @@ def pictures_folder() -> str:
     """Where this computer keeps pictures; the person's own folder where it has no such place."""
     place = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
     return place if place and Path(place).is_dir() else str(Path.home())
-
-
-def show_free(dialog: QFileDialog) -> None:
-    """Show a dialog that leaves Stop free: the window can be used, and Stop's keys work in the dialog too.
-
-    Qt's own dialog, not the system's: keys that are pressed there never come to us, and some of them block.
-    """
-    dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-    dialog.setWindowModality(Qt.WindowModality.NonModal)
-    dialog.show()
-    dialog.activateWindow()  # the keys go there, also where no window manager sees to it
 
 
 BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
@@ -74,6 +89,28 @@ class SystemDialogs:
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(SUFFIX.lstrip("."))
         dialog.selectFile(Path(suggestion).name)
+        dialog.show()
+
+    def save_as(
+        self,
+        title: str,
+        suggestion: Path,
+        kinds: Sequence[FileKind],
+        take: Callable[[Path, FileKind], None],
+    ) -> None:
+        offered = {f"{_(kind.words)} (*{kind.ending})": kind for kind in kinds}
+
+        def chosen(path: Path) -> None:
+            take(*meant(path, offered.get(dialog.selectedNameFilter(), kinds[0]), kinds))
+
+        dialog = self._dialog(title, str(suggestion.parent), chosen)
+        dialog.setNameFilters(list(offered))
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix(kinds[0].ending.lstrip("."))
+        dialog.filterSelected.connect(
+            lambda words: dialog.setDefaultSuffix(offered[words].ending.lstrip("."))
+        )
+        dialog.selectFile(suggestion.name)
         dialog.show()
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:

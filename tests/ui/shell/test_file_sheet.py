@@ -17,6 +17,7 @@ from app.ui.shell.dialogs.file_sheet import FileSheet, FolderPlace, known_places
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
+from app.ui.widgets.file_dialogs import FileKind
 from tests.ui.shell_parts import PANELS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -297,3 +298,38 @@ def test_the_settings_stay_open_below_the_sheet_and_get_the_keys_back(
     assert settings.isVisible()
     assert settings.choose.hasFocus()
     assert taken == []
+
+
+def test_something_else_is_saved_as_one_of_several_kinds(sheet: FileSheet, folder: Path) -> None:
+    kinds = FileKind("Picture", ".png"), FileKind("Sharp picture", ".svg")
+    taken: list[tuple[str, str]] = []
+    (folder / "Tea 1.svg").write_text("<svg/>")
+
+    def ask(name: str) -> None:
+        sheet.ask_save_as(
+            "Save a picture", folder / name, kinds, lambda p, k: taken.append((p.name, k.words))
+        )
+
+    ask("Tea 1")
+    assert (sheet.heading.text(), sheet.ending.text(), sheet.name.text()) == (
+        "Save a picture",
+        ".png",
+        "Tea 1",
+    )
+    assert rows(sheet) == ["class 3", "Tea 1.svg"]
+    sheet.kind.setCurrentIndex(1)
+    assert (sheet.ending.text(), sheet.done.text()) == (".svg", "Replace")
+    QTest.mouseClick(sheet.keep_both, LEFT)
+    ask("Tea 1")
+    assert sheet.ending.text() == ".png", "each question begins with the first kind"
+    typed(sheet, "Tea.SVG")
+    QTest.keyClick(sheet.name, Qt.Key.Key_Return)
+    ask("Tea 1")
+    typed(sheet, "Tea.svg")
+    sheet.kind.setCurrentIndex(1)
+    sheet.kind.setCurrentIndex(0)
+    QTest.mouseClick(sheet.done, LEFT)
+    assert taken == [("Tea 1 2.svg", "Sharp picture"), ("Tea.svg", "Sharp picture"), ("Tea.png", "Picture")]
+    sheet.ask_save(folder / "Dance.nepb", print)
+    assert not sheet.kind.isVisible()
+    assert sheet.ending.text() == ".nepb"

@@ -12,11 +12,12 @@ from PySide6.QtCore import QBuffer, QIODevice
 from PySide6.QtGui import QPageLayout, QPainter, QPdfWriter
 from PySide6.QtPdf import QPdfDocument
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter
-from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.session import Session
 from app.ui.shell.commands.printing import Printing, paint_pdf, usual_paper
 from app.ui.shell.commands.shell import Shell
+from tests.ui.shell_parts import Answers
 
 
 class Editor:
@@ -53,7 +54,10 @@ class Case:
         surface = SimpleNamespace(window=lambda: self.window)
         shell = SimpleNamespace(editor=lambda: self.editor, say=self.said.append, surface=surface)
         session = SimpleNamespace(document=SimpleNamespace(name="Tea", path=None))
-        self.printing = Printing(cast("Shell", shell), cast("Session", session), lambda: printers)
+        self.answers = Answers()
+        self.printing = Printing(
+            cast("Shell", shell), cast("Session", session), self.answers, lambda: printers
+        )
 
 
 def dialogs(kind: type) -> list[QWidget]:
@@ -62,14 +66,13 @@ def dialogs(kind: type) -> list[QWidget]:
 
 def test_without_a_printer_a_pdf_is_offered_in_a_sentence(qtbot, tmp_path: Path) -> None:
     case = Case(qtbot, b"%PDF", [])
+    case.answers.path = tmp_path / "Tea 1.2"
     case.printing.ask()
     assert "No printer" in case.said[0]
-    (dialog,) = dialogs(QFileDialog)
-    cast("QFileDialog", dialog).fileSelected.emit(str(tmp_path / "Tea 1.2"))
+    assert case.answers.asked == [f"Save the blocks as PDF: {Path.home() / 'Tea'}"]
     assert (tmp_path / "Tea 1.2.pdf").read_bytes() == b"%PDF"
     assert case.said[1] == "Saved Tea 1.2.pdf"
     assert case.editor.asked[0][0] == "Tea"
-    dialog.close()
 
 
 def test_with_a_printer_its_dialog_comes_and_the_window_stays_free(qtbot) -> None:

@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from app.core.session import Session
 from app.ui.shell.commands.program_pictures import ProgramPictures
 from app.ui.shell.commands.shell import Shell
+from tests.ui.shell_parts import Answers
 
 
 class Editor:
@@ -28,9 +29,20 @@ class Editor:
         done(self.data)
 
 
-def made(editor: Editor, said: list[str]) -> ProgramPictures:
+def made(editor: Editor, said: list[str], answers: Answers | None = None) -> ProgramPictures:
     shell = SimpleNamespace(editor=lambda: editor, say=said.append)
-    return ProgramPictures(cast("Shell", shell), cast("Session", SimpleNamespace()))
+    session = SimpleNamespace(document=SimpleNamespace(name="Tea", path=None))
+    return ProgramPictures(cast("Shell", shell), cast("Session", session), answers or Answers())
+
+
+def test_the_ending_that_is_typed_says_as_what_it_is_saved(tmp_path: Path) -> None:
+    said: list[str] = []
+    editor, answers = Editor(b"<svg/>"), Answers()
+    answers.path = tmp_path / "Tea.SVG"
+    made(editor, said, answers).ask()
+    assert answers.asked == [f"Save a picture of the blocks: {Path.home() / 'Tea'}"]
+    assert editor.asked == [("svg", True)]
+    assert answers.path.read_bytes() == b"<svg/>"
 
 
 def test_a_picture_is_written_with_the_ending_of_its_kind(tmp_path: Path) -> None:

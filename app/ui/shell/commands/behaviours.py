@@ -20,6 +20,7 @@ from app.ui.shell.commands.printing import Printing
 from app.ui.shell.commands.program_pictures import ProgramPictures
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
+from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
 from nep.system.lazy_import import lazy_module
 
@@ -130,11 +131,11 @@ def bring_into_view(shell: Shell) -> None:
 class BehaviourCommands:
     """What a person does with behaviours and their tabs."""
 
-    def __init__(self, shell: Shell, session: Session, files: DocumentController) -> None:
+    def __init__(self, shell: Shell, session: Session, files: DocumentController, asks: FileDialogs) -> None:
         self._shell, self._session, self._files = shell, session, files
         self._versions: version_history.VersionHistorySheet | None = None
-        self.pictures = ProgramPictures(shell, session)
-        self.printing = Printing(shell, session)
+        self.pictures = ProgramPictures(shell, session, asks)
+        self.printing = Printing(shell, session, asks)
 
     # -- run --------------------------------------------------------------------------------------
 

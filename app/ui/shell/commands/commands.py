@@ -31,7 +31,7 @@ class Commands:
         self.files = DocumentController(
             session, asks, shell.say, partial(bring_into_view, shell), shell.editor
         )
-        self.behaviours = BehaviourCommands(shell, session, self.files)
+        self.behaviours = BehaviourCommands(shell, session, self.files, asks)
         self.robots = RobotCommands(shell, session, self.files, self.behaviours.undo)
         self.view = ViewCommands(shell, session, self.files, keys)
         self.shortcuts = keys

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QLocale, QMarginsF, QRectF, QSize, Qt
 from PySide6.QtGui import QPageLayout, QPageSize, QPainter
-from PySide6.QtWidgets import QDialog, QFileDialog
+from PySide6.QtWidgets import QDialog
 
 from app.core.session import Session
 from app.core.storage.atomic_file import write_atomically
-from app.core.storage.settings import kept_folder
+from app.ui.shell.commands.program_pictures import beside
 from app.ui.shell.commands.shell import Shell
-from app.ui.widgets.file_dialogs import show_free
+from app.ui.widgets.file_dialogs import FileDialogs, FileKind
 from nep.i18n import _, day_text
 
 if TYPE_CHECKING:
@@ -37,11 +37,15 @@ class Printing:
     """Prints the blocks that are open."""
 
     def __init__(
-        self, shell: Shell, session: Session, printers: Callable[[], list[str]] | None = None
+        self,
+        shell: Shell,
+        session: Session,
+        asks: FileDialogs,
+        printers: Callable[[], list[str]] | None = None,
     ) -> None:
         """``printers`` names those that this computer knows."""
-        printers = printers if printers is not None else known_printers
-        self._shell, self._session, self._printers = shell, session, printers
+        self._shell, self._session, self._asks = shell, session, asks
+        self._printers = printers if printers is not None else known_printers
 
     def ask(self) -> None:
         """Ask on which printer and how; where there is none, where to save a PDF."""
@@ -77,16 +81,12 @@ class Printing:
 
     def ask_pdf(self) -> None:
         """Ask where, then save a PDF there."""
-        document = self._session.document
-        own = document.path
-        folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
-        dialog = QFileDialog(self._shell.surface.window(), _("Save the blocks as PDF"), str(folder))
-        dialog.setNameFilters(["PDF (*.pdf)"])
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setDefaultSuffix("pdf")
-        dialog.selectFile(document.name)
-        dialog.fileSelected.connect(lambda chosen: self.save(Path(chosen)))
-        show_free(dialog)
+        self._asks.save_as(
+            _("Save the blocks as PDF"),
+            beside(self._session.document),
+            (FileKind("PDF", ".pdf"),),
+            lambda path, _kind: self.save(path),
+        )
 
     def save(self, path: Path) -> None:
         """Write a PDF there; a name with another ending gets the right one."""

@@ -7,14 +7,32 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from PySide6.QtGui import QGuiApplication, QImage
-from PySide6.QtWidgets import QFileDialog
 
+from app.core.documents.document import Document
 from app.core.session import Session
 from app.core.storage.atomic_file import write_atomically
 from app.core.storage.settings import kept_folder
 from app.ui.shell.commands.shell import Shell
-from app.ui.widgets.file_dialogs import show_free
-from nep.i18n import _
+from app.ui.widgets.file_dialogs import FileDialogs, FileKind
+from nep.i18n import _, lazy
+
+ON_WHITE = (
+    FileKind(lazy("Picture"), ".png"),
+    FileKind(lazy("Picture that stays sharp at any size"), ".svg"),
+)
+KINDS = (
+    ON_WHITE[0],
+    FileKind(lazy("Picture without background"), ".png"),
+    ON_WHITE[1],
+    FileKind(lazy("Picture that stays sharp, without background"), ".svg"),
+)
+
+
+def beside(document: Document) -> Path:
+    """The name of what is made of a behaviour, beside its file unless Studio keeps that one."""
+    own = document.path
+    folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
+    return folder / document.name
 
 
 @runtime_checkable
@@ -28,33 +46,17 @@ class SupportsPicture(Protocol):
 class ProgramPictures:
     """Makes pictures of the blocks that are open."""
 
-    def __init__(self, shell: Shell, session: Session) -> None:
-        self._shell, self._session = shell, session
+    def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
+        self._shell, self._session, self._asks = shell, session, asks
 
     def ask(self) -> None:
         """Ask where and as what, then save there."""
-        kinds = {
-            _("Picture") + " (*.png)": ("png", True),
-            _("Picture without background") + " (*.png)": ("png", False),
-            _("Picture that stays sharp at any size") + " (*.svg)": ("svg", True),
-            _("Picture that stays sharp, without background") + " (*.svg)": ("svg", False),
-        }
-        document = self._session.document
-        own = document.path
-        folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
-        dialog = QFileDialog(self._shell.surface.window(), _("Save a picture of the blocks"), str(folder))
-        dialog.setNameFilters(list(kinds))
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setDefaultSuffix("png")
-        dialog.filterSelected.connect(lambda chosen: dialog.setDefaultSuffix(kinds[chosen][0]))
-        dialog.selectFile(document.name)
+        suggestion = beside(self._session.document)
 
-        def take(chosen: str) -> None:
-            kind, white = kinds[dialog.selectedNameFilter()]
-            self.save(Path(chosen), "svg" if chosen.lower().endswith(".svg") else kind, white)
+        def take(path: Path, kind: FileKind) -> None:
+            self.save(path, kind.ending.lstrip("."), kind in ON_WHITE)
 
-        dialog.fileSelected.connect(take)
-        show_free(dialog)
+        self._asks.save_as(_("Save a picture of the blocks"), suggestion, KINDS, take)
 
     def save(self, path: Path, kind: str, white: bool) -> None:
         """Write a "png" or "svg" there; a name with another ending gets the right one."""

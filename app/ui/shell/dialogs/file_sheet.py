@@ -41,7 +41,8 @@ from app.ui.text.dates import when_words
 from app.ui.text.numbers import size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel, IconButton, label, paint
-from app.ui.widgets.file_dialogs import PICTURE_ENDINGS, pictures_folder
+from app.ui.widgets.file_dialogs import BEHAVIOURS, PICTURE_ENDINGS, FileKind, meant, pictures_folder
+from app.ui.widgets.inputs.combo_box import ComboBox
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _, lazy
@@ -54,7 +55,8 @@ NAME, CHANGED, SIZE = range(3)
 class FileQuestion:
     """What a person is asked for: a file with one of the ``endings``, or a folder.
 
-    ``empty`` is said of a folder in which there is nothing to choose.
+    ``empty`` is said of a folder in which there is nothing to choose; ``kinds`` are offered
+    for what is saved.
     """
 
     heading: str
@@ -64,6 +66,7 @@ class FileQuestion:
     icon: str = "blocks"
     saves: bool = False
     wants_folder: bool = False
+    kinds: tuple[FileKind, ...] = (FileKind(BEHAVIOURS[0], SUFFIX),)
 
 
 OPEN = FileQuestion(lazy("Open a behaviour"), lazy("Open"), lazy("No behaviours and no folders are in here."))
@@ -180,6 +183,8 @@ class FileSheet(Overlay):
             field.setProperty("focusRadius", theme.radius("control"))
             EditMenu(theme, field)
         self.ending = label(SUFFIX, "bodyLarge", role="textTertiary")
+        self.kind = ComboBox(theme, name=_("Kind of file"))
+        self.kind.currentIndexChanged.connect(self._kind_chosen)
         self.said = label("", "body", role="textSecondary", wrap=True)
         self.cancel = Button(theme, _("Cancel"), size="form")
         self.cancel.clicked.connect(self.shut)
@@ -231,6 +236,7 @@ class FileSheet(Overlay):
         naming.addWidget(label(_("Name"), "bodyLarge", role="textSecondary"))
         naming.addWidget(self.name, 1)
         naming.addWidget(self.ending)
+        naming.addWidget(self.kind)
         right.addWidget(self._naming)
         foot = QHBoxLayout()
         foot.setSpacing(8)
@@ -264,10 +270,47 @@ class FileSheet(Overlay):
 
     def ask_save(self, suggestion: Path, take: Callable[[Path], object]) -> None:
         """Where to save, and under which name."""
+        self._ask_name(SAVE, suggestion, take)
+
+    def ask_save_as(
+        self,
+        title: str,
+        suggestion: Path,
+        kinds: Sequence[FileKind],
+        take: Callable[[Path, FileKind], object],
+    ) -> None:
+        """Where to save something that is no behaviour, under which name, and as what."""
+        endings = tuple(dict.fromkeys(each.ending for each in kinds))
+        question = FileQuestion(
+            title, SAVE.verb, SAVE.empty, endings=endings, icon="image", saves=True, kinds=tuple(kinds)
+        )
+        self._ask_name(question, suggestion, lambda path: take(*meant(path, self._kind, kinds)))
+
+    def _ask_name(self, question: FileQuestion, suggestion: Path, take: Callable[[Path], object]) -> None:
         name = suggestion.name.removesuffix(SUFFIX)
         self.name.setText(REFUSED.sub(" ", name).strip(". ")[:LONGEST_NAME])
-        self._ask(SAVE, suggestion.parent, take)
+        self.kind.blockSignals(True)
+        self.kind.clear()
+        for kind in question.kinds:
+            self.kind.addItem(_(kind.words))
+        self.kind.blockSignals(False)
+        self.kind.updateGeometry()
+        paint.show_when(self.kind, len(question.kinds) > 1)
+        self.ending.setText(question.kinds[0].ending)
+        self._ask(question, suggestion.parent, take)
         self.name.selectAll()
+
+    @property
+    def _kind(self) -> FileKind:
+        return self.question.kinds[max(0, self.kind.currentIndex())]
+
+    def _kind_chosen(self) -> None:
+        """Another ending; one that was typed goes, since it would count for more."""
+        name = self.name.text()
+        typed = next((each for each in self.question.endings if name.lower().endswith(each)), "")
+        self.name.setText(name[: len(name) - len(typed)])
+        self.ending.setText(self._kind.ending)
+        self._judge()
 
     def _ask(self, question: FileQuestion, folder: Path, take: Callable[[Path], object]) -> None:
         self.question, self._take = question, take
@@ -411,12 +454,13 @@ class FileSheet(Overlay):
         if not self.saves:
             return chosen.path if chosen is not None and not chosen.is_folder else None
         name = self.name.text().strip()
-        if name.lower().endswith(SUFFIX):
-            name = name[: -len(SUFFIX)]
+        ending = next((e for e in self.question.endings if name.lower().endswith(e)), self._kind.ending)
+        if name.lower().endswith(ending):
+            name = name[: -len(ending)]
         whole = whole_path(name)
         if whole is not None:
-            return whole.with_name(f"{whole.name}{SUFFIX}") if whole.parent.is_dir() else None
-        return self.folder / f"{name}{SUFFIX}" if name and not name_refusal(name) else None
+            return whole.with_name(f"{whole.name}{ending}") if whole.parent.is_dir() else None
+        return self.folder / f"{name}{ending}" if name and not name_refusal(name) else None
 
     def _judge(self) -> None:
         """Say what would happen, and call the buttons after it."""
@@ -476,8 +520,8 @@ class FileSheet(Overlay):
     def _keep_both(self) -> None:
         target = self.target
         if target is not None:
-            name = free_name(target.parent, target.name.removesuffix(SUFFIX))
-            self._answer(target.with_name(f"{name}{SUFFIX}"))
+            name = free_name(target.parent, target.stem, target.suffix)
+            self._answer(target.with_name(f"{name}{target.suffix}"))
 
     def _answer(self, path: Path) -> None:
         self.shut()
@@ -522,6 +566,16 @@ class StudioDialogs:
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
         """Where to save."""
         self._made().ask_save(Path(suggestion), take)
+
+    def save_as(
+        self,
+        title: str,
+        suggestion: Path,
+        kinds: Sequence[FileKind],
+        take: Callable[[Path, FileKind], None],
+    ) -> None:
+        """Where to save something that is no behaviour, and as what."""
+        self._made().ask_save_as(title, suggestion, kinds, take)
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
         """Which picture to take."""
