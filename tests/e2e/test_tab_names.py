@@ -34,7 +34,7 @@ def test_a_tab_is_renamed_with_its_file_and_back(start: Callable[..., Studio], t
     studio.screen.key("Return")
     studio.says("Renamed Greeting to Quiz for class")
     studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # it stays under the mouse
-    assert tabs(studio) == ["Quiz for class"]
+    until(lambda: tabs(studio) == ["Quiz for class"], "its tab says so")
     assert not old.exists()
     assert (tmp_path / "Quiz for class.nepb").exists()
     studio.click("Undo", kind="Button")

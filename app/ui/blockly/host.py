@@ -164,7 +164,7 @@ class BlocklyHost(QWidget):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if self._web is None:
-            self._make_page()
+            QTimer.singleShot(0, self, self._make_page)  # whoever pressed something sees the window first
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ChildAdded:
@@ -187,6 +187,8 @@ class BlocklyHost(QWidget):
         return super().eventFilter(watched, event)
 
     def _make_page(self) -> None:
+        if self._web is not None or not self.isVisible():
+            return
         self._web = BlocklyWeb(self._bridge, self._background(), self)
         self._layout.addWidget(self._web.view)
         self.setFocusProxy(self._web.view)

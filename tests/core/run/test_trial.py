@@ -29,7 +29,8 @@ def test_a_value_is_the_line_with_its_unit() -> None:
     assert words == "battery"
     assert trial.value is None
     assert trial.take("84") == "84 %"
-    assert trial.value == ("bat", "84 %")
+    assert trial.value is not None
+    assert (trial.value.block, trial.value.words) == ("bat", "84 %")
 
 
 def test_an_empty_line_is_a_value_that_is_not_known() -> None:

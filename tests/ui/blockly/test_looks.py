@@ -164,7 +164,7 @@ def test_an_empty_program_is_nothing_but_dots(person):
     them = person()
     assert them.ask("document.querySelectorAll('.blocklyBlockCanvas .blocklyBlock').length") == 0
     assert them.ask("document.querySelectorAll('.blocklyTrash, .blocklyZoom').length") == 0
-    assert them.ask("document.querySelectorAll('.nepZoom button').length") == 5
+    assert them.ask("document.querySelectorAll('.nepZoom button').length") == 6
     assert them.view.web.fence.blocked == []
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QVBoxLayout, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
@@ -47,6 +47,9 @@ class LargeRoom(QWidget):
         over.installEventFilter(self)
         self._top = over.window()  # Esc comes there from the run bar, too, when nobody else wanted it
         self._top.installEventFilter(self)
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.connect(self._keep_keys)
         self.setGeometry(over.rect())
         stage.show()
         self.show()
@@ -54,6 +57,12 @@ class LargeRoom(QWidget):
         stage.setFocus(Qt.FocusReason.OtherFocusReason)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _keep_keys(self, _old: QWidget | None, now: QWidget | None) -> None:
+        """Nothing that it covers gets the keys: Esc would end there, and the editor would change unseen."""
+        covered = now is not None and self._over.isAncestorOf(now) and not self.isAncestorOf(now)
+        if covered and now is not self and self.isVisible():
+            self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def fill_screen(self) -> None:
         """Let the whole window fill the screen, or not any more."""
