@@ -7,11 +7,14 @@ import math
 import random
 import unicodedata
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
 
 from app.blocks.runtime.errors import BehaviourError, kind
 from nep.i18n import _, lazy
 
 LONGEST_TEXT = 1_000_000
+MOST_BITS = 14_000
+"""Python writes no whole number of more than 4300 digits; one of more bits is written as 1.2e+4932."""
 _MOST_ROUNDS = 10**9
 _JOINER = "\u200d"
 
@@ -26,6 +29,8 @@ def text(value: object) -> str:
         return str(int(value))
     if isinstance(value, (Mapping, list, tuple)):
         return json.dumps(value, ensure_ascii=False, default=str)
+    if isinstance(value, int) and value.bit_length() > MOST_BITS:
+        return f"{Decimal(value):.16e}"
     return str(value)
 
 

@@ -181,3 +181,9 @@ def test_a_compiled_expression_is_worth_what_the_reference_says(tree):
     scripts[0]()
     assert written == [expected] or (math.isnan(written[0]) and math.isnan(expected))
     assert type(written[0]) is type(expected)
+
+
+def test_a_number_of_thousands_of_digits_has_a_text() -> None:
+    assert as_text(2**16384) == "1.1897314953572318e+4932"
+    assert as_text(-(2**13999)).startswith("-")
+    assert len(as_text(2**13999)) == 4215
