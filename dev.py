@@ -8,6 +8,7 @@ Ubuntu), the virtual environment ``.venv``, the pinned packages in it, and a vir
     check          the same as test; add --fast to leave the tests out
     bench          the benchmarks
     screenshots    the pictures of the README
+    guide-pictures the pictures of the guide, in each language
     setup          only make the environment
 
 What stands behind the command goes to the program that it starts. Standard library only.
@@ -39,6 +40,7 @@ SCRIPTS = {
     "check": ("tools/check.py", "dev"),
     "bench": ("tools/bench.py", "dev"),
     "screenshots": ("tools/screenshots.py", "dev"),
+    "guide-pictures": ("tools/guide_pictures.py", "dev"),
 }
 
 

@@ -35,6 +35,12 @@ def test_it_is_smaller_and_looks_the_same(picture: Path) -> None:
     assert len(np.unique(after.reshape(-1, 3), axis=0)) <= 256
 
 
+def test_fewer_colours_are_smaller_still(picture: Path) -> None:
+    before = shrink(picture)
+    assert shrink(picture, 64) < before
+    assert len(np.unique(cv2.imread(str(picture)).reshape(-1, 3), axis=0)) <= 64
+
+
 def test_few_colours_stay_as_they_are(tmp_path: Path) -> None:
     path = tmp_path / "few.png"
     made = np.arange(0, 250, 5, dtype=np.uint8).reshape(5, 10, 1).repeat(3, axis=2)

@@ -12,19 +12,20 @@ import cv2
 import numpy as np
 from PySide6.QtGui import QImage
 
-EXACT, FOUND = 112, 144  # colours taken as they are, since they are frequent; colours found for the rest
+COLOURS = 256
+EXACT = 0.4375  # of them are taken as they are, since they are frequent; the others are found for the rest
 SAMPLE, ROUNDS = 40_000, 12
 
 
-def shrink(path: Path) -> int:
-    """Write the picture again with at most 256 colours; its size in bytes now."""
+def shrink(path: Path, most: int = COLOURS) -> int:
+    """Write the picture again with at most so many colours; its size in bytes now."""
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
         raise OSError(f"{path} is no picture")
     height, width = picture.shape[:2]
     packed = picture.astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
     colours, place, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
-    table = _table(colours, counts)
+    table = _table(colours, counts, most)
     index = _nearest(_channels(colours), table)[place].astype(np.uint8).reshape(height, width)
     made = QImage(index.tobytes(), width, height, width, QImage.Format.Format_Indexed8)
     made.setColorTable([0xFF000000 | (r << 16) | (g << 8) | b for b, g, r in table.astype(int).tolist()])
@@ -38,19 +39,20 @@ def _channels(colours: np.ndarray) -> np.ndarray:
     return np.stack([colours & 255, colours >> 8 & 255, colours >> 16 & 255], axis=1).astype(np.float32)
 
 
-def _table(colours: np.ndarray, counts: np.ndarray) -> np.ndarray:
+def _table(colours: np.ndarray, counts: np.ndarray, most: int) -> np.ndarray:
     """The most frequent colours, and the middles of what the others gather around."""
     order = np.argsort(counts)[::-1]
-    exact, rest = order[:EXACT], order[EXACT:]
+    as_they_are = round(EXACT * most)
+    exact, rest, found = order[:as_they_are], order[as_they_are:], most - as_they_are
     table = _channels(colours[exact])
-    if len(rest) <= FOUND:
+    if len(rest) <= found:
         return np.vstack([table, _channels(colours[rest])])
     chance = np.random.default_rng(7)  # the same picture gives the same file
     share = counts[rest] / counts[rest].sum()
     sample = _channels(colours[chance.choice(rest, SAMPLE, p=share)])
     cv2.setRNGSeed(7)
     ends = (cv2.TERM_CRITERIA_MAX_ITER, ROUNDS, 0.0)
-    _, _, middles = cv2.kmeans(sample, FOUND, np.zeros(0, np.int32), ends, 1, cv2.KMEANS_PP_CENTERS)
+    _, _, middles = cv2.kmeans(sample, found, np.zeros(0, np.int32), ends, 1, cv2.KMEANS_PP_CENTERS)
     return np.vstack([table, np.rint(middles)])
 
 

@@ -37,6 +37,8 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "javaScriptConsoleMessage": NOTHING,
     "interceptRequest": NOTHING,
     "requestStarted": NOTHING,
+    # texts: a picture that can't be read is an empty one
+    "loadResource": NOTHING,
     # delegates and views
     "paint": NOTHING,
     "pixmap": QPixmap,

@@ -7,16 +7,17 @@ import re
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QGuiApplication, QImage, QTextDocument, QTextImageFormat
 from PySide6.QtTest import QTest
 
 from app import resources
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.dialogs.about import AboutSheet
-from app.ui.shell.dialogs.guide import GuidePage, GuideSheet, read_pages
+from app.ui.shell.dialogs.guide import PICTURE_RATIO, GuidePage, GuideSheet, read_pages
 from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
 from nep import i18n
 from nep.version import __version__
 
@@ -24,6 +25,8 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 FOLDER = resources.path("guide")
 PAGES = sorted(path.name for path in (FOLDER / "en").glob("*.md"))
 LANGUAGES = sorted(folder.name for folder in FOLDER.iterdir())
+LARGEST, ALL_PICTURES = 110_000, 1_500_000  # bytes: Studio is downloaded with them
+MOST_LETTERS_OF_A_NAME = 40
 TITLES = ["The window", "Blocks", "Robots", "The virtual room", "When something is wrong", "Keys", "Saving"]
 
 
@@ -44,7 +47,7 @@ def test_each_language_has_each_page_with_the_same_keys_and_parts(language: str,
     named = re.findall(r"\{key:([^}]*)\}", other)
     assert set(named) <= {command.id for command in COMMANDS}
     assert set(named) == set(re.findall(r"\{key:([^}]*)\}", english))
-    for part in (r"(?m)^#", r"(?m)^\|"):
+    for part in (r"(?m)^#", r"(?m)^\|", r"(?m)^!\["):
         assert len(re.findall(part, other)) == len(re.findall(part, english)), part
 
 
@@ -54,6 +57,109 @@ def test_what_english_pages_call_commands_is_what_they_are_called() -> None:
     for page in PAGES:
         for menu, entry in re.findall(r"\*(File|Edit|View|Run|Robots|Help) > ([^*]+)\*", text("en", page)):
             assert " ".join(entry.split()) in called, (page, menu, entry)
+
+
+@pytest.mark.parametrize("language", [each for each in LANGUAGES if each != "en"])
+@pytest.mark.parametrize("page", PAGES)
+def test_other_languages_call_commands_what_they_are_called_there(
+    monkeypatch: pytest.MonkeyPatch, language: str, page: str
+) -> None:
+    monkeypatch.setattr("nep.i18n._now", None)
+    i18n.install(language)
+    words = i18n.gettext
+    path = r"\*([^>*]+) > ([^*]+)\*"
+    menus = {words(menu): menu for menu in ("File", "Edit", "View", "Run", "Robots", "Help")}
+    called = {words(each.text).format(number="") for each in COMMANDS} | {
+        words(each.under) for each in COMMANDS if each.under
+    }
+    named = [(menu, " ".join(entry.split())) for menu, entry in re.findall(path, text(language, page))]
+    assert [menu for menu, entry in named if menu not in menus or entry not in called] == []
+    english = [menu for menu, _entry in re.findall(path, text("en", page))]
+    assert [menus[menu] for menu, _entry in named] == english
+
+
+def named_pictures(page: str) -> list[tuple[str, str, str]]:
+    """Each picture of a page: its language, its name, the words for who can't see it."""
+    return [
+        (language, name, words)
+        for language in LANGUAGES
+        for words, name in re.findall(r"!\[([^\]]*)\]\(([^)]*)\)", text(language, page))
+    ]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_each_picture_is_there_in_each_language_and_in_both_themes(page: str) -> None:
+    for language, name, words in named_pictures(page):
+        assert len(words) > MOST_LETTERS_OF_A_NAME, f"{name}: say what can be seen"
+        found = []
+        for theme in ("light", "dark"):
+            path = FOLDER / language / theme / f"{name}.png"
+            image = QImage(str(path))
+            assert not image.isNull(), path
+            assert round(300 * PICTURE_RATIO) <= image.width() <= round(640 * PICTURE_RATIO), path
+            assert path.stat().st_size < LARGEST, path
+            found.append((image.size(), image.pixelColor(4, 4).lightness()))
+        (light_size, light), (dark_size, dark) = found
+        assert light_size == dark_size, f"{name}: the page would jump with the theme"
+        assert light > dark, f"{name}: one of them is in the colours of the other"
+
+
+def test_pictures_differ_only_in_words_and_all_are_used_and_small() -> None:
+    by_language = {
+        language: {name for page in PAGES for of, name, _words in named_pictures(page) if of == language}
+        for language in LANGUAGES
+    }
+    assert set(map(frozenset, by_language.values())) == {frozenset(by_language["en"])}
+    assert len(by_language["en"]) >= 6
+    files = sorted(FOLDER.glob("*/*/*.png"))
+    assert {(path.parent.parent.name, path.stem) for path in files} == {
+        (language, name) for language, names in by_language.items() for name in names
+    }, "what no page names is only a burden"
+    assert sum(path.stat().st_size for path in files) < ALL_PICTURES
+
+
+def test_a_page_shows_the_pictures_of_its_language_in_the_colours_of_now(
+    qtbot, guide: GuideSheet, theme: Theme
+) -> None:
+    def pictures() -> list[QTextImageFormat]:
+        found, block = [], guide.page.document().begin()
+        while block.isValid():
+            looks = [part.fragment().charFormat() for part in block]
+            found += [look.toImageFormat() for look in looks if look.isImageFormat()]
+            block = block.next()
+        return found
+
+    def shown(look: QTextImageFormat) -> QImage:
+        return guide.page.document().resource(QTextDocument.ResourceType.ImageResource, QUrl(look.name()))
+
+    guide.list.setCurrentRow(1)
+    looks = pictures()
+    assert [look.name() for look in looks] == [
+        name for language, name, _words in named_pictures(PAGES[1]) if language == "en"
+    ]
+    room = guide.page.viewport().width()
+    assert all(0 < look.width() <= room for look in looks)
+    assert looks[0].toolTip()
+    light = shown(looks[0]).pixelColor(4, 4).lightness()
+    assert light > 128
+    assert shown(looks[0]).pixelColor(0, 9) == theme.colour("border"), "it ends where it can be seen"
+    assert "shadow" in guide.page.accessibleDescription()
+    theme.set_mode("dark")
+    qtbot.waitUntil(lambda: shown(pictures()[0]).pixelColor(4, 4).lightness() < 128)
+    guide.page.setFixedWidth(300)
+    qtbot.waitUntil(lambda: all(look.width() <= 300 for look in pictures()))
+
+
+def test_a_picture_that_is_not_there_in_a_language_is_the_english_one(tmp_path: Path) -> None:
+    (tmp_path / "en" / "dark").mkdir(parents=True)
+    (tmp_path / "en" / "1.md").write_text("# One\n![A room with a robot](room)\n", "utf-8")
+    (tmp_path / "en" / "dark" / "room.png").write_bytes(b"")
+    (page,) = read_pages(tmp_path, "fr", lambda _command: "")
+    assert page.pictures == (("room", "A room with a robot"),)
+    assert page.picture("room", dark=True) == tmp_path / "en" / "dark" / "room.png"
+    assert page.picture("room", dark=False) is None
+    assert page.has("robot room")
+    assert not page.has("png")
 
 
 def test_a_language_without_a_page_shows_the_english_one(tmp_path: Path) -> None:

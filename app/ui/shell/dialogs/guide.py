@@ -1,7 +1,8 @@
 """The guide: pages about Studio, inside Studio, in the person's language; found by their words.
 
 The pages are Markdown in ``resources/guide``, a folder each language. ``{key:run.stop}`` in them becomes
-the keys of a command as they are now.
+the keys of a command as they are now. ``![words](name)`` is a picture: ``light/name.png`` or
+``dark/name.png`` in the folder of the language, as Studio looks now; the words are for who can't see it.
 """
 
 from __future__ import annotations
@@ -12,15 +13,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-from PySide6.QtCore import QEvent, QObject, QSize, Qt
+from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer, QUrl
 from PySide6.QtGui import (
     QFont,
+    QImage,
     QKeyEvent,
+    QPainter,
     QPalette,
+    QResizeEvent,
     QTextBlock,
     QTextBlockFormat,
     QTextCursor,
     QTextDocument,
+    QTextFormat,
     QTextFrameFormat,
     QTextTable,
 )
@@ -36,6 +41,7 @@ from PySide6.QtWidgets import (
 
 from app.core.storage.atomic_file import read_whole
 from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.text import plain
 from app.ui.text.numbers import spoken_key
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SearchField, label, paint
@@ -43,21 +49,35 @@ from nep.i18n import ENGLISH, _, ngettext
 
 WIDE, HIGH, LIST_WIDE = 920, 640, 220
 LINE_PERCENT = 115.0
+PICTURE_RATIO = 1.5
+"""Pixels of a picture's file for one of the window at 100 %: sharp on fine screens, too."""
+_PICTURE = re.compile(r"!\[([^\]]*)\]\(([a-z-]+)\)")
 _KEY = re.compile(r"\{key:([a-z_.]+)\}")
 _MARKS = re.compile(r"[*#|`_-]+")
 
 
 @dataclass(frozen=True)
 class GuidePage:
-    """One page: its heading, and its Markdown."""
+    """One page: its heading, its Markdown, and the folders of its pictures, those of its language first."""
 
     title: str
     text: str
+    folders: tuple[Path, ...] = ()
 
     def has(self, words: str) -> bool:
-        """Whether all of these words are in it, in any order."""
-        said = _MARKS.sub(" ", self.text).casefold()
+        """Whether all of these words are in it, in any order, or in the words of its pictures."""
+        said = _MARKS.sub(" ", _PICTURE.sub(r"\1", self.text)).casefold()
         return all(word in said for word in words.casefold().split())
+
+    @property
+    def pictures(self) -> tuple[tuple[str, str], ...]:
+        """The name of each picture, and the words for who can't see it."""
+        return tuple((name, words) for words, name in _PICTURE.findall(self.text))
+
+    def picture(self, name: str, *, dark: bool) -> Path | None:
+        """The file of a picture in these colours; None when there is none."""
+        files = (folder / ("dark" if dark else "light") / f"{name}.png" for folder in self.folders)
+        return next((file for file in files if file.is_file()), None)
 
 
 def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tuple[GuidePage, ...]:
@@ -66,13 +86,90 @@ def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tup
     ``key_of`` gives the first key of a command; "" for none.
     """
     made = []
+    own = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0]
     for path in sorted((folder / ENGLISH).glob("*.md")):
-        translated = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0] / path.name
+        translated = own / path.name
         text = read_whole(translated if translated.is_file() else path).decode("utf-8")
         text = _KEY.sub(lambda found: f"**{spoken_key(key_of(found[1])) or '-'}**", text)
         title = text.partition("\n")[0].lstrip("# ")
-        made.append(GuidePage(title, text))
+        made.append(GuidePage(title, text, (own, folder / ENGLISH)))
     return tuple(made)
+
+
+class PageView(QTextBrowser):
+    """Shows a page with its pictures, each at most as wide as there is room."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._page = GuidePage("", "")
+        self._laid_for = 0
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setProperty("bare", "true")
+        self.setOpenLinks(False)
+        self.setAccessibleName(_("The page"))
+        self._again = QTimer(self)
+        self._again.setSingleShot(True)
+        self._again.timeout.connect(self._fit_pictures)
+
+    def show_page(self, page: GuidePage) -> None:
+        """Show it from its beginning."""
+        self._page = page
+        self.setMarkdown(page.text)
+        self.setAccessibleDescription(" ".join(words for _name, words in page.pictures))
+        self._fit_pictures()
+
+    def loadResource(self, kind: int, name: QUrl | str) -> object:
+        if kind != QTextDocument.ResourceType.ImageResource.value:
+            return super().loadResource(kind, name)
+        path = self._page.picture(QUrl(name).toString(), dark=self._theme.dark)
+        return QImage(str(path)) if path is not None else QImage()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self._laid_for and self._laid_for != self._room():
+            self._again.start(0)
+
+    def _room(self) -> int:
+        return self.viewport().width() - 2 * round(self.document().documentMargin())
+
+    def _fit_pictures(self) -> None:
+        """Give each picture its size here, and an image of as many pixels as it has then on the screen."""
+        self._laid_for = self._room()
+        document, ratio = self.document(), self.devicePixelRatioF()
+        cursor = QTextCursor(document)
+        for place in self._places():
+            cursor.setPosition(place)
+            cursor.setPosition(place + 1, QTextCursor.MoveMode.KeepAnchor)
+            look = cursor.charFormat().toImageFormat()
+            whole = self.loadResource(QTextDocument.ResourceType.ImageResource.value, QUrl(look.name()))
+            if not isinstance(whole, QImage) or whole.isNull():
+                continue
+            width = min(self._laid_for, round(whole.width() / PICTURE_RATIO))
+            plain_image = whole.convertToFormat(QImage.Format.Format_RGB32)
+            pixels = plain_image.scaledToWidth(
+                round(width * ratio), Qt.TransformationMode.SmoothTransformation
+            )
+            painter = QPainter(pixels)
+            painter.setPen(self._theme.colour("border"))
+            painter.drawRect(pixels.rect().adjusted(0, 0, -1, -1))
+            painter.end()
+            pixels.setDevicePixelRatio(ratio)
+            document.addResource(QTextDocument.ResourceType.ImageResource.value, QUrl(look.name()), pixels)
+            look.setWidth(width)
+            look.setHeight(pixels.height() / ratio)
+            look.setToolTip(plain.tip(str(look.property(QTextFormat.Property.ImageAltText))))
+            cursor.setCharFormat(look)
+
+    def _places(self) -> list[int]:
+        """Where pictures are in the text."""
+        found = []
+        block = self.document().begin()
+        while block.isValid():
+            fragments = [each.fragment() for each in cast("Iterable[QTextBlock.iterator]", block)]
+            found += [part.position() for part in fragments if part.charFormat().isImageFormat()]
+            block = block.next()
+        return found
 
 
 class GuideSheet(Overlay):
@@ -95,11 +192,7 @@ class GuideSheet(Overlay):
         self.list.installEventFilter(self)
         self.list.currentRowChanged.connect(self._show_page)
         self.none = label(_("No page has these words."), "body", role="textSecondary", wrap=True)
-        self.page = QTextBrowser()
-        self.page.setFrameShape(QFrame.Shape.NoFrame)
-        self.page.setProperty("bare", "true")
-        self.page.setOpenLinks(False)
-        self.page.setAccessibleName(_("The page"))
+        self.page = PageView(theme)
         self._lay_out()
         theme.changed.connect(self._again)
 
@@ -171,7 +264,7 @@ class GuideSheet(Overlay):
         self.page.setStyleSheet(f"background: {theme.colour('raised').name()};")
         document.setDefaultFont(theme.font("bodyLarge"))
         document.setDocumentMargin(4)
-        self.page.setMarkdown(self.shown[row].text)
+        self.page.show_page(self.shown[row])
         for frame in document.rootFrame().childFrames():
             if isinstance(frame, QTextTable):
                 self._line(frame)
@@ -191,9 +284,11 @@ class GuideSheet(Overlay):
             if cursor.currentTable() is None:
                 look = block.blockFormat()
                 heading = look.headingLevel()
+                picture = "\ufffc" in block.text()
                 look.setBottomMargin(self.theme.scaled(4 if block.textList() is not None else 10))
-                look.setTopMargin(self.theme.scaled(12 if heading > 1 else 0))
-                look.setLineHeight(LINE_PERCENT, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
+                look.setTopMargin(self.theme.scaled(12 if heading > 1 else 6 if picture else 0))
+                percent = 100.0 if picture else LINE_PERCENT  # above a picture it would be a gap
+                look.setLineHeight(percent, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
                 cursor.setBlockFormat(look)
             for part in [each.fragment() for each in cast("Iterable[QTextBlock.iterator]", block)]:
                 if part.charFormat().fontItalic():

@@ -1,0 +1,395 @@
+"""The pictures of the guide: drive the real window and write resources/guide/LANGUAGE/{light,dark}/*.png.
+
+    python3 dev.py guide-pictures [FOLDER]
+
+Each is taken in every language that has a guide, in light and in dark. Studio has settings of its own
+meanwhile, and a process of its own for each language, as a person has. A screen is needed; dev.py makes a
+virtual one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QPoint, QPointF, QRect, QSize, Qt, QTimer
+from PySide6.QtGui import QColor, QPainter, QPen, QPixmap, QPolygonF
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+
+from app.core.session import Session
+from app.ui.application import Options, make_application, make_window
+from app.ui.blockly.view import BlocklyView
+from app.ui.self_drive import SelfDrive, Step
+from app.ui.shell.dialogs.guide import PICTURE_RATIO
+from app.ui.shell.main_window import MainWindow
+from nep.i18n import LANG_VARIABLE, translate
+from nep.masters.master import is_running
+from tools.screenshots import EXAMPLE, PORTS, Block, block, chain, number, pepper, text
+from tools.small_png import shrink
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "resources" / "guide"
+COLOURS = 128  # enough for flat surfaces, and a sixth less to download than 256
+WAY = 10  # pieces of the mouse's way
+THEMES = ("light", "dark")
+WIDE = 640
+"""How wide a picture is at most, in the guide; a picture of a whole window is made smaller."""
+WINDOW, WHOLE = QSize(1280, 800), QSize(1200, 740)
+ARROW = ((0, 0), (0, 17), (4, 13.3), (6.8, 19.5), (9.6, 18.2), (6.9, 12.2), (12.3, 12))
+TAB = "document.querySelector('.nepTab:not([hidden])')"
+TALK, SWING = "talk", "swing"  # the blocks that glow in the pictures
+
+
+# ---- the behaviours ----------------------------------------------------------------------------------
+
+
+def variable(kind: str, *, id: str = "", **given: object) -> Block:
+    """A block about the variable that counts touches."""
+    made = block(kind, id=id, **given)
+    made["fields"] = {"VAR": {"id": "points"}}
+    return made
+
+
+def placed(x: int, y: int, script: Block) -> Block:
+    """A script at this place of the page."""
+    return {**script, "x": x, "y": y}
+
+
+def hello() -> list[Block]:
+    """What a person builds first."""
+    swing = chain(
+        pepper("do_turn", id=SWING, DIRECTION="left", ANGLE=number(30)),
+        pepper("do_turn", DIRECTION="right", ANGLE=number(30)),
+    )
+    first = chain(
+        block("events_started"),
+        pepper("do_say", id=TALK, TEXT=text("Hello! I am Pepper.")),
+        block("control_repeat", TIMES=number(3), BODY={"block": swing}),
+    )
+    return [placed(28, 28, first)]
+
+
+def beginning() -> list[Block]:
+    """A start, and the first block below it."""
+    say = pepper("do_say", id=TALK, TEXT=text("Hello! I am Pepper."))
+    return [placed(28, 28, chain(block("events_started"), say))]
+
+
+def counting() -> list[Block]:
+    """A variable that counts."""
+    start = chain(
+        block("events_started"),
+        variable("variables_set", VALUE=number(3)),
+        pepper("do_say", TEXT=text("Touch my head or my hands.")),
+    )
+    touched = chain(
+        pepper("when_touched", PLACE="head"),
+        variable("variables_change", BY=number(1)),
+        pepper("do_say", TEXT=text("Thank you.")),
+    )
+    return [placed(28, 28, start), placed(28, 210, touched)]
+
+
+def wrong() -> list[Block]:
+    """A block that nothing starts, and two scripts that both move the robot."""
+    first = chain(block("events_started"), pepper("do_turn", DIRECTION="left", ANGLE=number(90)))
+    second = chain(block("events_started"), pepper("do_walk", DISTANCE=number(0.3)))
+    loose = pepper("do_say", TEXT=text("Nice to see you."))
+    return [placed(28, 28, first), placed(28, 160, second), placed(28, 290, loose)]
+
+
+SCRIPTS = {
+    "Greeting": hello,
+    "A dance": beginning,
+    "Reaction to touch": counting,
+    "A careful walk": wrong,
+}
+"""By their names, which examples have, too: so they are translated."""
+
+
+def write_behaviour(folder: Path, name: str) -> Path:
+    """One of them as an example: its words are translated when it is opened."""
+    content = {
+        "format": "nep-behaviour",
+        "version": 1,
+        "name": name,
+        "workspace": {
+            "blocks": {"languageVersion": 0, "blocks": SCRIPTS[name]()},
+            "variables": [{"name": "points", "id": "points"}] if SCRIPTS[name] is counting else [],
+        },
+        "robots": json.loads(EXAMPLE.read_text("utf-8"))["robots"],
+    }
+    path = folder / f"{name}.nepb"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
+# ---- the pictures ------------------------------------------------------------------------------------
+
+
+class GuidePictures(SelfDrive):
+    """The stations of the guide, in the colours of one theme."""
+
+    def __init__(self, window: MainWindow, folder: Path, home: Path, theme: str) -> None:
+        self._home, self._theme = home, theme
+        self._crops: dict[str, Callable[[], QRect]] = {
+            "toolbox": lambda: QRect(self._place_of("behaviour").topLeft(), QSize(WIDE, 400)),
+            "running": lambda: QRect(0, window.run_bar.geometry().top(), WIDE, 400),
+            "variables": lambda: self._place_of("behaviour") | self._place_of("variables"),
+            "problems": lambda: self._place_of("behaviour") | self._place_of("problems"),
+            "backpack": lambda: self._place_of("behaviour"),
+            "room": lambda: self._place_of("robot"),
+        }
+        self._mouse: QPoint | None = None  # where the picture shows it, in the window
+        self._way: list[QPoint] = []  # of the mouse, that it still has to go
+        self._answers: dict[str, object] = {}
+        super().__init__(window, folder)
+
+    def _plan(self) -> list[Step]:
+        run, window = self._commands.run, self._window
+        runs = window.session.runs
+
+        def glows(id: str) -> Callable[[], bool]:
+            return lambda: runs.view().state == "running" and id in runs.running_blocks
+
+        return [
+            Step("the theme", lambda: run(f"theme.{self._theme}"), window.isVisible),
+            Step("the start page", lambda: window.resize(WHOLE), window.isVisible, picture="start"),
+            Step("the virtual robot", lambda: run("robots.virtual"), self._robot_there, 40, settle_s=2.0),
+            *self._open("Greeting"),
+            Step("the window", lambda: None, self._page_is_there, picture="window", settle_s=2.0),
+            Step("a usual size", lambda: window.resize(WINDOW), lambda: True, settle_s=1.0),
+            Step("it runs", lambda: run("run.run"), glows(SWING), 30, "running", 0.5),
+            *self._stop(),
+            *self._open("A dance"),
+            *self._drag_out(),
+            Step("a whole window", lambda: window.resize(WHOLE), lambda: True, settle_s=1.0),
+            *self._open("Reaction to touch"),
+            Step("its values", lambda: run("panel:variables"), lambda: True),
+            Step("a card", lambda: self._editor.edit_variable({"do": "watch", "id": "points"}), lambda: True),
+            Step("values come", lambda: run("run.run"), lambda: bool(runs.values), 20, "variables", 3.0),
+            *self._stop(),
+            *self._open("A careful walk"),
+            Step(
+                "what is wrong",
+                lambda: run("panel:problems"),
+                self._page_is_there,
+                picture="problems",
+                settle_s=2.5,
+            ),
+            *self._pack(),
+            Step("a second robot", lambda: run("robots.turtle"), self._two_robots, 40, "room", 3.0),
+            Step("the topics", lambda: run("layout.developer"), lambda: len(window.session.topics) > 3, 20),
+            Step("the list", lambda: run("panel:topics"), lambda: True, 20, "developer", 3.0),
+        ]
+
+    # -- stations -----------------------------------------------------------------------------------
+
+    def _open(self, name: str) -> list[Step]:
+        path = write_behaviour(self._home, name)
+        files, page = self._commands.files, self._page_is_there
+        return [Step(f"the behaviour {name}", lambda: files.example(path), page, 30, settle_s=1.5)]
+
+    def _stop(self) -> list[Step]:
+        run, runs = self._commands.run, self._window.session.runs
+        stopped = Step("stopped", lambda: run("run.stop"), lambda: runs.view().state == "proven")
+        world = self._window.session.fleet.world
+        return [stopped, Step("its place", lambda: world("Pepper", {"reset": True}), self._robot_there)]
+
+    def _drag_out(self) -> list[Step]:
+        """Hold a block of the toolbox over the page, at the end of what is there."""
+        labels = f"[...{TAB}.querySelectorAll('.blocklyToolboxCategoryLabel')]"
+        movement = f"{labels}.find(e => e.textContent === {json.dumps(translate('category', 'Movement'))})"
+        turn = f"{TAB}.querySelector('.blocklyFlyout .robot_pepper_do_turn')"
+        last = f"{TAB}.querySelector('[data-id={TALK}] > .blocklyPath')"
+
+        def open_it() -> None:
+            at = self._place(movement).center()
+            QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=at)
+
+        def carry() -> None:
+            start, end = self._place(turn).topLeft() + QPoint(12, 18), self._place(last).bottomLeft()
+            QTest.mouseMove(self._target, start)
+            QTest.mousePress(self._target, Qt.MouseButton.LeftButton, pos=start)
+            self._way = [start + (end + QPoint(36, 34) - start) * part / WAY for part in range(1, WAY + 1)]
+
+        def move() -> bool:
+            """One piece of the way with each look: the page paints in between."""
+            if self._way:
+                at = self._way.pop(0)
+                QTest.mouseMove(self._target, at)
+                self._mouse = self._target.mapTo(self._window, at)
+            return not self._way
+
+        return [
+            Step("its categories", lambda: None, lambda: self._is_there(movement), 20),
+            Step("a category", open_it, lambda: self._is_there(turn) and self._is_there(last), 20),
+            Step("a block in the hand", carry, move, 10, "toolbox", 1.0),
+            Step("it is let go", self._let_go, lambda: True, settle_s=1.0),
+        ]
+
+    def _let_go(self) -> None:
+        QTest.mouseRelease(self._target, Qt.MouseButton.LeftButton, pos=QPoint(600, 300))
+        self._mouse = None
+
+    def _pack(self) -> list[Step]:
+        """Put a stack into the backpack and open it."""
+        button = "[...document.querySelectorAll('.nepBackpack')].find(e => e.offsetParent)"
+        sheet = f"{TAB}.querySelector('.blocklyFlyout.nepPacked .blocklyBlock')"
+        first = f"{TAB}.querySelector('.blocklyBlockCanvas .robot_pepper_do_turn > .blocklyPath')"
+
+        def choose() -> None:
+            at = self._place(first).topLeft() + QPoint(10, 12)
+            QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=at)
+
+        def pack() -> None:
+            keys = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
+            QTest.keyClick(self._target, Qt.Key.Key_P, keys)
+
+        def look_into() -> None:
+            at = self._place(button).center()
+            QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=at)
+
+        return [
+            Step("the blocks", lambda: None, lambda: self._is_there(first) and self._is_there(button), 20),
+            Step("one is chosen", choose, lambda: True),
+            Step("it is packed", pack, lambda: True),
+            Step("the backpack", look_into, lambda: self._is_there(sheet), 10, "backpack", 8.0),
+        ]
+
+    def _robot_there(self) -> bool:
+        return any(link.state in {"ready", "busy"} for link in self._window.session.fleet.links)
+
+    def _two_robots(self) -> bool:
+        return sum(link.state in {"ready", "busy"} for link in self._window.session.fleet.links) > 1
+
+    # -- the page -----------------------------------------------------------------------------------
+
+    @property
+    def _editor(self) -> BlocklyView:
+        editor = getattr(self._window.editor(), "editor", None)
+        if not isinstance(editor, BlocklyView):
+            raise TypeError("the editor is not there yet")
+        return editor
+
+    @property
+    def _target(self) -> QWidget:
+        """The widget that mouse and keys go to."""
+        web = self._editor.web
+        found = web.keyboard() if web is not None else None
+        if not isinstance(found, QWidget):
+            raise TypeError("the page of the blocks is not there yet")
+        return found
+
+    def _page_is_there(self) -> bool:
+        return getattr(getattr(self._window.editor(), "editor", None), "is_ready", False)
+
+    def _is_there(self, element: str) -> bool:
+        """Whether the page has this element; where it is is asked anew with each call."""
+        self._ask(element)
+        return self._answers.get(element) is not None
+
+    def _place(self, element: str) -> QRect:
+        """Where it was when it was asked for last."""
+        place = self._answers[element]
+        if not isinstance(place, list):
+            raise TypeError(f"{element} is not there")
+        return QRect(*(round(each) for each in place))
+
+    def _ask(self, element: str) -> None:
+        script = (
+            f"(e => {{ const r = e?.getBoundingClientRect();"
+            f" return r ? JSON.stringify([r.left, r.top, r.width, r.height]) : ''; }})({element})"
+        )
+
+        def take(answer: object) -> None:
+            self._answers[element] = json.loads(answer) if isinstance(answer, str) and answer else None
+
+        if self._page_is_there() and self._editor.web is not None:
+            self._editor.web.page.runJavaScript(script, take)
+
+    # -- what of the window -------------------------------------------------------------------------
+
+    def _place_of(self, panel: str) -> QRect:
+        bench = self._window.bench
+        if bench is None:
+            raise TypeError("no panels show")
+        dock = bench.docks[panel]
+        return QRect(dock.mapTo(self._window, QPoint()), dock.size())
+
+    def _grab(self, name: str) -> None:
+        if not name:
+            return
+        crop = self._crops.get(name)
+        picture = self._window.grab(crop()) if crop is not None else self._window.grab()
+        if self._mouse is not None and crop is not None:
+            paint_mouse(picture, self._mouse - crop().topLeft())
+        most = round(WIDE * PICTURE_RATIO)
+        if picture.width() > most:
+            picture = picture.scaledToWidth(most, Qt.TransformationMode.SmoothTransformation)
+        path = self._folder / f"{name}.png"
+        if picture.save(str(path)):
+            self.pictures.append(path)
+        else:
+            sys.stderr.write(f"the picture {path} can't be written\n")
+
+
+def paint_mouse(picture: QPixmap, tip: QPoint) -> None:
+    """Paint the mouse's arrow: what is grabbed of a window is without it."""
+    painter = QPainter(picture)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(QPen(QColor("white"), 1.4))
+    painter.setBrush(QColor("black"))
+    painter.drawPolygon(QPolygonF([QPointF(tip) + QPointF(x, y) for x, y in ARROW]))
+    painter.end()
+
+
+def take(folder: Path, theme: str) -> int:
+    """Take the pictures in the language of this process; 0 when every station was seen."""
+    with tempfile.TemporaryDirectory(prefix="nep-guide-") as home:
+        free = next(port for port in PORTS if not is_running(f"127.0.0.1:{port}", 0.2))
+        os.environ.update(NEP_STUDIO_HOME=home, NEP_MASTER=f"127.0.0.1:{free}", NEP_GATEWAY="0")
+        application = make_application()
+        application.setQuitOnLastWindowClosed(False)
+        window = make_window(Session(), Options(theme=theme, self_drive=folder))
+        window.on_shut = lambda: QTimer.singleShot(0, application.quit)
+        window.show()
+        window.begin()
+        pictures = GuidePictures(window, folder, Path(home), theme)
+        application.exec()
+    for picture in pictures.pictures:
+        shrink(picture, COLOURS)
+    return 0 if pictures.well else 1
+
+
+def take_all(folder: Path) -> int:
+    """Take them in every language of the guide and in both themes; 0 when all are there."""
+    languages = sorted(each.name for each in FOLDER.iterdir())
+    failed = 0
+    for language in languages:
+        for theme in THEMES:
+            environ = {**os.environ, LANG_VARIABLE: language, "QT_SCALE_FACTOR": f"{PICTURE_RATIO:g}"}
+            into = folder / language / theme
+            command = [sys.executable, "-m", "tools.guide_pictures", str(into), "--theme", theme]
+            failed += subprocess.run(command, env=environ, cwd=ROOT, check=False).returncode != 0
+    return min(failed, 1)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run as a program."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=FOLDER)
+    parser.add_argument("--theme", choices=THEMES, help="only these colours, in the language of now")
+    asked = parser.parse_args(arguments)
+    return take(asked.folder, asked.theme) if asked.theme else take_all(asked.folder)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
