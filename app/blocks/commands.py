@@ -102,9 +102,9 @@ from nep.i18n import _
 from nep.system.streams import prepare_streams
 
 __all__ = [
-    "absolute", "add_item", "answer", "arc_cosine", "arc_sine", "arc_tangent", "ask", "average_of",
-    "backwards", "broadcast", "broadcast_and_wait", "clear_list", "contains", "copy_of", "cosine",
-    "counting", "e_to_the", "each", "ends_with", "fail", "has_in_it", "has_number", "in_capitals",
+    "absolute", "add_item", "answer", "arc_cosine", "arc_sine", "arc_tangent", "ask", "ask_with_choices",
+    "average_of", "backwards", "broadcast", "broadcast_and_wait", "clear_list", "contains", "copy_of",
+    "cosine", "counting", "e_to_the", "each", "ends_with", "fail", "has_in_it", "has_number", "in_capitals",
     "in_small_letters", "insert_item", "is_divisible", "is_empty", "is_empty_list", "is_even", "is_known",
     "is_negative", "is_odd", "is_positive", "is_whole", "item", "join", "join_items", "larger",
     "largest_of", "length", "letter", "limited", "logarithm", "mapped", "middle_of", "natural_logarithm",
@@ -126,6 +126,7 @@ _runtime = Runtime(_say)
 
 answer = _runtime.answer
 ask = _runtime.ask
+ask_with_choices = _runtime.ask_with_choices
 broadcast = _runtime.broadcast
 broadcast_and_wait = _runtime.broadcast_and_wait
 fail = _runtime.fail

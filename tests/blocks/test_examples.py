@@ -153,7 +153,7 @@ def test_reaction_to_touch():
     for times in (1, 2, 3):
         link.happen(("Pepper", "touched"), {"place": "head"})
         until(lambda times=times: said(link).count("Ha ha! That tickles.") == times)
-    until(lambda: said(link)[-1] == "You did that so often: 3")
+    until(lambda: said(link)[-1] == "Number of touches: 3")
     link.happen(("Pepper", "touched"), {"place": "right_hand"})
     until(lambda: link.invoked[-1][1] == "turn")
     play.stop()

@@ -67,7 +67,7 @@ def test_topics_colours_paths():
     ("value", "expected"),
     [
         (None, ""),
-        (True, "true"),
+        (True, "yes"),
         (2.0, "2"),
         (2.5, "2.5"),
         ({"a": "é"}, '{"a": "é"}'),

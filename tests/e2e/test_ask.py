@@ -9,6 +9,7 @@ import pytest
 
 from tests.e2e.behaviours import Block, block, say, started, text, write
 from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
 
 pytestmark = pytest.mark.timeout(240)
 
@@ -23,6 +24,13 @@ def says_the_answer() -> Block:
     joined = {"block": block("values_join", A=text("Hello "), B={"block": block("asking_answer")})}
     said = say("")
     return {**said, "inputs": {"TEXT": joined}}
+
+
+def chooses(words: str, choices: list[str], below: Block) -> Block:
+    items = {f"ITEM{number}": text(each) for number, each in enumerate(choices)}
+    held = {"type": "lists_create", "id": words, "extraState": {"items": len(choices)}, "inputs": items}
+    made = block("asking_choices", below=below, QUESTION=text(words), CHOICES={"block": held})
+    return {**made, "id": f"choices {words}"}
 
 
 @pytest.fixture
@@ -56,3 +64,40 @@ def test_pause_holds_the_question_and_stop_takes_it_away(asking: Studio) -> None
     asking.screen.key("F12")
     asking.says("Pepper stopped (")
     assert not asking.all(kind="QuestionCard")
+
+
+def test_who_has_choices_chooses_by_key_and_by_mouse_also_in_the_large_room(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
+    last = chooses("Which colour?", ["red", "green", "a blue like the sky"], says_the_answer())
+    first = chooses("Play?", ["yes", "no"], last)
+    studio = start(str(write(tmp_path / "Mine.nepb", started(first))))
+    studio.choose("Robots", "Use the virtual Pepper")
+    studio.says("Pepper ready", 40)
+    studio.spot("[data-id=started]")
+    studio.click("Run", kind="RunButton")
+    studio.find("yes", kind="ChoiceButton", within_s=40, focus=True)
+    studio.screen.key("Right")
+    studio.find("no", kind="ChoiceButton", focus=True)
+    studio.screen.key("Return")
+    studio.find("red", kind="ChoiceButton", focus=True)
+    assert not studio.all("no", kind="ChoiceButton")
+    studio.click("Large room", kind="IconButton")
+    studio.find(kind="LargeRoom")
+    studio.find("red", kind="ChoiceButton", focus=True)
+    studio.click("a blue like the sky", kind="ChoiceButton")
+    studio.says("Pepper says “Hello a blue like the sky”")
+    until(lambda: not studio.all(kind="QuestionCard"), "the card goes")
+
+
+def test_stop_takes_choices_away(start: Callable[..., Studio], tmp_path: Path) -> None:
+    script = started(chooses("Play?", ["yes", "no"], says_the_answer()))
+    studio = start(str(write(tmp_path / "Mine.nepb", script)))
+    studio.choose("Robots", "Use the virtual Pepper")
+    studio.says("Pepper ready", 40)
+    studio.spot("[data-id=started]")
+    studio.click("Run", kind="RunButton")
+    studio.find("yes", kind="ChoiceButton", within_s=40, focus=True)
+    studio.click("Stop", kind="StopButton")
+    studio.says("Pepper stopped (")
+    assert not studio.all(kind="QuestionCard")

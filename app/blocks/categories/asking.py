@@ -5,6 +5,7 @@ from __future__ import annotations
 from app.blocks.model.block import Block
 from app.blocks.model.category import Category
 from app.blocks.model.fields import ValueInput
+from app.blocks.model.mutators import ListInput
 
 CATEGORY = Category(
     name="asking",
@@ -28,12 +29,29 @@ CATEGORY = Category(
             words="input, prompt, question, type, person, read, keyboard, user, form",
         ),
         Block(
+            type="asking_choices",
+            text="ask %QUESTION with choices %CHOICES",
+            shape="statement",
+            style="values",
+            icon="list-checks",
+            tooltip="Shows a question in Studio with one large button for each choice, and waits for one.",
+            help="“answer” is what was chosen. The arrows and Enter choose, and so do the keys 1 to 9; Esc "
+            "answers nothing. The two buttons add and take away a choice; any other list fits in there, too. "
+            "A question has room for 12 choices.",
+            python="ask_with_choices(%QUESTION, %CHOICES)",
+            arguments=(
+                ValueInput("QUESTION", None, "Do you want to play?"),
+                ListInput("CHOICES", texts=("yes", "no")),
+            ),
+            words="quiz!, menu!, choose, choice, question, buttons, options, select, pick, yes no, form",
+        ),
+        Block(
             type="asking_answer",
             text="answer",
             shape="value",
             style="values",
             icon="message-circle-reply",
-            tooltip="What was answered to the last question.",
+            tooltip="What was answered to the last question: what was typed or chosen.",
             help="What is typed as a number can be counted with. Before the first question it is empty.",
             python="answer()",
             fails=False,

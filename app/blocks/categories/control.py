@@ -148,7 +148,7 @@ CATEGORY = Category(
             style="control",
             icon="octagon-minus",
             tooltip="Ends what all other scripts do now; this one goes on. Events start them again.",
-            help="What a robot does for one of them is taken back.",
+            help="What a robot is doing for one of them is cancelled.",
             python="stop_others()",
             words="end, cancel, kill, halt, interrupt, rest, other programs",
         ),

@@ -87,6 +87,7 @@ CATEGORY = Category(
             style="values",
             icon="",
             tooltip="True or false.",
+            help="A robot says it, and the console shows it, as “yes” or “no”.",
             python="%VALUE",
             arguments=(ChoiceField("VALUE", (("true", True), ("false", False))),),
             check="Boolean",

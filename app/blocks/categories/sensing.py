@@ -37,7 +37,7 @@ CATEGORY = Category(
             "timer",
             icon="timer",
             tooltip="How many seconds have gone by since Run, or since the timer was reset.",
-            help="It stands while the behaviour is paused.",
+            help="It stands still while the behaviour is paused.",
             python="timer()",
             check="Number",
             words="stopwatch, seconds, since, time, elapsed, chronometer, clock",

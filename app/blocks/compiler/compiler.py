@@ -35,10 +35,10 @@ from app.robots.description.description import Robot
 
 COMMANDS = frozenset(
     {
-        "answer", "ask", "broadcast", "broadcast_and_wait", "fail", "is_known", "join", "length",
-        "newest", "on_broadcast", "on_message", "on_start", "on_true", "part", "publish", "random_number",
-        "repeat", "reset_timer", "robot", "rounded", "rounded_down", "rounded_up", "run", "stop_others",
-        "stop_program", "stop_script", "timer", "wait", "wait_until", "write",
+        "answer", "ask", "ask_with_choices", "broadcast", "broadcast_and_wait", "fail", "is_known", "join",
+        "length", "newest", "on_broadcast", "on_message", "on_start", "on_true", "part", "publish",
+        "random_number", "repeat", "reset_timer", "robot", "rounded", "rounded_down", "rounded_up", "run",
+        "stop_others", "stop_program", "stop_script", "timer", "wait", "wait_until", "write",
         *calculation.__all__, *clock.__all__, *lists.__all__, *texts.__all__,
     }
 )  # fmt: skip

@@ -65,6 +65,10 @@ class ProblemCollector:
     def unattached(self, placed: Placed, block: Block) -> None:
         """Blocks that hang under nothing."""
         name = self.label(placed, block)
+        if block.shape in ("value", "boolean"):
+            words = _("{block} is a value that nothing uses. Put it into a gap of another block.")
+            self._note("info", placed, block, name, words.format(block=name))
+            return
         sentence = _("{block} does not run. Put it below “{start}”.")
         start = pgettext("block", "when started")
         self._note("info", placed, block, name, sentence.format(block=name, start=start))

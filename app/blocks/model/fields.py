@@ -194,7 +194,7 @@ class ChoiceField(Field):
                 return value
         if self.source is not None:
             return "" if saved is None else str(saved)
-        raise FieldError(_("does not offer “{saved}”").format(saved=saved))
+        raise FieldError(_("has no choice “{saved}”").format(saved=saved))
 
     def translated(self, say: Say) -> Argument:
         """What people choose from, unless these are names of robots."""

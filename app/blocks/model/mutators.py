@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from app.blocks.model.fields import Argument, Say, StatementInput, ValueInput, VariableField
+from app.blocks.model.fields import Argument, Check, Say, StatementInput, ValueInput, VariableField
 from app.blocks.model.workspace import Placed
 
 MOST_ITEMS = 50
@@ -45,6 +45,24 @@ class Items(Argument):
         sound = isinstance(count, int) and not isinstance(count, bool)
         many = min(max(int(count), 0), MOST_ITEMS) if sound and isinstance(count, int) else self.count
         return tuple(ValueInput(f"{self.name}{number}") for number in range(many))
+
+
+@dataclass(frozen=True)
+class ListInput(ValueInput):
+    """A gap for a list; out of the toolbox it holds a list with these texts, whose gaps can be added to."""
+
+    check: Check | None = "List"
+    texts: tuple[str, ...] = ()
+
+    def fillings(self) -> dict[str, object]:
+        """A block of its own, not a shadow: values go into the list's gaps, too."""
+        items = Items("ITEM", len(self.texts), self.texts)
+        held = {"type": "lists_create", "extraState": {"items": items.count}, "inputs": items.fillings()}
+        return {self.name: {"block": held}}
+
+    def translated(self, say: Say) -> Argument:
+        """What the list holds at first."""
+        return replace(self, texts=tuple(say("example", words) for words in self.texts))
 
 
 @dataclass(frozen=True)

@@ -172,7 +172,7 @@ class Run:
         if question is None:
             self._out.send("ask", question=0)
         else:
-            self._out.send("ask", question=question.id, text=question.text)
+            self._out.send("ask", question=question.id, text=question.text, choices=question.choices)
 
     def answer(self, order: Mapping[str, object]) -> None:
         """Somebody has answered."""

@@ -8,13 +8,15 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.errors import BehaviourError, kind
 from app.blocks.runtime.scheduler import Scheduler
 from app.blocks.runtime.values import text
 from nep.i18n import _
 
 LONGEST_QUESTION = 500
 LONGEST_ANSWER = 10_000
+LONGEST_CHOICE = 200
+MOST_CHOICES = 12
 _NUMBER = re.compile(r"-?(?:0|[1-9]\d{0,14})(?:[.,]\d{1,9})?", re.ASCII)
 
 
@@ -25,6 +27,8 @@ class ProgramQuestion:
     id: int
     text: str
     answer: str | None = None
+    choices: tuple[str, ...] = ()
+    """What can be chosen; when there is nothing, the answer is typed."""
 
 
 Asked = Callable[[ProgramQuestion | None], None]
@@ -40,19 +44,35 @@ class Questions:
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
         self._waiting: list[ProgramQuestion] = []
-        self.answer: str | int | float = ""
+        self.answer: object = ""
 
     def ask(self, words: object) -> None:
         """Ask and wait for the answer; BehaviourError where nobody can answer."""
         if self._asked is None:
             raise BehaviourError(_("Nobody can answer: the behaviour runs outside of Studio."))
-        question = ProgramQuestion(next(self._ids), text(words)[:LONGEST_QUESTION])
+        self.answer = as_value(self._answer_to(text(words)))
+
+    def ask_with_choices(self, words: object, choices: object) -> None:
+        """Ask, with a button for each item of a list; what is chosen is that item, Esc is an empty text.
+
+        BehaviourError where nobody can answer, and where there is nothing or too much to choose from.
+        """
+        if self._asked is None:
+            raise BehaviourError(_("Nobody can answer: the behaviour runs outside of Studio."))
+        offered = offers(choices)
+        chosen = self._answer_to(text(words), tuple(offered))
+        value = offered.get(chosen, "")
+        self.answer = as_value(value) if isinstance(value, str) else value
+
+    def _answer_to(self, words: str, choices: tuple[str, ...] = ()) -> str:
+        """Ask when it is this question's turn, and wait; an empty text when nothing was answered."""
+        question = ProgramQuestion(next(self._ids), words[:LONGEST_QUESTION], choices=choices)
         self._change(self._waiting.append, question)
         try:
             self._scheduler.wait_until(lambda: question.answer is not None, None)
         finally:  # also when the script ends meanwhile: its question goes
             self._change(self._waiting.remove, question)
-        self.answer = as_value(question.answer or "")
+        return question.answer or ""
 
     def answered(self, id: int, words: str) -> None:
         """Somebody has answered; what was no question any more is nothing."""
@@ -68,6 +88,27 @@ class Questions:
             change(question)
             if before != self._waiting[:1] and self._asked is not None:
                 self._asked(self._waiting[0] if self._waiting else None)
+
+
+def offers(choices: object) -> dict[str, object]:
+    """What is on the buttons, and the item that each stands for: no empty ones, none of them twice."""
+    if not isinstance(choices, list):
+        raise BehaviourError(
+            _("A question with choices needs a list of them, not {value}.").format(value=kind(choices))
+        )
+    found: dict[str, object] = {}
+    for item in choices:
+        if words := " ".join(text(item).split())[:LONGEST_CHOICE]:
+            found.setdefault(words, item)
+        if len(found) > MOST_CHOICES:
+            raise BehaviourError(
+                _("A question has room for {most} choices; this list has {count}.").format(
+                    most=MOST_CHOICES, count=len(choices)
+                )
+            )
+    if not found:
+        raise BehaviourError(_("There is nothing to choose from: the list of choices is empty."))
+    return found
 
 
 def as_value(words: str) -> str | int | float:

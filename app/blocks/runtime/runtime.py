@@ -27,8 +27,8 @@ from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
 
 _OWN = (
-    "answer", "ask", "broadcast", "broadcast_and_wait", "called", "fail", "newest", "number",
-    "on_broadcast", "on_message", "on_start", "on_true", "publish", "reset_timer", "robot", "step",
+    "answer", "ask", "ask_with_choices", "broadcast", "broadcast_and_wait", "called", "fail", "newest",
+    "number", "on_broadcast", "on_message", "on_start", "on_true", "publish", "reset_timer", "robot", "step",
     "stop_others", "stop_program", "timer", "value", "wait", "wait_until", "write",
 )  # fmt: skip
 _PURE = (
@@ -278,6 +278,10 @@ class Runtime:
     def ask(self, question: object) -> None:
         """Ask the person in front of Studio and wait for the answer."""
         self.questions.ask(question)
+
+    def ask_with_choices(self, question: object, choices: object) -> None:
+        """Ask the person in front of Studio which item of a list it shall be, and wait."""
+        self.questions.ask_with_choices(question, choices)
 
     def answer(self) -> object:
         """What was answered last; a number when it reads as one, an empty text before the first answer."""

@@ -20,18 +20,35 @@ _JOINER = "\u200d"
 
 
 def text(value: object) -> str:
-    """A value as people write it: 2 for 2.0, true, nothing for a value that is not known."""
+    """A value as people say it: 2 for 2.0, yes and no, nothing for a value that is not known."""
     if value is None:
         return ""
     if isinstance(value, bool):
-        return "true" if value else "false"
+        return _("yes") if value else _("no")
     if isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
         return str(int(value))
     if isinstance(value, (Mapping, list, tuple)):
-        return json.dumps(value, ensure_ascii=False, default=str)
+        try:
+            return json.dumps(value, ensure_ascii=False, default=str)
+        except ValueError:  # a number of too many digits somewhere, or a list that is in itself
+            return json.dumps(_writable(value, ()), ensure_ascii=False, default=str)
     if isinstance(value, int) and value.bit_length() > MOST_BITS:
         return f"{Decimal(value):.16e}"
     return str(value)
+
+
+def _writable(value: object, around: tuple[int, ...]) -> object:
+    """The same with long numbers as their text; what is in itself, in one of ``around``, ends with "…"."""
+    if isinstance(value, int) and value.bit_length() > MOST_BITS:
+        return text(value)
+    if not isinstance(value, (Mapping, list, tuple)):
+        return value
+    if id(value) in around:
+        return "…"
+    inside = (*around, id(value))
+    if isinstance(value, Mapping):
+        return {str(_writable(key, inside)): _writable(each, inside) for key, each in value.items()}
+    return [_writable(each, inside) for each in value]
 
 
 def is_known(value: object) -> bool:

@@ -153,8 +153,6 @@ def words(value: object, most: int) -> str:
             if left < 0:
                 break
         return _cut("".join(parts), most)
-    if isinstance(value, bool):
-        return _("yes") if value else _("no")
     return _cut(values.text(value), most)
 
 

@@ -9,11 +9,12 @@ from app.core.run.runner import Runner, RunnerEvent
 
 @dataclass(frozen=True, slots=True)
 class AskedQuestion:
-    """A question as it is shown: of which run, its number there, and its words."""
+    """A question as it is shown: of which run, its number there, its words, and what can be chosen."""
 
     run: int
     number: int
     words: str
+    choices: tuple[str, ...] = ()
 
 
 class Asking:
@@ -31,7 +32,7 @@ class Asking:
         """The program asks, or takes its question back; other events are no matter of this."""
         if event.kind == "ask" and self._runner is not None:
             number = event.question
-            self.question = AskedQuestion(event.run, number, event.text) if number else None
+            self.question = AskedQuestion(event.run, number, event.text, event.choices) if number else None
 
     def answer(self, question: AskedQuestion, words: str) -> None:
         """A person answers this question; nothing happens when it is not asked any more."""

@@ -38,6 +38,7 @@ PIPE_S = 0.5
 """How long its pipes may go on after it has gone: somebody that it has started may hold them."""
 EVENTS_PER_S = 300
 MOST_BLOCKS = 100
+MOST_CHOICES, LONGEST_CHOICE = 12, 200
 WORTH_TELLING = 10_000
 LONGEST_ERROR = 100_000
 ERRORS_KEPT = 40
@@ -53,6 +54,7 @@ class RunnerEvent:
     first is the next one), or failed (error). ``says`` is what happens, in words (for paused: the next block
     in words); ``text`` a printed line, what a person should know (paused), an error's sentence, or at the end
     why it did not end well, or what it asks (ask), whose number is ``question``; 0: it asks nothing any more.
+    One of ``choices`` is its answer, where there are any.
     ``ok``: it ended, and no block failed. ``silent``: robots that did not answer the program's own stop at
     its end. ``values`` are the variables whose values have changed. ``count``: a warning was so often so.
     """
@@ -68,6 +70,7 @@ class RunnerEvent:
     values: tuple[VariableValue, ...] = ()
     count: int = 1
     question: int = 0
+    choices: tuple[str, ...] = ()
 
 
 class Runner:
@@ -349,7 +352,8 @@ class Runner:
         if kind in ("print", "ask"):
             question = said.get("question")
             asked = question if isinstance(question, int) else 0
-            return RunnerEvent(kind, self.run, text=text_of(said, "text"), question=asked)
+            choices = tuple(each[:LONGEST_CHOICE] for each in texts(said.get("choices"))[:MOST_CHOICES])
+            return RunnerEvent(kind, self.run, text=text_of(said, "text"), question=asked, choices=choices)
         if kind == "variables":
             told = said.get("values")
             made = map(VariableValue.from_json, told if isinstance(told, list) else ())

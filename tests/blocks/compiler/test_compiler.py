@@ -212,7 +212,7 @@ def test_what_the_robot_would_refuse_is_told_before_run():
         (block("messages_publish", VALUE=text("x"), TOPIC="two words"), "needs a topic without spaces"),
         (
             block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="up", ANGLE=number(1)),
-            "does not offer “up”",
+            "has no choice “up”",
         ),
         (block("robot_pepper_do_light", ROBOT="Pepper", WHERE="eyes", COLOUR="blue"), "needs a colour"),
         (write(number("three")), "needs a number"),
@@ -233,6 +233,13 @@ def test_blocks_without_a_start():
     ]
     assert sentences(workspace()) == []
     assert [severity for severity, _ in sentences(workspace(started(), say("Hi")))] == ["info"]
+
+
+def test_a_loose_value_is_told_to_go_into_a_gap():
+    for value in (number(1), boolean(True), block("values_join", A=text("a"), B=text("b"))):
+        ((severity, sentence),) = sentences(workspace(started(), value))
+        assert severity == "info"
+        assert sentence.endswith("is a value that nothing uses. Put it into a gap of another block.")
 
 
 def test_the_message_outside_of_its_script():

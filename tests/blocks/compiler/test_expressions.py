@@ -156,9 +156,9 @@ def small(tree):
     return all(small(part) for part in tree[2:])
 
 
-@pytest.mark.timeout(180)  # 3000 programs; a busy computer may need more than a minute
+@pytest.mark.timeout(180)  # a thousand programs; a busy computer may need more than a minute
 @settings(
-    max_examples=3000,
+    max_examples=1000,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
@@ -187,3 +187,17 @@ def test_a_number_of_thousands_of_digits_has_a_text() -> None:
     assert as_text(2**16384) == "1.1897314953572318e+4932"
     assert as_text(-(2**13999)).startswith("-")
     assert len(as_text(2**13999)) == 4215
+
+
+def test_a_list_with_a_number_of_thousands_of_digits_has_a_text() -> None:
+    assert as_text([1, 2**16384, "a"]) == '[1, "1.1897314953572318e+4932", "a"]'
+    assert as_text({"big": (2**16384,), 2**16384: 1}) == (
+        '{"big": ["1.1897314953572318e+4932"], "1.1897314953572318e+4932": 1}'
+    )
+
+
+def test_a_list_that_is_in_itself_has_a_text() -> None:
+    items: list[object] = [1]
+    items.append(items)
+    assert as_text(items) == '[1, "…"]'
+    assert as_text([[1], [1]]) == "[[1], [1]]"

@@ -88,7 +88,7 @@ def filled(draw, described, depth: int) -> dict[str, object]:
 
 
 @settings(
-    max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
 )
 @given(st.lists(blocks(), max_size=4), texts, st.lists(texts, max_size=3))
 def test_only_our_own_names_are_ever_called(tops, name, variables):

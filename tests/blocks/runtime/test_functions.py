@@ -97,7 +97,7 @@ def test_an_error_in_a_function_is_on_its_block_and_one_after_it_on_the_caller()
         "inputs": {"TEXT": {"block": block("values_join", "j", A=call("g", value=True), B=boolean(True))}},
     }), five))  # fmt: skip
     assert run.runtime.error is None
-    assert run.link.invoked[-1] == ("Pepper", "say", {"text": "5true"})
+    assert run.link.invoked[-1] == ("Pepper", "say", {"text": "5yes"})
 
 
 def test_the_caller_is_where_the_script_is_after_the_function() -> None:

@@ -5,9 +5,26 @@ from __future__ import annotations
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.runtime.questions import LONGEST_QUESTION, ProgramQuestion, as_value
+from app.blocks.runtime.questions import (
+    LONGEST_CHOICE,
+    LONGEST_QUESTION,
+    MOST_CHOICES,
+    ProgramQuestion,
+    as_value,
+)
 from tests.blocks.fakes import Play, play, until
-from tests.blocks.samples import block, boolean, get, number, stack, started, text, workspace, write
+from tests.blocks.samples import (
+    block,
+    boolean,
+    get,
+    list_of,
+    number,
+    stack,
+    started,
+    text,
+    workspace,
+    write,
+)
 
 
 class Person:
@@ -28,6 +45,10 @@ class Person:
 
 def ask(question: object) -> dict[str, object]:
     return block("asking_ask", QUESTION=question if isinstance(question, dict) else text(question))
+
+
+def choose(choices: dict[str, object], question: str = "Which?") -> dict[str, object]:
+    return block("asking_choices", "choose", QUESTION=text(question), CHOICES=choices)
 
 
 def answer() -> dict[str, object]:
@@ -109,7 +130,7 @@ def test_where_nobody_can_answer_a_sentence_says_so():
         (text("👍?"), "👍?"),
         (number(-1), "-1"),
         (number(2**64 - 1), "1.8446744073709552e+19"),
-        (boolean(True), "true"),
+        (boolean(True), "yes"),
         (block("lists_empty"), "[]"),
         (text("x" * 9999), "x" * LONGEST_QUESTION),
     ],
@@ -152,4 +173,82 @@ def test_an_answer_can_be_compared_and_counted_with():
     them = Person(workspace(stack(block("events_started"), ask("How often?"), twice, write(same))))
     them.answers("How often?", "2")
     them.run.end()
-    assert them.run.lines == ["hop", "hop", "true"]
+    assert them.run.lines == ["hop", "hop", "yes"]
+
+
+def test_a_choice_is_the_answer_and_what_is_typed_next_has_no_choices():
+    them = Person(
+        workspace(started(choose(list_of(text("cat"), text("dog"))), write(answer()), ask("Name?")))
+    )
+    assert them.sees("Which?").choices == ("cat", "dog")
+    them.answers("Which?", "dog")
+    assert them.sees("Name?").choices == ()
+    them.answers("Name?", "")
+    them.run.end()
+    assert them.run.lines == ["dog"]
+
+
+@pytest.mark.parametrize(
+    ("item", "shown", "same_as"),
+    [
+        (number(2), "2", number(2)),
+        (text("2"), "2", number(2)),
+        (boolean(True), "yes", boolean(True)),
+        (text(" two\n words "), "two words", text(" two\n words ")),
+        (text("x" * 9999), "x" * LONGEST_CHOICE, text("x" * 9999)),
+    ],
+)
+def test_the_answer_is_the_item_itself(item, shown, same_as):
+    same = block("values_compare", A=answer(), RELATION="==", B=same_as)
+    them = Person(workspace(started(choose(list_of(item)), write(same))))
+    assert them.sees("Which?").choices == (shown,)
+    them.answers("Which?", shown)
+    them.run.end()
+    assert them.run.lines == ["yes"]
+
+
+def test_any_list_fits_and_escape_answers_nothing():
+    split = block("lists_split", TEXT=text("a,b,,a,c"), BETWEEN=text(","))
+    them = Person(workspace(started(choose(split), write(block("texts_empty", TEXT=answer())))))
+    assert them.sees("Which?").choices == ("a", "b", "c")
+    them.answers("Which?", "")
+    them.run.end()
+    assert them.run.lines == ["yes"]
+
+
+def test_questions_of_both_kinds_wait_for_each_other():
+    them = Person(workspace(started(ask("one")), started(choose(list_of(text("a")), "two"), write(answer()))))
+    until(lambda: len(them.run.runtime.scheduler.snapshot().blocks) == 2)
+    first = them.shown[-1]
+    assert first is not None
+    for words in (first.text, {"one": "two", "two": "one"}[first.text]):
+        them.answers(words, "a")
+    them.run.end()
+    assert them.run.lines == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("choices", "sentence"),
+    [
+        (block("lists_empty"), "There is nothing to choose from: the list of choices is empty."),
+        (list_of(text(""), text(" ")), "There is nothing to choose from: the list of choices is empty."),
+        (
+            list_of(*(number(each) for each in range(MOST_CHOICES + 1))),
+            "A question has room for 12 choices; this list has 13.",
+        ),
+        (get("pets"), "A question with choices needs a list of them, not a number."),
+    ],
+)
+def test_what_nobody_can_choose_from_is_a_sentence_on_the_block(choices, sentence):
+    them = Person(workspace(started(choose(choices)), variables=("pets",)))
+    until(lambda: them.run.runtime.error is not None)
+    error = them.run.runtime.error
+    assert error is not None
+    assert (error.block, error.sentence, them.shown) == ("choose", sentence, [])
+    them.run.stop()
+
+
+def test_choices_too_need_somebody_who_answers():
+    run = play(workspace(started(choose(list_of(text("a"))))))
+    assert run.runtime.error is not None
+    assert run.runtime.error.sentence == "Nobody can answer: the behaviour runs outside of Studio."

@@ -118,7 +118,7 @@ def test_values_become_what_the_parameter_wants():
     )
     assert [given for _, _, given in link.invoked] == [
         {"text": "0.5"},
-        {"text": "true"},
+        {"text": "yes"},
         {"words": ["yes", "no", "maybe"]},
     ]
     assert run.lines == ["no"]

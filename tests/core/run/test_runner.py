@@ -16,7 +16,7 @@ from app.blocks.runtime.variables import VariableValue
 from app.core.run import runner as runner_module
 from app.core.run.runner import Runner, RunnerEvent, child_command
 from app.errors import RunnerError
-from tests.blocks.samples import block, get, number, say, started, text, workspace, write
+from tests.blocks.samples import block, get, list_of, number, say, started, text, workspace, write
 from tests.blocks.wire_robot import WireRobot
 
 LONG_S = 30.0
@@ -152,6 +152,17 @@ def test_a_program_asks_and_goes_on_with_the_answer(runner, heard, master):
     assert heard.until("ask", question=0)
     assert heard.until("print").text == "Ada “x”"
     assert heard.until("ended").ok
+
+
+def test_a_program_tells_what_can_be_chosen(runner, heard, master):
+    made = runner()
+    asks = block("asking_choices", QUESTION=text("Play?"), CHOICES=list_of(text("yes"), number(2)))
+    made.start(program(asks, write(block("asking_answer"))), [], master.address)
+    asked = heard.until("ask")
+    assert asked.choices == ("yes", "2")
+    made.answer(asked.question, "2")
+    assert heard.until("ask", question=0).choices == ()
+    assert heard.until("print").text == "2"
 
 
 def test_pause_step_and_go_on(runner, heard, master):

@@ -18,6 +18,7 @@ from app.ui.shell.main_window import MainWindow
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
 NAME = AskedQuestion(1, 1, "What is your name?")
+PET = AskedQuestion(1, 3, "Which one?", ("cat", "dog", "cow"))
 AGE = AskedQuestion(1, 2, "How old are you?")
 
 
@@ -132,3 +133,85 @@ def test_only_the_question_that_is_asked_is_answered_and_once() -> None:
     asking.take(RunnerEvent("ask", 4, text="Name?", question=3))
     asking.clear()
     assert asking.question is None
+
+
+def test_choices_are_large_buttons_and_a_click_answers(card, said) -> None:
+    card.show_question(PET, held=False)
+    assert [each.text() for each in card.choices.buttons] == ["cat", "dog", "cow"]
+    assert all(each.height() >= 48 and each.isVisible() for each in card.choices.buttons)
+    assert not card.field.isVisible()
+    QTest.mouseClick(card.choices.buttons[1], Qt.MouseButton.LeftButton)
+    assert said == [(3, "dog")]
+    card.show_question(NAME, held=False)
+    assert card.field.isVisible()
+    assert QApplication.focusWidget() is card.field
+    assert not card.choices.buttons
+
+
+@pytest.mark.parametrize(
+    ("keys", "answer"),
+    [
+        ([Qt.Key.Key_Return], "cat"),
+        ([Qt.Key.Key_Right, Qt.Key.Key_Space], "dog"),
+        ([Qt.Key.Key_Right, Qt.Key.Key_Right, Qt.Key.Key_Left, Qt.Key.Key_Enter], "dog"),
+        ([Qt.Key.Key_Down, Qt.Key.Key_Up, Qt.Key.Key_Up, Qt.Key.Key_Return], "cat"),
+        ([Qt.Key.Key_Tab, Qt.Key.Key_Tab, Qt.Key.Key_Return], "cow"),
+        ([Qt.Key.Key_3], "cow"),
+        ([Qt.Key.Key_Escape], ""),
+    ],
+)
+def test_the_keyboard_chooses(card, said, keys, answer) -> None:
+    card.show_question(PET, held=False)
+    for key in keys:
+        focus = QApplication.focusWidget()
+        assert focus is not None
+        QTest.keyClick(focus, key)
+    assert said == [(3, answer)]
+
+
+def test_a_number_without_a_choice_does_nothing(card, said) -> None:
+    card.show_question(PET, held=False)
+    QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_4)
+    QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
+    assert said == []
+
+
+def test_choices_are_held_while_paused_and_the_keys_go_nowhere_else(card, said) -> None:
+    card.show_question(PET, held=False)
+    card.show_question(PET, held=True)
+    assert QApplication.focusWidget() is card
+    for key in (Qt.Key.Key_Return, Qt.Key.Key_2, Qt.Key.Key_Escape):
+        QTest.keyClick(card, key)
+    QTest.mouseClick(card.choices.buttons[1], Qt.MouseButton.LeftButton)
+    assert said == []
+    card.show_question(PET, held=False)
+    assert QApplication.focusWidget() is card.choices.buttons[0]
+    QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_2)
+    assert said == [(3, "dog")]
+
+
+@pytest.mark.parametrize("size", [(1024, 600), (1440, 900)])
+def test_long_choices_wrap_and_many_scroll_to_what_an_arrow_reaches(card, window, size, qtbot) -> None:
+    window.resize(*size)
+    many = tuple(f"{number} " + "a choice of some length " * 8 for number in range(12))
+    card.show_question(AskedQuestion(1, 4, "Which one? " * 20, many), held=False)
+    assert window.rect().contains(card.geometry())
+    stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stops_in(window)]
+    assert not [stop for stop in stops if stop.intersects(card.geometry())]
+    assert card.choices.buttons[0].height() > 2 * card.choices.buttons[0].fontMetrics().height()
+    for _each in range(11):
+        focus = QApplication.focusWidget()
+        assert focus is not None
+        QTest.keyClick(focus, Qt.Key.Key_Down)
+    last = card.choices.buttons[11]
+    assert last.hasFocus()
+    qtbot.waitUntil(lambda: not last.visibleRegion().isEmpty())
+    shown = last.visibleRegion().boundingRect()
+    assert shown == last.rect()
+
+
+def test_short_choices_stand_beside_each_other(card) -> None:
+    card.show_question(AskedQuestion(1, 5, "Play?", ("yes", "no")), held=False)
+    yes, no = card.choices.buttons
+    assert yes.y() == no.y()
+    assert yes.geometry().right() < no.x()

@@ -17,24 +17,29 @@ from PySide6.QtWidgets import (
 from shiboken6 import isValid
 
 from app.core.run.asking import AskedQuestion
+from app.ui.shell.bars.choices import GAP, Choices
 from app.ui.shell.bars.floating_card import FloatingCard
 from app.ui.shell.dialogs.overlay import stops_in
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
+from app.ui.widgets.lists.scroll_areas import Scrolled
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
-WIDE = 460
+WIDE, WIDE_WITH_CHOICES = 460, 560
 MARGIN = 16
 LOWER = 0.8  # how far down the window its lower edge is: over the blocks, not over what is below them
 LONGEST_ANSWER = 10_000
 
 
 class QuestionCard(FloatingCard):
-    """The question, a field and a button. Enter answers; Esc answers nothing. While paused it is held."""
+    """The question, and a field and a button or what can be chosen. Enter answers; Esc answers nothing.
+
+    While paused it is held.
+    """
 
     def __init__(self, theme: Theme, window: QWidget, answer: Callable[[AskedQuestion, str], object]) -> None:
-        """``answer`` gets the question and what was typed."""
+        """``answer`` gets the question and what was typed or chosen."""
         super().__init__(window)
         self._theme, self._answer = theme, answer
         self._question: AskedQuestion | None = None
@@ -47,6 +52,12 @@ class QuestionCard(FloatingCard):
         EditMenu(theme, self.field)
         self.button = Button(theme, _("Answer"), kind="primary", size="form")
         self.button.clicked.connect(self._done)
+        self.choices = Choices(theme)
+        self.choices.chosen.connect(self._send)
+        self._offered = Scrolled(self.choices)
+        self.choices.reached.connect(lambda button: self._offered.ensureWidgetVisible(button, 0, GAP))
+        self._hint = label(_("Press Go on first"), "small", role="textSecondary")
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # while it is held, there is nothing else for the keys
         row = QHBoxLayout()
         row.setSpacing(10)
         row.addWidget(self.field, 1)
@@ -56,6 +67,8 @@ class QuestionCard(FloatingCard):
         column.setSpacing(10)
         column.addWidget(self.words)
         column.addLayout(row)
+        column.addWidget(self._offered)
+        column.addWidget(self._hint)
         shadow = QGraphicsDropShadowEffect(self)
         shadow.setBlurRadius(32)
         shadow.setOffset(0, 8)
@@ -79,25 +92,52 @@ class QuestionCard(FloatingCard):
         self.setAccessibleName(words)
         self.field.setAccessibleName(words)
         self.field.clear()
-        self._hold(held=False)
+        self.choices.show_choices(question.choices)
+        self.choices.setAccessibleName(words)
+        typed = not question.choices
+        self.field.setVisible(typed)
+        self.button.setVisible(typed)
+        self._offered.setVisible(not typed)
         if not self.isVisible():
             self._before = QApplication.focusWidget()
+        self._hold(held=False)
         self.show()
         self.place()
         self.raise_()
-        self.field.setFocus(Qt.FocusReason.PopupFocusReason)
-        paint.announce(self, words)
+        self.take_keyboard()
+        paint.announce(self, ", ".join((words, *question.choices)))
+
+    def take_keyboard(self) -> None:
+        """Get the keys, if there is a question and it is not held."""
+        if self._question is None or self._held:
+            return
+        if self.choices.buttons:
+            self.choices.take_keyboard()
+        else:
+            self.field.setFocus(Qt.FocusReason.PopupFocusReason)
 
     def _leave(self) -> None:
         """Go, and give the keyboard back to where it was."""
-        inside = self.isAncestorOf(focus) if (focus := QApplication.focusWidget()) is not None else False
+        inside = self._has_keyboard()
         before, self._before = self._before, None
         if inside and before is not None and isValid(before) and before.isVisible():
             before.setFocus(Qt.FocusReason.PopupFocusReason)
         self.hide()
 
+    def _has_keyboard(self) -> bool:
+        focus = QApplication.focusWidget()
+        return focus is not None and (focus is self or self.isAncestorOf(focus))
+
     def _hold(self, *, held: bool) -> None:
+        had = self._has_keyboard()
         self._held = held
+        if had and held and self.choices.buttons:
+            # What is disabled would give the keyboard to whatever comes next in the window.
+            self.setFocus(Qt.FocusReason.OtherFocusReason)
+        self.choices.hold(held=held)
+        self._hint.setVisible(held and bool(self.choices.buttons))
+        if had and not held and self.hasFocus():
+            self.choices.take_keyboard()
         self.field.setReadOnly(held)
         self.field.setPlaceholderText(_("Press Go on first") if held else "")
         self.button.setEnabled(not held)
@@ -109,37 +149,45 @@ class QuestionCard(FloatingCard):
         if window is None or layout is None:
             return
         self.field.setMinimumHeight(self.button.sizeHint().height())
-        wide = min(window.width() - 2 * MARGIN, round(self._theme.scaled(WIDE)))
-        high = min(
-            max(layout.totalHeightForWidth(wide), layout.minimumSize().height()), window.height() - 2 * MARGIN
-        )
-        bottom = round(window.height() * LOWER)
-        place = QRect(
-            QPoint((window.width() - wide) // 2, bottom - high),
-            QPoint((window.width() + wide) // 2, bottom),
-        )
-        covered = [
-            stop
-            for stop in (QRect(each.mapTo(window, QPoint()), each.size()) for each in stops_in(window))
-            if stop.intersects(place)
-        ]
-        if covered:
-            place.moveBottom(min(stop.top() for stop in covered) - MARGIN)
-        self.setGeometry(place)
+        wanted = WIDE_WITH_CHOICES if self.choices.buttons else WIDE
+        wide = min(window.width() - 2 * MARGIN, round(self._theme.scaled(wanted)))
+        left = (window.width() - wide) // 2
+        top, lowest = self._free(window, left, wide)
+        needed = max(layout.totalHeightForWidth(wide), layout.minimumSize().height())
+        bottom = min(lowest, max(round(window.height() * LOWER), top + needed))
+        high = min(needed, bottom - top)
+        self.setGeometry(left, bottom - high, wide, high)
+
+    def _free(self, window: QWidget, left: int, wide: int) -> tuple[int, int]:
+        """From where to where it may reach, between the Stops above and below it."""
+        middle, top, bottom = window.height() // 2, MARGIN, window.height() - MARGIN
+        for each in stops_in(window):
+            stop = QRect(each.mapTo(window, QPoint()), each.size())
+            if stop.right() < left or stop.left() > left + wide:
+                continue
+            if stop.center().y() < middle:
+                top = max(top, stop.bottom() + MARGIN)
+            else:
+                bottom = min(bottom, stop.top() - MARGIN)
+        return top, bottom
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+        if self.choices.press(event):
+            return
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and not self.choices.buttons:
             self._done()
         elif event.key() == Qt.Key.Key_Escape:
-            self.field.clear()
-            self._done()
+            self._send("")
         else:
             super().keyPressEvent(event)
 
     def _done(self) -> None:
+        self._send(self.field.text())
+
+    def _send(self, words: str) -> None:
         question = self._question
         if question is not None and not self._held:
-            self._answer(question, self.field.text())
+            self._answer(question, words)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme

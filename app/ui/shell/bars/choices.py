@@ -1,0 +1,190 @@
+"""What can be chosen as the answer to a question: large buttons, for mouse, arrows and number keys."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from PySide6.QtCore import QRect, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QFont, QFontMetricsF, QKeyEvent, QPainter, QResizeEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.buttons import PaintedButton
+from app.ui.widgets.keyboard import is_plain, is_pressed_key
+
+GAP = 8
+PADDING = 14
+LEAST_HEIGHT = 52
+MOST_COLUMNS = 3
+NUMBER_KEYS = 9
+_WRAPPED = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+
+
+class ChoiceButton(PaintedButton):
+    """One choice: the key that chooses it, and its words on as many lines as they need."""
+
+    def __init__(self, theme: Theme, words: str, key: str) -> None:
+        """``key`` is empty where no key is left for it."""
+        super().__init__(theme, words, radius="large")
+        self.key = key
+        self._shown = plain.breakable(words)
+        self.setProperty("ownFocus", True)
+
+    def _font(self) -> QFont:
+        return self._theme.font("button")
+
+    def _before_words(self) -> float:
+        """What stands left of the words: the edge, and the key's cap."""
+        return PADDING + (paint.key_width(self._theme, self.key) + 10 if self.key else 0)
+
+    def one_line_width(self) -> int:
+        """How wide it is with all its words on one line."""
+        return math.ceil(self._before_words() + paint.width_of(self._font(), self.text()) + PADDING) + 1
+
+    def height_for(self, width: int) -> int:
+        """How high it is at this width."""
+        room = QRectF(0, 0, max(1.0, width - self._before_words() - PADDING), 1e6)
+        needed = QFontMetricsF(self._font()).boundingRect(room, _WRAPPED, self._shown).height()
+        return max(round(self._theme.scaled(LEAST_HEIGHT)), math.ceil(needed) + 2 * PADDING)
+
+    def sizeHint(self) -> QSize:
+        wide = self.one_line_width()
+        return QSize(wide, self.height_for(wide))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Enter and Space press it; all other keys go to the choices, also those that Qt's buttons take."""
+        if is_pressed_key(event.key()):
+            super().keyPressEvent(event)
+        else:
+            event.ignore()
+
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme, role = self._theme, self._theme.colour
+        chosen = self.hasFocus()
+        fill = "pressed" if self.isDown() else "hover" if self.is_hovered else None
+        edge = "accent" if chosen else "borderStrong" if self.isEnabled() else "border"
+        if fill is None and self.isEnabled():
+            fill = "accentTint" if chosen else "panel"
+        radius = theme.radius("large")
+        paint.box(painter, rect, radius, role(fill) if fill else None, role(edge), 2 if chosen else 1)
+        if self.key:
+            right = PADDING + paint.key_width(theme, self.key)
+            paint.key_cap(painter, theme, right, rect.center().y(), self.key)
+        painter.setFont(self._font())
+        painter.setPen(role("text" if self.isEnabled() else "textDisabled"))
+        painter.drawText(rect.adjusted(self._before_words(), 0, -PADDING, 0), _WRAPPED, self._shown)
+
+
+class Choices(QWidget):
+    """The choices of one question in rows: beside each other where all of them fit so on one line each."""
+
+    chosen = Signal(str)
+    reached = Signal(QWidget)
+    """An arrow led to this button, which may be out of sight."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.buttons: list[ChoiceButton] = []
+        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+
+    def show_choices(self, choices: Sequence[str]) -> None:
+        """Offer these from now on."""
+        for button in self.buttons:
+            button.hide()
+            button.deleteLater()
+        self.buttons = []
+        for number, words in enumerate(choices, 1):
+            button = ChoiceButton(self._theme, words, str(number) if number <= NUMBER_KEYS else "")
+            button.clicked.connect(lambda _on=False, words=words: self.chosen.emit(words))
+            button.setParent(self)
+            button.show()
+            self.buttons.append(button)
+        self._arrange()
+        self.updateGeometry()
+
+    def take_keyboard(self) -> None:
+        """The first choice has the keyboard."""
+        if self.buttons:
+            self.buttons[0].setFocus(Qt.FocusReason.PopupFocusReason)
+
+    def hold(self, *, held: bool) -> None:
+        """Nothing can be chosen while it is held."""
+        for button in self.buttons:
+            button.setEnabled(not held)
+
+    # -- where they stand -------------------------------------------------------------------------
+
+    def columns(self, width: int) -> int:
+        """How many stand beside each other."""
+        widest = max((each.one_line_width() for each in self.buttons), default=1)
+        fitting = (width - GAP) // (widest + GAP)
+        return max(1, min(MOST_COLUMNS, len(self.buttons), fitting))
+
+    def places(self, width: int) -> list[QRect]:
+        """The place of each button at this width; those of a row are as high as the highest of them."""
+        columns = self.columns(width)
+        wide = (width - GAP) // columns - GAP
+        found: list[QRect] = []
+        top = 0
+        for first in range(0, len(self.buttons), columns):
+            row = self.buttons[first : first + columns]
+            high = max(each.height_for(wide) for each in row)
+            found += [QRect(place * (wide + GAP), top, wide, high) for place in range(len(row))]
+            top += high + GAP
+        return found
+
+    def heightForWidth(self, width: int) -> int:
+        places = self.places(width)
+        return places[-1].bottom() + 1 if places else 0
+
+    def hasHeightForWidth(self) -> bool:
+        return True
+
+    def sizeHint(self) -> QSize:
+        wide = max(1, self.width())
+        return QSize(wide, self.heightForWidth(wide))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(60, 0)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        for button, place in zip(self.buttons, self.places(max(60, self.width())), strict=True):
+            button.setGeometry(place)
+
+    # -- the keyboard -----------------------------------------------------------------------------
+
+    def press(self, event: QKeyEvent) -> bool:
+        """Go to the choice beside it, or choose by a number; whether the key meant one of these."""
+        key = event.key()
+        number = key - Qt.Key.Key_1
+        if not is_plain(event) or not self.buttons or not self.buttons[0].isEnabled():
+            return False
+        if 0 <= number < min(len(self.buttons), NUMBER_KEYS):
+            if not event.isAutoRepeat():
+                self.buttons[number].click()
+            return True
+        columns = self.columns(self.width())
+        steps = {
+            Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_Up: -columns, Qt.Key.Key_Down: columns,
+        }  # fmt: skip
+        if key not in steps:
+            return False
+        here = next((place for place, each in enumerate(self.buttons) if each.hasFocus()), 0)
+        there = min(max(here + steps[Qt.Key(key)], 0), len(self.buttons) - 1)
+        self.buttons[there].setFocus(Qt.FocusReason.OtherFocusReason)
+        self.reached.emit(self.buttons[there])
+        return True
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not self.press(event):
+            super().keyPressEvent(event)
