@@ -6,13 +6,13 @@ does that, and would show them black: there the window itself is cut to its roun
 
 from __future__ import annotations
 
-import re
-
-from PySide6.QtCore import QObject, QPoint, QRect, QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, QSize, Qt
 from PySide6.QtGui import (
     QAction,
+    QFontMetricsF,
     QGuiApplication,
     QIcon,
+    QKeyEvent,
     QKeySequence,
     QMouseEvent,
     QPainter,
@@ -28,11 +28,14 @@ from app.ui.text.numbers import spoken_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets.buttons import Button, StopButton
-from app.ui.widgets.paint import RIGHT, box, words
+from app.ui.widgets.keyboard import keyboard_leads
+from app.ui.widgets.letters import key_of, letters_of, plain_words
+from app.ui.widgets.paint import RIGHT, box, width_of, words
 
 CUT_ON = frozenset({"xcb"})
 MARK, LARGEST_MARK, TEXT_LEFT = 15, 22, 33
 SCROLLER = 22  # px, as the style sheet has it
+LEAST_WIDTH = 160  # px; a narrower menu says too little, and rather covers Stop
 
 
 def make_round(widget: QWidget) -> None:
@@ -57,12 +60,19 @@ def round_region(size: QSize, radius: float) -> QRegion:
 
 
 def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
-    """Where a menu covers no Stop: left of it, else below it; as it is when the screen has no such room."""
+    """Where a menu covers no Stop: left of it, else below it, else left of it and narrower.
+
+    It stays as it is when the screen has no such room.
+    """
     if not menu.intersects(stop):
         return menu
-    left, low = menu.translated(stop.left() - menu.right() - 1, 0), QRect(menu)
+    left, low, narrow = menu.translated(stop.left() - menu.right() - 1, 0), QRect(menu), QRect(menu)
     low.moveTop(stop.bottom() + 1)
-    return next((place for place in (left, low) if screen.contains(place)), menu)
+    narrow.setLeft(screen.left())
+    narrow.setRight(stop.left() - 1)
+    if narrow.width() < LEAST_WIDTH:
+        narrow = menu
+    return next((place for place in (left, low) if screen.contains(place)), narrow)
 
 
 def stop_at(place: QPoint) -> QAbstractButton | None:
@@ -90,15 +100,42 @@ def press_stop(place: QPoint) -> bool:
 
 
 class Menu(QMenu):
-    """A menu in the design's look: icons and checks in one column, shortcuts quiet at the right."""
+    """A menu in the design's look: icons and checks in one column, shortcuts quiet at the right.
+
+    Each entry is chosen by a letter, too. It is underlined for who opened the menu by keys.
+    """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None, title: str = "") -> None:
         super().__init__(title, parent)
         self._theme = theme
+        self._by_keys = False
         make_round(self)
+
+    def letters(self) -> dict[QAction, int]:
+        """The place in its words of the letter that chooses each entry; -1 for none."""
+        entries = [action for action in self.actions() if action.isVisible() and not action.isSeparator()]
+        places = letters_of([plain_words(action.text()) for action in entries])
+        return dict(zip(entries, places, strict=True))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """A letter chooses its entry, as Enter does."""
+        self._by_keys = True
+        self.update()
+        held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.AltModifier)
+        pressed = "" if held else key_of(event.text())
+        for action, place in self.letters().items() if pressed else ():
+            if place >= 0 and key_of(plain_words(action.text())[place]) == pressed and action.isEnabled():
+                self.setActiveAction(action)
+                if action.menu() is None:
+                    nothing = Qt.KeyboardModifier.NoModifier
+                    super().keyPressEvent(QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Return, nothing))
+                return
+        super().keyPressEvent(event)
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
+        held = QGuiApplication.queryKeyboardModifiers() & Qt.KeyboardModifier.AltModifier
+        self._by_keys = bool(held) or keyboard_leads()
         cut(self, self._theme.radius("panel"))
         self._leave_stop()
 
@@ -113,7 +150,7 @@ class Menu(QMenu):
         for stop in owner.window().findChildren(StopButton):
             if stop.isVisible():
                 place = QRect(stop.mapToGlobal(QPoint()), stop.size())
-                self.move(beside(self.geometry(), place, screen).topLeft())
+                self.setGeometry(beside(self.geometry(), place, screen))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """A press beside a menu only closes it, but for Stop.
@@ -143,10 +180,12 @@ class Menu(QMenu):
                 square = QRectF((rect.width() - 14) / 2, top + (SCROLLER - 14) / 2, 14, 14)
                 paint_icon(painter, square, icon, theme.colour("textSecondary"))
         painter.setClipRect(inside)
+        letters = self.letters()
         for action in shown:
             place = QRectF(self.actionGeometry(action))
+            place.setRight(min(place.right(), rect.right() - 6))
             if place.intersects(inside):
-                self._paint_action(painter, place, action)
+                self._paint_action(painter, place, action, letters.get(action, -1))
         painter.end()
 
     def _scrolled(self, shown: list[QAction]) -> tuple[bool, bool]:
@@ -156,7 +195,13 @@ class Menu(QMenu):
         first, last = self.actionGeometry(shown[0]), self.actionGeometry(shown[-1])
         return first.top() < 0, last.bottom() > self.height()
 
-    def _paint_action(self, painter: QPainter, place: QRectF, action: QAction) -> None:
+    def _underline(self, painter: QPainter, inside: QRectF, said: str, letter: int) -> None:
+        font = self.font()
+        left, wide = width_of(font, said[:letter]), width_of(font, said[letter])
+        low = inside.center().y() + QFontMetricsF(font).ascent() / 2 + 1
+        painter.fillRect(QRectF(inside.left() + left, round(low), wide, 1), painter.pen().color())
+
+    def _paint_action(self, painter: QPainter, place: QRectF, action: QAction, letter: int) -> None:
         theme = self._theme
         if action.isSeparator():
             line = QRectF(place.left() + 6, round(place.center().y()), place.width() - 12, 1)
@@ -171,11 +216,17 @@ class Menu(QMenu):
         elif not action.icon().isNull():
             mode = QIcon.Mode.Normal if action.isEnabled() else QIcon.Mode.Disabled
             action.icon().paint(painter, mark.toRect(), Qt.AlignmentFlag.AlignCenter, mode)
-        said, _tab, key = action.text().partition("\t")
-        key = spoken_key(action.shortcut().toString(QKeySequence.SequenceFormat.PortableText)) or key
+        own = action.shortcut().toString(QKeySequence.SequenceFormat.PortableText)
+        key = spoken_key(own or action.text().partition("\t")[2])
         ink = theme.colour("text" if action.isEnabled() else "textDisabled")
         inside = place.adjusted(TEXT_LEFT, 0, -12, 0)
-        words(painter, inside, re.sub("&(.)", r"\1", said), self.font(), ink)
+        said = plain_words(action.text())
+        whole = width_of(self.font(), said)
+        if whole + 12 + width_of(self.font(), key) > inside.width():
+            key = ""  # in a menu made narrow the words come first; keys are in F1
+        words(painter, inside, said, self.font(), ink)
+        if self._by_keys and letter >= 0 and whole <= inside.width():
+            self._underline(painter, inside, said, letter)
         if action.menu() is not None:
             chevron = QRectF(inside.right() - 12, place.center().y() - 7, 14, 14)
             paint_icon(painter, chevron, "chevron-right", theme.colour("textTertiary"))

@@ -60,6 +60,44 @@ def test_words_marks_and_keys_are_painted(qtbot, theme: Theme) -> None:
     menu.close()
 
 
+def test_a_letter_chooses_an_entry_whatever_its_words_are(qtbot, theme: Theme) -> None:
+    place, done = QWidget(), []
+    made = [QAction(words, place) for words in ("Cortar", "Copiar", "Última", "No")]
+    for action in made:
+        action.triggered.connect(lambda _on=False, action=action: done.append(action.text()))
+    made[3].setEnabled(False)
+    for key in ("C", "O", "U", "N"):
+        menu = shown(qtbot, theme, place, *made)
+        QTest.keyClick(menu, key)
+        menu.close()
+    assert done == ["Cortar", "Copiar", "Última"]  # what is off is not chosen
+
+
+def test_a_letter_opens_the_menu_in_a_menu(qtbot, theme: Theme) -> None:
+    place = QWidget()
+    menu = Menu(theme, place)
+    inner = Menu(theme, menu, "Look")
+    menu.addMenu(inner)
+    inner.addAction("Dark")
+    theme.apply()
+    qtbot.addWidget(place)
+    place.show()
+    menu.popup(QPoint(20, 20))
+    QTest.keyClick(menu, "L")
+    qtbot.waitUntil(inner.isVisible)
+    menu.close()
+
+
+def test_the_letters_are_underlined_for_who_uses_keys(qtbot, theme: Theme) -> None:
+    place = QWidget()
+    menu = shown(qtbot, theme, place, QAction("Copy", place), QAction("Paste", place))
+    before = menu.grab().toImage()
+    QTest.keyClick(menu, Qt.Key.Key_Down)
+    menu.setActiveAction(None)
+    assert menu.grab().toImage() != before
+    menu.close()
+
+
 def test_a_field_offers_its_editing_in_our_menu(qtbot, theme: Theme) -> None:
     field = QLineEdit("hello")
     EditMenu(theme, field)

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QAbstractButton, QMenuBar, QWidget
 from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.theme.theme import Theme
 from app.ui.widgets import name_command
+from app.ui.widgets.letters import marked
 from app.ui.widgets.menus import Menu
 from nep.i18n import _
 
@@ -41,7 +42,7 @@ class Actions:
             self._why_not[command.id] = partial(command.why_not, do)
 
     def _make(self, command: Command[Any], window: QWidget) -> QAction:
-        action = QAction(command.words, window)
+        action = QAction("\t".join(filter(None, (command.words, command.shows))), window)
         action.setObjectName(command.id)
         if command.icon is not None and not command.group:
             action.setIcon(self._theme.icon(command.icon))
@@ -108,9 +109,12 @@ class Actions:
     def fill(self, bar: QMenuBar, menus: Sequence[str]) -> dict[str, Menu]:
         """Make these menus in a menu bar; they are returned by name, and say it in the language of now.
 
+        Alt with a letter of its name opens each.
+
         Those in them are returned as "View/Look".
         """
-        made: dict[str, Menu] = {name: Menu(self._theme, bar, _(name)) for name in menus}
+        titles = marked([_(name) for name in menus])
+        made = {name: Menu(self._theme, bar, title) for name, title in zip(menus, titles, strict=True)}
         for menu in made.values():
             bar.addMenu(menu)
         for command in self._commands:

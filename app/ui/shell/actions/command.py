@@ -32,9 +32,10 @@ class Command(Generic[T]):
     hole of that name, and ``menu`` and ``tip`` by `_`. ``tip`` is what a button of it says under the mouse.
     ``group`` makes it one of several choices; ``above`` puts a line over it in its ``menu``; without a menu
     it is only in the palette and among the shortcuts, if it is there. ``under`` names a menu in its ``menu``
-    that has it, also marked with `lazy`. ``check`` makes it something that is on
-    or off, ``everywhere`` a key that works in all windows. ``mac`` are the keys of a Mac in place of
-    ``keys``: Ctrl is written there for Cmd, Meta for the key that says Ctrl.
+    that has it, also marked with `lazy`. ``check`` makes it something that is on or off, ``everywhere`` a key
+    that works in all windows. ``shows`` is a key that stands in the menu and that whoever has the keyboard
+    hears itself, as text fields hear Ctrl+C. ``mac`` are the keys of a Mac in place of ``keys``: Ctrl is
+    written there for Cmd, Meta for the key that says Ctrl.
     """
 
     id: str
@@ -54,6 +55,7 @@ class Command(Generic[T]):
     in_shortcuts: bool = True
     why_not: Callable[[T], str] = _always
     number: int | None = None
+    shows: str = ""
 
     @property
     def words(self) -> str:

@@ -42,7 +42,7 @@ class Fixed:
 
 
 FIXED: tuple[Fixed, ...] = (
-    Fixed(lazy("Everywhere"), lazy("Close the palette or a sheet, leave a field"), "Esc"),
+    Fixed(lazy("Everywhere"), lazy("Close the palette or what else is open, leave a field"), "Esc"),
     Fixed(lazy("Everywhere"), lazy("Next control in the panel"), "Tab"),
     Fixed(lazy("Everywhere"), lazy("Control before it"), "Shift+Tab"),
     Fixed(lazy("Everywhere"), lazy("Press the chosen button"), "Space"),
@@ -59,19 +59,19 @@ FIXED: tuple[Fixed, ...] = (
     Fixed(lazy("Blocks"), lazy("Move through blocks and gaps"), "Up, Down, Left, Right"),
     Fixed(lazy("Blocks"), lazy("Open the field of the block, or take it from the toolbox"), "Enter"),
     Fixed(lazy("Blocks"), lazy("Run from the block, or show its value"), "Ctrl+Enter"),
-    Fixed(lazy("Blocks"), lazy("Open the menu of the block or of the canvas"), "Shift+F10"),
+    Fixed(lazy("Blocks"), lazy("Open the menu of the block or of the page"), "Shift+F10"),
     Fixed(lazy("Blocks"), lazy("Copy, cut, paste blocks"), "Ctrl+C, Ctrl+X, Ctrl+V"),
     Fixed(lazy("Blocks"), lazy("Put the block, with all below it, into the backpack"), "Ctrl+Shift+P"),
-    Fixed(lazy("Blocks"), lazy("Choose all blocks and notes"), "Ctrl+A"),
+    Fixed(lazy("Blocks"), lazy("Select all blocks and notes"), "Ctrl+A"),
     Fixed(lazy("Blocks"), lazy("Duplicate the block"), "Ctrl+D"),
     Fixed(lazy("Blocks"), lazy("Delete the block"), "Delete, Backspace"),
     Fixed(lazy("Blocks"), lazy("Move the block with the arrow keys; Enter puts it down"), "Ctrl+M"),
     Fixed(lazy("Blocks"), lazy("Move it with all blocks below it"), "Ctrl+Shift+M"),
     Fixed(lazy("Blocks"), lazy("Take the block out of its stack"), "Ctrl+Shift+X"),
     Fixed(lazy("Blocks"), lazy("Switch the block off, or on again"), "Ctrl+E"),
-    Fixed(lazy("Blocks"), lazy("Tidy up the canvas"), "Ctrl+L"),
+    Fixed(lazy("Blocks"), lazy("Tidy up the page"), "Ctrl+L"),
     Fixed(lazy("Blocks"), lazy("Go to the toolbox"), "Ctrl+B"),
-    Fixed(lazy("Blocks"), lazy("Go to the canvas"), "Ctrl+Shift+B"),
+    Fixed(lazy("Blocks"), lazy("Go to the page"), "Ctrl+Shift+B"),
     Fixed(lazy("Blocks"), lazy("Go to the next stack, or to the one before it"), "Alt+Down, Alt+Up"),
     Fixed(lazy("Blocks"), lazy("Show what the block does, in a few words"), "Ctrl+J"),
     Fixed(

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.robots.robot_link import RobotLink
 from app.core.run.view import connected_words
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.logo import Logo
+from app.ui.shell.bars.menu_bar import MenuBar
 from app.ui.shell.docking.layouts import Layout
 from app.ui.text.numbers import spoken_key
 from app.ui.theme.icons import paint_icon
@@ -48,7 +49,7 @@ class AppBar(QWidget):
         self.setMinimumHeight(theme.size("appBar"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("Menus and layouts"))
-        self.menus = QMenuBar()
+        self.menus = MenuBar(theme)
         self.native = platform == "darwin"  # a Mac shows the menus at the top of its screen
         self.menus.setNativeMenuBar(self.native)
         self.menus.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Preferred)

@@ -9,6 +9,7 @@ from app.ui.shell.actions.actions import STOP, Actions
 from app.ui.shell.actions.command import UnknownCommandError
 from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.behaviours import BehaviourCommands, bring_into_view
+from app.ui.shell.commands.editing import EditCommands
 from app.ui.shell.commands.menus import MenuLists
 from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.robots import RobotCommands
@@ -37,7 +38,14 @@ class Commands:
         self.shortcuts = keys
         self.variables = VariableCommands(shell, session, self.files)
         self._do = Handlers(
-            session, shell, self.files, self.variables, self.behaviours, self.robots, self.view
+            session,
+            shell,
+            self.files,
+            self.variables,
+            self.behaviours,
+            self.robots,
+            self.view,
+            EditCommands(shell),
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.why_not, keys)

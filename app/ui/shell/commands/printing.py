@@ -113,7 +113,7 @@ class Printing:
             editor.pdf(self._session.document.name, date, layout, done)
 
     def _say_nothing_there(self) -> None:
-        self._shell.say(_("There are no blocks to be seen"))
+        self._shell.say(_("There are no blocks on this page"))
 
 
 def known_printers() -> list[str]:

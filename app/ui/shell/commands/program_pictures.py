@@ -96,4 +96,4 @@ class ProgramPictures:
             editor.picture(kind, white, done)
 
     def _say_nothing_there(self) -> None:
-        self._shell.say(_("There are no blocks to be seen"))
+        self._shell.say(_("There are no blocks on this page"))

@@ -13,6 +13,7 @@ from typing import TypeVar
 from app.core.session import Session
 from app.ui.shell.actions.command import ArgumentCommand, Command
 from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPlace, read_stack
+from app.ui.shell.commands.editing import Edit, EditCommands
 from app.ui.shell.commands.freeze import freezable
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
 from app.ui.shell.commands.shell import START, Shell
@@ -43,6 +44,7 @@ class Handlers:
     behaviours: BehaviourCommands
     robots: RobotCommands
     view: ViewCommands
+    editing: EditCommands
 
 
 # ---- why a command can't be done now: menus grey it, the palette says the sentence ------------------
@@ -132,11 +134,28 @@ def _go_to_panel(number: int) -> C:
     )
 
 
+def _edit(what: Edit, text: str, key: str, icon: str, *, above: bool = False) -> C:
+    """An entry that does what a key does in whatever has the keyboard: the key is not the command's."""
+    return C(
+        f"edit.{what}",
+        text,
+        lambda do: do.editing.do(what),
+        "Edit",
+        icon=icon,
+        shows=key,
+        above=above,
+        why_not=lambda do: do.editing.why_not(what),
+        in_palette=False,
+        in_shortcuts=False,
+    )
+
+
 COMMANDS: tuple[C, ...] = (
     C("file.new", lazy("New behaviour"), lambda do: do.files.new(), "File", ("Ctrl+N",), "file-plus"),
     C("file.open", lazy("Open a file"), lambda do: do.files.ask_open(), "File", ("Ctrl+O",), "folder-open"),
     C("file.save", lazy("Save"), lambda do: do.files.save(), "File", ("Ctrl+S",), "save", above=True),
-    C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",)),
+    C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",),
+      "save-pen"),
     C("picture.save", lazy("Save a picture of the blocks"), lambda do: do.behaviours.pictures.ask(), "File",
       icon="image-down", why_not=_no_editor),
     C("print.ask", lazy("Print the blocks"), lambda do: do.behaviours.printing.ask(), "File", ("Ctrl+P",),
@@ -161,6 +180,10 @@ COMMANDS: tuple[C, ...] = (
       why_not=_no_editor),
     C("edit.redo", lazy("Redo"), lambda do: do.behaviours.redo(), "Edit", ("Ctrl+Shift+Z", "Ctrl+Y"),
       "rotate-cw", why_not=_no_editor),
+    _edit("cut", lazy("Cut"), "Ctrl+X", "scissors", above=True),
+    _edit("copy", lazy("Copy"), "Ctrl+C", "copy"),
+    _edit("paste", lazy("Paste"), "Ctrl+V", "clipboard-paste"),
+    _edit("selectAll", lazy("Select all"), "Ctrl+A", "text-select"),
     C("picture.copy", lazy("Copy the blocks as a picture"), lambda do: do.behaviours.pictures.copy(),
       "Edit", icon="image", above=True, why_not=_no_editor),
     C("blocks.find", lazy("Find in the blocks"), lambda do: do.behaviours.find_blocks(to_add=False), "Edit",

@@ -1,0 +1,82 @@
+"""The menu bar, which underlines the letter of each menu while Alt is held."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QRectF, Qt, Signal
+from PySide6.QtGui import QAction, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QShowEvent
+from PySide6.QtWidgets import QMenuBar, QWidget
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.letters import plain_words
+
+
+class _Alt(QObject):
+    """Hears whether Alt is held in a window.
+
+    An object of its own: Qt lets a menu bar filter the events of the whole application while Alt is held, and
+    those of the web view's own objects must not come to Python.
+    """
+
+    held = Signal(bool)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
+            self.held.emit(event.key() == Qt.Key.Key_Alt)
+        elif event.type() in {QEvent.Type.KeyRelease, QEvent.Type.FocusOut}:
+            self.held.emit(False)
+        return super().eventFilter(watched, event)
+
+
+class MenuBar(QMenuBar):
+    """Alt with a letter opens a menu; lines below the letters at all times would only be noise."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._shows_letters = False
+        self._alt = _Alt(self)
+        self._alt.held.connect(self._show_letters)
+
+    @property
+    def shows_letters(self) -> bool:
+        """Whether the letters are underlined now."""
+        return self._shows_letters
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        window = self.window().windowHandle()
+        if window is not None:  # hears Alt before whoever has the keyboard; a second time is the first one
+            window.removeEventFilter(self._alt)
+            window.installEventFilter(self._alt)
+
+    def _show_letters(self, shown: bool) -> None:
+        if shown != self._shows_letters:
+            self._shows_letters = shown
+            self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        for action in self.actions():
+            place = self.actionGeometry(action)
+            if action.isVisible() and not place.isEmpty():
+                self._paint_entry(painter, QRectF(place), action)
+        painter.end()
+
+    def _paint_entry(self, painter: QPainter, place: QRectF, action: QAction) -> None:
+        theme, font, said = self._theme, self.font(), plain_words(action.text())
+        chosen, menu = action is self.activeAction(), action.menu()
+        if chosen:
+            is_open = isinstance(menu, QWidget) and menu.isVisible()
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            paint.box(painter, place, theme.radius("small"), theme.colour("pressed" if is_open else "hover"))
+        ink = theme.colour("text" if chosen else "textSecondary")
+        wide, metrics = paint.width_of(font, said), QFontMetricsF(font)
+        left = place.center().x() - wide / 2
+        paint.words(painter, QRectF(left, place.top(), wide + 1, place.height()), said, font, ink)
+        letter = action.text().find("&")
+        if letter >= 0 and (self._shows_letters or self.hasFocus()):
+            start = left + paint.width_of(font, said[:letter])
+            line = QRectF(start, 0, paint.width_of(font, said[letter]), 1)
+            line.moveTop(round(place.center().y() + metrics.ascent() / 2 + 1))
+            painter.fillRect(line, ink)

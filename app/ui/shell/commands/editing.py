@@ -1,0 +1,64 @@
+"""Cut, copy, paste and select all of the Edit menu: in the field that has the keyboard, else with blocks."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol, runtime_checkable
+
+from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QMenuBar, QPlainTextEdit, QTextEdit, QWidget
+from shiboken6 import isValid
+
+from app.ui.shell.commands.shell import Shell
+from nep.i18n import _
+
+Edit = Literal["cut", "copy", "paste", "selectAll"]
+Field = QLineEdit | QPlainTextEdit | QTextEdit
+FIELDS = (QLineEdit, QPlainTextEdit, QTextEdit)
+CHANGES = frozenset({"cut", "paste"})
+
+
+@runtime_checkable
+class SupportsEditMenu(Protocol):
+    """A panel with blocks, and with fields that are no widgets of Qt."""
+
+    def edit_from_menu(self, what: Edit) -> None:
+        """Do it in the field of the page that has the keyboard, else with the chosen blocks."""
+
+
+class EditCommands:
+    """Does what the keys would do, for who looks for it in the menu.
+
+    Ctrl+C and the others stay with whoever has the keyboard: fields, the page of the blocks, the Inspector.
+    """
+
+    def __init__(self, shell: Shell) -> None:
+        self._shell = shell
+        self._had: QWidget | None = None
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.connect(self._changed)
+
+    def _changed(self, _old: QWidget | None, now: QWidget | None) -> None:
+        """Remember who has the keyboard when the menu bar takes it, as with Alt."""
+        if now is not None and not isinstance(now, (QMenu, QMenuBar)):
+            self._had = now
+
+    def do(self, what: Edit) -> None:
+        """Cut, copy, paste or select all."""
+        field = self._field()
+        if field is not None:
+            getattr(field, what)()
+            return
+        editor = self._shell.editor()
+        if self._shell.showing == "behaviour" and isinstance(editor, SupportsEditMenu):
+            editor.edit_from_menu(what)
+
+    def why_not(self, what: Edit) -> str:
+        """Why it can't be done now; "" when it can."""
+        field = self._field()
+        if field is not None:
+            return _("This text can't be changed") if what in CHANGES and field.isReadOnly() else ""
+        return "" if self._shell.showing == "behaviour" else _("Only for blocks and in text fields")
+
+    def _field(self) -> Field | None:
+        had = self._had if self._had is not None and isValid(self._had) else None
+        return had if isinstance(had, FIELDS) and had.isVisible() else None

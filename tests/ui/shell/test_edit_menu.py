@@ -1,0 +1,60 @@
+"""Cut, copy, paste and select all in the Edit menu: in text fields, else with the blocks."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QApplication, QLineEdit
+
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@pytest.fixture
+def field(qtbot, window: MainWindow, commands: Commands) -> QLineEdit:
+    """A field of the window that has the keyboard."""
+    made = QLineEdit("hello", window)
+    window.show()
+    made.show()
+    qtbot.waitActive(window)
+    made.setFocus()
+    qtbot.waitUntil(made.hasFocus)
+    return made
+
+
+def test_a_field_is_edited(window: MainWindow, commands: Commands, field: QLineEdit) -> None:
+    commands.run("edit.selectAll")
+    assert field.selectedText() == "hello"
+    commands.run("edit.copy")
+    assert QGuiApplication.clipboard().text() == "hello"
+    commands.run("edit.cut")
+    assert field.text() == ""
+    commands.run("edit.paste")
+    assert field.text() == "hello"
+
+
+def test_a_field_stays_meant_while_the_menu_bar_has_the_keyboard(
+    window: MainWindow, commands: Commands, field: QLineEdit
+) -> None:
+    window.bar.menus.setFocus()
+    assert QApplication.focusWidget() is window.bar.menus
+    commands.run("edit.selectAll")
+    assert field.selectedText() == "hello"
+
+
+def test_what_can_t_be_done_is_grey(commands: Commands, field: QLineEdit) -> None:
+    field.setReadOnly(True)
+    assert commands.actions.why_not("edit.paste") == "This text can't be changed"
+    assert commands.actions.why_not("edit.copy") == ""
+    field.clearFocus()
+    field.hide()
+    assert commands.actions.why_not("edit.copy") == "Only for blocks and in text fields"
+
+
+def test_the_keys_stay_with_who_has_the_keyboard(commands: Commands) -> None:
+    for what in ("cut", "copy", "paste", "selectAll"):
+        action = commands.actions[f"edit.{what}"]
+        assert action.shortcuts() == []
+        assert action.text().partition("\t")[2].startswith("Ctrl+")

@@ -1,0 +1,36 @@
+"""The menus open by Alt and a letter, which is underlined while Alt is held."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QApplication
+
+from app.ui.shell.main_window import MainWindow
+
+pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+def test_alt_shows_the_letters(qtbot, window: MainWindow) -> None:
+    window.show()
+    bar = window.bar.menus
+    qtbot.waitUntil(bar.isVisible)
+    before = bar.grab().toImage()
+    for kind, shown in ((QEvent.Type.KeyPress, True), (QEvent.Type.KeyRelease, False)):
+        QApplication.sendEvent(window.windowHandle(), QKeyEvent(kind, Qt.Key.Key_Alt, Qt.AltModifier))
+        assert bar.shows_letters == shown
+        if shown:  # when Alt is let go alone, Qt gives the bar the keyboard
+            assert bar.grab().toImage() != before
+
+
+def test_a_chosen_menu_is_marked(qtbot, window: MainWindow) -> None:
+    window.show()
+    bar = window.bar.menus
+    qtbot.waitUntil(bar.isVisible)
+    before = bar.grab().toImage()
+    bar.setActiveAction(bar.actions()[1])
+    menu = bar.actions()[1].menu()
+    qtbot.waitUntil(lambda: bar.grab().toImage() != before)
+    menu.close()
