@@ -54,6 +54,7 @@ def test_blocks_that_are_let_go_on_another_tab_move_there(studio: Studio) -> Non
     carry(studio, "say Two", *place_of(studio, "Quiz"))
     until(lambda: ringed(studio, "Quiz"), "a ring is round the tab that would take it")
     assert not ringed(studio, "Greeting")
+    until(lambda: "say Four" in shown(studio), "it has opened meanwhile")
     studio.screen.release()
     studio.says("Moved 2 blocks to Quiz")
     studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # it stays under the mouse
@@ -90,4 +91,33 @@ def test_what_is_let_go_elsewhere_goes_back_and_on_plus_makes_a_new_behaviour(st
     studio.screen.let_go("Ctrl")
     studio.says("Copied 1 block to New behaviour")
     until(lambda: tabs(studio) == ["Quiz", "Greeting", "New behaviour, not saved"], "a new one has it")
+    assert studio.quit() == 0
+
+
+def test_a_tab_opens_under_held_blocks_and_they_are_dragged_on_there(studio: Studio) -> None:
+    before = shown(studio)
+    carry(studio, "say Two", *place_of(studio, "Quiz"))
+    picture = studio.find(kind="CarriedPicture")["rect"]
+    x, y = place_of(studio, "Quiz")
+    assert 0 < picture[0] - x < 40, "it is at the mouse"
+    assert 0 < picture[1] - y < 40
+    until(lambda: "say Four" in shown(studio), "the tab has opened")
+    assert studio.find(kind="CarriedPicture"), "the blocks are still in the hand"
+    left, top, _, high = studio.spot(PATH.format("say Four"))
+    bottom = top + high
+    studio.screen.glide(left + 60, bottom + 60)
+    until(lambda: not studio.all(kind="CarriedPicture"), "the page shows them itself")
+    studio.screen.glide(left + 14, bottom + 14, 6)
+    until(
+        lambda: studio.page(f"!!{SHOWN}.querySelector('.blocklyInsertionMarker')"),
+        "it shows where they would go",
+    )
+    studio.screen.release()
+    studio.says("Moved 2 blocks to Quiz")
+    studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # it stays under the mouse
+    under = f"{SHOWN}.querySelector('[data-id=\"say Four\"]').querySelectorAll('.robot_pepper_do_say').length"
+    until(lambda: studio.page(under) == 2, "they hang below the script of this tab")
+    until(lambda: tabs(studio) == ["Quiz, not saved", "Greeting, not saved"], "both are edited")
+    studio.click("Undo", kind="Button")
+    until(lambda: shown(studio) == before, "they are back in their stack")
     assert studio.quit() == 0

@@ -28,6 +28,7 @@ class BlocklyBridge(QObject):
     block_chosen = Signal(str)
     answered = Signal(int, str)  # token of a flush, workspace as JSON
     went_wrong = Signal(str)
+    field_opened = Signal()  # the field that was asked for has the keys
     try_asked = Signal(str)  # a stack to be tried, as JSON
     block_focused = Signal(bool)  # whether the keys go to a block
     command_wanted = Signal(str)  # a command of the window about variables or the picture of the blocks
@@ -37,9 +38,12 @@ class BlocklyBridge(QObject):
     wanted = Signal(str)  # what a button of the empty canvas is for: "robot", "examples"
     pinned = Signal(bool)  # a person wants the blocks of a category to stay open, or not
     removed = Signal(int)  # a person has deleted so many blocks at once
-    carried_out = Signal(int, int, bool)  # a block is outside of the page, at x, y; False: not any more
+    # something of that tab is outside of the page, at x, y; False: not any more
+    carried_out = Signal(int, int, bool, str)
+    carried_seen = Signal(str, float)  # how that looks: a PNG as `data:`, so many pixels in one of the page
     let_go_outside = Signal(int, int)  # and was let go there
-    carried_over = Signal(int, str)  # so many blocks are in this tab now: "moved", "copied", "added"
+    # so many blocks are in this tab now: "moved", "copied", "added"; from which tab
+    carried_over = Signal(int, str, str)
     backpack_asked = Signal(str)  # what is to be done with the backpack, as JSON (`backpack.ts`)
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
@@ -83,6 +87,10 @@ class BlocklyBridge(QObject):
     def tries(self, stack: str) -> None:
         self.try_asked.emit(stack)
 
+    @Slot()
+    def opened(self) -> None:
+        self.field_opened.emit()
+
     @Slot(bool)
     def on_block(self, has: bool) -> None:
         self.block_focused.emit(has)
@@ -99,17 +107,21 @@ class BlocklyBridge(QObject):
     def deleted(self, count: int) -> None:
         self.removed.emit(count)
 
-    @Slot(int, int, bool)
-    def carried(self, x: int, y: int, out: bool) -> None:
-        self.carried_out.emit(x, y, out)
+    @Slot(int, int, bool, str)
+    def carried(self, x: int, y: int, out: bool, home: str) -> None:
+        self.carried_out.emit(x, y, out, home)
+
+    @Slot(str, float)
+    def pictureOfCarried(self, data: str, ratio: float) -> None:
+        self.carried_seen.emit(data, ratio)
 
     @Slot(int, int)
     def dropped(self, x: int, y: int) -> None:
         self.let_go_outside.emit(x, y)
 
-    @Slot(int, str)
-    def brought(self, count: int, how: str) -> None:
-        self.carried_over.emit(count, how)
+    @Slot(int, str, str)
+    def brought(self, count: int, how: str, home: str) -> None:
+        self.carried_over.emit(count, how, home)
 
     @Slot(str)
     def backpack(self, what: str) -> None:

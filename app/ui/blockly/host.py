@@ -20,6 +20,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app import resources
 from app.ui.blockly.bridge import BlocklyBridge, Json
+from app.ui.blockly.held_keys import HeldKeys
 from app.ui.blockly.scheme import PAGE, SCHEME, RequestBlocker, SchemeHandler, register_scheme
 from app.ui.widgets.keyboard import keyboard_leads, proxy_of
 from nep import i18n
@@ -115,6 +116,9 @@ class BlocklyHost(QWidget):
         self._up_since = 0.0
         self._bridge = BlocklyBridge(self._beginning, self)
         self._bridge.came_up.connect(self._came_up)
+        self._keys = HeldKeys(lambda: self._web.keyboard() if self._web is not None else None)
+        self._asked_for = ""  # the field that gets the keys: "find" or "search"; "" when it has them
+        self._bridge.field_opened.connect(self._field_opened)
         self._on_block = False
         self._bridge.block_focused.connect(self._block_focused)
         self._bridge.went_wrong.connect(lambda sentence: _log.error("block editor: %s", sentence))
@@ -159,6 +163,15 @@ class BlocklyHost(QWidget):
         if self._up:
             self._bridge.tell(command, payload)
 
+    def _ask_for(self, field: str) -> None:
+        """Let the keys go to a field of the page, also those that are pressed before it is there."""
+        if self._web is None:
+            return
+        self._asked_for = field
+        self._watch_keys()
+        self._keys.hold()
+        self._tell(field, None)
+
     # -- the page ---------------------------------------------------------------------------------
 
     def showEvent(self, event: QShowEvent) -> None:
@@ -169,6 +182,8 @@ class BlocklyHost(QWidget):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ChildAdded:
             self._watch_keys()
+        if self._keys.keeps(event):
+            return True
         if event.type() == QEvent.Type.FocusIn and keyboard_leads():
             self._tell("keyboard", None)
         overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
@@ -244,6 +259,10 @@ class BlocklyHost(QWidget):
         mode = colours.get("dark" if self._theme["dark"] else "light", colours)
         return QColor(str(cast("Mapping[str, object]", mode)["workspace"]))
 
+    def _field_opened(self) -> None:
+        self._asked_for = ""
+        self._keys.let_go()
+
     def _block_focused(self, has: bool) -> None:
         self._on_block = has
 
@@ -252,6 +271,8 @@ class BlocklyHost(QWidget):
         self._up_since = time.monotonic()
         self._watch_keys()
         self._page_came()
+        if self._asked_for:
+            self._tell(self._asked_for, None)
         self.ready.emit()
         if self._had_died:
             self._had_died = False
@@ -261,6 +282,8 @@ class BlocklyHost(QWidget):
         _log.warning("the web process of the block editor ended (code %d); it is started again", code)
         self._up = self._on_block = False
         self._had_died = True
+        self._asked_for = ""
+        self._keys.forget()
         self._page_went()
         if time.monotonic() - self._up_since > _STABLE_S:
             self._deaths = 0

@@ -23,6 +23,10 @@ from nep import i18n
 
 _PIXELS_PER_INCH = 96.0  # a page's own pixels
 _EDGE_INCH = 0.45
+PAGE_EDITS = {"cut": "Cut", "copy": "Copy", "paste": "Paste", "selectAll": "SelectAll"}
+"""What a page's own fields do, as `QWebEnginePage.WebAction` names it."""
+TYPES = "(e => !!e && (e.isContentEditable || /^(INPUT|TEXTAREA)$/.test(e.tagName)))(document.activeElement)"
+"""Whether a field of the page has the keys."""
 
 
 class BlocklyView(BlocklyHost):
@@ -42,9 +46,12 @@ class BlocklyView(BlocklyHost):
     values_watched = Signal(tuple)  # the variables (ids) whose values the page shows
     toolbox_pinned = Signal(bool)  # a person wants the blocks of a category to stay open, or not
     blocks_deleted = Signal(int)  # a person has deleted so many blocks at once in the shown tab
-    block_carried = Signal(object)  # outside of the page, at this place of the screen (QPoint); None: no more
+    # outside of the page, at this place of the screen (QPoint), from that tab; None: no more
+    block_carried = Signal(object, str)
+    carried_seen = Signal(bytes, float)  # how that looks: a PNG, and its pixels in one of the screen
     block_dropped = Signal(QPoint)  # it was let go there; unless `bring_blocks` follows it is where it was
-    blocks_brought = Signal(int, str)  # so many are in the shown tab now: "moved", "copied" or "added"
+    # so many are in the shown tab now: "moved", "copied" or "added"; from which tab
+    blocks_brought = Signal(int, str, str)
     backpack_asked = Signal(str)  # what a person wants done with the backpack, as JSON: `BackpackKeeper`
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
@@ -56,6 +63,7 @@ class BlocklyView(BlocklyHost):
         self._values: Json = {}
         self._first_step: Json | None = None
         self._backpack: list[Json] = []
+        self._pointed: Json | None = None  # what a page that is not there yet is to point at
         self._waiting: dict[int, Callable[[WorkspaceJson], None]] = {}
         self._pictures: dict[int, Callable[[bytes], None]] = {}
         self._tokens = 0
@@ -71,8 +79,9 @@ class BlocklyView(BlocklyHost):
         self._bridge.pinned.connect(self._toolbox_pinned)
         self._bridge.removed.connect(self.blocks_deleted)
         self._bridge.carried_out.connect(
-            lambda x, y, out: self.block_carried.emit(self._on_screen(x, y) if out else None)
+            lambda x, y, out, home: self.block_carried.emit(self._on_screen(x, y) if out else None, home)
         )
+        self._bridge.carried_seen.connect(lambda data, ratio: self.carried_seen.emit(_png(data), ratio))
         self._bridge.let_go_outside.connect(lambda x, y: self.block_dropped.emit(self._on_screen(x, y)))
         self._bridge.carried_over.connect(self.blocks_brought)
         self._bridge.backpack_asked.connect(self.backpack_asked)
@@ -268,7 +277,9 @@ class BlocklyView(BlocklyHost):
         ``name`` is what people call it, ``then`` the words that say where to put it. It ends by itself when
         there is one more of them.
         """
-        self._tell("point", {"block": block, "name": name, "then": then} if block else None)
+        wanted: Json | None = {"block": block, "name": name, "then": then} if block else None
+        self._pointed = None if self._up else wanted
+        self._tell("point", wanted)
 
     # -- commands ---------------------------------------------------------------------------------
 
@@ -301,6 +312,21 @@ class BlocklyView(BlocklyHost):
             self.setFocus()
             self._tell("edit", what)
 
+    def edit_from_menu(self, what: str) -> None:
+        """Do "cut", "copy", "paste" or "selectAll" in the page's field with the keys, else with blocks."""
+        if self.web is None:
+            return
+        page = self.web.page
+
+        def act(types: object) -> None:
+            if types:
+                page.triggerAction(page.WebAction[PAGE_EDITS[what]])
+            else:
+                self.setFocus()
+                self._tell("edit", what)
+
+        page.runJavaScript(TYPES, act)
+
     def _has_keys(self) -> bool:
         focus = QApplication.focusWidget()
         return focus is not None and self.isAncestorOf(focus)
@@ -319,11 +345,11 @@ class BlocklyView(BlocklyHost):
 
     def open_find(self) -> None:
         """Open the bar that finds blocks in the shown program."""
-        self._tell("find", None)
+        self._ask_for("find")
 
     def open_search(self) -> None:
         """Let the keys go to the field that finds blocks in the toolbox."""
-        self._tell("search", None)
+        self._ask_for("search")
 
     def show_help(self) -> None:
         """Show the help of the block that the keys go to, if there is one."""
@@ -352,6 +378,9 @@ class BlocklyView(BlocklyHost):
         self._tell("backpack", self._backpack)
         self._tabs.page_gone()
         self._send_tab()
+        pointed, self._pointed = self._pointed, None
+        if pointed is not None:
+            self._tell("point", pointed)
 
     def _page_went(self) -> None:
         pictures, self._pictures = self._pictures, {}
@@ -410,6 +439,11 @@ def _margins(layout: QPageLayout) -> tuple[float, float, float, float]:
 
 def _texts(text: str) -> tuple[str, ...]:
     return tuple(map(str, json.loads(text)))
+
+
+def _png(data: str) -> bytes:
+    """The picture of a ``data:`` URL."""
+    return b64decode(data.partition(",")[2])
 
 
 def _pairs(text: str) -> tuple[tuple[str, str], ...]:

@@ -259,3 +259,34 @@ def test_nothing_of_the_backpack_itself_goes_into_it_again(qtbot, view, them, wi
     them.wait_for("!document.querySelector('.blocklyDragging')")
     assert chains(them) == [["started"], ["wait", "wait"]]
     assert window.types == [["wait"]]
+
+
+@pytest.mark.parametrize("held", ["block", "note"])
+def test_of_blocks_and_notes_chosen_together_it_takes_the_blocks_and_says_so(
+    qtbot, view, them, window, held: str
+) -> None:
+    note = {"height": 100, "width": 160, "id": "note", "x": 520, "y": 56, "text": "Look"}
+    view.load({**workspace(START, WAITS), "workspaceComments": [note]})
+    bar = ".nepTab:not([hidden]) .blocklyCommentTopbar"
+    them.wait_for(f"!!document.querySelector('{bar}')")
+    them.click(BLOCK.format("two"))
+    box = them.box(bar)
+    at = QPoint(round(box["left"]) + 60, round(box["top"] + box["bottom"]) // 2)
+    QTest.mouseClick(them.target, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.ControlModifier, at)
+    them.wait_for("document.querySelectorAll('.nepTab:not([hidden]) .nepChosen').length", 2)
+    before, end = them.newest(), centre(them, ".nepBackpack")
+    start = at if held == "note" else None
+    if start is None:
+        start = them.hold(BLOCK.format("two"))
+    else:
+        QTest.mouseMove(them.target, start)
+        QTest.mousePress(them.target, Qt.MouseButton.LeftButton, pos=start)
+    them.move(start, end)
+    them.wait_for("document.querySelector('.nepBackpack').classList.contains('nepOver')")
+    middle = f"document.elementFromPoint({end.x()}, {end.y()}).closest('.nepBackpack') !== null"
+    assert them.ask(middle) is True, "its ring is seen over what is in the hand"
+    them.drop(end)
+    them.until(lambda: len(window.backpack.items) == 1, "the block is in the backpack")
+    assert window.types == [["wait"]]
+    assert window.said == ["Put 1 block into the backpack. Notes stay here: it keeps blocks only."]
+    assert them.newest() == before

@@ -75,6 +75,7 @@ def test_the_plus_adds_else_then_else_if_above_it_and_undo_knows(qtbot, view, pe
     them: Person = person(state=choice())
     press_button(them, 0)
     qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 0, "else": True}, timeout=WAIT_MS)
+    them.wait_for("document.querySelectorAll('[data-id=if] > .nepButton').length", 2)  # it is drawn anew
     press_button(them, 0)
     qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 1, "else": True}, timeout=WAIT_MS)
     assert compile_behaviour(them.newest(), []).errors  # no condition yet: that is said, and nothing else

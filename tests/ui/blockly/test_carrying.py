@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 
 from tests.ui.blockly_person import START, WAIT_MS, Person, workspace
@@ -31,10 +32,14 @@ class Told:
         self.places: list[QPoint | None] = []
         self.dropped: list[QPoint] = []
         self.brought: list[tuple[int, str]] = []
+        self.homes: list[str] = []
+        self.pictures: list[tuple[bytes, float]] = []
         self.deleted: list[int] = []
-        view.block_carried.connect(self.places.append)
+        view.block_carried.connect(lambda place, _home: self.places.append(place))
+        view.carried_seen.connect(lambda *each: self.pictures.append(each))
         view.block_dropped.connect(self.dropped.append)
-        view.blocks_brought.connect(lambda *each: self.brought.append(each))
+        view.blocks_brought.connect(lambda count, how, _home: self.brought.append((count, how)))
+        view.blocks_brought.connect(lambda _count, _how, home: self.homes.append(home))
         view.blocks_deleted.connect(self.deleted.append)
 
 
@@ -196,3 +201,176 @@ def test_a_note_moves_too(qtbot, view, them, told) -> None:
     assert [each["text"] for each in them.newest()["workspaceComments"]] == ["Look"]
     view.show_tab("a", {})
     qtbot.waitUntil(lambda: "workspaceComments" not in them.newest(), timeout=WAIT_MS)
+
+
+# -- a tab that opens under what is held -----------------------------------------------------------
+
+
+def hold_outside(them: Person, told: Told, selector: str, to: QPoint = ABOVE) -> None:
+    """Drag something out of the page, and go on holding it."""
+    box = them.box(selector)
+    start = QPoint(
+        round(box["left"]) + (60 if "Comment" in selector else 12), round(box["top"] + box["bottom"]) // 2
+    )
+    QTest.mouseMove(them.target, start)
+    QTest.mousePress(them.target, Qt.MouseButton.LeftButton, pos=start)
+    them.move(start, start + QPoint(60, 30))
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    go(them, told, to, start + QPoint(60, 30))
+
+
+def go(them: Person, told: Told, to: QPoint, start: QPoint) -> None:
+    them.move(start, to)
+    them.until(lambda: told.places[-1:] == [them.view.mapToGlobal(to)], "the window knows where it is")
+
+
+def open_tab(view, them: Person, key: str, block: str) -> None:
+    view.show_tab(key, {})
+    them.wait_for(
+        f"!!{SHOWN}.querySelector('[data-id={block}]') && !document.querySelector('.blocklyDragging')"
+    )
+
+
+def below(them: Person, block: str) -> QPoint:
+    """Where the mouse is with a block held at its left end that joins below this one."""
+    box = them.box(f".nepTab:not([hidden]) [data-id={block}] > .blocklyPath")
+    return QPoint(round(box["left"]) + 16, round(box["bottom"]) + 16)
+
+
+def drop_at(them: Person, place: QPoint, start: QPoint = ABOVE) -> None:
+    them.move(start, place)
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    them.move(place - QPoint(0, 6), place)
+    QTest.mouseRelease(them.target, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, place)
+    them.wait_for("!!document.querySelector('.blocklyDragging')", False)
+
+
+def test_in_the_tab_that_opened_it_is_dragged_on_and_joins(qtbot, view, them, told) -> None:
+    hold_outside(them, told, TWO)
+    open_tab(view, them, "b", "start")
+    drop_at(them, below(them, "start"))
+    qtbot.waitUntil(lambda: bool(told.brought), timeout=WAIT_MS)
+    assert (told.brought, told.homes, told.dropped) == ([(2, "moved")], ["a"], [])
+    them.until(lambda: chains(them) == [["started", "wait", "wait"]], "it hangs below the script there")
+    view.undo()
+    qtbot.waitUntil(lambda: chains(them) == [["started"]], timeout=WAIT_MS)
+    view.redo()
+    qtbot.waitUntil(lambda: chains(them) == [["started", "wait", "wait"]], timeout=WAIT_MS)
+    view.show_tab("a", {})
+    them.until(lambda: chains(them) == [["started"], ["wait"]], "and is gone where it was")
+    view.give_blocks_back()
+    them.until(lambda: chains(them) == BEFORE, "both are as before")
+    view.show_tab("b", {})
+    them.until(lambda: chains(them) == [["started"]], "in both tabs")
+    assert told.deleted == []
+
+
+def test_it_may_pass_through_a_tab_and_leaves_nothing_there(qtbot, view, them, told) -> None:
+    changes: list[str] = []
+    view.changed.connect(lambda key, _program: changes.append(key))
+    histories: list[tuple[bool, bool]] = []
+    hold_outside(them, told, TWO)
+    open_tab(view, them, "b", "start")
+    before = them.newest()
+    view.history_changed.connect(lambda *each: histories.append(each))
+    them.move(ABOVE, QPoint(600, 300))
+    them.wait_for(f"{SHOWN}.querySelectorAll('.blocklyDragging .control_wait').length", 1)
+    go(them, told, ABOVE, QPoint(600, 300))
+    them.wait_for("!!document.querySelector('.blocklyDragging')", False)
+    them.until(lambda: histories[-1:] == [(False, False)], "there is nothing to undo")
+    assert them.newest() == before
+    open_tab(view, them, "a", "two")
+    place = QPoint(600, 420)
+    drop_at(them, place)
+    them.until(lambda: chains(them) == [["started"], ["wait"], ["wait", "wait"]], "it is at home")
+    assert told.brought == [], "it went nowhere"
+    view.undo()
+    qtbot.waitUntil(lambda: chains(them) == BEFORE, timeout=WAIT_MS)
+    assert "b" not in changes
+
+
+@pytest.mark.parametrize("how", ["outside", "toolbox", "escape"])
+def test_let_go_elsewhere_it_is_where_it_was(qtbot, view, them, told, how: str) -> None:
+    before = them.newest()
+    hold_outside(them, told, TWO)
+    open_tab(view, them, "b", "start")
+    there = them.newest()
+    if how == "outside":
+        QTest.mouseRelease(them.target, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, ABOVE)
+        qtbot.waitUntil(lambda: bool(told.dropped), timeout=WAIT_MS)
+    elif how == "toolbox":
+        drop_at(them, QPoint(40, 300))
+    else:
+        them.press(Qt.Key.Key_Escape)
+        them.until(lambda: told.places[-1] is None, "nothing is carried any more")
+        them.move(ABOVE, QPoint(600, 300))
+        assert them.ask("!!document.querySelector('.blocklyDragging')") is False
+        QTest.mouseRelease(
+            them.target, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(600, 300)
+        )
+    assert them.newest() == there
+    view.show_tab("a", {})
+    them.until(lambda: chains(them) == BEFORE, "it is where it was")
+    assert them.newest() == before
+    assert (told.brought, told.deleted) == ([], [])
+
+
+def test_a_block_of_the_toolbox_goes_through_a_tab_too(qtbot, view, them, told) -> None:
+    them.open_category("Control")
+    hold_outside(them, told, ".nepTab:not([hidden]) .nepCategory .control_wait")
+    open_tab(view, them, "b", "start")
+    drop_at(them, below(them, "start"))
+    qtbot.waitUntil(lambda: bool(told.brought), timeout=WAIT_MS)
+    assert told.brought == [(1, "added")]
+    them.until(lambda: chains(them) == [["started", "wait"]], "it hangs there")
+    view.show_tab("a", {})
+    qtbot.waitUntil(lambda: chains(them) == BEFORE, timeout=WAIT_MS)
+
+
+def choose_mixed(them: Person) -> None:
+    """The last block of the script, and the note."""
+    them.click(".nepTab:not([hidden]) [data-id='3'] > .blocklyPath")
+    box = them.box(".nepTab:not([hidden]) .blocklyCommentTopbar")
+    at = QPoint(round(box["left"]) + 60, round(box["top"] + box["bottom"]) // 2)
+    QTest.mouseClick(them.target, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.ControlModifier, at)
+    them.wait_for("document.querySelectorAll('.nepTab:not([hidden]) .nepChosen').length", 2)
+
+
+@pytest.mark.parametrize("through", [False, True])
+def test_blocks_and_notes_chosen_together_go_to_another_tab(qtbot, view, them, told, through: bool) -> None:
+    choose_mixed(them)
+    path = ".nepTab:not([hidden]) [data-id='3'] > .blocklyPath"
+    if through:
+        hold_outside(them, told, path)
+        open_tab(view, them, "b", "start")
+        drop_at(them, QPoint(560, 320))
+        qtbot.waitUntil(lambda: bool(told.brought), timeout=WAIT_MS)
+    else:
+        carry(them, told, path, ABOVE)
+        bring(qtbot, view, told)
+    assert told.brought == [(1, "moved")]
+    assert chains(them) == [["started"], ["wait"]]
+    assert [each["text"] for each in them.newest()["workspaceComments"]] == ["Look"]
+    view.show_tab("a", {})
+    them.until(lambda: chains(them) == [["started"], ["wait", "wait"]], "the block is gone")
+    assert "workspaceComments" not in them.newest()
+    view.give_blocks_back()
+    them.until(lambda: chains(them) == BEFORE, "the block is back")
+    assert [each["text"] for each in them.newest()["workspaceComments"]] == ["Look"]
+    view.show_tab("b", {})
+    them.until(lambda: chains(them) == [["started"]], "and gone there")
+    assert "workspaceComments" not in them.newest()
+
+
+def test_the_window_gets_a_picture_of_what_is_carried(qtbot, view, them, told) -> None:
+    hold_outside(them, told, TWO)
+    qtbot.waitUntil(lambda: bool(told.pictures), timeout=WAIT_MS)
+    data, ratio = told.pictures[-1]
+    picture = QImage.fromData(data)
+    wide, high = picture.width() / ratio, picture.height() / ratio
+    assert 100 < wide <= 360
+    assert 60 < high <= 240
+    colours = {picture.pixelColor(x, picture.height() // 2).name() for x in range(picture.width())}
+    assert len(colours) > 3, "a block is on it"
+    QTest.mouseRelease(them.target, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, ABOVE)
+    qtbot.waitUntil(lambda: bool(told.dropped), timeout=WAIT_MS)

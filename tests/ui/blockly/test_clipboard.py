@@ -144,6 +144,32 @@ def test_keys_that_are_elsewhere_in_the_window_paste_all_the_same(qtbot, view, t
     view.setParent(None)
 
 
+def test_the_edit_menu_works_with_the_blocks(qtbot, view, them):
+    them.click("[data-id=w] > .blocklyPath")
+    them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")
+    view.edit_from_menu("copy")  # the page has the keys: from the menu it is done all the same
+    qtbot.waitUntil(lambda: "control_wait" in QGuiApplication.clipboard().text(), timeout=WAIT_MS)
+    view.edit_from_menu("paste")
+    qtbot.waitUntil(lambda: types(them) == ["control_wait", "events_started"], timeout=WAIT_MS)
+    view.edit_from_menu("selectAll")
+    them.wait_for("document.querySelectorAll('.nepChosen').length > 1")
+    view.edit_from_menu("cut")
+    qtbot.waitUntil(lambda: types(them) == [], timeout=WAIT_MS)
+
+
+def test_the_edit_menu_works_in_a_field_of_the_page(qtbot, view, them):
+    QGuiApplication.clipboard().setText("seven")
+    view.open_find()
+    them.wait_for("document.activeElement?.tagName", "INPUT")
+    view.edit_from_menu("paste")
+    them.wait_for("document.activeElement?.value", "seven")
+    view.edit_from_menu("selectAll")
+    them.wait_for("document.activeElement?.selectionEnd - document.activeElement?.selectionStart", 5)
+    view.edit_from_menu("cut")
+    them.wait_for("document.activeElement?.value", "")
+    assert types(them) == ["events_started"]
+
+
 def test_text_of_another_studio_is_pasted_and_other_text_is_not(qtbot, them):
     clipboard = QGuiApplication.clipboard()
     press(them, Qt.Key_V)

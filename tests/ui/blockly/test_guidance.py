@@ -30,6 +30,13 @@ def empty(view: BlocklyView, person: Callable[..., Person]) -> Person:
     return made
 
 
+def test_who_asks_before_the_page_is_there_is_shown_the_block_as_soon_as_it_is(
+    view: BlocklyView, person: Callable[..., Person]
+) -> None:
+    view.point_at("events_started", "when started")
+    person().wait_for(RING)
+
+
 def middle_of(person: Person, selector: str) -> QPoint:
     box = person.box(selector)
     return QPoint(round((box["left"] + box["right"]) / 2), round((box["top"] + box["bottom"]) / 2))
@@ -47,6 +54,17 @@ def test_the_empty_canvas_says_what_to_drag_and_offers_a_robot_until_there_is_on
     empty.until(lambda: asked == ["robot", "examples"], "the window hears what was pressed")
     view.set_first_step("when started", True)
     empty.wait_for(BUTTONS, ["Show me", "Open an example"])
+
+
+def test_in_a_low_page_the_words_do_not_lie_below_the_buttons_of_the_canvas(
+    empty: Person, view: BlocklyView
+) -> None:
+    view.resize(700, 200)
+    empty.wait_for("innerHeight <= 260")
+    parts = "[...document.querySelector('.nepBegin').children]"
+    lowest = f"Math.max(...{parts}.map(e => e.getBoundingClientRect().bottom))"
+    low = f"{lowest} <= document.querySelector('.nepZoom').getBoundingClientRect().top"
+    empty.wait_for(low)
 
 
 def test_a_block_can_be_dropped_onto_the_words_and_takes_them_away(empty: Person) -> None:

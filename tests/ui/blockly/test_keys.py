@@ -252,7 +252,7 @@ def test_what_blocks_are_called_is_words_without_pictures(them):
     press(them, Qt.Key_Tab)
     to_the_canvas(them)
     press(them, Qt.Key_Down)
-    goes_to(them, "Begin stack, when started")
+    goes_to(them, "Beginning of a stack, when started")
     press(them, Qt.Key_Down)
     goes_to(them, "wait, 5, s")
     assert "empty" not in them.ask("document.activeElement.getAttribute('aria-label')").lower()

@@ -89,10 +89,12 @@ def test_a_block_is_moved_with_keys_and_put_down(qtbot, them):
     on_a_block(them)
     them.press(Qt.Key_M, Qt.ControlModifier)
     them.wait_for("!!document.querySelector('.blocklyDragging')")
+    them.wait_for("document.querySelector('.blocklyToast')?.textContent.includes('puts it down')")
     for _ in range(6):
         them.press(Qt.Key_Right, Qt.ControlModifier)
     them.press(Qt.Key_Return)
     them.wait_for("!document.querySelector('.blocklyDragging')")
+    assert not them.ask("!!document.querySelector('.blocklyToast')"), "it is said no longer than it moves"
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
 
 

@@ -31,6 +31,29 @@ def test_a_block_dragged_under_the_hat_snaps_there(qtbot, view, person):
     assert them.newest() == changed.args[1].blocks
 
 
+def test_a_fast_hand_joins_the_gap_that_it_aimed_at(qtbot, person):
+    """The preview of a gap on the way pushes the blocks below it apart, and nobody could see that yet."""
+    wait = {"type": "control_wait", "inputs": {"SECONDS": {"shadow": {"type": "math_number"}}}}
+    last = {**wait, "id": "last"}
+    them = person({**START, "next": {"block": {**wait, "id": "first", "next": {"block": last}}}})
+    hat, lowest = (them.box(f"[data-id={name}] > .blocklyPath") for name in ("start", "last"))
+    them.open_category("Control")
+    start = them.hold(".blocklyFlyout .control_wait")
+    on_the_way = QPoint(round(hat["left"] + 12), round(hat["bottom"] + 18))
+    end = QPoint(on_the_way.x(), round(lowest["bottom"] + 18))
+    them.move(start, on_the_way)
+    them.wait_for("!!document.querySelector('[data-id=start] > .blocklyInsertionMarker')")
+    them.move(on_the_way, end, steps=1)
+    them.drop(end)
+    qtbot.waitUntil(lambda: len(them.tops()) == 1, timeout=WAIT_MS)
+    order, block = [], them.tops()[0]
+    while block:
+        order.append(block["id"])
+        block = block.get("next", {}).get("block")
+    assert order[:3] == ["start", "first", "last"]
+    assert len(order) == 4
+
+
 def test_what_is_flushed_while_a_block_is_in_the_hand_is_a_program(qtbot, view, person):
     them = person(START)
     hat = them.box("[data-id=start] > .blocklyPath")

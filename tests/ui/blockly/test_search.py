@@ -36,6 +36,8 @@ ENGLISH = {
     "send": "events_broadcast",
     "print": "messages_write",
     "question": "asking_ask",
+    "quiz": "asking_choices",
+    "menu": "asking_choices",
     "dice": "values_random",
     "+": "values_arithmetic",
     "minus": "values_arithmetic",
@@ -90,6 +92,9 @@ SPANISH = {
     "enviar mensaje": "events_broadcast",
     "imprimir": "messages_write",
     "preguntar": "asking_ask",
+    "opciones": "asking_choices",
+    "menú": "asking_choices",
+    "cuestionario": "asking_choices",
     "azar": "values_random",
     "dado": "values_random",
     "restar": "values_arithmetic",
@@ -202,13 +207,21 @@ def opened(qtbot) -> Iterator[Callable[[str], Person]]:
     install(before)
 
 
+TYPED = f"""(words => {{
+    const field = document.querySelector({FIELD!r});
+    field.value = words;
+    field.dispatchEvent(new Event('input'));
+    field.dispatchEvent(new KeyboardEvent('keydown', {{key: 'Tab'}}));
+}})"""
+"""Types words; Tab leaves the field, so that what is found is there at once."""
+
+
 def first_two(them: Person, words: str) -> list[str]:
     """The types of the blocks that come first and second when the field holds these words."""
-    given = f"(f => {{ f.value = {json.dumps(words)}; f.dispatchEvent(new Event('input')); }})"
     of_all = f"[...document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .blocklyDraggable')]"
     top = "(e => e.getBoundingClientRect().top)"
     return them.ask(
-        f"({given}(document.querySelector({FIELD!r})), {of_all}"
+        f"({TYPED}({json.dumps(words)}), {of_all}"
         f".sort((a, b) => {top}(a) - {top}(b)).slice(0, 2)"
         ".map(e => [...e.classList].find(name => /^[a-z]+_/.test(name))))"
     )
@@ -216,9 +229,8 @@ def first_two(them: Person, words: str) -> list[str]:
 
 def found(them: Person, words: str) -> str:
     """The type of the block that comes first when the field holds these words."""
-    given = f"(f => {{ f.value = {json.dumps(words)}; f.dispatchEvent(new Event('input')); }})"
     return them.ask(
-        f"({given}(document.querySelector({FIELD!r})), "
+        f"({TYPED}({json.dumps(words)}), "
         f"[...({FIRST})?.classList ?? []].find(name => /^[a-z]+_/.test(name)) ?? '')"
     )
 
@@ -254,3 +266,76 @@ def test_who_finds_nothing_is_told_what_to_try(opened):
         f"[...document.querySelectorAll('{FLYOUT} .blocklyFlyoutLabelText')].map(e => e.textContent.trim())",
         ["No block for “zzyzx”", "Try a simpler word, such as “turn” or “say”,", "or look into a category."],
     )
+
+
+def shown(them: Person) -> int:
+    """How many blocks the toolbox shows."""
+    return them.ask(f"document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .blocklyDraggable').length")
+
+
+def test_a_word_is_looked_for_once_and_not_each_of_its_letters(opened):
+    them = opened("en")
+    them.ask(
+        "(window.made = 0, new MutationObserver(all => window.made +="
+        " all.flatMap(each => [...each.addedNodes])"
+        ".filter(each => each.matches?.('.robot_pepper_do_turn')).length)"
+        f".observe(document.querySelector('{FLYOUT} .blocklyBlockCanvas'), {{childList: true}}))"
+    )
+    them.ask(
+        f"'turn'.split('').forEach((_, at) => {{ const field = document.querySelector('{FIELD}');"
+        " field.value = 'turn'.slice(0, at + 1); field.dispatchEvent(new Event('input')); })"
+    )
+    them.wait_for(f"!!document.querySelector('{FLYOUT} .robot_pepper_do_turn')")
+    assert them.ask("window.made") == 1
+    assert found(them, "turn") == "robot_pepper_do_turn"
+
+
+def test_enter_takes_what_was_typed_and_not_what_was_found_before(qtbot, opened):
+    them = opened("en")
+    them.click(FIELD)
+    assert found(them, "wait") == "control_wait"
+    them.ask(
+        "(field => { field.value = 'say'; field.dispatchEvent(new Event('input'));"
+        " field.dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter'})); })"
+        f"(document.querySelector('{FIELD}'))"
+    )
+    qtbot.waitUntil(lambda: "robot_pepper_do_say" in json.dumps(them.tops()), timeout=WAIT_MS)
+
+
+def test_more_is_found_than_fits_and_a_button_shows_it(opened):
+    them = opened("en")
+    found(them, "e")
+    few = shown(them)
+    assert 8 <= few < 20
+    button = f"document.querySelector('{FLYOUT} .blocklyFlyoutButton')"
+    words = them.ask(f"{button}.textContent").replace("\u00a0", " ")
+    assert words == f"Show {40 - few} more"
+    for kind in ("pointerdown", "pointerup"):
+        them.ask(f"{button}.dispatchEvent(new PointerEvent('{kind}', {{bubbles: true}}))")
+    assert shown(them) == 40
+    assert them.ask(button) is None
+
+
+@pytest.mark.parametrize("wanted", ["search", "find"])
+def test_letters_typed_right_after_a_new_behaviour_and_a_search_all_arrive(opened, wanted):
+    them = opened("en")
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    them.view.show_tab("new", workspace(*({**START, "id": f"many{at}"} for at in range(60))))
+    (them.view.open_search if wanted == "search" else them.view.open_find)()
+    QTest.keyClicks(them.target, "wait")
+    field = FIELD if wanted == "search" else ".nepFind input"
+    them.wait_for(f"document.querySelector('{field}').value", "wait")
+    QTest.keyClicks(them.target, " a")
+    them.wait_for(f"document.querySelector('{field}').value", "wait a")
+
+
+def test_letters_that_are_typed_before_the_page_is_there_arrive(qtbot):
+    view = editor(qtbot, editor_definitions([robot("Pepper")]), 1320, 700)
+    view.show()
+    qtbot.waitUntil(lambda: view.web is not None and view.web.keyboard() is not None, timeout=WAIT_MS)
+    view.open_search()
+    QTest.keyClicks(view.web.keyboard(), "wait")
+    assert not view.is_ready
+    qtbot.waitUntil(lambda: view.is_ready, timeout=WAIT_MS)
+    them = Person(qtbot, view)
+    them.wait_for(f"document.querySelector('{FIELD}')?.value", "wait")

@@ -182,6 +182,29 @@ def test_the_keys_go_to_the_tab_that_is_shown(qtbot, view, two) -> None:
     assert two.tops() == [START]
 
 
+@pytest.mark.parametrize("full", [False, True], ids=["room", "full"])
+def test_a_script_that_a_change_adds_lies_free_and_in_sight(qtbot, person, view, full) -> None:
+    wide = {"type": "control_wait", "x": 40, "y": 40}
+    filled = [
+        {**wide, "id": f"w{x}.{y}", "x": x, "y": y} for x in range(0, 1300, 100) for y in range(0, 900, 60)
+    ]
+    scripts = [START, *(filled if full else [{**wide, "id": "far", "x": 900}])]
+    them = person(*scripts)
+    before = them.tops()
+    added = {"type": "events_received", "id": "added", "fields": {"NAME": "go"}, "x": 1320, "y": 40}
+    view.change(workspace(*before, added))
+    here = them.box("[data-id=added] > .blocklyPath")
+    canvas = them.ask(
+        "(r => [r.right, r.bottom])(document.querySelector('.blocklySvg').getBoundingClientRect())"
+    )
+    assert here["right"] <= canvas[0]
+    assert here["bottom"] <= canvas[1]
+    qtbot.waitUntil(lambda: view.workspace["blocks"]["blocks"] == them.tops(), timeout=WAIT_MS)
+    view.undo()
+    them.wait_for("document.querySelector('[data-id=added]')", None)
+    assert sorted(them.tops(), key=str) == sorted(before, key=str)
+
+
 def test_a_change_from_outside_is_one_edit_that_undo_takes_back(qtbot, two, view) -> None:
     told: list[tuple[str, WorkspaceJson]] = []
     view.changed.connect(lambda key, program: told.append((key, program)))

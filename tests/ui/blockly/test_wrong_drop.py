@@ -82,6 +82,19 @@ def test_a_wrong_drop_says_why_and_uncovers_the_place(qtbot, them, id, selector,
     qtbot.waitUntil(lambda: them.newest() == before, timeout=WAIT_MS)
 
 
+def test_what_is_moved_aside_covers_no_other_script(qtbot, view, them):
+    """The way to the right of the place leads onto the script there."""
+    state = workspace(START, TURN, EVER, {**FACE, "y": 476}, {**BATTERY, "x": 300, "y": 196})
+    view.load(state)
+    them.wait_for("!!document.querySelector('[data-id=battery]') && !document.querySelector('[data-id=if]')")
+    drop(them, "face", corner(them, "[data-id=angle] > .blocklyPath"))
+    them.wait_for(f"{SAID} !== ''")
+    mine, other, turn = (them.box(f"[data-id={each}] > .blocklyPath") for each in ("face", "battery", "turn"))
+    for each in (other, turn):
+        apart = mine["left"] >= each["right"] or mine["right"] <= each["left"]
+        assert apart or mine["top"] >= each["bottom"] or mine["bottom"] <= each["top"]
+
+
 def test_the_sentence_goes_with_the_next_touch(them):
     drop(them, "face", corner(them, "[data-id=angle] > .blocklyPath"))
     them.wait_for(f"{SAID} !== ''")

@@ -9,7 +9,7 @@ import {focusedBlock} from './help';
 import {drawIcon, iconElement} from './icons';
 import {ctrl} from './keys';
 import {PACK, addToMenus} from './menu';
-import {chosenWith, runsOf} from './selection';
+import {chosenWith, notesChosenWith, runsOf} from './selection';
 import {Sheet, disposeSheet, openable, sheetOf} from './sheet';
 import {type BlockState, wrapUnknown, wrapWholeStack} from './unknown_blocks';
 import {withOwnVariables} from './own_variables';
@@ -30,7 +30,7 @@ export interface Packed {
 
 type BlockInfo = Blockly.utils.toolbox.BlockInfo;
 
-type Asked = {do: 'put'; blocks: BlockState[]; count: number} | {do: 'remove'; id: string} | {do: 'empty' | 'look'};
+type Asked = {do: 'put'; blocks: BlockState[]; count: number; notes: number} | {do: 'remove'; id: string} | {do: 'empty' | 'look'};
 
 let contents: readonly Packed[] = [];
 let tell: (asked: Asked) => void = () => undefined;
@@ -83,10 +83,11 @@ export function isPacked(block: Blockly.Block): boolean {
 
 export function pack(copied: Copied | CopiedBlocks): void {
   if (copied.nepStudio === 'note') return;
+  const notes = copied.nepStudio === 'blocks' ? copied.notes?.length ?? 0 : 0;
   const states = copied.nepStudio === 'blocks' ? copied.states : [copied.state];
   const blocks = states.map(({id: _id, x: _x, y: _y, ...rest}) => rest as BlockState);
   const count = blocks.reduce((sum, each) => sum + countOf(each as Blockly.serialization.blocks.State), 0);
-  if (blocks.length) tell({do: 'put', blocks, count});
+  if (blocks.length) tell({do: 'put', blocks, count, notes});
 }
 
 /** The block with what hangs below it, or all blocks that are chosen with it. */
@@ -94,7 +95,8 @@ function packBlock(block: Blockly.BlockSvg): void {
   const chosen = chosenWith(block);
   const one = chosen.length ? null : stateOf(block, true);
   const states = chosen.length ? runsOf(chosen).map(stateOfRun) : [one?.state ?? null];
-  pack({nepStudio: 'blocks', states: states.filter((each) => each !== null)});
+  const notes = notesChosenWith(block).map((each) => stateOf(each)?.state).filter((each) => each !== undefined);
+  pack({nepStudio: 'blocks', states: states.filter((each) => each !== null), notes});
 }
 
 /** Once for the page: the menus and the key; `ask` tells the window what is to be done with the backpack. */

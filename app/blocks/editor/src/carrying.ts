@@ -1,10 +1,13 @@
 // Blocks or a note carried out of the page: the window sees where they are, and may take them to another behaviour.
+// When it shows another behaviour while they are held, they stay in the hand: back on the page, they are dragged there.
 import * as Blockly from 'blockly/core';
 import {countOf} from './bin';
 import {removeAll} from './carry';
 import {type Copied, type CopiedBlocks, add, copyOfAll, inOneStep, stateOf} from './clipboard';
+import {forgetSoon, takeInHand} from './drag';
 import {inSight} from './free_place';
-import type {Note} from './selection';
+import {asPng, pictureOf} from './picture';
+import type {Item, Note} from './selection';
 import type {Tab} from './tab';
 
 type Point = Blockly.utils.Coordinate;
@@ -17,18 +20,22 @@ export interface Leaving {
   /** The blocks at the top of what goes; none: it is a note. */
   heads: Blockly.BlockSvg[];
   place: Point;
+  /** Where the mouse holds it, from the corner of the first, in units of the canvas. */
+  grip: Point;
   isGone(): boolean;
   /** Takes it away from where it is; its stack closes behind it. */
   remove(): void;
 }
 
 export interface CarryingWindow {
-  /** Something in the hand is outside of the page there; not `out`: it is not any more. */
-  carried(x: number, y: number, out: boolean): void;
+  /** Something in the hand, of the behaviour `home`, is outside of the page there; not `out`: it is not any more. */
+  carried(x: number, y: number, out: boolean, home: string): void;
+  /** How it looks, as a `data:` URL of a PNG with so many pixels in one of the page. */
+  pictured(data: string, ratio: number): void;
   /** It was let go there. */
   dropped(x: number, y: number): void;
-  /** So many blocks are in the behaviour that shows now; 0: it was a note. */
-  brought(count: number, how: string): void;
+  /** So many blocks of the behaviour `from` are in the one that shows now; 0: it was a note. */
+  brought(count: number, how: string, from: string): void;
 }
 
 interface Step {
@@ -38,12 +45,32 @@ interface Step {
   otherwise(): void;
 }
 
+/** What was held when another behaviour came to show: the mouse is still pressed. */
+interface Hand {
+  from: Tab;
+  what: Leaving;
+  /** It lies on the page of the behaviour that shows, and is dragged there. */
+  visit: Visit | null;
+}
+
+interface Visit {
+  tab: Tab;
+  made: Item[];
+  group: string;
+  /** The variables that were there before. */
+  variables: ReadonlySet<string>;
+}
+
+/** How large a picture of what is carried is at most, in pixels of the page. */
+const MOST_WIDE = 360;
+const MOST_HIGH = 240;
+
 export function isOutside({x, y}: Point): boolean {
   return x < 0 || y < 0 || x >= window.innerWidth || y >= window.innerHeight;
 }
 
 /** What would leave the page with this; null: it stays. */
-export function leaving(item: unknown, fromToolbox: boolean, copies: boolean): Leaving | null {
+export function leaving(item: unknown, fromToolbox: boolean, copies: boolean, mouse: Point): Leaving | null {
   const isOne = item instanceof Blockly.BlockSvg || item instanceof Blockly.comments.RenderedWorkspaceComment;
   const copied = isOne ? stateOf(item, true) : null;
   if (!isOne || !copied) return null;
@@ -54,13 +81,14 @@ export function leaving(item: unknown, fromToolbox: boolean, copies: boolean): L
     how: fromToolbox ? 'added' : copies || !item.isDeletable() ? 'copied' : 'moved',
     heads: block ? [block] : [],
     place: item.getRelativeToSurfaceXY(),
+    grip: Blockly.utils.Coordinate.difference(mouse, item.getRelativeToSurfaceXY()),
     isGone: () => item.isDeadOrDying(),
     remove: () => block ? block.dispose(isAlone, false) : item.dispose(),
   };
 }
 
 /** The same of blocks and notes that were chosen together. */
-export function leavingTogether(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[], copies: boolean): Leaving | null {
+export function leavingTogether(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[], copies: boolean, mouse: Point): Leaving | null {
   const heads = runs.flatMap(([head]) => head ?? []);
   const first = heads[0] ?? notes[0];
   if (!first) return null;
@@ -70,6 +98,7 @@ export function leavingTogether(runs: readonly Blockly.BlockSvg[][], notes: read
     how: copies || !all.every((each) => each.isDeletable()) ? 'copied' : 'moved',
     heads,
     place: first.getRelativeToSurfaceXY(),
+    grip: Blockly.utils.Coordinate.difference(mouse, first.getRelativeToSurfaceXY()),
     isGone: () => all.some((each) => each.isDeadOrDying()),
     remove: () => removeAll(runs, notes),
   };
@@ -83,18 +112,58 @@ export class Carrying {
   /** What undoes the last one, the other behaviour first. */
   private steps: Step[] = [];
 
-  constructor(private readonly window: CarryingWindow) {}
+  private hand: Hand | null = null;
+  /** Another behaviour comes to show, or what visits one goes: the ends of drags that follow are none of a person's. */
+  private turning = false;
+  /** The newest picture that was asked for. */
+  private picture = 0;
 
-  /** Where the mouse is, while that is outside; told once in a frame. */
-  over(mouse: Point | null): void {
+  constructor(private readonly window: CarryingWindow, private readonly shown: () => Tab) {}
+
+  /** Where the mouse is with these in the hand, while that is outside; told once in a frame. */
+  over(mouse: Point | null, items: readonly Item[] = []): void {
+    if (this.turning) return;
+    if (mouse && this.hand?.visit) window.setTimeout(() => this.leave());  // not in the middle of its drag
+    if (mouse && !this.mouse && items.length) void this.takePicture(items);
     this.mouse = mouse;
     if (mouse) this.frame ||= window.requestAnimationFrame(() => this.tell());
     else this.tell();
   }
 
   letGo(tab: Tab, what: Leaving, mouse: Point): void {
-    this.held = {tab, what};
+    if (this.turning) {
+      this.hand ??= this.take({from: tab, what, visit: null});
+      return;
+    }
+    const {hand} = this;
+    if (hand) this.drop();
+    this.held = hand ? {tab: hand.from, what: hand.what} : {tab, what};
     this.window.dropped(Math.round(mouse.x), Math.round(mouse.y));
+  }
+
+  /** Shows another behaviour. What is held outside of the page goes back to where it was, and stays in the hand. */
+  turn(show: () => void): void {
+    if (this.hand?.visit) this.leave();
+    this.quietly(show);
+  }
+
+  /** A drag on the page has ended; that of a visitor has brought it here, or it is where it was. */
+  dragEnded(placed: boolean, copies: boolean): void {
+    const {hand} = this;
+    if (this.turning || !hand?.visit) return;
+    if (!placed) return this.drop();
+    const {from, what, visit: {tab, made, group}} = hand;
+    hand.visit = null;
+    this.drop();
+    const how = copies && what.how === 'moved' ? 'copied' : what.how;
+    const removes = how === 'moved' && !what.isGone();
+    if (tab === from) {  // it came back by a detour
+      if (removes) inGroup(group, what.remove);
+      return;
+    }
+    this.steps = [stepOf(tab, group, made)];
+    if (removes) this.remove(what, from);
+    this.window.brought(countIn(what.copied), how, from.key);
   }
 
   /** Lays it free on the canvas of `to`, in sight and selected, and takes it away where it was. */
@@ -106,7 +175,7 @@ export class Carrying {
     this.steps = [];
     if (!this.lay(what.copied, to)) return;
     if (what.how === 'moved' && !what.isGone()) this.remove(what, from);
-    this.window.brought(countIn(what.copied), what.how);
+    this.window.brought(countIn(what.copied), what.how, from.key);
   }
 
   /** Undoes the last `bring`, in both behaviours, after the edits of this frame have reached the lists of edits. */
@@ -122,12 +191,114 @@ export class Carrying {
     }));
   }
 
+  // -- in the hand, while another behaviour shows
+
+  private take(hand: Hand): Hand {
+    window.addEventListener('pointermove', this.onMove, true);
+    window.addEventListener('pointerup', this.onUp, true);
+    window.addEventListener('keydown', this.onKey, true);
+    return hand;
+  }
+
+  /** Nothing is in the hand any more; what it was is where it was. */
+  private drop(): void {
+    if (this.hand?.visit) this.leave();
+    this.hand = null;
+    window.removeEventListener('pointermove', this.onMove, true);
+    window.removeEventListener('pointerup', this.onUp, true);
+    window.removeEventListener('keydown', this.onKey, true);
+    Blockly.Events.setGroup(false);
+    this.over(null);
+  }
+
+  private readonly onMove = (event: PointerEvent): void => {
+    if (!this.hand || this.hand.visit) return;
+    const mouse = new Blockly.utils.Coordinate(event.clientX, event.clientY);
+    if (!(event.buttons & 1)) this.drop();  // it was let go where the page could not see it
+    else if (isOutside(mouse)) this.over(mouse);
+    else this.visit(event, mouse);
+  };
+
+  private readonly onUp = (event: PointerEvent): void => {
+    const {hand} = this;
+    if (!hand || hand.visit) return;  // the drag on the page ends by itself
+    const mouse = new Blockly.utils.Coordinate(event.clientX, event.clientY);
+    if (isOutside(mouse)) this.letGo(hand.from, hand.what, mouse);
+    else this.drop();
+  };
+
+  private readonly onKey = (event: KeyboardEvent): void => {
+    if (event.key === 'Escape' && this.hand && !this.hand.visit) this.drop();
+  };
+
+  /** The mouse is on the page of another behaviour: it has a copy in the hand there, which a person drags on. */
+  private visit(event: PointerEvent, mouse: Point): void {
+    const hand = this.hand!;
+    const tab = this.shown();
+    const {workspace} = tab;
+    const {scrollX, scrollY} = workspace;
+    const {svgMath, Coordinate} = Blockly.utils;
+    const wanted = Coordinate.difference(svgMath.screenToWsCoordinates(workspace, mouse), hand.what.grip);
+    const variables = new Set(workspace.getVariableMap().getAllVariables().map((each) => each.getId()));
+    this.over(null);
+    Blockly.Events.setGroup(true);  // until it is let go: all of it is one step
+    const made = add(hand.what.copied, workspace, wanted);
+    const [first] = made;
+    if (!first) return this.drop();
+    workspace.scroll(scrollX, scrollY);  // what has the keys is brought into sight, but the hand leads this one
+    hand.visit = {tab, made, group: Blockly.Events.getGroup(), variables};
+    const grip = Coordinate.sum(first.getRelativeToSurfaceXY(), hand.what.grip);
+    takeInHand(first, svgMath.wsToScreenCoordinates(workspace, grip), event);
+  }
+
+  /** Takes what visits a behaviour out of it again, as if it had never been there. */
+  private leave(): void {
+    const visit = this.hand?.visit;
+    if (!visit) return;
+    this.hand!.visit = null;
+    const {tab, made, group, variables} = visit;
+    this.quietly(() => tab.letGo());
+    inGroup(group, () => {
+      for (const each of made) if (!each.isDeadOrDying()) {
+        tab.bin.leaves(each.id);
+        each.dispose();
+      }
+      const map = tab.workspace.getVariableMap();
+      for (const each of map.getAllVariables()) if (!variables.has(each.getId())) map.deleteVariable(each);
+    });
+    Blockly.Events.setGroup(false);
+    forgetSoon(tab.workspace, group);
+    window.requestAnimationFrame(() => window.setTimeout(() => tab === this.shown() && tab.program.tellHistory()));
+  }
+
+  private quietly(act: () => void): void {
+    const before = this.turning;
+    this.turning = true;
+    try {
+      act();
+    } finally {
+      this.turning = before;
+    }
+  }
+
+  private async takePicture(items: readonly Item[]): Promise<void> {
+    const mine = this.picture += 1;
+    const {workspace} = items[0]!;
+    const picture = await pictureOf(workspace, false, new Set(items));
+    if (!picture) return;
+    const shown = Math.min(workspace.scale, MOST_WIDE / picture.width, MOST_HIGH / picture.height);
+    const ratio = window.devicePixelRatio;
+    const data = await asPng(picture, shown * ratio);
+    if (mine === this.picture && this.mouse) this.window.pictured(data, ratio);
+  }
+
   private tell(): void {
     window.cancelAnimationFrame(this.frame);
     this.frame = 0;
     if (!this.mouse && !this.isTold) return;
     this.isTold = this.mouse !== null;
-    this.window.carried(Math.round(this.mouse?.x ?? 0), Math.round(this.mouse?.y ?? 0), this.isTold);
+    const home = (this.hand?.from ?? this.shown()).key;
+    this.window.carried(Math.round(this.mouse?.x ?? 0), Math.round(this.mouse?.y ?? 0), this.isTold, home);
   }
 
   private lay(copied: Copied | CopiedBlocks, tab: Tab): boolean {
@@ -139,7 +310,7 @@ export class Carrying {
     if (!first) return false;
     const box = (first as Blockly.IBoundedElement).getBoundingRectangle();
     if (first instanceof Blockly.BlockSvg && !inSight(workspace).contains(box.left, box.top)) tab.reveal(first.id);
-    this.steps.push({tab, group, otherwise: () => inOneStep(() => made.forEach((each) => !each.isDeadOrDying() && each.dispose()))});
+    this.steps.push(stepOf(tab, group, made));
     return true;
   }
 
@@ -151,6 +322,21 @@ export class Carrying {
       return Blockly.Events.getGroup();
     });
     this.steps.push({tab, group, otherwise: () => void add(copied, tab.workspace, where)});
+  }
+}
+
+/** What undoes that these were made. */
+function stepOf(tab: Tab, group: string, made: readonly Item[]): Step {
+  return {tab, group, otherwise: () => inOneStep(() => made.forEach((each) => !each.isDeadOrDying() && each.dispose()))};
+}
+
+function inGroup(group: string, change: () => void): void {
+  const before = Blockly.Events.getGroup();
+  Blockly.Events.setGroup(group);
+  try {
+    change();
+  } finally {
+    Blockly.Events.setGroup(before);
   }
 }
 

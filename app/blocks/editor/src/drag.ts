@@ -18,16 +18,39 @@ export interface DragListener {
   letGo(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void;
   /** A block was put down with the keys and joined nothing; what had them when it was taken from the toolbox. */
   putDown(block: Blockly.BlockSvg, meant: Blockly.IFocusableNode): void;
-  /** Where the mouse is with something in the hand while it is outside of the page; null: it is not. */
-  outside(mouse: Blockly.utils.Coordinate | null): void;
+  /** Where the mouse is with these in the hand while it is outside of the page; null: it is not. */
+  outside(mouse: Blockly.utils.Coordinate | null, items?: readonly Item[]): void;
   /** It was let go there, and went back to where it was. */
   letGoOutside(what: Leaving, mouse: Blockly.utils.Coordinate): void;
+  /** The drag is over; `placed`: something lies or hangs where it was let go. `copies`: Ctrl was held. */
+  ended(placed: boolean, copies: boolean): void;
 }
+
+/** What comes from another behaviour with the mouse, which is still pressed: over the toolbox it goes back there. */
+const visitors = new WeakSet<object>();
 
 const listeners = new WeakMap<Blockly.Workspace, DragListener>();
 
 export function listenToDrags(workspace: Blockly.WorkspaceSvg, listener: DragListener): void {
   listeners.set(workspace, listener);
+}
+
+/** How far a mouse moves at least, in pixels, that drags; far enough for any radius of Blockly's. */
+const FAR = 60;
+
+/** Lets the mouse, which is pressed already, hold this as if it had been pressed on it `at` that place of the page. */
+export function takeInHand(item: Item, at: Blockly.utils.Coordinate, {pointerId, pointerType}: PointerEvent): void {
+  const like = (type: string, x: number) => new PointerEvent(type,
+    {clientX: x, clientY: at.y, pointerId, pointerType, isPrimary: true, button: 0, buttons: 1, cancelable: true});
+  const down = like('pointerdown', at.x);
+  visitors.add(item);
+  Blockly.Touch.clearTouchIdentifier();
+  Blockly.Touch.checkTouchIdentifier(down);  // Blockly listens to the pointer that was pressed
+  const gesture = item.workspace.getGesture(down);
+  if (item instanceof Blockly.BlockSvg) gesture?.handleBlockStart(down, item);
+  else gesture?.handleCommentStart(down, item);
+  gesture?.handleWsStart(down, item.workspace);
+  gesture?.handleMove(like('pointermove', at.x + FAR));
 }
 
 /** Blockly keeps what a drag would join to itself. */
@@ -42,7 +65,9 @@ class Dragger extends Blockly.dragging.Dragger {
   /** What it came out of: it closes, so that all of the canvas is there for it. */
   private readonly sheet = this.draggable instanceof Blockly.BlockSvg ? sheetOf(this.draggable) : null;
   private readonly wasPacked = this.draggable instanceof Blockly.BlockSvg && isPacked(this.draggable);
+  private readonly isVisitor = visitors.has(this.draggable);
   private placed = false;
+  private hasEnded = false;
   /** What had the keys on the canvas when a block was taken from the toolbox with them. */
   private meant: Blockly.IFocusableNode | null = null;
   /** The other blocks and notes that were chosen go along. */
@@ -86,17 +111,29 @@ class Dragger extends Blockly.dragging.Dragger {
     this.carried?.move(this.pixelsToWorkspaceUnits(delta));
     if (!(event instanceof PointerEvent)) return;
     this.tellDelete(this.wouldDelete(event) ? mouseOf(event) : null);
-    this.listener?.outside(this.isOut(mouseOf(event)) ? mouseOf(event) : null);
+    if (this.isOut(mouseOf(event))) this.listener?.outside(mouseOf(event), this.items);
+    else this.listener?.outside(null);
     aimAtBackpack(this.goesIntoBackpack(mouseOf(event)));
   }
 
   override onDragEnd(event?: PointerEvent | KeyboardEvent): void {
+    if (this.hasEnded) return;  // the block that goes with the end of a gesture ends the gesture once more
+    this.hasEnded = true;
+    const {listener} = this;
+    const mouse = event instanceof PointerEvent ? mouseOf(event) : null;
+    const placed = !mouse || !(this.leaves(mouse) || this.goesBack(mouse));
+    this.endDrag(event);
+    visitors.delete(this.draggable);
+    listener?.ended(placed, Boolean(event?.ctrlKey || event?.metaKey));
+  }
+
+  private endDrag(event?: PointerEvent | KeyboardEvent): void {
     const {draggable} = this;
     const mouse = event instanceof PointerEvent ? mouseOf(event) : null;
     const {listener} = this;
     const leaves = mouse && this.leaves(mouse) ? this.leaving(event as PointerEvent) : null;
     const joins = Boolean((draggable as unknown as Strategy).dragStrategy?.connectionCandidate);
-    const loose = mouse && !joins && !this.wouldDelete(event as PointerEvent);
+    const loose = mouse && !joins && !this.wouldDelete(event as PointerEvent) && !this.goesBack(mouse);
     const group = Blockly.Events.getGroup();
     const {carried, way, meant} = this;
     const free = leaves ? keepPlace(draggable) : null;
@@ -131,23 +168,39 @@ class Dragger extends Blockly.dragging.Dragger {
 
   override onDragRevert(event?: PointerEvent | KeyboardEvent): void {
     const group = Blockly.Events.getGroup();
+    const {listener} = this;
     super.onDragRevert(event);
     this.end();
-    if (!this.carried) return;
-    Blockly.Events.setGroup(group || true);
-    this.carried.revert();
-    forgetSoon(this.draggable.workspace, Blockly.Events.getGroup());
-    Blockly.Events.setGroup(group);
+    if (this.carried) {
+      Blockly.Events.setGroup(group || true);
+      this.carried.revert();
+      forgetSoon(this.draggable.workspace, Blockly.Events.getGroup());
+      Blockly.Events.setGroup(group);
+    }
+    visitors.delete(this.draggable);
+    listener?.ended(false, false);
   }
 
   /** Outside of the page, and on the backpack, nothing is deleted: it goes back to where it was, to the toolbox if it came from there. */
   protected override wouldDeleteDraggable(mouse: Blockly.utils.Coordinate,
     draggable: Blockly.IDraggable & Blockly.IDeletable): boolean {
-    return this.leaves(mouse) ? this.cameFrom > 0 : super.wouldDeleteDraggable(mouse, draggable);
+    if (this.leaves(mouse)) return this.cameFrom > 0;
+    return !this.isVisitor && super.wouldDeleteDraggable(mouse, draggable);
   }
 
   protected override shouldReturnToStart(mouse: Blockly.utils.Coordinate, draggable: Blockly.IDraggable): boolean {
-    return this.leaves(mouse) ? !this.cameFrom : super.shouldReturnToStart(mouse, draggable);
+    return this.leaves(mouse) ? !this.cameFrom : this.goesBack(mouse) || super.shouldReturnToStart(mouse, draggable);
+  }
+
+  /** Whether what came from another behaviour is over what deletes: it was never here, so it goes back there. */
+  private goesBack(mouse: Blockly.utils.Coordinate): boolean {
+    return this.isVisitor && Blockly.isDeletable(this.draggable) && super.wouldDeleteDraggable(mouse, this.draggable);
+  }
+
+  /** What is in the hand, each with what hangs below it. */
+  private get items(): readonly Item[] {
+    if (this.carried) return [...this.carried.runs.map(([head]) => head!), ...this.carried.notes];
+    return [this.draggable as unknown as Item];
   }
 
   /** Whether what is let go there goes elsewhere, and back to where it was here. */
@@ -156,7 +209,7 @@ class Dragger extends Blockly.dragging.Dragger {
   }
 
   private goesIntoBackpack(mouse: Blockly.utils.Coordinate): boolean {
-    return this.draggable instanceof Blockly.BlockSvg && isOverBackpack(mouse);
+    return (this.draggable instanceof Blockly.BlockSvg || Boolean(this.carried?.runs.length)) && isOverBackpack(mouse);
   }
 
   /** Whether it is outside of the page there, as blocks and notes may be. */
@@ -165,9 +218,12 @@ class Dragger extends Blockly.dragging.Dragger {
       this.draggable instanceof Blockly.comments.RenderedWorkspaceComment);
   }
 
-  private leaving({ctrlKey, metaKey}: PointerEvent): Leaving | null {
-    const copies = ctrlKey || metaKey;
-    return this.carried ? leavingTogether(this.carried.runs, this.carried.notes, copies) : leaving(this.draggable, this.cameFrom > 0, copies);
+  private leaving(event: PointerEvent): Leaving | null {
+    const copies = event.ctrlKey || event.metaKey;
+    const {workspace} = this.draggable;
+    const mouse = Blockly.utils.svgMath.screenToWsCoordinates(workspace, mouseOf(event));
+    return this.carried ? leavingTogether(this.carried.runs, this.carried.notes, copies, mouse) :
+      leaving(this.draggable, this.cameFrom > 0, copies, mouse);
   }
 
   private get listener(): DragListener | undefined {
@@ -186,6 +242,8 @@ class Dragger extends Blockly.dragging.Dragger {
     this.tellDelete(null);
     this.listener?.outside(null);
     aimAtBackpack(false);
+    // How it is moved by keys is said no longer than it is moved.
+    document.querySelector('.blocklyToast[data-toast-id$="MoveHint"]')?.remove();
   }
 
   /** The flyout has a zoom of its own: what is under the mouse there is under it here. */
@@ -206,7 +264,7 @@ class Dragger extends Blockly.dragging.Dragger {
 
   /** What comes from the flyout and goes back there was never on the canvas. */
   private tellDelete(mouse: Blockly.utils.Coordinate | null): void {
-    this.listener?.overDelete(this.cameFrom ? null : mouse);
+    this.listener?.overDelete(this.cameFrom || this.isVisitor ? null : mouse);
   }
 }
 
@@ -217,7 +275,7 @@ function waiting(flyout: Blockly.WorkspaceSvg): Blockly.IFocusableNode | null {
 }
 
 /** What was put back is nothing to undo. Blockly lists edits after the next frame. */
-function forgetSoon(workspace: Blockly.WorkspaceSvg, group: string): void {
+export function forgetSoon(workspace: Blockly.WorkspaceSvg, group: string): void {
   window.requestAnimationFrame(() => window.setTimeout(() => {
     const steps = workspace.getUndoStack();
     while (steps.length && steps[steps.length - 1]?.group === group) steps.pop();

@@ -17,8 +17,8 @@ export function frameButton(): HTMLButtonElement {
   button = document.createElement('button');
   button.type = 'button';
   button.className = 'nepFrameButton';
-  button.title = t('Choose several blocks (or drag with Shift)');
-  button.setAttribute('aria-label', t('Choose several blocks'));
+  button.title = t('Select several blocks (or drag with Shift)');
+  button.setAttribute('aria-label', t('Select several blocks'));
   button.append(iconElement('square-dashed-mouse-pointer', 18));
   button.onclick = () => setArmed(!isArmed());
   setArmed(false);
@@ -167,7 +167,7 @@ export function chooseAll(workspace: Blockly.WorkspaceSvg): void {
 
 export function registerChooseAll(): void {
   Blockly.ShortcutRegistry.registry.register({
-    name: CHOOSE_ALL, keyCodes: [ctrl(Blockly.utils.KeyCodes.A)], displayText: () => t('Choose all blocks and notes'),
+    name: CHOOSE_ALL, keyCodes: [ctrl(Blockly.utils.KeyCodes.A)], displayText: () => t('Select all blocks and notes'),
     preconditionFn: (workspace) => !workspace.isDragging() && !Blockly.getFocusManager().ephemeralFocusTaken(),
     callback: (_workspace, event) => {
       event.preventDefault();

@@ -4,12 +4,14 @@ import './blockly_patches';
 import './fields';
 import './focus_after_delete';
 import './mutators';
+import {giveBlocklyOurWords} from './blockly_words';
+import './near';
 import {type Packed, backpackButton, registerBackpack, showContents} from './backpack';
 import {Carrying} from './carrying';
 import {Clipboard} from './clipboard';
 import {type Begin, EmptyCanvas, Pointer, type Wanted} from './guidance';
 import {binButton} from './bin';
-import {frameButton} from './frame';
+import {chooseAll, frameButton} from './frame';
 import {HelpCard, focusedBlock, registerHelpMenu} from './help';
 import {iconElement} from './icons';
 import {useClipboard, useOwnKeys} from './keys';
@@ -38,6 +40,7 @@ interface Bridge {
   flushed(token: number, json: string): void;
   pictured(token: number, data: string): void;
   failed(sentence: string): void;
+  opened(): void;
   on_block(has: boolean): void;
   offers(sensors: string): void;
   copy(text: string): void;
@@ -48,9 +51,10 @@ interface Bridge {
   tries(stack: string): void;
   pin(keeps: boolean): void;
   deleted(count: number): void;
-  carried(x: number, y: number, out: boolean): void;
+  carried(x: number, y: number, out: boolean, home: string): void;
+  pictureOfCarried(data: string, ratio: number): void;
   dropped(x: number, y: number): void;
-  brought(count: number, how: string): void;
+  brought(count: number, how: string, from: string): void;
   backpack(asked: string): void;
 }
 
@@ -72,10 +76,11 @@ class Editor {
   constructor(private readonly bridge: Bridge, pinned: boolean | null, private theme: {tokens: Tokens; dark: boolean}) {
     this.empty = new EmptyCanvas(() => this.shown.workspace, this.pointer, (what) => bridge.wants(what));
     this.carrying = new Carrying({
-      carried: (x, y, out) => bridge.carried(x, y, out),
+      carried: (x, y, out, home) => bridge.carried(x, y, out, home),
+      pictured: (data, ratio) => bridge.pictureOfCarried(data, ratio),
       dropped: (x, y) => bridge.dropped(x, y),
-      brought: (count, how) => bridge.brought(count, how),
-    });
+      brought: (count, how, from) => bridge.brought(count, how, from),
+    }, () => this.shown);
     const ofShown = (tab: Tab, tell: () => void) => {
       if (tab === this.tabs?.shown) tell();
     };
@@ -95,7 +100,8 @@ class Editor {
       },
       deleted: (tab, count) => ofShown(tab, () => bridge.deleted(count)),
       binned: (tab) => ofShown(tab, () => this.dressBin()),
-      outside: (mouse) => this.carrying.over(mouse),
+      outside: (mouse, items) => this.carrying.over(mouse, items),
+      dragEnded: (placed, copies) => this.carrying.dragEnded(placed, copies),
       letGoOutside: (tab, what, mouse) => this.carrying.letGo(tab, what, mouse),
     });
     this.tabs.setPinned(pinned);
@@ -175,12 +181,19 @@ class Editor {
     fit: () => this.shown.fit(),
     show: (id: string) => this.shown.reveal(id),
     help: () => this.help.show(focusedBlock()),
-    find: () => this.find.open(),
+    find: () => {
+      this.find.open();
+      this.bridge.opened();
+    },
     keyboard: () => setKeyboardLed(true),
-    search: () => this.shown.search(),
-    edit: (what: 'copy' | 'cut' | 'paste' | 'duplicate') => {
+    search: () => {
+      this.shown.search();
+      this.bridge.opened();
+    },
+    edit: (what: 'copy' | 'cut' | 'paste' | 'duplicate' | 'selectAll') => {
       if (!this.shown.hasFocus) this.shown.focus();
-      void this.clipboard[what]();
+      if (what === 'selectAll') chooseAll(this.shown.workspace);
+      else void this.clipboard[what]();
     },
     begin: (it: Begin | null) => it && this.empty.tell(it),
     point: (it: Wanted | null) => this.pointer.show(it),
@@ -202,7 +215,7 @@ class Editor {
 
   private showTab(it: ShownTab): void {
     this.help.close();
-    this.tabs.show(it);
+    this.carrying.turn(() => this.tabs.show(it));
     this.find.again();
     this.empty.lookSoon();
     this.dressBin();
@@ -330,7 +343,8 @@ async function start(bridge: Bridge): Promise<void> {
   document.documentElement.classList.toggle('reduced', beginning.reduced);
   useWords(beginning.words ?? {});
   const language = await useLanguage(beginning.language);
-  trimMenu(language);
+  giveBlocklyOurWords(language);
+  trimMenu();
   useOwnKeys();
   // Blockly measures text once; the font has to be there before.
   await Promise.allSettled([document.fonts.load('600 15px Inter'), document.fonts.load('500 14px Inter')]);

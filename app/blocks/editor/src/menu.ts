@@ -13,7 +13,7 @@ import {hiddenIn, leadTo} from './inside_marks';
 import {addCanvasNote, addNote, hasNote, removeNote} from './notes';
 import {registerRemoveMenu} from './remove_menu';
 import {allChosenWith, chosenWith, countIn, notesChosenWith, removeChosenWith} from './selection';
-import {lazy, t} from './words';
+import {t} from './words';
 
 const {names} = Blockly.ShortcutItems;
 const {ScopeType} = Blockly.ContextMenuRegistry;
@@ -22,18 +22,6 @@ const SWITCH = 'nepSwitch';
 
 const REMOVED = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockHelp', 'commentCreate', 'commentDelete',
   'commentDuplicate', 'blockDuplicate', 'blockCollapseExpand', 'blockDisable', 'blockDelete', 'blockComment'];
-
-const WORDS: Readonly<Record<string, string>> = {
-  CLEAN_UP: lazy('Tidy up'),
-  WORKSPACE_COMMENT_DEFAULT_TEXT: lazy('Write a note'),
-  DELETE_BLOCK: lazy('Delete'),
-  DELETE_X_BLOCKS: lazy('Delete %1 blocks'),
-  DIALOG_OK: lazy('Use it'),
-  DIALOG_CANCEL: lazy('Not now'),
-  NEW_VARIABLE_TITLE: lazy('Name of the variable'),
-  UNDO: lazy('Undo'),
-  REDO: lazy('Redo'),
-};
 
 /** Blockly's own entries that stay: their weight here, and their icon. */
 const KEPT: Readonly<Record<string, [weight: number, icon: string]>> = {
@@ -51,7 +39,7 @@ export function menuIcon(id: string, icon: string): void {
 }
 
 /** Before anything is made. */
-export function trimMenu(language: string): void {
+export function trimMenu(): void {
   registerRemoveMenu();
   const registry = Blockly.ContextMenuRegistry.registry;
   for (const id of REMOVED) if (registry.getItem(id)) registry.unregister(id);
@@ -66,10 +54,6 @@ export function trimMenu(language: string): void {
   menuIcon('nepAddElse', 'split');
   // Nothing asks: deleting can be undone.
   Blockly.dialog.setConfirm((_message, callback) => callback(true));
-  // Blockly's own words stay where nobody has translated ours.
-  for (const [key, english] of Object.entries(WORDS)) {
-    if (language === 'en' || t(english) !== english) Blockly.Msg[key] = t(english);
-  }
 }
 
 type Scope = Blockly.ContextMenuRegistry.Scope;
@@ -160,7 +144,7 @@ export function registerMenu(clipboard: Clipboard): void {
   });
 
   registerChooseAll();
-  add(ScopeType.WORKSPACE, {id: 'nepChooseAll', weight: 12, icon: 'square-dashed-mouse-pointer', words: t('Choose all'),
+  add(ScopeType.WORKSPACE, {id: 'nepChooseAll', weight: 12, icon: 'square-dashed-mouse-pointer', words: t('Select all'),
     shortcut: CHOOSE_ALL_SHORTCUT,
     when: ({workspace}) => (workspace ? workspace.getTopBlocks(false).length + workspace.getTopComments().length : 0) > 0,
     run: ({workspace}) => workspace && chooseAll(workspace)});
@@ -178,7 +162,7 @@ export function registerMenu(clipboard: Clipboard): void {
   note({id: 'nepNoteCopy', weight: 11, icon: 'copy', words: t('Copy'), shortcut: names.COPY,
     when: () => true, run: (it) => clipboard.copy(it.comment)});
   note({id: 'nepNoteDelete', weight: 99, icon: 'trash-2', shortcut: names.DELETE,
-    words: (it) => allChosenWith(it.comment).length ? t('Delete all that is chosen') : t('Remove the note'),
+    words: (it) => allChosenWith(it.comment).length ? t('Delete all that is selected') : t('Remove the note'),
     when: () => true, run: (it) => it.comment && !removeChosenWith(it.comment) && step(() => it.comment!.dispose())});
 }
 
@@ -241,7 +225,7 @@ function step(change: () => void): void {
 }
 
 function deleteWords(block: Blockly.BlockSvg): string {
-  if (notesChosenWith(block).length) return t('Delete all that is chosen');
+  if (notesChosenWith(block).length) return t('Delete all that is selected');
   const count = countIn(all(block));
   return count === 1 ? Blockly.Msg['DELETE_BLOCK'] ?? '' :
     (Blockly.Msg['DELETE_X_BLOCKS'] ?? '').replace('%1', String(count));

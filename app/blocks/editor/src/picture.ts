@@ -37,28 +37,31 @@ export interface Drawn {
   drawn: SVGElement | null;
 }
 
-/** Each thing on the canvas with its looks written on it; `patterns` gets what they are filled with, by id. */
-export function drawings(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGElement>): Drawn[] {
+/** Each thing on the canvas, or `only` these, with its looks written on it; `patterns` gets what they are filled with, by id. */
+export function drawings(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGElement>, only?: ReadonlySet<unknown>): Drawn[] {
   keepTyped();
   Blockly.renderManagement.triggerQueuedRenders();
-  const items = [...workspace.getTopBlocks(true), ...workspace.getTopComments()] as (Blockly.IBoundedElement & {
+  const all = [...workspace.getTopBlocks(true), ...workspace.getTopComments()] as (Blockly.IBoundedElement & {
     getSvgRoot?(): SVGElement; view?: {getSvgRoot(): SVGElement};
   })[];
+  const items = all.filter((each) => !only || only.has(each));
   const found = items.map((item): Drawn => ({item, box: item.getBoundingRectangle(),
     drawn: copy(item.getSvgRoot?.() ?? item.view!.getSvgRoot(), patterns)}));
   for (const sheet of workspace.getBubbleCanvas().querySelectorAll<SVGGElement>('.nepNote')) {
+    const owner = workspace.getBlockById(ownerOf(sheet))?.getRootBlock();
+    if (only && !only.has(owner)) continue;
     const {x, y, width, height} = sheet.getBBox();
     const {e, f} = sheet.transform.baseVal.consolidate()?.matrix ?? {e: 0, f: 0};
-    found.push({item: workspace.getBlockById(ownerOf(sheet))?.getRootBlock(),
+    found.push({item: owner,
       box: new Blockly.utils.Rect(y + f, y + f + height, x + e, x + e + width), drawn: copy(sheet, patterns)});
   }
   return found;
 }
 
-/** null: there is nothing to be seen. Call it while the page has the light theme. */
-export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean): Promise<Picture | null> {
+/** null: there is nothing to be seen. Call it while the page has the light theme; of `only` these, in the theme of now. */
+export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean, only?: ReadonlySet<unknown>): Promise<Picture | null> {
   const patterns = new Map<string, SVGElement>();
-  const found = drawings(workspace, patterns);
+  const found = drawings(workspace, patterns, only);
   if (!found.length) return null;
   const boxes = found.map(({box}) => box);
   const drawn = found.map((each) => each.drawn);
@@ -84,9 +87,9 @@ export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean)
   return {svg: new XMLSerializer().serializeToString(made), width, height};
 }
 
-/** As a `data:` URL of a PNG, twice as large as on the screen or as large as can be. */
-export async function asPng({svg, width, height}: Picture): Promise<string> {
-  const scale = Math.min(SCALE, MOST_SIDE / width, MOST_SIDE / height, Math.sqrt(MOST_PIXELS / (width * height)));
+/** As a `data:` URL of a PNG, twice as large as on the screen (or `wanted`) or as large as can be. */
+export async function asPng({svg, width, height}: Picture, wanted = SCALE): Promise<string> {
+  const scale = Math.min(wanted, MOST_SIDE / width, MOST_SIDE / height, Math.sqrt(MOST_PIXELS / (width * height)));
   const image = new Image(width, height);
   image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`;
   await image.decode();
@@ -212,10 +215,21 @@ function wrapped(words: string, width: number, font: string): string[] {
 
 const FONTS: Readonly<Record<string, string>> = {'400': 'Regular', '500': 'Medium', '600': 'SemiBold', '700': 'Bold'};
 
-/** The font itself, so that the picture looks the same where it is not installed. */
+const faces = new Map<string, Promise<string>>();
+
+/** The font itself, so that the picture looks the same where it is not installed; read once. */
 async function fontFace(weight: string | null): Promise<string> {
   const file = FONTS[weight ?? ''];
   if (!file) return '';
+  if (!faces.has(file)) {
+    const read = readFace(file, weight!);
+    read.catch(() => faces.delete(file));  // the next picture tries again
+    faces.set(file, read);
+  }
+  return faces.get(file)!;
+}
+
+async function readFace(file: string, weight: string): Promise<string> {
   const answer = await fetch(`fonts/Inter-${file}.otf`);
   const data = await new Promise<string>((done, failed) => {
     const reader = new FileReader();

@@ -2,6 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import type {Culling} from './culling';
+import {freePlace, inSight, obstacles} from './free_place';
 import {type BlockState, UNKNOWN_BLOCK, wrapUnknown, wrapWholeStack, unwrapUnknown} from './unknown_blocks';
 import {keepTyped} from './notes';
 import {withDeferredWords} from './blockly_patches';
@@ -45,15 +46,35 @@ export class Program {
   change(state: Json): void {
     this.flush();
     const {scrollX, scrollY} = this.workspace;
+    const before = new Set(this.workspace.getTopBlocks(false).map((block) => block.id));
     const group = Blockly.Events.getGroup();
     Blockly.Events.setGroup(true);
     try {
       this.fill(state, {recordUndo: true});
+      this.workspace.scroll(scrollX, scrollY);
+      this.told = JSON.stringify(this.save());  // the window made it
+      const made = this.workspace.getTopBlocks(false).filter((block) => !before.has(block.id));
+      const [only] = made;
+      if (before.size && only && made.length === 1) this.layInSight(only);
     } finally {
       Blockly.Events.setGroup(group);
     }
-    this.workspace.scroll(scrollX, scrollY);
-    this.told = JSON.stringify(this.save());  // the window made it
+  }
+
+  /** A script that was added: the window knows neither what can be seen nor how wide the other scripts are. */
+  private layInSight(made: Blockly.BlockSvg): void {
+    Blockly.renderManagement.triggerQueuedRenders(this.workspace);
+    const box = made.getBoundingRectangle();
+    const size = {width: box.getWidth(), height: box.getHeight()};
+    const view = inSight(this.workspace);
+    const place = freePlace(new Blockly.utils.Coordinate(box.left, box.top), size,
+      obstacles(this.workspace, new Set([made])), view);
+    if (place.x !== box.left || place.y !== box.top) {
+      made.moveBy(place.x - box.left, place.y - box.top);
+      this.touched();
+    }
+    const now = made.getRelativeToSurfaceXY();
+    if (!view.contains(now.x, now.y)) this.workspace.centerOnBlock(made.id, true);
   }
 
   /** Tells nothing any more. */

@@ -6,16 +6,24 @@ import {t} from './words';
 
 export const SEARCH = 'nepSearch';
 
+/** Blocks are made for a word, not for each letter of it: when no other came for so long. */
+const QUIET_MS = 80;
+/** As high as a block in the toolbox is at least, with what is free below it. */
+const BLOCK_HEIGHT = 50;
+const SHOW_ALL = 'SHOW_ALL_FOUND';
+
 /** What the field needs of the toolbox in which it stands. */
 interface SearchedToolbox {
   allEntries(): Entry[];
   showFound(entries: unknown[] | null): void;
+  showAllFound(entries: unknown[], before: number): void;
   enterFound(event: KeyboardEvent | null): void;
 }
 
 export class SearchItem extends Blockly.ToolboxItem {
   private readonly div = document.createElement('div');
   private readonly field = document.createElement('input');
+  private waiting = 0;
 
   override init(): void {
     this.div.className = 'nepSearch';
@@ -25,12 +33,20 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.field.spellcheck = false;
     this.field.setAttribute('aria-label', t('Find a block: type words, Enter takes the first'));
     this.field.title = t('Find a block');
-    this.field.onfocus = this.field.onblur = () => this.dress();
-    this.field.oninput = () => this.show();
+    this.field.onfocus = () => this.dress();
+    this.field.onblur = () => {
+      // Who goes elsewhere in the page wants that; another window takes the keys as well.
+      if (document.hasFocus()) this.forgetWaiting();
+      this.dress();
+    };
+    this.field.oninput = () => this.showSoon();
     this.field.onkeydown = (event) => this.onKey(event);
     // Otherwise the toolbox takes it for a click beside its categories and closes the blocks.
     this.div.onpointerdown = (event) => event.stopPropagation();
     this.div.append(iconElement('search', 16), this.field);
+    this.parentToolbox_.getWorkspace().registerButtonCallback(SHOW_ALL, () => {
+      this.toolbox.showAllFound(this.found(), this.atFirst);
+    });
   }
 
   override getDiv(): Element {
@@ -42,6 +58,7 @@ export class SearchItem extends Blockly.ToolboxItem {
   }
 
   override dispose(): void {
+    this.forgetWaiting();
     this.div.remove();
   }
 
@@ -52,6 +69,7 @@ export class SearchItem extends Blockly.ToolboxItem {
   }
 
   clear(): void {
+    this.forgetWaiting();
     this.field.value = '';
     this.dress();
   }
@@ -70,16 +88,45 @@ export class SearchItem extends Blockly.ToolboxItem {
     return this.parentToolbox_ as unknown as SearchedToolbox;
   }
 
+  private showSoon(): void {
+    this.forgetWaiting();
+    this.waiting = window.setTimeout(() => this.show(), QUIET_MS);
+  }
+
+  /** Shows what was typed, if it was not yet. */
+  private showWaiting(): void {
+    if (this.waiting) this.show();
+  }
+
+  private forgetWaiting(): void {
+    window.clearTimeout(this.waiting);
+    this.waiting = 0;
+  }
+
+  private found(): Entry[] {
+    return findEntries(this.toolbox.allEntries(), this.field.value);
+  }
+
+  /** So many can be seen at once, and one is half hidden. */
+  private get atFirst(): number {
+    const {height} = this.parentToolbox_.getWorkspace().getCachedParentSvgSize();
+    return Math.max(8, Math.ceil(height / BLOCK_HEIGHT) + 1);
+  }
+
   private show(): void {
+    this.forgetWaiting();
     const words = this.field.value;
     if (!words.trim()) {
       this.toolbox.showFound(null);
       return;
     }
-    const found = findEntries(this.toolbox.allEntries(), words);
+    const found = this.found();
     const none = [t('No block for “{words}”', {words: words.trim()}), t('Try a simpler word, such as “turn” or “say”,'),
       t('or look into a category.')].map((text) => ({kind: 'label', text, gap: 8}));
-    this.toolbox.showFound(found.length ? found : none);
+    const {atFirst} = this;
+    const number = found.length - atFirst;
+    const more = {kind: 'button', text: t('Show {number} more', {number}), callbackkey: SHOW_ALL};
+    this.toolbox.showFound(!found.length ? none : number > 0 ? [...found.slice(0, atFirst), more] : found);
   }
 
   private onKey(event: KeyboardEvent): void {
@@ -89,8 +136,10 @@ export class SearchItem extends Blockly.ToolboxItem {
       this.toolbox.showFound(null);
       Blockly.getFocusManager().focusTree(this.parentToolbox_.getWorkspace());
     } else if (event.key === 'Enter' || event.key === 'ArrowDown') {
+      this.showWaiting();
       this.toolbox.enterFound(event.key === 'Enter' ? event : null);
     } else {
+      if (event.key === 'Tab') this.showWaiting();
       if (event.key === 'Tab' && event.shiftKey) this.leaveBackwards();
       return;
     }

@@ -18,7 +18,7 @@ import {keepInsideMarks} from './inside_marks';
 import {keepNotesReadable} from './notes';
 import {Program, holdsAny} from './program';
 import {RENDERER} from './renderer';
-import {Selection} from './selection';
+import {type Item, Selection} from './selection';
 import {Overlays} from './overlays';
 import {makeTheme} from './theme';
 import {Toolbox} from './toolbox';
@@ -42,10 +42,12 @@ export interface TabListener {
   deleted(tab: Tab, count: number): void;
   /** There is another number of deletions in the bin. */
   binned(tab: Tab): void;
-  /** Something in the hand is outside of the page, there; null: it is not any more. */
-  outside(mouse: Blockly.utils.Coordinate | null): void;
+  /** These in the hand are outside of the page, there; null: they are not any more. */
+  outside(mouse: Blockly.utils.Coordinate | null, items?: readonly Item[]): void;
   /** It was let go there. */
   letGoOutside(tab: Tab, what: Leaving, mouse: Blockly.utils.Coordinate): void;
+  /** A drag is over; see `DragListener`. */
+  dragEnded(placed: boolean, copies: boolean): void;
 }
 
 export class Tab {
@@ -102,7 +104,8 @@ export class Tab {
       overDelete: (mouse) => this.bin.showHint(mouse),
       letGo: (block, mouse) => this.wrongDrops.explain(block, mouse),
       putDown: (block, meant) => this.wrongDrops.explainAt(block, meant),
-      outside: (mouse) => listener.outside(mouse),
+      outside: (mouse, items) => listener.outside(mouse, items),
+      ended: (placed, copies) => listener.dragEnded(placed, copies),
       letGoOutside: (what, mouse) => listener.letGoOutside(this, what, mouse),
     });
     const toolbox = this.workspace.getToolbox();

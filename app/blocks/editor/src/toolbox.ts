@@ -206,6 +206,16 @@ export class Toolbox extends Blockly.Toolbox {
     this.onFound();
   }
 
+  /** Shows also those that were found and not shown; with the keys one is on the first of them. */
+  showAllFound(entries: unknown[], before: number): void {
+    const flyout = this.getFlyout();
+    const scroll = flyout?.getWorkspace().scrollY ?? 0;
+    this.showFound(entries);
+    flyout?.getWorkspace().scrollbar?.setY(-scroll);
+    const next = flyout?.getWorkspace().getTopBlocks(true)[before];
+    if (next && Blockly.keyboardNavigationController.getIsActive()) Blockly.getFocusManager().focusNode(next);
+  }
+
   /** The keys go to the first block that was found; with a key press it is taken at once. */
   enterFound(event: KeyboardEvent | null): void {
     const workspace = this.getFlyout()?.getWorkspace();

@@ -1,5 +1,6 @@
 // A block that was let go where it does not fit: why, in a sentence at that place, and out of the way.
 import * as Blockly from 'blockly/core';
+import {freePlace, inSight, obstacles} from './free_place';
 import {helpFor} from './help';
 import {lazy, t} from './words';
 
@@ -93,6 +94,17 @@ export class WrongDrops {
     const bubble = new Blockly.utils.Rect(from.y, to.y, from.x, to.x);
     if (mine.intersects(its)) shift(block, right + ASIDE - mine.left, mine);
     if (mine.intersects(bubble)) shift(block, bubble.right + ASIDE - mine.left, mine);
+    this.uncover(block, mine, bubble);
+  }
+
+  /** Where it lies now may be another script: then it goes to the next free place. */
+  private uncover(block: Blockly.BlockSvg, mine: Blockly.utils.Rect, bubble: Blockly.utils.Rect): void {
+    const others = obstacles(this.workspace, new Set([block]));
+    if (!others.some((other) => other.intersects(mine))) return;
+    const wanted = new Blockly.utils.Coordinate(mine.left, mine.top);
+    const size = {width: mine.getWidth(), height: mine.getHeight()};
+    const place = freePlace(wanted, size, [...others, bubble], inSight(this.workspace), ASIDE);
+    block.moveBy(place.x - mine.left, place.y - mine.top, ['bump']);
   }
 
   private refusal(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): Refusal | null {

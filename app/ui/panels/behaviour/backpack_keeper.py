@@ -25,7 +25,7 @@ class Shows(Protocol):
 
 
 class BackpackKeeper:
-    """Does what the page asks, as JSON whose "do" is put (blocks, count), remove (id), empty or look.
+    """Does what the page asks, as JSON whose "do" is put (blocks, count, notes), remove (id), empty or look.
 
     Each change offers to undo it.
     """
@@ -65,22 +65,24 @@ class BackpackKeeper:
         elif asked.get("do") == "put":
             blocks, count = asked.get("blocks"), asked.get("count")
             if isinstance(blocks, list) and isinstance(count, int):
-                self._put(blocks, count)
+                self._put(blocks, count, left=bool(asked.get("notes")))
         elif asked.get("do") == "remove":
             self._take_out(lambda: self._backpack.remove([str(asked.get("id"))]), emptied=False)
         elif asked.get("do") == "empty":
             self._take_out(self._backpack.empty, emptied=True)
 
-    def _put(self, blocks: Sequence[Mapping[str, object]], count: int) -> None:
+    def _put(self, blocks: Sequence[Mapping[str, object]], count: int, *, left: bool) -> None:
+        """``left``: there were notes, too, which belong to their page and stay there."""
         made: list[Packed] = []
         if blocks and self._try(lambda: made.extend(self._backpack.put(blocks))):
             words = ngettext(
                 "Put {count} block into the backpack", "Put {count} blocks into the backpack", count
             )
             ids = [item.id for item in made]
-            self._context.toast(
-                words.format(count=count), _("Undo"), lambda: self._try(lambda: self._backpack.remove(ids))
-            )
+            said = words.format(count=count)
+            if left:
+                said = _("{what}. Notes stay here: it keeps blocks only.").format(what=said)
+            self._context.toast(said, _("Undo"), lambda: self._try(lambda: self._backpack.remove(ids)))
 
     def _take_out(self, take: Callable[[], list[Packed]], *, emptied: bool) -> None:
         gone: list[Packed] = []

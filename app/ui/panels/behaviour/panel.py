@@ -62,6 +62,7 @@ class Editor(Protocol):
     toolbox_pinned: SignalInstance
     blocks_deleted: SignalInstance
     block_carried: SignalInstance
+    carried_seen: SignalInstance
     block_dropped: SignalInstance
     blocks_brought: SignalInstance
     backpack_asked: SignalInstance
@@ -91,6 +92,7 @@ class Editor(Protocol):
     def point_at(self, block: str, name: str = "", then: str = "") -> None: ...
     def undo(self) -> None: ...
     def edit(self, what: str) -> None: ...
+    def edit_from_menu(self, what: str) -> None: ...
     def undo_deletion(self) -> None: ...
     def bring_blocks(self) -> None: ...
     def give_blocks_back(self) -> None: ...
@@ -349,6 +351,11 @@ class BehaviourPanel(PanelWidget):
         """Do "copy", "cut", "paste" or "duplicate" with the blocks, unless the page has the keys itself."""
         if self.editor is not None and self.mode == "blocks":
             self.editor.edit(what)
+
+    def edit_from_menu(self, what: str) -> None:
+        """Do "cut", "copy", "paste" or "selectAll" in the page's field with the keys, else with blocks."""
+        if self.editor is not None and self.mode == "blocks":
+            self.editor.edit_from_menu(what)
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
         """Make a "png" or "svg" of all blocks; b"" when there are none."""

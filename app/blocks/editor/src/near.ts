@@ -1,0 +1,77 @@
+// Which gap a block in the hand is near: judged by where the blocks lay when it was taken.
+import * as Blockly from 'blockly/core';
+
+type Point = Blockly.utils.Coordinate;
+
+interface Pair {
+  local: Blockly.RenderedConnection;
+  neighbour: Blockly.RenderedConnection;
+}
+
+interface Candidate extends Pair {
+  distance: number;
+}
+
+/** What Blockly keeps to itself. */
+interface Strategy {
+  workspace: Blockly.WorkspaceSvg;
+  /** All that could be joined; made once when a block is taken. */
+  allConnectionPairs: Pair[];
+  cacheAllConnectionPairs(): void;
+  getClosestCandidate(block: Blockly.BlockSvg, delta: Point): Candidate | null;
+  getSearchRadius(): number;
+  currCandidateIsBetter(current: Candidate, delta: Point, other: Candidate): boolean;
+}
+
+/**
+ * Where the gaps are, as a person sees them who aims at one.
+ *
+ * The preview of a gap on the way pushes apart what lies below it. A fast hand is past it before that can be seen, and
+ * what it let go would join the block above the one it was let go at.
+ */
+const places = new WeakMap<Strategy, Map<Blockly.RenderedConnection, Point>>();
+
+function placesFor(strategy: Strategy): Map<Blockly.RenderedConnection, Point> {
+  const known = places.get(strategy);
+  if (known) return known;
+  // What the block was taken out of closes up first.
+  Blockly.renderManagement.triggerQueuedRenders(strategy.workspace);
+  const found = new Map<Blockly.RenderedConnection, Point>();
+  for (const {neighbour} of strategy.allConnectionPairs) {
+    if (!found.has(neighbour)) found.set(neighbour, new Blockly.utils.Coordinate(neighbour.x, neighbour.y));
+  }
+  places.set(strategy, found);
+  return found;
+}
+
+function distance({local, neighbour}: Pair, delta: Point, at: Map<Blockly.RenderedConnection, Point>): number {
+  const place = at.get(neighbour) ?? neighbour;
+  return Math.hypot(local.x + delta.x - place.x, local.y + delta.y - place.y);
+}
+
+const strategy = Blockly.dragging.BlockDragStrategy.prototype as unknown as Strategy;
+
+const cache = strategy.cacheAllConnectionPairs;
+strategy.cacheAllConnectionPairs = function () {
+  places.delete(this);
+  cache.call(this);
+};
+
+const closest = strategy.getClosestCandidate;
+strategy.getClosestCandidate = function (block, delta) {
+  const radius = this.getSearchRadius();
+  if (radius === Infinity) return closest.call(this, block, delta);  // the keys go from gap to gap
+  const at = placesFor(this);
+  let best: Candidate | null = null;
+  for (const pair of this.allConnectionPairs) {
+    const far = distance(pair, delta, at);
+    if (far > radius || (best && far >= best.distance) || pair.neighbour.getSourceBlock().isDeadOrDying()) continue;
+    best = {...pair, distance: far};
+  }
+  return best;
+};
+
+strategy.currCandidateIsBetter = function (current, delta, other) {
+  if (this.getSearchRadius() === Infinity) return false;
+  return other.distance > distance(current, delta, placesFor(this)) - Blockly.config.currentConnectionPreference;
+};

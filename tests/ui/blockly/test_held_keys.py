@@ -1,0 +1,68 @@
+"""Keys that are kept until the page is ready for them."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtGui import QFocusEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit
+
+from app.ui.blockly.held_keys import HeldKeys
+
+
+class Watch(QObject):
+    """Gives the keys of a field to whoever keeps them, as the host of the page does."""
+
+    def __init__(self, keys: HeldKeys) -> None:
+        super().__init__()
+        self._keys = keys
+
+    def eventFilter(self, _watched, event) -> bool:
+        return self._keys.keeps(event)
+
+
+@pytest.fixture
+def field(qtbot) -> QLineEdit:
+    made = QLineEdit()
+    qtbot.addWidget(made)
+    return made
+
+
+@pytest.fixture
+def keys(field) -> HeldKeys:
+    keys = HeldKeys(lambda: field)
+    field.watch = Watch(keys)
+    field.installEventFilter(field.watch)
+    return keys
+
+
+def test_keys_wait_and_come_in_their_order(field, keys):
+    QTest.keyClicks(field, "a")
+    keys.hold()
+    QTest.keyClicks(field, "bc")
+    assert field.text() == "a"
+    keys.let_go()
+    QTest.keyClicks(field, "d")
+    assert field.text() == "abcd"
+
+
+@pytest.mark.parametrize("how", ["mouse", "focus"])
+def test_who_goes_elsewhere_lets_go_what_was_kept(field, keys, how):
+    keys.hold()
+    QTest.keyClicks(field, "ab")
+    if how == "mouse":
+        QTest.mouseClick(field, Qt.LeftButton)
+    else:
+        keys.keeps(QFocusEvent(QFocusEvent.Type.FocusOut))
+    QTest.keyClicks(field, "c")
+    assert field.text() == "abc"
+
+
+def test_what_was_typed_for_a_page_that_died_is_gone(field, keys):
+    keys.hold()
+    QTest.keyClicks(field, "ab")
+    keys.forget()
+    keys.let_go()
+    QTest.keyClicks(field, "c")
+    assert field.text() == "c"
