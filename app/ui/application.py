@@ -38,6 +38,7 @@ from app.ui.theme.theme import MODES, Theme
 from nep.i18n import ENGLISH, _, language
 
 LOG_EVERY_MS = 500
+BEGUN = "begun"  # kept since the first start
 SOON = (
     "app.ui.shell.dialogs.command_palette",
     "app.ui.blockly.view",
@@ -140,6 +141,20 @@ def layout_left(window: MainWindow) -> str:
     return last if there.get(last, False) else ""
 
 
+def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
+    """At the very first start, offer the first steps on the start page.
+
+    Not where something was ``asked`` of Studio, nor in front of work that a Studio left behind. That it was
+    the first start is kept at once: the next one is the second, however this one ends.
+    """
+    if not window.session.settings.are_new:
+        return
+    window.state.keep(BEGUN, True)
+    if not asked and not window.banner.offers and all(each.blank for each in window.session.documents):
+        window.start.offer_first_steps()
+        window.start.focus_first()
+
+
 def first_steps(window: MainWindow, options: Options) -> list[Callable[[], object]]:
     """Let the window say what comes (what was asked, or left); what brings it after the first paint."""
     left = "" if options.alone else layout_left(window)
@@ -149,6 +164,7 @@ def first_steps(window: MainWindow, options: Options) -> list[Callable[[], objec
         # It begins the demonstration itself, after the start page: twice would be two robots' worth of tabs.
         open_asked(window, StartRequest(options.files, demo=False))
         return []
+    offer_first_steps(window, asked=asked)
     if not asked and not left:
         return [window.begin]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from tests.e2e.studio import Studio
@@ -27,6 +29,7 @@ def step(studio: Studio, words: str) -> None:
 
 
 def test_six_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -> None:
+    studio.says("First steps: five minutes")  # the very first start offers them
     studio.click("First steps")
     step(studio, "Use the virtual robot")
     studio.click("Use the virtual robot", kind="Button")
@@ -54,3 +57,12 @@ def test_six_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -
     studio.screen.key("F12")
     studio.find("First steps done")
     studio.says("6 of 6")
+
+
+def test_after_kill_9_the_second_start_does_not_offer_them_again(start: Callable[..., Studio]) -> None:
+    first = start()
+    first.says("First steps: five minutes")
+    first.kill()
+    second = start()
+    second.says("Learn in five minutes")
+    assert not second.all("Not now", kind="Button")

@@ -65,6 +65,8 @@ class Settings:
         """Read ``settings.json`` in ``folder`` (default: `home`); none yet is fine."""
         self.path = (folder if folder is not None else home()) / "settings.json"
         self.damaged: Path | None = None
+        self.are_new = False
+        """Whether nothing was kept here before: Studio starts for the first time."""
         self.not_kept: str | None = None
         """Why the file could not be written last, as a sentence; None when it could."""
         self._unwritten: dict[str, object] = {}
@@ -138,7 +140,10 @@ class Settings:
     def _read(self) -> dict[str, object]:
         try:
             text = read_whole(self.path).decode("utf-8")
-        except (FileNotFoundError, NotADirectoryError):
+        except FileNotFoundError:
+            self.are_new = True
+            return {}
+        except NotADirectoryError:
             return {}
         except (OSError, UnicodeDecodeError):
             return self._set_aside()

@@ -15,6 +15,18 @@ def test_a_value_is_there_after_a_restart(tmp_path: Path) -> None:
     assert Settings(tmp_path).get("theme", "light") == "dark"
 
 
+def test_settings_are_new_until_something_is_kept(tmp_path: Path) -> None:
+    assert Settings(tmp_path).are_new
+    assert Settings(tmp_path).are_new
+    Settings(tmp_path).set("theme", "dark")
+    assert not Settings(tmp_path).are_new
+
+
+def test_damaged_settings_are_not_new(tmp_path: Path) -> None:
+    (tmp_path / "settings.json").write_bytes(b"{")
+    assert not Settings(tmp_path).are_new
+
+
 def test_a_value_of_another_type_gives_the_default(tmp_path: Path) -> None:
     Settings(tmp_path).set("theme", 5)
     assert Settings(tmp_path).get("theme", "light") == "light"

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QLabel
 
 from app import resources
 from app.core.storage.settings import RecentFile
-from app.ui.shell.start_page.cards import CardTitle
+from app.ui.shell.start_page.cards import BigCard, CardTitle
 from app.ui.shell.start_page.open_work import OpenWork
 from app.ui.shell.start_page.page import StartPage, read_examples
 from app.ui.shell.start_page.preview import Row, category_of, rows
@@ -59,6 +59,52 @@ def test_it_offers_a_robot_a_behaviour_and_examples(page: StartPage) -> None:
 
 def test_only_one_button_is_filled(page: StartPage) -> None:
     assert [b.text() for b in page.findChildren(Button) if b.kind == "primary"] == ["Use the virtual robot"]
+
+
+def cards(page: StartPage) -> list[BigCard]:
+    """The large cards from left to right."""
+    return sorted(page.findChildren(BigCard), key=lambda card: (card.y(), card.x()))
+
+
+def filled(page: StartPage) -> list[str]:
+    return [b.text() for b in page.findChildren(Button) if b.kind == "primary"]
+
+
+def test_who_is_new_is_offered_the_first_steps_before_all_else(qtbot, page: StartPage) -> None:
+    page.offer_first_steps()
+    page.focus_first()
+    qtbot.waitUntil(lambda: cards(page)[0] is page.learn_card)
+    assert page.learn_card.width() > max(card.width() for card in cards(page)[1:])
+    assert filled(page) == ["First steps"]
+    assert "First steps: five minutes" in words(page)
+    button = page.focusWidget()
+    assert isinstance(button, Button)
+    assert button.text() == "First steps"
+    order = []
+    while len(order) < 4:
+        order.append(button.text())
+        button = button.nextInFocusChain()
+    assert order == ["First steps", "Not now", "Use the virtual robot", "New behaviour"]
+
+
+def test_not_now_makes_it_one_of_three(qtbot, page: StartPage) -> None:
+    before = cards(page)
+    page.offer_first_steps()
+    (no,) = [each for each in page.findChildren(Button) if each.text() == "Not now"]
+    no.setFocus()
+    QTest.mouseClick(no, Qt.MouseButton.LeftButton)
+    assert not page.offers_first_steps
+    qtbot.waitUntil(lambda: cards(page) == before)
+    assert not no.isVisible()
+    assert filled(page) == ["Use the virtual robot"]
+    assert page.focusWidget().text() == "Use the virtual robot"
+    assert "Learn in five minutes" in words(page)
+
+
+def test_who_has_begun_something_is_offered_nothing_before_it(page: StartPage) -> None:
+    page.offer_first_steps()
+    page.show_open([OpenWork("a", "Greeting")])
+    assert not page.offers_first_steps
 
 
 def test_what_is_pressed_is_told(qtbot, page: StartPage, tmp_path: Path) -> None:
@@ -164,6 +210,17 @@ def test_large_text_scrolls_and_clips_nothing(qtbot, page: StartPage, theme: The
         if shown.isVisible() and shown.text():
             room = shown.heightForWidth(shown.width()) if shown.wordWrap() else shown.sizeHint().height()
             assert shown.height() >= room, shown.text()
+
+
+def test_in_a_low_window_with_large_text_the_first_button_is_in_sight(
+    qtbot, page: StartPage, theme: Theme
+) -> None:
+    page.resize(1024, 530)
+    theme.set_text_percent(200)
+    first = page.robot_card
+    qtbot.waitUntil(lambda: not first.art.isVisible())
+    page.resize(1024, 900)
+    qtbot.waitUntil(first.art.isVisible)
 
 
 def test_the_shipped_examples_are_read_with_their_blocks() -> None:

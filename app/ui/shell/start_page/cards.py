@@ -44,6 +44,7 @@ class BigCard(Card):
 
     def __init__(self, theme: Theme, art: Art, title: str, text: str, buttons: list[Button]) -> None:
         super().__init__(theme)
+        self.art = art
         self.chip = Chip(theme, "", "ok")
         self.text: QLabel = label(text, "bodyLarge", role="textSecondary", wrap=True)
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
@@ -56,7 +57,8 @@ class BigCard(Card):
         body.setSpacing(0)
         head = QHBoxLayout()
         head.setSpacing(10)
-        head.addWidget(CardTitle(title))
+        self.title = CardTitle(title)
+        head.addWidget(self.title)
         head.addWidget(self.chip)
         head.addStretch(1)
         body.addLayout(head)
@@ -70,6 +72,11 @@ class BigCard(Card):
         row.addStretch(1)
         body.addLayout(row)
         column.addLayout(body, 1)
+
+    def say(self, title: str, text: str) -> None:
+        """Another heading, and other words below it."""
+        self.title.setText(title)
+        self.text.setText(text)
 
 
 class ExampleCard(PaintedButton):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import itertools
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -50,6 +51,15 @@ ALL_WORDS = {
 }
 """In words, where a person reads them more easily than a figure."""
 RECENT_SHOWN = 3
+FIRST, OTHER = 408, 318  # how wide the first card and the others are, in parts
+LEARN = (
+    lazy("Learn in five minutes"),
+    lazy("Six steps to a robot that speaks and turns. Each is checked as you go."),
+)
+OFFER = (
+    lazy("First steps: five minutes"),
+    lazy("New here? Six steps to a robot that speaks and turns. Each is checked as you go."),
+)
 
 
 @dataclass(frozen=True)
@@ -125,15 +135,14 @@ class StartPage(QWidget):
             _("Start with an empty page and the blocks of your robot."),
             [self._new],
         )
-        learn = Button(theme, _("First steps"), size="large")
-        learn.clicked.connect(self.learn_pressed)
-        self.learn_card = BigCard(
-            theme,
-            StepsArt(theme),
-            _("Learn in five minutes"),
-            _("Six steps to a robot that speaks and turns. Each is checked as you go."),
-            [learn],
-        )
+        self._learn = Button(theme, _("First steps"), size="large")
+        self._learn.clicked.connect(self.learn_pressed)
+        self._not_now = Button(theme, _("Not now"), kind="ghost", size="large")
+        self._not_now.clicked.connect(self._decline)
+        self._not_now.hide()
+        title, text = LEARN
+        self.learn_card = BigCard(theme, StepsArt(theme), _(title), _(text), [self._learn, self._not_now])
+        self._offers = False
         self._shows_all = False
         self._recent_box = QWidget()
         self._open = Button(theme, _("Open a file"), "folder-open", kind="ghost", size="normal")
@@ -165,9 +174,8 @@ class StartPage(QWidget):
         column.addWidget(self.open_work)
         cards = self._cards = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         cards.setSpacing(CARD_GAP)
-        cards.addWidget(self.robot_card, 408)
-        cards.addWidget(self.new_card, 318)
-        cards.addWidget(self.learn_card, 318)
+        for place, card in enumerate(self._order_of_cards()):
+            cards.addWidget(card, OTHER if place else FIRST)
         column.addLayout(cards)
         column.addSpacing(26)
         self._all = LinkButton(self._theme, all_words(len(examples)), "arrow-right")
@@ -223,13 +231,55 @@ class StartPage(QWidget):
         return done
 
     def _fit_cards(self) -> None:
-        """Large text in a small window: the cards stand below each other."""
+        """Large text in a small window: the cards stand below each other, in a low one without pictures.
+
+        What to press first is to be seen at once.
+        """
         cards = (self.robot_card, self.new_card, self.learn_card)
         needed = sum(card.minimumSizeHint().width() for card in cards) + CARD_GAP * (len(cards) - 1)
         beside = needed <= min(WIDTH, self.width() - 2 * MARGIN)
         wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
         if self._cards.direction() != wanted:
             self._cards.setDirection(wanted)
+        for card in cards:
+            card.art.setVisible(beside or self.height() >= HIGH)
+
+    def _order_of_cards(self) -> list[BigCard]:
+        """What most people want stands first: it is the widest, and has the filled button."""
+        cards = [self.robot_card, self.new_card]
+        cards.insert(0 if self._offers else len(cards), self.learn_card)
+        return cards
+
+    @property
+    def offers_first_steps(self) -> bool:
+        """Whether the first steps are offered before all else."""
+        return self._offers
+
+    def offer_first_steps(self, offers: bool = True) -> None:
+        """Offer the first steps before all else, or as one of three from now on."""
+        if offers == self._offers:
+            return
+        self._offers = offers
+        had = self._not_now.hasFocus()
+        self._learn.set_kind("primary" if offers else "plain")
+        self._use.set_kind("plain" if offers else "primary")
+        title, text = OFFER if offers else LEARN
+        self.learn_card.say(_(title), _(text))
+        self.learn_card.border = "accent" if offers else "border"
+        paint.show_when(self._not_now, offers)
+        cards = self._order_of_cards()
+        for place, card in enumerate(cards):
+            self._cards.removeWidget(card)
+            self._cards.insertWidget(place, card, OTHER if place else FIRST)
+        for before, after in itertools.pairwise(
+            [each for card in cards for each in card.findChildren(Button)]
+        ):
+            QWidget.setTabOrder(before, after)
+        if had:
+            self.focus_first()
+
+    def _decline(self) -> None:
+        self.offer_first_steps(False)
 
     def _head(self, title: QLabel, button: Button | None = None) -> QHBoxLayout:
         row = QHBoxLayout()
@@ -313,10 +363,16 @@ class StartPage(QWidget):
         self.robot_card.chip.set(chip, status)
 
     def show_open(self, work: Sequence[OpenWork]) -> None:
-        """The behaviours that are open; without any the section is not there."""
+        """The behaviours that are open; without any the section is not there.
+
+        Who has begun something is not offered the first steps before it.
+        """
         self.open_work.show_work(work)
+        if work:
+            self.offer_first_steps(False)
 
     def focus_first(self) -> None:
         """Give the keyboard to the button that most people want."""
         rows = self.open_work.rows
-        (rows[0] if rows else self._use).setFocus(Qt.FocusReason.OtherFocusReason)
+        first = self._learn if self._offers else self._use
+        (rows[0] if rows else first).setFocus(Qt.FocusReason.OtherFocusReason)
