@@ -114,7 +114,7 @@ class DiffDrive:
         speed: Annotated[float, Range(-0.5, 0.5, 0.05, "m/s", "slider")] = 0.2,
         turn: Annotated[float, Range(-90, 90, 5, "deg/s", "slider")] = 0.0,
     ) -> None:
-        """Keep moving until the next drive or stop; the watchdog stops it when its program falls silent."""
+        """Keep moving until the next drive or stop; it stops by itself when its program falls silent."""
         self._go(call, speed, turn)
 
     @drives("move %distance m", "footprints", "moves %distance m", unit="m", moved=True)

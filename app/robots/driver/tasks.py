@@ -196,7 +196,7 @@ class Tasks:
             return NOTHING_RUNS
         stubborn = [task for task in found if task in self._running and not task.cancellable]
         if stubborn:
-            return _("{action} can't be canceled; it ends by itself").format(action=stubborn[0].action)
+            return _("{action} can't be cancelled; it ends by itself").format(action=stubborn[0].action)
         self._drop([task for task in found if task in self._queue], Answer("canceled"))
         for task in found:
             self._end(task, Answer("canceled"))

@@ -22,6 +22,8 @@ _SHORTEST_SPEECH_S = 0.6
 _LONGEST_STEP_S = 0.02
 TOUCH_LEAST_S = 0.3
 """A tap counts as long as this: a program that looks now and then must see it."""
+HEARD_FOR_S = 4.0
+"""So long the room shows what a person said to it."""
 _DRAIN_PER_S = 1 / 180  # % of the battery, standing
 _DRAIN_MOVING_PER_S = 1 / 60
 
@@ -79,6 +81,8 @@ class Body:
     touched: dict[str, float] = field(default_factory=dict)
     """Where hands are now, and for how many seconds they have been there."""
     heard: str = ""
+    listened_s: float = HEARD_FOR_S
+    """How long ago it heard that."""
     volume: int = 60
     language: str = "en"
     held: bool = False
@@ -242,7 +246,7 @@ class Body:
 
     def hear(self, word: str) -> None:
         """Somebody said something."""
-        self.heard = word
+        self.heard, self.listened_s = word, 0.0
         self.happenings.append(BodyEvent("heard", {"word": word}))
 
     # ---- time -------------------------------------------------------------------------------------
@@ -254,7 +258,13 @@ class Body:
             seconds -= dt
             self._step(dt)
 
+    @property
+    def just_heard(self) -> str:
+        """What it heard a moment ago; "" when that is longer ago."""
+        return self.heard if self.listened_s < HEARD_FOR_S else ""
+
     def _step(self, dt: float) -> None:
+        self.listened_s += dt
         if self._base is not None and not (self.held and self._base.hold()):
             self._roll(self._base, dt)
         for wave in self._waves:

@@ -247,6 +247,7 @@ def drawable(body: Body) -> dict[str, object]:
         "head_pitch_deg": round(body.head_pitch.angle, 1),
         "speech": body.speech,
         "spoken": round(body.spoken, 2),
+        "heard": body.just_heard,
         "language": body.language,
         "volume": body.volume,
         "sound": body.sound.drawable() if body.sound is not None else None,

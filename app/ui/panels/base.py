@@ -48,7 +48,8 @@ class PanelContext:
     """What a panel may use of the window.
 
     ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run``
-    does one of the window's commands by its name (`app.ui.shell.commands.table`), ``files`` asks for files.
+    does one of the window's commands by its name (`app.ui.shell.commands.table`), ``files`` asks for files,
+    ``keys_to_question`` gives the keyboard to what a running behaviour asks, if it asks something.
     """
 
     session: Session
@@ -57,6 +58,7 @@ class PanelContext:
     toast: ShowToast
     run: Callable[[str], None]
     files: FileDialogs
+    keys_to_question: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.no_robot import NoRobot
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.pictures.boxes import boxes_on, camera_of
-from app.ui.pictures.view import SILENT_AFTER_S, PictureView, rate_sentence
+from app.ui.pictures.view import SILENT_AFTER_S, PictureView, RateWords
 from app.ui.text.numbers import age_words
 from app.ui.widgets import Chip, ElidedLabel, EmptyAction, EmptyState
 from nep.i18n import _, lazy
@@ -32,6 +32,7 @@ class CameraPanel(OneRobotPanel):
         # It stays whole; the topic beside it is what can be shortened.
         self.rate = ElidedLabel("body", "textSecondary", least=110)
         self.header = [self.rate]
+        self._rates = RateWords()
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.view = PictureView(self.theme, fill=True, labelled=False)
@@ -43,6 +44,7 @@ class CameraPanel(OneRobotPanel):
         start = EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "camera", title, text, [start])
         self._no_robot = NoRobot(self.empty, title, text, [start])
+        self._no_robot.tell(self.session.coming)
         self.pages = self.show_one_of(self.empty, self.view)
 
     def refresh_robot(self, link: RobotLink | None) -> None:
@@ -53,7 +55,7 @@ class CameraPanel(OneRobotPanel):
         self.view.take(self._stream, boxes_on(link, self._topic))
         silent_s = self._stream.silent_s
         silent = silent_s is not None and silent_s > SILENT_AFTER_S
-        sentence = rate_sentence(self._stream.shown_hz, self._stream.arriving_hz)
+        sentence = self._rates.of(self._stream)
         self.rate.setText("" if silent else sentence)
         self.chip.set(_("silent for {age}").format(age=age_words(silent_s)) if silent else "", "error")
         if self._stream.picture is not None:
@@ -73,6 +75,7 @@ class CameraPanel(OneRobotPanel):
         self._topic = _topic_of(link)
         self._stream = self.session.images.stream(self._topic)
         self.view.clear()
+        self._rates.clear()
         self.set_title(_("Camera"), self._topic)
         said = _("The next picture of {robot} appears here.").format(robot=link.name)
         self.empty.say(_("No pictures yet"), said)

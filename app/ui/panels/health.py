@@ -90,6 +90,7 @@ class HealthPanel(OneRobotPanel):
         ]
         self.empty = EmptyState(self.theme, "bot", title, text, steps)
         self._no_robot = NoRobot(self.empty, title, text, steps)
+        self._no_robot.tell(self.session.coming)
         self.step = Button(self.theme, _("Start it again"), "rotate-ccw", size="small")
         self.step.clicked.connect(self._do_next_step)
         inside = QWidget()

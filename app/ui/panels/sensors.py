@@ -97,6 +97,7 @@ class SensorsPanel(OneRobotPanel):
         title, text = _("No robot, no sensors"), _("Connect a robot to see what it feels and sees.")
         self.empty = EmptyState(self.theme, "eye", title, text)
         self._no_robot = NoRobot(self.empty, title, text)
+        self._no_robot.tell(self.session.coming)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
         self.pages.addWidget(self._scroll)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt
@@ -25,6 +26,7 @@ SILENT_AFTER_S = 2.0
 LABEL_EDGE = 8
 SHARP_FROM = 2.0  # so many pixels of the screen for one of the picture: then it has edges
 AGE_EVERY = 8  # refreshes: nobody reads an age 30 times a second
+RATE_STAYS_S = 1.0
 OLDEST_S = 3600.0
 COARSE = QSize(16, 12)
 DIMMED, SILENT = QColor(0, 0, 0, 110), QColor(0, 0, 0, 140)
@@ -37,6 +39,30 @@ def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
         return ""
     shown = min(shown_hz, arriving_hz) if shown_hz is not None else 0.0
     return _("shown {shown} of {arriving}/s").format(shown=round(shown), arriving=round(arriving_hz))
+
+
+class RateWords:
+    """The rates of a stream in words, at most once a second in others.
+
+    What jumps between two numbers with every picture can't be read, and the longer of the two moves what
+    stands beside it.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """``clock`` tells seconds."""
+        self._clock = clock
+        self._words, self._since = "", 0.0
+
+    def of(self, stream: ImageStream) -> str:
+        """What to say now."""
+        words, now = rate_sentence(stream.shown_hz, stream.arriving_hz), self._clock()
+        if words != self._words and (not self._words or not words or now - self._since >= RATE_STAYS_S):
+            self._words, self._since = words, now
+        return self._words
+
+    def clear(self) -> None:
+        """Another stream is shown."""
+        self._words = ""
 
 
 def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
@@ -66,6 +92,7 @@ class PictureView(QWidget):
         self._grey: QImage | None = None  # of the last picture, when no new one comes
         self._boxes: tuple[DetectionBox, ...] = ()
         self._rate = self._state = self._age = ""
+        self._rates = RateWords()
         self._silent = False  # the last picture is shown, and no new one comes
         self.mouse: QPointF | None = None  # where a person points, when it matters
         self._takes = 0
@@ -102,6 +129,7 @@ class PictureView(QWidget):
         self._picture = self._image = self._grey = None
         self._boxes = ()
         self._rate = self._state = self._age = ""
+        self._rates.clear()
         self._silent = False
         self.update()
 
@@ -110,7 +138,7 @@ class PictureView(QWidget):
         before = (self.words, self._boxes)
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
         self._takes += 1
-        self._rate = rate_sentence(stream.shown_hz, stream.arriving_hz)
+        self._rate = self._rates.of(stream)
         if picture is not None and (self._takes % AGE_EVERY == 1 or not self._age):
             self._age = _age_of(picture)
         self._silent = not stream.held and silent_s is not None and silent_s > SILENT_AFTER_S

@@ -9,6 +9,7 @@ from nep.i18n import _
 
 EYES = "#35B0FA"
 SHOULDERS = "#3AB5FF"
+MOST_HEARD = 200  # letters
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,8 @@ class RobotState:
     ``x``, ``y`` in m, ``theta_deg`` 0 looks along x, at the person, and grows to the robot's left. Head yaw
     grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
     ``figure`` is how it looks, ``pepper`` or ``turtle``; ``bumped`` is the side that touches something,
-    ``spoken`` how much of its words it has said (0 to 1), ``sound`` what it plays ("bell", "440 Hz").
+    ``spoken`` how much of its words it has said (0 to 1), ``sound`` what it plays ("bell", "440 Hz"),
+    ``heard`` what a person said to it a moment ago.
     ``held`` says that a person holds it up, ``shared`` that its room is the one that all robots share.
     """
 
@@ -53,6 +55,7 @@ class RobotState:
     speech: str | None = None
     spoken: float = 0.0
     sound: str = ""
+    heard: str = ""
     eyes: str = EYES
     shoulders: str = SHOULDERS
     emotion: str = "neutral"
@@ -86,6 +89,7 @@ class RobotState:
             speech=speech if isinstance(speech, str) and speech.strip() else None,
             spoken=min(1.0, max(0.0, _number(data.get("spoken")))),
             sound=_sound(data.get("sound")),
+            heard=str(data.get("heard") or "")[:MOST_HEARD],
             eyes=_colour(data.get("eyes"), EYES),
             shoulders=_colour(data.get("shoulders"), SHOULDERS),
             emotion=str(data.get("emotion") or "neutral"),

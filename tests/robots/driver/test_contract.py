@@ -173,9 +173,12 @@ def wrong_for(kind: str) -> object:
 
 @contextmanager
 def at_its_start(kind: Kind, name: str) -> Iterator[Bench]:
-    """A driver of its own, in the world as it is when the robot starts."""
-    clock = FakeClock()
-    with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
+    """A driver of its own, in a room of its own, as that is when the robot starts."""
+    clock, alone = FakeClock(), f"only {name}"  # who hears of another robot steps aside, and bumps elsewhere
+    with (
+        nep.node("contract", "memory", master=alone) as node,
+        nep.node("listener", "memory", master=alone) as other,
+    ):
         ears = Ears(other, name.replace(" ", "_"))
         with Driver(kind, name, node, clock=clock) as driver:
             yield Bench(kind, driver, ears, clock)

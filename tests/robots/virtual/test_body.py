@@ -155,6 +155,17 @@ def test_how_much_of_a_speech_is_spoken_is_told():
     assert body.spoken == 0.0
 
 
+def test_what_a_person_said_is_told_for_a_moment():
+    body = Body()
+    assert drawable(body)["heard"] == ""
+    body.hear("hello")
+    body.step(1)
+    assert drawable(body)["heard"] == "hello"
+    body.step(4)
+    assert drawable(body)["heard"] == ""
+    assert body.heard == "hello"  # the sensor keeps it
+
+
 def test_the_battery_drains_faster_when_it_moves():
     standing, walking = Body(), Body(theta_deg=180.0)
     walking.walk(1.5, 0.3)

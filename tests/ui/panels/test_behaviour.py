@@ -3,12 +3,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import QPoint, Signal
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtCore import QBuffer, QIODevice, QPoint, Signal
+from PySide6.QtGui import QColor, QGuiApplication, QPixmap
 from PySide6.QtWidgets import QWidget
 
+from app.core.documents.workspace_json import WorkspaceJson
 from app.ui.panels.base import Panel
-from app.ui.panels.behaviour.carried_blocks import brought_words
+from app.ui.panels.behaviour.carried_blocks import BESIDE, CarriedPicture, brought_words
 from app.ui.panels.behaviour.panel import BehaviourPanel
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.theme.theme import Theme
@@ -31,9 +32,10 @@ class Editor(QWidget):
     try_asked = Signal(str)
     toolbox_pinned = Signal(bool)
     blocks_deleted = Signal(int)
-    block_carried = Signal(object)
+    block_carried = Signal(object, str)
+    carried_seen = Signal(bytes, float)
     block_dropped = Signal(QPoint)
-    blocks_brought = Signal(int, str)
+    blocks_brought = Signal(int, str, str)
     backpack_asked = Signal(str)
 
     def __init__(self, parent: QWidget) -> None:
@@ -342,7 +344,7 @@ def test_a_block_let_go_on_its_own_tab_or_elsewhere_stays(panel, window) -> None
     tabs = title.tabs
     own = tabs.tabs[window.session.document.key]
     for place in (own.mapToGlobal(own.rect().center()), own.mapToGlobal(QPoint(10, 300))):
-        editor(panel).block_carried.emit(place)
+        editor(panel).block_carried.emit(place, window.session.document.key)
         assert not own.is_aimed
         editor(panel).block_dropped.emit(place)
     assert window.commands == []
@@ -362,15 +364,71 @@ def test_a_block_held_at_the_end_of_the_row_brings_tabs_until_there_are_no_more(
         return len(asked) < 3
 
     monkeypatch.setattr(title.tabs, "scroll_at", scroll_at)
-    editor(panel).block_carried.emit(place)
+    editor(panel).block_carried.emit(place, window.session.document.key)
     qtbot.waitUntil(lambda: len(asked) == 3)
     scrolling = panel._carried._scrolling
     assert asked == [place] * 3
     assert not scrolling.isActive(), "nothing moved: it waits for the mouse"
-    editor(panel).block_carried.emit(place)
+    editor(panel).block_carried.emit(place, window.session.document.key)
     assert scrolling.isActive()
-    editor(panel).block_carried.emit(None)
+    editor(panel).block_carried.emit(None, window.session.document.key)
     assert not scrolling.isActive()
+
+
+def test_a_tab_under_a_held_block_opens_and_its_picture_follows(qtbot, panel, window) -> None:
+    session = window.session
+    home = session.document
+    home.edited(WorkspaceJson.of({"blocks": {"blocks": [{"type": "events_started"}]}}))
+    other = session.documents.new()
+    session.documents.show(home)
+    title = panel.replaces_title()
+    title.resize(900, 34)
+    title.show()
+    panel.refresh()
+    tab = title.tabs.tabs[other.key]
+    place = tab.mapToGlobal(tab.rect().center())
+    carried = panel._carried
+    editor(panel).block_carried.emit(place, home.key)
+    assert tab.is_aimed
+    assert carried._opening.isActive()
+    editor(panel).block_carried.emit(place + QPoint(0, 400), home.key)
+    assert not carried._opening.isActive(), "moved away: it stays closed"
+    editor(panel).block_carried.emit(place, home.key)
+    picture = QPixmap(60, 40)
+    picture.fill(QColor("#00ff00"))
+    data = QBuffer()
+    data.open(QIODevice.OpenModeFlag.WriteOnly)
+    picture.save(data, "PNG")
+    editor(panel).carried_seen.emit(bytes(data.data()), 2.0)
+    shown = title.window().findChild(CarriedPicture)
+    assert shown is not None
+    assert shown.isVisible()
+    assert (shown.width(), shown.height()) == (30, 20)
+    assert shown.pos() == title.window().mapFromGlobal(place) + BESIDE
+    qtbot.waitUntil(lambda: window.commands == [f"tab:{other.key}"])
+    editor(panel).block_carried.emit(None, home.key)
+    assert not shown.isVisible()
+    editor(panel).carried_seen.emit(bytes(data.data()), 2.0)
+    assert not shown.isVisible(), "it came too late"
+
+
+def test_let_go_on_the_tab_that_opened_meanwhile_it_goes_there(panel, window) -> None:
+    session = window.session
+    home = session.document
+    home.edited(WorkspaceJson.of({"blocks": {"blocks": [{"type": "events_started"}]}}))
+    other = session.documents.new()
+    title = panel.replaces_title()
+    title.resize(900, 34)
+    title.show()
+    panel.refresh()
+    for key, times in ((home.key, 0), (other.key, 1)):
+        tab = title.tabs.tabs[key]
+        place = tab.mapToGlobal(tab.rect().center())
+        editor(panel).block_carried.emit(place, home.key)
+        assert tab.is_aimed == bool(times)
+        editor(panel).block_carried.emit(None, other.key)
+        editor(panel).block_dropped.emit(place)
+        assert editor(panel).count("bring_blocks") == times
 
 
 def test_plus_has_a_ring_while_a_block_is_over_it_and_makes_a_new_behaviour(panel, window) -> None:
@@ -379,9 +437,9 @@ def test_plus_has_a_ring_while_a_block_is_over_it_and_makes_a_new_behaviour(pane
     title.show()
     tabs = title.tabs
     place = tabs.add.mapToGlobal(tabs.add.rect().center())
-    editor(panel).block_carried.emit(place)
+    editor(panel).block_carried.emit(place, window.session.document.key)
     assert tabs.add.is_aimed
-    editor(panel).block_carried.emit(None)
+    editor(panel).block_carried.emit(None, window.session.document.key)
     assert not tabs.add.is_aimed
     editor(panel).block_dropped.emit(place)
     assert window.commands == ["file.new"]

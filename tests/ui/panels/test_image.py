@@ -4,6 +4,7 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -20,7 +21,7 @@ from app.ui.panels.image.panel import PANEL, ImagePanel
 from app.ui.panels.image.snapshot import SnapshotJob
 from app.ui.pictures.boxes import boxes_of
 from app.ui.pictures.placement import PicturePlace
-from app.ui.pictures.view import PictureView, pixel_words, rate_sentence
+from app.ui.pictures.view import PictureView, RateWords, pixel_words, rate_sentence
 from app.ui.pictures.zoom import ZoomablePicture
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message
@@ -78,6 +79,19 @@ def test_it_says_how_many_are_shown_and_their_size(view) -> None:
     assert view.words.endswith(" ms")  # its age
     assert rate_sentence(None, None) == ""
     assert rate_sentence(17.2, 15.0) == "shown 15 of 15/s"  # two windows of time: never more than arrive
+
+
+def test_a_rate_that_jumps_is_said_once_a_second() -> None:
+    now, rates = [100.0], SimpleNamespace(shown_hz=15.4, arriving_hz=15.4)
+    words = RateWords(lambda: now[0])
+    assert words.of(rates) == "shown 15 of 15/s"  # type: ignore[arg-type]
+    rates.shown_hz = rates.arriving_hz = 15.6
+    now[0] += 0.9
+    assert words.of(rates) == "shown 15 of 15/s"  # type: ignore[arg-type]
+    now[0] += 0.2
+    assert words.of(rates) == "shown 16 of 16/s"  # type: ignore[arg-type]
+    rates.arriving_hz = None
+    assert words.of(rates) == ""  # type: ignore[arg-type]
 
 
 def test_the_boxes_of_a_frozen_picture_are_frozen_too(view) -> None:

@@ -63,7 +63,11 @@ def plug_in(tmp_path: Path) -> Iterator[None]:
 
 def menu_named(where: QMenuBar | QMenu, name: str) -> QMenu:
     """A menu of a bar or of a menu, by the words that a person reads."""
-    return next(menu for each in where.actions() if each.text() == name and (menu := each.menu()) is not None)
+    return next(
+        menu
+        for each in where.actions()
+        if each.text().replace("&", "") == name and (menu := each.menu()) is not None
+    )
 
 
 def test_a_panel(qtbot, plug_in: None, theme: Theme, session: Session) -> None:

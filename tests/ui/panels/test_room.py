@@ -224,7 +224,7 @@ def test_a_kind_of_which_there_are_enough_says_so(panel, window) -> None:
     for _turn in range(9):
         press(panel.add)
         choose(panel, "Add a ball")
-    assert window.toasts == ["There is no more place for that in the room"] * 2
+    assert window.toasts == ["There is no more room for that; take something away first"] * 2
 
 
 # ---- a larger room ----------------------------------------------------------------------------------------

@@ -60,6 +60,16 @@ def test_what_is_typed_is_heard_with_return(panel, window) -> None:
     assert panel.say.field.text() == "good morning"
 
 
+def test_the_room_says_what_the_robot_has_heard(panel, window) -> None:
+    link = window.session.fleet.links[0]
+    link.drawing = {**drawing(), "speech": "", "heard": "good morning"}
+    panel.refresh()
+    assert panel.view.heard == "Pepper heard “good morning”"
+    link.drawing = {**drawing(), "speech": "", "heard": ""}
+    panel.refresh()
+    assert panel.view.heard == ""
+
+
 def test_the_words_that_the_behaviour_waits_for_are_offered(panel, window) -> None:
     hat = {"type": "robot_pepper_when_heard", "fields": {"ROBOT": "Pepper", "WORD": "quiz"}}
     window.session.document.workspace = {"blocks": {"blocks": [hat]}}

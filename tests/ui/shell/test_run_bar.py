@@ -176,3 +176,43 @@ def test_stop_has_room_for_each_of_its_words_and_its_key(qtbot, theme: Theme, pl
     key = paint.width_of(key_font, "F12") + 7 if place != "runBar" else 0
     needed = stop._side() + 8 + paint.width_of(font, word) + key
     assert needed + 12 <= size.width() - 2 * 4, "within its frame, with some air"
+
+
+def test_a_detail_that_is_too_long_for_its_line_has_two(bar: RunBar) -> None:
+    fault = "“walk” stopped: Pepper did not say within 20 s that it had arrived, and it may have met a wall"
+    bar.show_view(replace(VIEWS["proven"], detail=fault, result=None))
+    sentence = bar.sentence
+    whole = sentence.lines(2000.0)
+    assert [text for text, _font, _role in whole] == ["Stopped after 14 s", fault]
+    narrow = 360.0
+    title, first, second = sentence.lines(narrow)
+    assert title[0] == "Stopped after 14 s"
+    assert f"{first[0]} {second[0]}" == fault
+    assert all(paint.width_of(font, text) <= narrow for text, font, _role in (first, second))
+    assert fault in sentence.toolTip()
+
+
+def test_in_a_narrow_window_the_sentence_has_room_beside_what_a_stop_brought(qtbot, bar: RunBar) -> None:
+    bar.show_view(replace(VIEWS["proven"], result="Pepper stopped (41 ms)"))
+    assert bar.pause.sizeHint().width() == bar.pause.full_width()
+    bar.resize(1024, 60)
+    qtbot.waitUntil(lambda: bar.sentence.width() >= 180)
+    assert bar.pause.sizeHint().width() < bar.pause.full_width()
+
+
+def test_a_long_good_result_leaves_room_for_a_fault(qtbot, bar: RunBar) -> None:
+    good = "the robot of the second group and all others have stopped (41 ms), as far as anybody can tell"
+    fault = replace(VIEWS["proven"], title="Stopped by a problem after 14 s", result=good)
+    bar.resize(1093, 60)
+    bar.show_view(fault)
+    qtbot.waitUntil(lambda: bar.sentence.width() >= 180)
+    assert bar.result.toolTip() == good
+    bar.show_view(replace(fault, result_ok=False))  # what is not good is never shortened for it
+    qtbot.waitUntil(lambda: bar.result.width() >= bar.result.sizeHint().width())
+
+
+def test_a_title_without_a_detail_stands_in_the_middle(bar: RunBar) -> None:
+    bar.show_view(replace(VIEWS["proven"], title="Stopped", detail=""))
+    assert [text for text, _font, _role in bar.sentence.lines(300.0)] == ["Stopped"]
+    assert bar.sentence.accessibleName() == "Stopped"
+    assert bar.sentence.toolTip() == "Stopped"

@@ -89,6 +89,7 @@ class RobotPanel(OneRobotPanel):
         start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "bot", title, text, [start])
         self._no_robot = NoRobot(self.empty, title, text, [start])
+        self._no_robot.tell(self.session.coming)
         self.pages = self.show_one_of(self.empty, self.stage)
 
     def _room_tools(self, size: int) -> tuple[IconButton, IconButton]:
@@ -234,10 +235,13 @@ class RobotPanel(OneRobotPanel):
         self.view.show_state(drawing, others, self._things[1])
 
     def _heard_beside(self) -> str:
-        """What is heard now and stands in no bubble any more, with who says it."""
+        """What is heard now and stands in no bubble any more, with who says it; else what a robot heard."""
         said = self.session.voices.saying
-        shown = {state.speech for state in (self.view.state, *(state for _name, state in self.view.others))}
-        return "" if said is None or said.words in shown else f"{said.robot}: {said.words}"
+        robots = [(self._robot, self.view.state), *self.view.others]
+        if said is not None and said.words not in {state.speech for _name, state in robots}:
+            return f"{said.robot}: {said.words}"
+        heard = [(name, state.heard) for name, state in robots if state.heard]
+        return _("{robot} heard “{words}”").format(robot=heard[0][0], words=heard[0][1]) if heard else ""
 
     def _others(self, link: RobotLink) -> list[RobotLink]:
         """The other virtual robots that are there; each is watched while the panel shows."""
@@ -292,7 +296,7 @@ class RobotPanel(OneRobotPanel):
         x, y = room.nearest_free(state.x + 1.0, state.y + 0.9, radius)
         name = self.session.room.add(kind, x, y)
         if name is None:
-            self.context.toast(_("There is no more place for that in the room"))
+            self.context.toast(_("There is no more room for that; take something away first"))
         else:
             self.view.chosen = name
 
@@ -305,6 +309,7 @@ class RobotPanel(OneRobotPanel):
             return
         self._large = LargeRoom(self.theme, self, self.stage, self._room_tools(size=26))
         self._large.closed.connect(self._give_back)
+        self.context.keys_to_question()  # which lies above the room
         self.large.set_icon("minimize-2")
 
     def fill_screen(self) -> None:

@@ -124,6 +124,7 @@ class RobotsPanel(OneRobotPanel):
         )
         self.empty = EmptyState(theme, "bot", title, text, [start])
         self._no_robot = NoRobot(self.empty, title, text, [start])
+        self._no_robot.tell(self.session.coming)
         self.list = RobotList(theme, self.context.run)
         self.list.chosen.connect(self.choose)
         self.list.forgotten.connect(self.forget)

@@ -123,7 +123,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
     Column(
         "topic",
         lazy("Topic"),
-        137,
+        168,  # "/Pepper/description" whole
         name_cell,
         lambda t: t.name.casefold(),
         stretch=True,

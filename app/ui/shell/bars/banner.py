@@ -170,6 +170,11 @@ class AlertBanner(QWidget):
         """The alert that is shown."""
         return self._alert
 
+    @property
+    def offers(self) -> bool:
+        """Whether something is offered that nobody has answered yet."""
+        return self._offer is not None
+
     def offer(
         self,
         title: str,

@@ -17,8 +17,12 @@ from nep.i18n import _
 
 PACES = ("run.full_speed", "run.slow", "run.very_slow")
 ROOM_PX = 960  # what the bar needs at 100 % text
+SENTENCE_PX, RESULT_PX = 190, 230  # at 100 % text: what should be left for what happens, and for a result
+LEAST_RESULT_PX = 110  # where there is less for both, a good result is shortened to this
+EDGES_PX = 150  # the button for the speed, the mark, and what is between all of them
 LEAST_ROOM_PX = 600  # below that even Run is an icon, so that nothing of a stop's result is cut
 LEAST_SENTENCE = 30  # px at 100 % text
+QWIDGETSIZE_MAX = 16777215  # Qt's own: no limit
 DOT = 10
 HALO = 16
 MARKS = {
@@ -91,14 +95,20 @@ class Sentence(QWidget):
         """Say something else; `is_alarm`: somebody must act, so the title is red."""
         if (title, detail, is_alarm) != (self._title, self._detail, self._is_alarm):
             self._title, self._detail, self._is_alarm = title, detail, is_alarm
-            self.setAccessibleName(f"{title}. {detail}")
-            self.setToolTip(plain.tip(f"{title}\n{detail}"))
+            said = [each for each in (title, detail) if each]
+            self.setAccessibleName(". ".join(said))
+            self.setToolTip(plain.tip("\n".join(said)))
             self.update()
 
     def _title_font(self) -> QFont:
         font = self._theme.font("label")
         font.setWeight(font.Weight.DemiBold)
         return font
+
+    def full_width(self) -> float:
+        """How wide its longer line is."""
+        lines = self.lines(float(QWIDGETSIZE_MAX))
+        return max(paint.width_of(font, text) for text, font, _role in lines)
 
     def sizeHint(self) -> QSize:
         high = paint.height_of(self._title_font()) + paint.height_of(self._theme.font("body"))
@@ -108,19 +118,30 @@ class Sentence(QWidget):
         return QSize(0, self.sizeHint().height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        theme = self._theme
-        if self.width() < theme.scaled(LEAST_SENTENCE):
+        if self.width() < self._theme.scaled(LEAST_SENTENCE):
             return  # two letters and dots say nothing; its tooltip and a screen reader say all
         painter = QPainter(self)
-        bold, plain = self._title_font(), theme.font("body")
-        upper, lower = paint.height_of(bold), paint.height_of(plain)
-        top = (self.height() - upper - lower) / 2
-        paint.words(
-            painter, QRectF(0, top, self.width(), upper), self._title, bold, theme.colour(self.colour_role)
-        )
-        second = QRectF(0, top + upper, self.width(), lower)
-        paint.words(painter, second, self._detail, plain, theme.colour("textSecondary"))
+        lines = self.lines(self.width())
+        top = (self.height() - sum(paint.height_of(font) for _text, font, _role in lines)) / 2
+        for text, font, role in lines:
+            high = paint.height_of(font)
+            paint.words(painter, QRectF(0, top, self.width(), high), text, font, self._theme.colour(role))
+            top += high
         painter.end()
+
+    def lines(self, width: float) -> list[tuple[str, QFont, str]]:
+        """What is painted: lines with their font and colour; the last one is elided where it is too long.
+
+        A detail that is too long for its line has two small ones, as far as the bar has room for them.
+        """
+        bold, plain, small = self._title_font(), self._theme.font("body"), self._theme.font("small")
+        title, quiet = [(self._title, bold, self.colour_role)], "textSecondary"
+        if not self._detail:
+            return title
+        both = paint.height_of(bold) + 2 * paint.height_of(small)
+        if paint.width_of(plain, self._detail) <= width or both > self.height():
+            return [*title, (self._detail, plain, quiet)]
+        return [*title, *((line, small, quiet) for line in paint.two_lines(small, self._detail, width))]
 
 
 class Result(QWidget):
@@ -158,6 +179,7 @@ class Result(QWidget):
         if (look, text) != (self._look, self._text):
             self._look, self._text = look, text
             self.setAccessibleName(text)
+            self.setToolTip(plain.tip(text))
             if look in {"ok", "error"}:
                 paint.announce(self, text)
             paint.show_when(self, bool(text))
@@ -262,6 +284,7 @@ class RunBar(Bar):
         self.restart.hide()
         self.restart.let_shrink(96)
         self.stop = StopButton(theme)
+        self._fitted: RunView | None = None
         self._build(theme)
         self.pace.clicked.connect(lambda: drop_below(self._paces, self.pace))
         theme.changed.connect(self._fit)
@@ -295,11 +318,25 @@ class RunBar(Bar):
         self._fit()
 
     def _fit(self) -> None:
-        """Large text in a narrow window: Pause and Step are icons in every state, then Run, too."""
-        bare = self.width() < self._theme.scaled(ROOM_PX)
+        """Large text in a narrow window, or long words: Pause and Step are icons in every state, then Run.
+
+        A good result leaves room for what happens now, which may be a fault.
+        """
+        scaled, buttons = self._theme.scaled, (self.run, self.pause, self.step)
+        words = sum(each.full_width() for each in buttons)
+        needed = words + self.stop.sizeHint().width() + EDGES_PX + scaled(SENTENCE_PX) + scaled(RESULT_PX)
+        bare = self.width() < max(scaled(ROOM_PX), needed)
         self.run.set_bare(self.width() < self._theme.scaled(LEAST_ROOM_PX))
         self.pause.set_bare(bare)
         self.step.set_bare(bare)
+        shown = (
+            *buttons,
+            self.stop,
+            *(each for each in (self.restart, self.confirm) if each.isVisibleTo(self)),
+        )
+        rest = self.width() - EDGES_PX - sum(each.sizeHint().width() for each in shown)
+        left = max(scaled(LEAST_RESULT_PX), rest - min(self.sentence.full_width(), scaled(SENTENCE_PX)))
+        self.result.setMaximumWidth(round(left) if self.result.look == "ok" else QWIDGETSIZE_MAX)
 
     def show_view(self, view: RunView) -> None:
         """Show one of the six states. Restart has the place of Run; while paused that is Go on."""
@@ -317,6 +354,9 @@ class RunBar(Bar):
         self.confirm.set_word(view.confirm or "")
         paint.show_when(self.confirm, view.confirm is not None)
         self.stop.show_state(_(view.stop_word), ring=view.state == "stopping")
+        if view != self._fitted:  # called with every tick
+            self._fitted = view
+            self._fit()
 
 
 class ToolBar(Bar):

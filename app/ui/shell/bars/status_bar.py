@@ -22,6 +22,7 @@ from nep.i18n import _, ngettext
 Fact = tuple[str, str, str | None]  # icon, words, status
 NOTHING: Fact = ("", "", None)
 TICK_MS = 33
+FIGURE_SPACE = "\u2007"
 
 
 def _worst(found: Iterable[str]) -> tuple[str, str]:
@@ -144,7 +145,8 @@ class StatusFacts:
 
     def window(self) -> Fact:
         """How long the last refresh of the window took."""
-        return "", _("Window {spent} ms of {most} ms").format(spent=round(self.window_ms), most=TICK_MS), None
+        spent = f"{round(self.window_ms):>2}".replace(" ", FIGURE_SPACE)  # as wide for 9 as for 10
+        return "", _("Window {spent} ms of {most} ms").format(spent=spent, most=TICK_MS), None
 
 
 class StatusBar(QWidget):
