@@ -23,32 +23,26 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 pytest.register_assert_rewrite("tests.robots.whose_words_count")  # a contract: others hold to it
 os.environ["NEP_LANG"] = "en"  # what tests read is English, also on a computer that is set to something else
 WITH_FIXED_PORTS = ("tests/interop/", "tests/e2e/test_rize.py")
-USUAL_S = 0.2
-"""What a test takes, all in all, ..."""
+USUAL_S, USUAL_OF_STUDIO_S = 0.2, 12.0
+"""What a test takes, all in all, and one that starts Studio, ..."""
 LONG_S = {
-    "ports": 210.0,
-    "tests/e2e/test_hour_keys.py": 110.0,
+    "ports": 200.0,
+    "tests/e2e/test_hour_mouse.py": 130.0,
+    "tests/e2e/test_hour_keys.py": 120.0,
     "tests/core/run/test_run_file.py": 100.0,
-    "tests/e2e/test_soak.py": 63.0,
-    "tests/e2e/test_behaviour.py": 56.0,
-    "tests/e2e/test_stop.py": 44.0,
-    "tests/e2e/test_nothing_is_lost.py": 44.0,
+    "tests/e2e/test_path_mouse.py": 70.0,
+    "tests/e2e/test_path_keys.py": 60.0,
+    "tests/e2e/test_soak.py": 65.0,
+    "tests/ui/shell/test_layout_orders.py": 50.0,
     "tests/core/robots/test_claims.py": 33.0,
+    "tests/ui/theme/test_high_dpi.py": 32.0,
     "tests/core/test_session.py": 32.0,
     "tests/core/robots/test_robot_bad_days.py": 30.0,
-    "tests/e2e/test_path_mouse.py": 26.0,
     "tests/core/robots/test_refused_stop.py": 25.0,
-    "tests/e2e/test_path_keys.py": 20.0,
     "tests/core/network/test_no_network.py": 21.0,
     "tests/blocks/compiler/test_expressions.py": 20.0,
-    "tests/e2e/test_two_studios.py": 20.0,
-    "tests/e2e/test_main_job.py": 18.0,
-    "tests/e2e/test_robots.py": 17.0,
-    "tests/e2e/test_layouts.py": 16.0,
+    "tests/blocks/compiler/test_hostile.py": 20.0,
     "tests/robots/driver/test_contract_of_any_file.py": 16.0,
-    "tests/e2e/test_headless.py": 15.0,
-    "tests/ui/theme/test_high_dpi.py": 15.0,
-    "tests/e2e/test_tabs.py": 13.0,
 }
 """... and files that take longer than so many tests would. Speed alone depends on it."""
 _GRACE_S = 20.0
@@ -72,7 +66,8 @@ class ByFile(LoadScopeScheduling):
         super()._assign_work_unit(node)
 
     def _seconds(self, scope: str) -> float:
-        return LONG_S.get(scope, USUAL_S * len(self.workqueue[scope]))
+        each = USUAL_OF_STUDIO_S if scope.startswith("tests/e2e/") else USUAL_S
+        return LONG_S.get(scope, each * len(self.workqueue[scope]))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -47,6 +47,7 @@ EARNED = {
     "app.core.run.run_warnings": "pure, and tested alone",
     "app.core.run.trial": "pure, and tested alone",
     "app.ui.shell.stop_keys": "hears keys before all else, and is tested alone",
+    "app.ui.blockly.held_keys": "is tested without a page",
     "app.ui.panels.registry": "a seam: panels, ours and those of plug-ins, are found through it",
     "app.ui.widgets.inputs.switch": "one of a list: the widgets; two use it through their face",
 }

@@ -70,6 +70,7 @@ def start(screen: Screen, address: str, tmp_path: Path) -> Iterator[Callable[...
 
     screen.move(2, 990)
     yield start
+    screen.let_all_go()
     for studio in started:
         studio.close()
     if started:

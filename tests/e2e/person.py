@@ -11,6 +11,7 @@ from tests.e2e.x11 import WHEEL_DOWN, WHEEL_UP, Picture, Screen
 from tests.still import LOOK
 
 STEP_S = 40.0
+AGAIN_S = 10.0  # so long nothing came: a person would try again
 RUNNING = (0xFF, 0xB3, 0x00)  # the token "running" of the light theme
 Seen = Mapping[str, object]
 
@@ -95,21 +96,32 @@ class Person:
         return seen
 
     def choose(self, menu: str, entry: str) -> None:
-        """Choose an entry of a menu of the menu bar."""
+        """Choose an entry of a menu of the menu bar, once the menu before it has closed.
+
+        One that the window closes, as it does when the blocks come to show after the start, is opened again.
+        """
+        until(lambda: not self._menus("popup"), "the menu before it closes")
         self._entry("bar", menu)
-        self._entry("popup", entry)
+        try:
+            self._entry("popup", entry, AGAIN_S)
+        except AssertionError:
+            if not self._menus("popup"):
+                self._entry("bar", menu)
+            self._entry("popup", entry)
 
     def pick(self, entry: str) -> None:
         """Choose an entry of the menu that is open."""
         self._entry("popup", entry)
 
-    def _entry(self, kind: str, text: str) -> None:
+    def _menus(self, kind: str) -> list[Seen]:
+        return [each for each in self.look() if each.get("menu") == kind]
+
+    def _entry(self, kind: str, text: str, within_s: float = STEP_S) -> None:
         def found() -> Seen | None:
-            bars = [each for each in self.look() if each.get("menu") == kind]
-            entries = [entry for each in bars for entry in each.get("entries", [])]
+            entries = [entry for each in self._menus(kind) for entry in each.get("entries", [])]
             return next((e for e in entries if e["text"].replace("&", "").split("\t")[0] == text), None)
 
-        self.screen.click(*middle(until(found, f"no entry {text!r}")["rect"]))
+        self.screen.click(*middle(until(found, f"no entry {text!r}", within_s)["rect"]))
 
     # -- in the web view --------------------------------------------------------------------------
 
@@ -159,7 +171,7 @@ class Person:
         def in_sight() -> list[float] | None:
             """Where the category is, once the wheel has brought it into the toolbox and it stands still."""
             rect, box = self.page(
-                f"[{named}[{place}], {shown}]"
+                f"[{named}[{place}].closest('.blocklyToolboxCategory'), {shown}]"
                 ".map(e => (r => [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
             )
             x, y = view[0] + box[0] + box[2] / 2, view[1] + box[1] + box[3] / 2

@@ -34,7 +34,7 @@ from tests.e2e.test_virtual_robots import RoomOnScreen
 from tests.e2e.waiting import until
 from tests.e2e.x11 import RIGHT
 
-pytestmark = pytest.mark.timeout(500)
+pytestmark = pytest.mark.timeout(900)
 MOST_CLICKS, MOST_DRAGS = 4, 2  # from the start to the first motion
 HEAD = 150  # how high Pepper's head is above the floor, in the units of its drawing
 FIGHT = "both move Pepper at the same time"

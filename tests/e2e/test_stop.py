@@ -187,7 +187,8 @@ def test_one_press_on_stop_whatever_is_open(turning: Studio) -> None:
                 turning.screen.key("Escape")
                 until(lambda: not menus(turning) and not turning.all(kind="Scrim"), "all is closed")
     turning.screen.type("way")
-    assert turning.find("Name of the file", focus=True)["text"] == "Halfway", "it is typed where it was"
+    name = "Name of the file"
+    until(lambda: turning.find(name, focus=True)["text"] == "Halfway", "it is typed where it was")
     turning.screen.key("Escape")
     until(lambda: not turning.all(kind="FileSheet"), "the sheet has the keys")
 

@@ -61,9 +61,18 @@ class Screen:
         self._d = ctypes.c_void_p(opened)
         self._root = ctypes.c_ulong(self._x.XDefaultRootWindow(self._d))
         self._at = (0, 0)
+        self._buttons: set[int] = set()
+        self._keys: set[str] = set()
 
     def close(self) -> None:
         self._x.XCloseDisplay(self._d)
+
+    def let_all_go(self) -> None:
+        """Release what is still held: the next test could press nothing while a failed one holds it."""
+        for button in list(self._buttons):
+            self.release(button)
+        for name in list(self._keys):
+            self.let_go(name)
 
     # -- the mouse --------------------------------------------------------------------------------
 
@@ -96,6 +105,7 @@ class Screen:
         self.release()
 
     def _button(self, button: int, *, down: bool, after_ms: int = 0) -> None:
+        (self._buttons.add if down else self._buttons.discard)(button)
         self._test.XTestFakeButtonEvent(self._d, button, int(down), ctypes.c_ulong(after_ms))
         self._x.XSync(self._d, 0)
 
@@ -127,6 +137,7 @@ class Screen:
         keysym = KEYSYMS.get(name) or ord(name)
         code = self._x.XKeysymToKeycode(self._d, ctypes.c_ulong(keysym))
         assert code, f"no key for {name!r}"
+        (self._keys.add if down else self._keys.discard)(name)
         self._test.XTestFakeKeyEvent(self._d, code, int(down), ctypes.c_ulong(0))
         self._x.XSync(self._d, 0)
 

@@ -1,4 +1,4 @@
-"""Tests of widgets: no screen needed, and any Qt warning fails the test that caused it.
+"""Tests of widgets: no screen needed; a Qt warning, or a window left open, fails the test that caused it.
 
 While the test runs, pytest-qt watches for warnings; while its widgets are closed and deleted, we do.
 The few lines that are known noise are in pyproject.toml, ``qt_log_ignore``.
@@ -13,6 +13,9 @@ from functools import partialmethod
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, QMessageLogContext, Qt, QtMsgType, qInstallMessageHandler
+from PySide6.QtGui import QCursor
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from tests.ui.fakes import close_sessions
@@ -53,9 +56,27 @@ def _sessions_end() -> Iterator[None]:
     close_sessions()
 
 
+@pytest.fixture(autouse=True)
+def _mouse_is_away(qapp: QApplication) -> Iterator[None]:
+    """Each test begins with the mouse beside its windows, and ends with no button held.
+
+    Where an earlier test left the mouse, panels wait for it to go; with the left button held, as
+    ``QTest.mouseDClick`` leaves it, a page takes no press of the right one.
+    """
+    QCursor.setPos(0, 0)
+    yield
+    nobody = QWidget()
+    for held in Qt.MouseButton:
+        if held.value and held & QApplication.mouseButtons():
+            QTest.mouseRelease(nobody, held)
+
+
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object]:
-    """Fails a test whose widgets warn while they are closed and deleted."""
+    """Fails a test whose widgets warn while they are closed and deleted, or that leaves a window open.
+
+    Such a window lies above those of later tests and takes their clicks.
+    """
     noise = [re.compile(pattern) for pattern in item.config.getini("qt_log_ignore")]
     warnings: list[str] = []
 
@@ -71,4 +92,10 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object
         qInstallMessageHandler(previous)
     if warnings:
         pytest.fail("Qt warned while the test's widgets were closed:\n" + "\n".join(warnings), pytrace=False)
+    left = [each for each in QApplication.topLevelWidgets() if each.isVisible()]
+    if left:
+        for each in left:
+            each.hide()  # one test fails, not all that follow
+        names = ", ".join(f"{type(each).__name__} “{each.accessibleName()}”" for each in left)
+        pytest.fail(f"The test left open: {names}. Give them a parent or to qtbot.addWidget.", pytrace=False)
     return result

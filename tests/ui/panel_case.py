@@ -6,13 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session
 from tests.ui.shell_parts import Answers
+
+OUT_OF_SIGHT = 5000
 
 
 @dataclass
@@ -46,10 +48,20 @@ class Window:
         """The panel, shown in our fonts also when no test has loaded them before."""
         fonts.load()
         made = panel.make(self.context())
+        _give_title(made)
         made.resize(*size)
         made.show()
         made.refresh()
         return made
+
+
+def _give_title(made: PanelWidget) -> None:
+    """A place for what stands in its title, as the dock gives it; alone, each would be a window."""
+    title = QWidget(made)
+    row = QHBoxLayout(title)
+    for widget in made.header_widgets():
+        row.addWidget(widget)
+    title.move(-OUT_OF_SIGHT, 0)
 
 
 def ticks(window: Window, panel: PanelWidget, count: int = 1) -> None:

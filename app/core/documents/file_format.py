@@ -18,7 +18,7 @@ from nep.i18n import _, lazy, number
 FORMAT = "nep-behaviour"
 VERSION = 1
 SUFFIX = ".nepb"
-TOO_DEEP = lazy("more than 4000 blocks hang in one stack")
+TOO_DEEP = lazy("there are more than 4000 blocks in one stack")
 FROM_BEFORE = lazy("open a copy from before")
 DIVIDE = lazy("divide it into several scripts")
 FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})

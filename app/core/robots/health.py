@@ -128,7 +128,9 @@ class Health:
             GIVES_UP,
             "error",
             _("Studio stays open: the unsaved work in {name} would be lost.").format(name=name),
-            _("{why}. Closing once more gives it up.").format(why=f"{sentence[0].upper()}{sentence[1:]}"),
+            _("{why}. If you close once more, it is lost.").format(
+                why=f"{sentence[0].upper()}{sentence[1:]}"
+            ),
             button=_("Save somewhere else"),
             action="file.save_as",
             count=0,
@@ -264,7 +266,7 @@ class Health:
             _("The camera of {robot} has been silent for {seconds} s.").format(
                 robot=link.name, seconds=int(topic.silent_s)
             ),
-            _("What needs its picture waits."),
+            _("Blocks that need its picture wait."),
             button=_(ASK_DOCTOR),
             action="help.doctor",
             count=0,

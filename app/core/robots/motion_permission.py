@@ -16,7 +16,7 @@ from app.core.storage.settings import ListSettings
 from app.errors import AppError
 from app.robots.description.description import Robot
 from app.robots.identity import Identity
-from nep.i18n import _, listed, ngettext
+from nep.i18n import _, listed, ngettext, pgettext
 
 ALWAYS = "robots.may_move"
 MOST_NAMED = 4
@@ -136,7 +136,11 @@ def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
     """The titles of those actions that move the robot, each once; of many only the first."""
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
     titles = [f"“{title}”" for title in dict.fromkeys(found)]
-    return (*titles[:MOST_NAMED], "more") if len(titles) > MOST_NAMED else tuple(titles)
+    return (
+        (*titles[:MOST_NAMED], pgettext("after a list", "more"))
+        if len(titles) > MOST_NAMED
+        else tuple(titles)
+    )
 
 
 def wanted_by(program: Program, robots: Iterable[Robot]) -> list[tuple[Robot, Sequence[str]]]:

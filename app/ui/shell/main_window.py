@@ -96,7 +96,8 @@ class MainWindow(QMainWindow):
         self._flush_before_close = FlushBeforeClose(self, self.editor, self.close)
         self._build(examples)
         files = asks if asks is not None else self._file_dialogs()
-        self.context = PanelContext(session, theme, self.open_topic, self.say, self._run, files)
+        asked = self.asked.take_keyboard
+        self.context = PanelContext(session, theme, self.open_topic, self.say, self._run, files, asked)
         self.ring = FocusRing(theme, self)
         self.timer = QTimer(self)
         self.timer.setInterval(TICK_MS)
@@ -156,6 +157,7 @@ class MainWindow(QMainWindow):
         start.file_chosen.connect(files.open)
         start.work_chosen.connect(self._go_on_with)
         start.left.connect(actions["start_page.leave"].trigger)
+        actions["help.first_steps"].triggered.connect(lambda: start.offer_first_steps(False))
         self.banner.on_action = run
         self.banner.on_dismiss = self.session.alerts.dismiss
         self.banner.on_more = self._show_all_alerts

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from PySide6.QtCore import QCoreApplication
 from PySide6.QtGui import QFont, QFontDatabase
 
 from app import resources
 
+LOADED = "fontsRefused"
+"""What the application remembers: that they were loaded, and what Qt refused of them."""
 FILES = (
     "Inter-Regular.otf",
     "Inter-Medium.otf",
@@ -23,13 +26,19 @@ FILES = (
 def load() -> tuple[str, ...]:
     """Register the bundled fonts with Qt; the files that Qt refused (an empty tuple when all is well).
 
-    Needs a QGuiApplication. Calling it again is harmless: Qt keeps one copy of a file.
+    Needs a QGuiApplication. Called again it does nothing: each file that Qt gets, also one that it has, makes
+    it forget how wide and high all words are.
     """
+    application = QCoreApplication.instance()
+    if application is not None and application.property(LOADED) is not None:
+        return tuple(application.property(LOADED))
     refused: list[str] = []
     for name in FILES:
         number = QFontDatabase.addApplicationFont(str(resources.path("fonts", name)))
         if number < 0:
             refused.append(name)
+    if application is not None:
+        application.setProperty(LOADED, refused)
     return tuple(refused)
 
 

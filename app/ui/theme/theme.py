@@ -51,6 +51,10 @@ PALETTE_ROLES: Mapping[QPalette.ColorRole, str] = {
 DISABLED_ROLES = (QPalette.ColorRole.Text, QPalette.ColorRole.WindowText, QPalette.ColorRole.ButtonText)
 
 
+STYLED = "isFusion"
+"""What the application remembers: with a style sheet it does not tell the style that is below."""
+
+
 class Theme(QObject):
     """Colours, sizes, fonts and icons of the chosen mode; `changed` when any of them did."""
 
@@ -139,11 +143,17 @@ class Theme(QObject):
         """Give the application this theme's style, palette, style sheet and font, then tell everyone."""
         application = QApplication.instance()
         if isinstance(application, QApplication):
-            if application.style().name() != "fusion":
+            # Each of these goes through all widgets, also when it brings nothing new.
+            if application.property(STYLED) is None:
                 application.setStyle(QStyleFactory.create("Fusion"))
-            application.setPalette(self.palette())
-            application.setFont(self.font("body"))
-            application.setStyleSheet(self.style_sheet())
+                application.setProperty(STYLED, True)
+            palette, font, sheet = self.palette(), self.font("body"), self.style_sheet()
+            if application.palette() != palette:
+                application.setPalette(palette)
+            if application.font() != font:
+                application.setFont(font)
+            if application.styleSheet() != sheet:
+                application.setStyleSheet(sheet)
         self.changed.emit()
 
     def _wanted_dark(self) -> bool:

@@ -133,10 +133,12 @@ class PaintedButton(QAbstractButton):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
+        rect, radius, role = QRectF(self.rect()), self._theme.radius("small"), self._theme.colour
         if self._aimed:
-            radius, role = self._theme.radius("small"), self._theme.colour
-            paint.box(painter, QRectF(self.rect()), radius, role("accentTint"), role("accent"), AIM_WIDTH)
-        self.paint_button(painter, QRectF(self.rect()))
+            paint.box(painter, rect, radius, role("accentTint"))
+        self.paint_button(painter, rect)
+        if self._aimed:  # above what it paints itself: the tab that opens under held blocks is filled
+            paint.box(painter, rect, radius, None, role("accent"), AIM_WIDTH)
         painter.end()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
@@ -374,9 +376,13 @@ class RunButton(Button):
                 max(BARE_WIDTH, self.icon_side() + 28),
                 max(self.measure.height, round(paint.height_of(font)) + 12),
             )
-        inner = self.icon_side() + self.measure.gap + paint.width_of(font, self._widest)
         height = max(self.measure.height, round(paint.height_of(font)) + 12)
-        return QSize(max(RUN_WIDTH, round(inner) + 28), height)
+        return QSize(self.full_width(), height)
+
+    def full_width(self) -> int:
+        """How wide it is with its longest word, whether or not that shows now."""
+        words = paint.width_of(self._theme.font("button"), self._widest)
+        return max(RUN_WIDTH, round(self.icon_side() + self.measure.gap + words) + 28)
 
 
 class StopButton(PaintedButton):

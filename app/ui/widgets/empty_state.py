@@ -9,6 +9,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -19,6 +20,7 @@ from app.ui.widgets.lists.scroll_areas import Scrolled
 TILE, BELOW_TILE = 56, 16
 TEXT_WIDTH = 400
 MARGIN = 12
+ABOVE_ROW = 14
 
 
 @dataclass(frozen=True)
@@ -77,8 +79,8 @@ class EmptyState(QWidget):
         column.addLayout(inner)
         self._row = QHBoxLayout()
         self._row.setSpacing(8)
-        self._row.setContentsMargins(0, 14, 0, 0)
         column.addLayout(self._row)
+        self._column = column
         column.addStretch(1)
         self._buttons: list[Button] = []
         whole = QVBoxLayout(self)
@@ -98,13 +100,19 @@ class EmptyState(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """In a low place the words go before the picture."""
+        """In a low place the words go before the picture, and a next step before the smaller words."""
         width = self.width() - 32
         text = self._text.heightForWidth(min(width, TEXT_WIDTH))
         self._text.setMinimumHeight(max(0, text))  # else a low place takes some pixels of its last line
         high = self._title.heightForWidth(width) + text + 4
-        high += self._row.sizeHint().height() if self._buttons else 0
+        high += ABOVE_ROW + self._buttons[0].sizeHint().height() if self._buttons else 0
         self._tile.setVisible(self.height() - 2 * MARGIN >= high + TILE + BELOW_TILE)
+        is_low = bool(self._buttons) and self.height() - 2 * MARGIN < high
+        self._text.setVisible(not is_low)
+        self._title.setToolTip(plain.tip(self._text.text()) if is_low else "")
+        self._row.setContentsMargins(0, 0 if is_low else ABOVE_ROW, 0, 0)
+        edge = 2 if is_low else MARGIN
+        self._column.setContentsMargins(16, edge, 16, edge)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from math import isfinite
 
@@ -210,10 +211,12 @@ class StatusItem(QWidget):
         """Show another fact; without words the item is hidden. A status colours it."""
         if (icon, text, status) == (self._icon, self._text, self._status):
             return
+        before = self.sizeHint()
         self._icon, self._text, self._status = icon, text, status
         self.setAccessibleName(text)
         paint.show_when(self, bool(text))
-        self.updateGeometry()
+        if self.sizeHint() != before:
+            self.updateGeometry()
         self.update()
 
     def _side(self) -> float:
@@ -221,7 +224,9 @@ class StatusItem(QWidget):
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
-        width = paint.width_of(font, self._text) + (self._side() + 6 if self._icon else 0)
+        # As wide for a 1 as for a 0: figures change many times a second, and each time all is laid out.
+        words = re.sub(r"\d", "0", self._text)
+        width = paint.width_of(font, words) + (self._side() + 6 if self._icon else 0)
         return QSize(round(width) + 1, round(paint.height_of(font)))
 
     def minimumSizeHint(self) -> QSize:

@@ -79,6 +79,14 @@ def words(
     painter.drawText(rect, int(align), fitting)
 
 
+def two_lines(font: QFont, text: str, width: float) -> list[str]:
+    """A text as one line, or broken between two words as two: the second may be too long."""
+    line, *rest = text.split(" ")
+    while rest and width_of(font, f"{line} {rest[0]}") <= width:
+        line = f"{line} {rest.pop(0)}"
+    return [line, " ".join(rest)] if rest else [line]
+
+
 def width_of(font: QFont, text: str) -> float:
     """How wide a line of text is."""
     return QFontMetricsF(font).horizontalAdvance(text)

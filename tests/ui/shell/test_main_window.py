@@ -741,6 +741,35 @@ def test_a_start_shows_what_was_left(
     assert [step.__name__ for step in first_steps(window, Options(new_window=True))] == ["<lambda>"]
 
 
+def test_the_very_first_start_offers_the_first_steps_and_the_second_does_not(
+    window: MainWindow, commands: Commands, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(window, "begin", lambda: None)
+    first_steps(window, Options())
+    assert window.start.offers_first_steps
+    assert not Settings(home).are_new, "however this start ends"
+    commands.run("help.first_steps")
+    assert not window.start.offers_first_steps
+    window.session.settings.are_new = Settings(home).are_new
+    first_steps(window, Options())
+    assert not window.start.offers_first_steps
+
+
+@pytest.mark.parametrize("instead", ["work of last time", "open work", "a file", "an earlier version"])
+def test_nothing_is_offered_where_something_else_is_at_hand(
+    window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, instead: str
+) -> None:
+    monkeypatch.setattr(window, "begin", lambda: None)
+    if instead == "work of last time":
+        window.banner.offer("Put back?", "It was not saved.", ("Put it back", bool), ("Not now", bool))
+    elif instead == "open work":
+        window.session.document.edited({"blocks": {"blocks": [{"type": "events_started"}]}})
+    elif instead == "an earlier version":
+        window.session.settings.are_new = False
+    first_steps(window, Options((tmp_path / "Mine.nepb",) if instead == "a file" else ()))
+    assert not window.start.offers_first_steps
+
+
 def test_who_drives_the_window_alone_begins_the_demonstration_and_nobody_else_does(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -65,7 +65,7 @@ def test_a_place_where_nothing_can_be_written_is_said(tmp_path: Path) -> None:
 def test_without_blocks_nothing_is_written(tmp_path: Path) -> None:
     said: list[str] = []
     made(Editor(b""), said).save(tmp_path / "a.png", "png", True)
-    assert said == ["There are no blocks to be seen"]
+    assert said == ["There are no blocks on this page"]
     assert list(tmp_path.iterdir()) == []
 
 

@@ -316,6 +316,26 @@ def test_an_empty_place_that_is_low_says_its_words_without_the_picture(qtbot, th
     assert empty._tile.isVisible()
 
 
+def test_an_empty_place_that_is_very_low_keeps_its_next_step_in_sight(qtbot, theme: Theme) -> None:
+    theme.apply()
+    step = EmptyAction("New variable", lambda: None)
+    words = "A variable keeps a number, a text or a list, and shows here what it is while the program runs."
+    empty = EmptyState(theme, "variable", "No variables yet", words, [step])
+    place = QWidget()
+    qtbot.addWidget(place)
+    empty.setParent(place)
+    empty.resize(384, 84)
+    place.show()
+    title, text = empty.findChildren(QLabel)
+    button = empty.findChild(Button)
+    qtbot.waitUntil(lambda: button.mapTo(empty, QPoint(0, button.height())).y() <= 84)
+    assert not text.isVisible()
+    assert title.toolTip() == words
+    empty.resize(384, 300)
+    qtbot.waitUntil(text.isVisible)
+    assert title.toolTip() == ""
+
+
 @pytest.mark.parametrize(("ratio", "thick"), [(1.0, 1), (1.25, 1), (1.5, 1), (2.0, 2)])
 @pytest.mark.parametrize("edge", [Qt.Edge.TopEdge, Qt.Edge.BottomEdge, Qt.Edge.LeftEdge, Qt.Edge.RightEdge])
 def test_a_hairline_is_as_thin_at_every_place_and_scale(

@@ -104,7 +104,7 @@ class NetworkAccessSheet(Overlay):
             paint.show_when(shown, is_open or can_open)
         paint.show_when(self.yes, can_open and not is_open)
         paint.show_when(self.end, is_open and access.is_near)
-        self.no.set_word(_("Leave it so") if is_open or not can_open else _("Not now"))
+        self.no.set_word(_("Leave it as it is") if is_open or not can_open else _("Not now"))
         self.setAccessibleName(f"{self.heading.text()} {self.warning.text()}")
 
     def _heading(self, *, is_open: bool, can_open: bool) -> str:
