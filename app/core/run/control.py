@@ -409,6 +409,8 @@ class Runs:
                 return
             wrong = wanted.problems(program)
             if wrong:
+                if wanted.stack is None:
+                    self._run = RunState(nothing_in=program, last_words=self._run.last_words)
                 self._set_errors(wrong)
                 return
             if not program.starts:

@@ -50,7 +50,7 @@ class RunState:
     finished: bool = False
     dashed: bool = False
     errors: Mapping[str, str] = field(default_factory=dict)
-    nothing_in: object = None  # the program that Run was pressed for and that had nothing to run
+    nothing_in: object = None  # the program that Run was pressed for: it had nothing to run, or `errors`
     last_words: str = ""
 
     def elapsed(self, now: float) -> float:
@@ -170,11 +170,15 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
     }
     if run.state in views:
         return views[run.state](run, now)
-    title = _("Nothing to run yet") if run.nothing_in else _("Ready")
+    title, detail = _("Ready"), connected_words(connected, coming)
+    if run.nothing_in and run.errors:
+        title, detail = _("Not started"), next(iter(run.errors.values()))
+    elif run.nothing_in:
+        title, detail = _("Nothing to run yet"), _(NOTHING)
     return RunView(
         "ready",
         title,
-        _(NOTHING) if run.nothing_in else connected_words(connected, coming),
+        detail,
         title,
         can_run=True,
         can_step=True,

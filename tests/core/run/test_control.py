@@ -127,6 +127,20 @@ def test_another_behaviour_takes_the_hint_away(session: Session) -> None:
     until(lambda: title_at_next_tick(session) == "Ready")
 
 
+def test_run_with_a_problem_says_why_it_did_not_start_until_it_is_mended(session: Session) -> None:
+    wait = {"type": "control_wait", "id": "wait"}
+    hat = {"type": "events_started", "id": "hat", "next": {"block": wait}}
+    session.document.edited({"blocks": {"blocks": [hat]}})
+    session.runs.run()
+    assert not session.runs.active
+    view = session.runs.view()
+    assert (view.state, view.title) == ("ready", "Not started")
+    assert "needs a number" in view.detail
+    assert session.runs.block_errors == {"wait": view.detail}
+    session.document.edited({"blocks": {"blocks": [{"type": "events_started", "id": "hat"}]}})
+    until(lambda: title_at_next_tick(session) == "Ready")
+
+
 def test_the_view_is_made_once_a_tick_and_again_when_something_is_done(session: Session) -> None:
     runs = session.runs
     before = runs.view()

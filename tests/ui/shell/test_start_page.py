@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QLabel, QScrollArea
 
 from app import resources
 from app.core.storage.settings import RecentFile
@@ -156,6 +156,15 @@ def test_help_leads_to_examples_that_are_in_sight(qtbot, page: StartPage) -> Non
     page.focus_examples()
     for card in page.example_cards:
         qtbot.waitUntil(lambda card=card: card.visibleRegion().boundingRect() == card.rect())
+
+
+def test_who_comes_back_after_the_examples_sees_the_top(qtbot, page: StartPage) -> None:
+    page.resize(1100, 500)
+    bar = page.findChild(QScrollArea).verticalScrollBar()
+    page.focus_examples()
+    qtbot.waitUntil(lambda: bar.value() > 0)
+    page.focus_first()
+    assert bar.value() == 0
 
 
 def test_open_rows_stay_while_nothing_changed(page: StartPage) -> None:

@@ -372,7 +372,8 @@ class StartPage(QWidget):
             self.offer_first_steps(False)
 
     def focus_first(self) -> None:
-        """Give the keyboard to the button that most people want."""
+        """Give the keyboard to the button that most people want; the page begins at its top."""
+        self._area.verticalScrollBar().setValue(0)
         rows = self.open_work.rows
         first = self._learn if self._offers else self._use
         (rows[0] if rows else first).setFocus(Qt.FocusReason.OtherFocusReason)
