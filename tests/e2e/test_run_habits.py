@@ -65,8 +65,8 @@ def test_f5_and_the_button_restart(turning: Studio) -> None:
     turning.screen.key("F5")
     until(lambda: only_another(turning, first, second), "the key restarts, too")
     turning.screen.key("F12")
+    until(lambda: not programs(turning), "the program has ended")
     turning.says("Pepper stopped (")
-    assert not programs(turning)
 
 
 def test_an_edit_while_it_runs_says_when_it_applies(turning: Studio) -> None:

@@ -11,6 +11,7 @@ import os
 import sys
 import threading
 import time
+from typing import NamedTuple
 
 CELL_ROLE = 0x0100  # Qt.UserRole: what a cell of our tables shows
 TABLE_ROWS = 200
@@ -150,29 +151,66 @@ def _script(request, reply) -> None:
 
 
 def _web_views():
+    """The pages that can be seen."""
     from PySide6.QtWidgets import QApplication
 
-    kind = getattr(sys.modules.get("PySide6.QtWebEngineWidgets"), "QWebEngineView", None)
+    kind = _web_view()
     views = [each for each in QApplication.allWidgets() if kind is not None and isinstance(each, kind)]
     return [view for view in views if view.isVisible()]
 
 
+def _web_view():
+    """The class of such a page; None before the first."""
+    return getattr(sys.modules.get("PySide6.QtWebEngineWidgets"), "QWebEngineView", None)
+
+
+class _Around(NamedTuple):
+    """What a widget has from those around it, so that nobody asks for it again for each widget in them."""
+
+    shown: object = None  # the part of the screen that they leave, a QRect
+    panel: str = ""
+    is_fresh: bool = False  # in a banner that has just come and lets presses through: nobody aimed at it
+
+
 def _widgets(application) -> list[dict]:
-    """Every widget that can be seen, windows first."""
+    """Every widget that can be seen, windows first. Quick: the window can do nothing else meanwhile."""
     from PySide6.QtWidgets import QWidget
 
-    seen = []
+    seen, focus, kind = [], application.focusWidget(), _web_view()
+
+    def walk(widget, around: _Around) -> None:
+        around = _inside(widget, around)
+        seen.append(_tell(widget, around, focus, kind))
+        for child in widget.children():
+            if isinstance(child, QWidget) and child.isVisible() and not child.isWindow():
+                walk(child, around)
+
     for window in application.topLevelWidgets():
         if window.isVisible():
-            inside = [widget for widget in window.findChildren(QWidget) if widget.isVisible()]
-            seen += [_tell(widget, application) for widget in (window, *inside)]
+            walk(window, _Around())
     return seen
 
 
-def _tell(widget, application) -> dict:
+def _inside(widget, around: _Around) -> _Around:
+    """What those have around them that are in this widget."""
+    from PySide6.QtCore import QPoint, QRect, Qt
+    from PySide6.QtWidgets import QDockWidget
+
+    place = QRect(widget.mapToGlobal(QPoint(0, 0)), widget.size())
+    shown = place if around.shown is None else place & around.shown
+    panel, is_fresh = around.panel, around.is_fresh
+    if isinstance(widget, QDockWidget):
+        panel = widget.objectName().removeprefix("panel.")
+    if type(widget).__name__ == "AlertBanner":
+        is_fresh = widget.testAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+    return _Around(shown, panel, is_fresh)
+
+
+def _tell(widget, around: _Around, focus, web_view) -> dict:
     from PySide6.QtCore import QRect
     from PySide6.QtWidgets import QAbstractItemView, QMenu, QMenuBar
 
+    shown = around.shown
     told = {
         "kind": type(widget).__name__,
         "name": widget.accessibleName(),
@@ -180,15 +218,15 @@ def _tell(widget, application) -> dict:
         "object": widget.objectName(),
         "text": _text(widget),
         "tip": widget.toolTip(),
-        "rect": _shown(widget),
+        "rect": [shown.x(), shown.y(), shown.width(), shown.height()],
         "enabled": widget.isEnabled(),
-        "takes_mouse": not _is_in_fresh_banner(widget),
-        "focus": widget is application.focusWidget(),
+        "takes_mouse": not around.is_fresh,
+        "focus": widget is focus,
         "checked": bool(getattr(widget, "isChecked", bool)()),
-        "in": _panel(widget),
+        "in": around.panel,
         "window": widget.isWindow(),
     }
-    if widget in _web_views():
+    if web_view is not None and isinstance(widget, web_view):
         told["pid"] = widget.page().renderProcessPid()
     if isinstance(widget, QAbstractItemView):
         told["rows"] = _rows(widget)
@@ -202,30 +240,6 @@ def _tell(widget, application) -> dict:
     return told
 
 
-def _is_in_fresh_banner(widget) -> bool:
-    """Whether it is in a banner that has just come and lets presses through: nobody aimed at it."""
-    from PySide6.QtCore import Qt
-
-    above = widget
-    while above is not None and type(above).__name__ != "AlertBanner":
-        above = above.parentWidget()
-    return above is not None and above.testAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-
-
-def _shown(widget) -> list[int]:
-    """Where it is on the screen, without what its parents cut off."""
-    from PySide6.QtCore import QRect
-
-    def place(each):
-        return QRect(each.mapToGlobal(each.rect().topLeft()), each.size())
-
-    shown, above = place(widget), widget
-    while not above.isWindow() and above.parentWidget() is not None:
-        above = above.parentWidget()
-        shown &= place(above)
-    return [shown.x(), shown.y(), shown.width(), shown.height()]
-
-
 def _text(widget) -> str:
     for name in ("text", "toPlainText", "title", "words"):
         ask = getattr(widget, name, None)
@@ -237,14 +251,6 @@ def _text(widget) -> str:
             if isinstance(value, str):
                 return value
     return ""
-
-
-def _panel(widget) -> str:
-    from PySide6.QtWidgets import QDockWidget
-
-    while widget is not None and not isinstance(widget, QDockWidget):
-        widget = widget.parentWidget()
-    return widget.objectName().removeprefix("panel.") if widget is not None else ""
 
 
 def _rows(view) -> list[dict]:
