@@ -249,14 +249,18 @@ class Launcher:
     def check(self) -> None:
         """Notice processes that ended by themselves (called once in a while by the session's tick)."""
         with self._lock:
-            ended = [name for name, (process, _log) in self._robots.items() if process.poll() is not None]
-            for name in ended:
+            codes = {name: process.poll() for name, (process, _log) in self._robots.items()}
+            for name, code in codes.items():
+                if code is None:
+                    continue
                 _process, log = self._robots.pop(name)
                 self.ended |= {name}
                 self._coming.pop(name, None)
                 self._post_event(
                     LaunchFailed(
-                        name, _("The virtual robot {robot} has ended.").format(robot=name), _tail(log)
+                        name,
+                        _("The virtual robot {robot} has ended.").format(robot=name),
+                        _tail(log) or _silent_end(code),
                     )
                 )
                 log.close()
@@ -276,6 +280,13 @@ def _end(process: Process) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+
+
+def _silent_end(code: int) -> str:
+    """What is known of a process that ended without a word; a negative code is the number of a signal."""
+    if code < 0:
+        return _("Something else on this computer ended it.")
+    return _("It did not say why (exit code {code}).").format(code=code)
 
 
 def _tail(log: IO[bytes]) -> str:

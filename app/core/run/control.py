@@ -11,7 +11,7 @@ from functools import partial
 from typing import Protocol
 
 from app.blocks.compiler.stack import Stack
-from app.blocks.model.program import Variable
+from app.blocks.model.program import Program, Variable
 from app.blocks.runtime.variables import VariableValue
 from app.core.alerts import Alerts
 from app.core.console import Console
@@ -407,14 +407,7 @@ class Runs:
             program = wanted.program()
             if program is None:
                 return
-            wrong = wanted.problems(program)
-            if wrong:
-                if wanted.stack is None:
-                    self._run = RunState(nothing_in=program, last_words=self._run.last_words)
-                self._set_errors(wrong)
-                return
-            if not program.starts:
-                self._run = RunState(nothing_in=program, last_words=self._run.last_words)
+            if not self._can_begin(wanted, program):
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
             asked = wanted_by(program, used)
@@ -451,6 +444,16 @@ class Runs:
         self._run = RunState("running", title, started_s=self._clock(), last_words=last, trying=trying)
         said = _("trying “{block}”").format(block=trying) if trying else _("started")
         self._console.add("info", self._run.name, said)
+
+    def _can_begin(self, wanted: Wanted, program: Program) -> bool:
+        """Whether there is something to run and nothing to mend first; else the run bar says why not."""
+        wrong = wanted.problems(program)
+        if program.starts and not wrong:
+            return True
+        if wanted.stack is None or not wrong:  # what is wrong with a block that is tried stands at the block
+            self._run = RunState(nothing_in=program, last_words=self._run.last_words)
+        self._set_errors(wrong)
+        return False
 
     def _begin_now(self, wanted: Wanted) -> None:
         """A person has answered that the robots may move; nothing else was begun meanwhile."""

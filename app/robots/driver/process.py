@@ -72,19 +72,28 @@ def tell_briefly() -> None:
 def run(
     kind: Kind, name: str, ended: threading.Event, *, master: str | None = None, owner_pid: int | None = None
 ) -> None:
-    """Drive a robot until `ended` is set or the owner is gone; then stop it and leave the network."""
+    """Drive a robot until `ended` is set or the owner is gone; then stop it and leave the network.
+
+    Who started it in a terminal is told how it goes; an owner hears that over the network, and takes what it
+    prints for why it ended.
+    """
     owner = _process(owner_pid)
     if owner_pid is not None and owner is None:
         return
     address = master_address(master)
     with Terminal(sys.stdout) as said, nep.node(name, master=master) as node, _published(node):
         driver = Driver(kind, name, node)
+
+        def say(sentence: str) -> None:
+            if owner is None:
+                _say(sentence, said)
+
         words = (
             _("{robot}: a robot, model virtual {model}; its topics are {topics}")
             if kind.virtual
             else _("{robot}: a robot, model {model}; its topics are {topics}")
         )
-        _say(words.format(robot=name, model=kind.model, topics=topic_of(name, "...")), said)
+        say(words.format(robot=name, model=kind.model, topics=topic_of(name, "...")))
         has_waited = False
         try:
             while not _started(driver):
@@ -93,7 +102,7 @@ def run(
                         "{robot}: no master answers at {address}; waiting for one, "
                         "start Studio or `nep master`"
                     )
-                    _say(words.format(robot=name, address=address), said)
+                    say(words.format(robot=name, address=address))
                 has_waited = True
                 if _over(ended, owner):
                     return
@@ -102,7 +111,7 @@ def run(
                 if has_waited
                 else _("{robot}: the master is at {address}; the robot is ready, Ctrl+C ends it")
             )
-            _say(words.format(robot=name, address=address), said)
+            say(words.format(robot=name, address=address))
             while not _over(ended, owner):
                 ended.wait(_OWNER_CHECK_S)
         finally:

@@ -82,12 +82,14 @@ def test_it_ends_with_its_owner(network):
         assert robot.poll() is None
         owner.kill()
         owner.wait()
+        assert robot.stdout is not None
+        said = robot.stdout.read()
         code, errors = ended(robot)
     finally:
         owner.kill()
         owner.communicate()
         ended(robot)
-    assert (code, errors) == (0, "")
+    assert (code, errors, said) == (0, "", ""), "what it prints is taken for why it ended"
     eventually(lambda: not has_robot(network))
 
 

@@ -73,6 +73,15 @@ def test_a_new_note_has_the_keys_stands_beside_its_block_and_keeps_what_is_typed
     assert "Inter" in them.ask(f"{shown}.fontFamily")
 
 
+def test_where_the_page_is_full_a_new_note_is_brought_into_sight(view, them):
+    view.resize(420, 300)
+    them.wait_for("innerHeight", 300)
+    add_note(them)
+    sheet, room = them.box(".nepNote .blocklyDraggable"), them.box(".blocklySvg")
+    assert room["left"] <= sheet["left"] < sheet["right"] <= room["right"]
+    assert room["top"] <= sheet["top"] < sheet["bottom"] <= room["bottom"]
+
+
 def test_what_is_typed_stays_when_another_tab_comes(qtbot, view, them):
     view.show_tab("one", them.newest())
     them.wait_for("!!document.querySelector('.nepTab:not([hidden]) [data-id=first]')")

@@ -109,6 +109,17 @@ def test_one_that_ends_by_itself_says_its_last_words_once(launcher: Launcher, st
     assert (launcher.virtual_robots, launcher.ended) == (("Pepper",), frozenset())
 
 
+def test_one_that_was_ended_from_outside_says_so(launcher: Launcher, started_here, told) -> None:
+    launcher.start_virtual_robot("Pepper")
+    killed = started_here.made[0]
+    killed.kill()
+    killed.wait(60)
+    launcher.check()
+    (failed,) = told
+    ended = "Something else on this computer ended it."
+    assert failed.detail == (ended if os.name == "posix" else "It did not say why (exit code 1).")
+
+
 def test_one_that_is_started_anew_is_another_process(launcher: Launcher, started_here, told) -> None:
     launcher.start_virtual_robot("Pepper")
     launcher.restart_virtual_robot("Pepper")

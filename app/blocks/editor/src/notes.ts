@@ -6,13 +6,15 @@ import {freePlace, inSight, obstacles} from './free_place';
 import {drawIcon} from './icons';
 import {t} from './words';
 
-const {Coordinate, Size} = Blockly.utils;
+const {Coordinate, Rect, Size} = Blockly.utils;
 const SVG = 'http://www.w3.org/2000/svg';
 const SIGN = 20;
 const HEAD = 26;
 const BORDER = 6;
 const FROM_BLOCK = 26;
 const GAP = 12;
+/** From a new note to the edge of what can be seen, beside a scrollbar. */
+const IN_SIGHT = 24;
 const FIRST_SIZE = [230, 128] as const;
 const TYPED_MS = 200;
 const FONT = 14;
@@ -381,7 +383,11 @@ export async function addNote(block: Blockly.BlockSvg): Promise<void> {
   if (!(sign instanceof NoteSign)) return;
   await sign.setBubbleVisible(true);
   const sheet = sign.getBubble();
-  if (sheet instanceof Sheet) Blockly.getFocusManager().focusNode(sheet.getEditor());
+  if (!(sheet instanceof Sheet)) return;
+  Blockly.getFocusManager().focusNode(sheet.getEditor());
+  const {x, y} = sheet.getRelativeToSurfaceXY();
+  const {width, height} = sheet.getSize();
+  block.workspace.scrollBoundsIntoView(new Rect(y, y + height, x, x + width), IN_SIGHT);  // where all is full it is far off
 }
 
 /** A note on the canvas itself, at a place of the page. */
