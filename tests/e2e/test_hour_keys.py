@@ -31,7 +31,8 @@ def test_the_hour_with_the_keyboard_alone(start: Callable[..., Studio], tmp_path
     studio = start(HOME=str(home))
     studio.screen = KeysOnly(studio.screen.display)
     film, fingers = Film(studio, "hour-keys", tmp_path), Fingers(studio)
-    studio.says("What would you like to do?")
+    with film.step("The start page asks what you would like to do"):
+        studio.says("What would you like to do?")
     first_steps(studio, film, fingers)
     with nep.node("listener", master=address) as node:
         ears = Ears(node)
@@ -316,6 +317,7 @@ def restore(studio: Studio, film: Film, fingers: Fingers) -> None:
         until(lambda: len(tabs(studio)) == 3, lambda: f"{tabs(studio)}")
         assert tabs(studio)[0].startswith("Quiz")
         until(lambda: len(kind_of(studio, "robot_pepper_do_turn")) == 2, "the one that was worked on shows")
+        studio.says("2 robots", 60)  # they come back, too
 
 
 def take_back(studio: Studio, film: Film, fingers: Fingers) -> None:

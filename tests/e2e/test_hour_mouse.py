@@ -311,6 +311,7 @@ def come_back_after_a_crash(hour: Hour, start: Callable[..., Studio]) -> None:
         studio.click("Put it back")
         until(lambda: blocks_of(studio) == before, "every block is back")
         assert tabs(studio) == names
+        studio.says("2 robots", 60)  # they come back, too
 
 
 def take_out_of_the_bin(hour: Hour) -> None:
