@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.table_panel import TablePanel, TableWords
-from app.ui.widgets import EmptyAction, IconButton, label
+from app.ui.widgets import ElidedLabel, EmptyAction, IconButton
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import Cell, Column, Order, TableModel
 from app.ui.widgets.table.view import TableView
@@ -127,7 +127,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         self.clock: Callable[[], float] = time.monotonic
         self.add = IconButton(self.theme, "plus", _("New variable"), size=26)
         self.add.clicked.connect(lambda: context.run("variable.new"))
-        self.when = label("", "body", role="textSecondary")
+        self.when = ElidedLabel("body", "textSecondary")
         self.header = [self.when, self.filter, self.add]
         self.table.horizontalHeader().hide()  # a name and its value need no heading, and the panel is low
         self.table.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)

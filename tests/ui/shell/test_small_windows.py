@@ -338,3 +338,22 @@ def test_a_menu_that_is_too_large_to_go_aside_is_narrower() -> None:
     assert beside(QRect(0, 0, 1000, 590), STOP, SCREEN) == QRect(0, 0, 780, 590)
     early = QRect(100, 50, 230, 52)  # left of this there is no room for words
     assert beside(QRect(0, 0, 1000, 590), early, SCREEN) == QRect(0, 0, 1000, 590)
+
+
+@pytest.mark.parametrize("wide", [24, 34, 90])
+def test_a_count_on_a_tab_is_whole_however_narrow_it_is(qtbot, theme: Theme, wide: int) -> None:
+    tab = TitleTab(theme, "Problems", "triangle-alert", False)
+    qtbot.addWidget(tab)
+    tab.set_bare(True)
+    tab.show_badge(("2", "error"))
+    tab.resize(wide, 30)
+    tab.show()
+    picture, ring = tab.grab().toImage(), theme.colour(theme.status("error").colour)
+
+    def is_ring(x: int) -> bool:
+        seen = picture.pixelColor(x, 15)
+        return abs(seen.red() - ring.red()) + abs(seen.blue() - ring.blue()) < 40
+
+    near = [x for x in range(picture.width()) if is_ring(x)]
+    assert near[-1] - near[0] >= 15, "both sides of the ring are there"
+    assert near[0] >= 1

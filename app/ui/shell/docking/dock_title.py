@@ -90,7 +90,8 @@ class TitleTab(PaintedButton):
             side = theme.scaled(ICON)
             square = QRectF(0, 0, side, side)
             square.moveCenter(room.center())
-            paint_icon(painter, square, self._icon, ink)
+            if room.width() >= side or not self.badge:  # a count says more than a part of an icon
+                paint_icon(painter, square, self._icon, ink)
         else:
             paint.words(painter, room, self.text(), theme.font("title"), ink, paint.CENTRE)
         if self.badge:
@@ -98,7 +99,8 @@ class TitleTab(PaintedButton):
 
     def _paint_badge(self, painter: QPainter, rect: QRectF, words: str, status: str) -> None:
         theme, high, wide = self._theme, self._theme.scaled(BADGE), self._badge_width()
-        place = QRectF(rect.right() - wide - 8, rect.center().y() - high / 2, wide, high)
+        left = max(rect.left() + 1, rect.right() - wide - 8)  # squeezed, it is whole all the same
+        place = QRectF(left, rect.center().y() - high / 2, min(wide, rect.width() - 2), high)
         look = theme.status(status)
         paint.box(painter, place, high / 2, theme.colour(look.tint or "sunken"), theme.colour(look.colour))
         paint.words(painter, place, words, theme.font("caption"), theme.colour(look.colour), paint.CENTRE)
