@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from PySide6.QtGui import QShowEvent
+
 from app.ui.panels.base import PanelContext, PanelWidget
 
 if TYPE_CHECKING:
@@ -25,6 +27,11 @@ class OneRobotPanel(PanelWidget):
         self._shown: object = None  # what `key_of` said of it
         self._watch: Watch | None = None
         self._revision = -1
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if self.session.fleet.revision != self._revision:
+            self.refresh()  # before it is painted: until the next tick it would say that no robot is there
 
     def refresh(self) -> None:
         fleet = self.session.fleet

@@ -67,7 +67,8 @@ def test_a_file_runs_to_its_end_and_the_robot_has_stopped(pepper, saved):
     assert "“Test” runs" in out
     assert "done" in out.splitlines()
     assert "Pepper stopped (" in out
-    assert pepper.commands[-1]["op"] == "stop"
+    told = [command["op"] for command in pepper.commands]
+    assert [op for op in told if op != "alive"][-1] == "stop"  # a sign of life may come between
 
 
 def test_a_failing_block_is_told(pepper, saved):
@@ -309,7 +310,8 @@ def test_the_program_text_runs_as_a_file(master, pepper, tmp_path):
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
     assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
-    assert pepper.commands[-1]["op"] == "stop"
+    told = [command["op"] for command in pepper.commands]
+    assert [op for op in told if op != "alive"][-1] == "stop"  # a sign of life may come between
 
 
 class Lost(io.StringIO):
@@ -336,7 +338,8 @@ def test_an_output_that_is_gone_stops_the_behaviour_and_its_robots(pepper, saved
     path = saved(workspace(started(say("Hi"), write(text("one")), write(text("two")), say("never"))))
     assert run_file(path, out=Lost(number, 1)) == FAILED
     assert capsys.readouterr().err == said
-    assert pepper.commands[-1]["op"] == "stop"
+    told = [command["op"] for command in pepper.commands]
+    assert [op for op in told if op != "alive"][-1] == "stop"  # a sign of life may come between
     assert "never" not in [each.get("input") for each in pepper.commands]
 
 

@@ -82,3 +82,14 @@ def test_a_toast_goes_once_what_it_says_has_happened(qtbot, theme: Theme) -> Non
     toast.say("Copied")
     toast.refresh()
     assert toast.isVisible()
+
+
+@pytest.mark.parametrize("panel", [camera.PANEL, health.PANEL, robot.PANEL, robots.PANEL, sensors.PANEL])
+def test_a_panel_that_opens_shows_the_robot_at_once(qtbot, panel) -> None:
+    made = panel.make(Window(fakes.Session.full()).context())
+    qtbot.addWidget(made)
+    for widget in made.header_widgets():
+        widget.setParent(made)
+    made.show()  # the next tick is not waited for
+    assert not made.empty.isVisible(), "for a moment it would say that no robot is connected"
+    made.shut()

@@ -64,7 +64,7 @@ ANSWERED, SILENT = RobotStop("Rover", True, 41.4), RobotStop("Turtle", False, No
 RUNS = (
     RunState(),
     RunState(nothing_in=object()),
-    RunState(nothing_in=object(), errors={"a": "Xx"}),
+    RunState(nothing_in=object(), errors={"a": "Greeting"}),
     RunState("running", "Greeting", last_words="Rover"),
     RunState("paused", "Greeting"),
     RunState("stopping", "Greeting", asked=("Rover", "Turtle"), answered=(ANSWERED,), elapsed_s=3.0),
