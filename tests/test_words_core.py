@@ -78,6 +78,7 @@ def test_the_run_bar_in_all_states() -> None:
         RunState(),
         RunState(nothing_in=object()),
         RunState(nothing_in=object(), errors={"a": "Xx"}),
+        RunState("running", "Greeting", begun=False),
         RunState("running", "Greeting"),
         RunState("paused", "Greeting"),
         RunState("paused", "Greeting", paused_at="Xx"),

@@ -326,7 +326,7 @@ class Runs:
         """Take over what the program's process said; what an earlier run still says is ignored."""
         if self._runner is None or event.run != self._runner.run:
             return
-        run = self._run
+        run = self._begun(event)
         self.asking.take(event)
         match event.kind:
             case "running" if run.state in {"running", "paused"}:
@@ -355,6 +355,12 @@ class Runs:
                 self._show_values({**self.values, **{value.id: value for value in event.values}})
             case "ended":
                 self._on_end(event)
+
+    def _begun(self, event: RunnerEvent) -> RunState:
+        """The state of the run, whose clock begins with the first that is heard of its scripts."""
+        if event.kind in {"running", "paused"} and self.active and not self._run.begun:
+            self._run = replace(self._run, begun=True, started_s=self._clock())
+        return self._run
 
     def on_stop(self, event: StopDone | RobotAnswered | OneStopped | LateAnswer) -> None:
         """Take over what robots answered to the newest stop."""
@@ -441,7 +447,10 @@ class Runs:
         trying = self._trial.start(program, used)
         last = self._run.last_words
         title = self._documents.title(document)
-        self._run = RunState("running", title, started_s=self._clock(), last_words=last, trying=trying)
+        started_s = self._clock()
+        self._run = RunState(
+            "running", title, begun=False, started_s=started_s, last_words=last, trying=trying
+        )
         said = _("trying “{block}”").format(block=trying) if trying else _("started")
         self._console.add("info", self._run.name, said)
 

@@ -26,7 +26,8 @@ class RunState:
     know before a paused program goes on. Times are monotonic seconds; the program's clock stands while it is
     paused (``held_s``, ``pause_began_s``). ``again``: the stop before this one is not proven. ``restarts``:
     something is run as soon as this stop is proven. ``edited``: the behaviour is not what runs any more.
-    ``trying``: the words of the block that is tried alone, ``value`` what it gave.
+    ``trying``: the words of the block that is tried alone, ``value`` what it gave. ``begun``: its scripts
+    run, so that it feels what happens to robots; its process is there some tenths of a second before.
     """
 
     state: str = "ready"
@@ -34,6 +35,7 @@ class RunState:
     says: str = ""
     paused_at: str = ""
     warning: str = ""
+    begun: bool = True
     started_s: float = 0.0
     held_s: float = 0.0
     pause_began_s: float | None = None
@@ -144,6 +146,8 @@ def _named(view: RunView, run: RunState, now: float) -> RunView:
         # just pressed: the words of before stay, and what ran has its time
         if run.state == "stopping" and run.elapsed_s is None:
             return replace(view, title=_("{name} is ready").format(name=run.name))
+        if not run.begun:
+            return replace(view, title=_("{name} is starting").format(name=run.name))
         elapsed = run.elapsed_s if run.state == "stopping" and run.elapsed_s is not None else run.elapsed(now)
         return replace(view, title=_("{name} runs, {time}").format(name=run.name, time=seconds(elapsed)))
     if view.state == "paused":
@@ -187,12 +191,15 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
 
 
 def _running(run: RunState, now: float) -> RunView:
+    title, compact = _("Starting"), _("{name} is starting")
+    if run.begun:
+        title, compact = _("Running, {time}"), _("{name} runs, {time}")
     time_words = seconds(run.elapsed(now))
     return RunView(
         "running",
-        _("Running, {time}").format(time=time_words),
+        title.format(time=time_words),
         _(APPLIES_LATER) if run.edited else run.says,
-        _("{name} runs, {time}").format(name=run.name, time=time_words),
+        compact.format(name=run.name, time=time_words),
         can_pause=True,
         can_step=True,
         can_restart=True,

@@ -36,6 +36,11 @@ def test_running_tells_its_time_and_what_happens() -> None:
     assert (view.title, view.detail) == ("Running, 14 s", "Pepper says “Touch my head.”")
     assert view.compact == "Greeting runs, 14 s"
     assert (view.can_run, view.can_pause, view.can_step) == (False, True, True)
+    early = view_of(replace(run, begun=False, says=""), ["Pepper"], 100.1)
+    assert (early.title, early.detail, early.compact) == ("Starting", "", "Greeting is starting")
+    assert (early.state, early.can_pause) == ("running", True)
+    elsewhere = view_of(replace(run, begun=False), ["Pepper"], 100.1, elsewhere=True)
+    assert elsewhere.title == "Greeting is starting"
 
 
 def test_a_paused_program_says_what_go_on_will_leave_out() -> None:

@@ -159,8 +159,10 @@ def test_run_pause_step_go_on_and_stop(run: Run) -> None:
     assert (shown(run), runs.active) == (READY, False)
     runs.run()
     assert (shown(run), runs.active) == (RUNNING, True)
+    assert runs.view().title == "Starting", "nothing of its program was heard yet"
     assert runs.document is run.session.document
     run.works("c")
+    assert runs.view().title.startswith("Running, ")
     runs.pause()
     tick_until(run.session, lambda: runs.view().state == "paused")
     assert (shown(run), runs.active) == (PAUSED, True)

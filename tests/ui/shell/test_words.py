@@ -65,6 +65,7 @@ RUNS = (
     RunState(),
     RunState(nothing_in=object()),
     RunState(nothing_in=object(), errors={"a": "Greeting"}),
+    RunState("running", "Greeting", begun=False),
     RunState("running", "Greeting", last_words="Rover"),
     RunState("paused", "Greeting"),
     RunState("stopping", "Greeting", asked=("Rover", "Turtle"), answered=(ANSWERED,), elapsed_s=3.0),
