@@ -410,10 +410,8 @@ class Runs:
         self._set_errors({})
         self._mark()
         try:
-            program = wanted.program()
+            program = self._what_runs(wanted)
             if program is None:
-                return
-            if not self._can_begin(wanted, program):
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
             asked = wanted_by(program, used)
@@ -445,24 +443,21 @@ class Runs:
         self._console.leave_out(runner.pid)
         self._edits.ran(document if wanted.stack is None else None, program)
         trying = self._trial.start(program, used)
-        last = self._run.last_words
-        title = self._documents.title(document)
-        started_s = self._clock()
-        self._run = RunState(
-            "running", title, begun=False, started_s=started_s, last_words=last, trying=trying
-        )
+        run = RunState("running", self._documents.title(document), begun=False, trying=trying)
+        self._run = replace(run, started_s=self._clock(), last_words=self._run.last_words)
         said = _("trying “{block}”").format(block=trying) if trying else _("started")
         self._console.add("info", self._run.name, said)
 
-    def _can_begin(self, wanted: Wanted, program: Program) -> bool:
-        """Whether there is something to run and nothing to mend first; else the run bar says why not."""
-        wrong = wanted.problems(program)
-        if program.starts and not wrong:
-            return True
+    def _what_runs(self, wanted: Wanted) -> Program | None:
+        """The program, when there is something to run and nothing to mend; else the bar says why not."""
+        program = wanted.program()
+        wrong = {} if program is None else wanted.problems(program)
+        if program is None or (program.starts and not wrong):
+            return program
         if wanted.stack is None or not wrong:  # what is wrong with a block that is tried stands at the block
             self._run = RunState(nothing_in=program, last_words=self._run.last_words)
         self._set_errors(wrong)
-        return False
+        return None
 
     def _begin_now(self, wanted: Wanted) -> None:
         """A person has answered that the robots may move; nothing else was begun meanwhile."""
@@ -558,9 +553,7 @@ class Runs:
 
         if runner is not None:
             if stopper is not None:
-                with log_errors(
-                    "tell the robots at once"
-                ):  # they are told again below, also those without `ends`
+                with log_errors("tell the robots at once"):  # told again below, also those without `ends`
                     stopper.send_stop(ends=ends)
             with log_errors("end the program"):
                 runner.stop()
