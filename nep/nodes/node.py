@@ -89,7 +89,9 @@ class Node:
         self._wait_s = seconds("wait_s", wait_s)
         self._lock = threading.RLock()
         self._stop_spin = threading.Event()
-        self._callbacks: tuple[tuple[Subscriber, SubscriberTransport, Callable[[Any], object]], ...] = ()
+        self._callbacks: tuple[
+            tuple[Subscriber, SubscriberTransport, Callable[[Any], object], bool], ...
+        ] = ()
         self._publishers: set[Publisher] = set()
         self._subscribers: set[Subscriber] = set()
         self._is_closed = False
@@ -218,10 +220,21 @@ class Node:
         msg_type: str,
         callback: Callable[[Any], object],
         configuration: Configuration | None = None,
+        *,
+        keep: Keep = "all",
+        max_messages: int = MAX_MESSAGES,
+        with_message: bool = False,
     ) -> Subscriber:
-        """A subscriber whose payloads are given to `callback`, in the thread that calls `spin`."""
+        """A subscriber whose payloads are given to `callback`, in the thread that calls `spin`.
+
+        `keep` and `max_messages` as for `new_sub`: with `keep="latest"` a callback that is slower than the
+        topic gets the newest message each time and never falls behind. `with_message`: it is given the
+        `Message`, which has the payload, topic, stamp_ns, seq and publisher. A message that cannot be decoded
+        is skipped, logged, and an alert in the graph, either way. Raises as `new_pub` does.
+        """
         transport = self._open_transport()
         function("callback", callback)
+        flag("with_message", with_message)
         number = next(self._numbers)
         spec = SubscriberSpec(
             id_from(self._key, number),
@@ -229,13 +242,15 @@ class Node:
             text("msg_type", msg_type),
             self._configured(configuration),
             self._wait_s,
+            one_of("keep", keep, ("all", "latest")),
+            at_least("max_messages", max_messages, 1),
             number=number,
         )
         incoming = transport.subscriber(spec)
         subscriber = self._subscribed(incoming, spec)
         with self._lock:
             if not incoming.is_closed:
-                self._callbacks = (*self._callbacks, (subscriber, incoming, callback))
+                self._callbacks = (*self._callbacks, (subscriber, incoming, callback, with_message))
         return subscriber
 
     def _configured(self, configuration: object) -> Configuration:
@@ -279,7 +294,9 @@ class Node:
                     return
                 if not self._run_callbacks():
                     waited = [
-                        transport for _sub, transport, _call in self._callbacks if not transport.is_closed
+                        transport
+                        for _sub, transport, _call, _whole in self._callbacks
+                        if not transport.is_closed
                     ]
                     self._transport.wait(waited, left)
             if self._is_forked:
@@ -296,7 +313,7 @@ class Node:
     def _run_callbacks(self) -> bool:
         """One message for each callback that has one; whether there was any."""
         worked = False
-        for subscriber, transport, callback in self._callbacks:
+        for subscriber, transport, callback, with_message in self._callbacks:
             try:
                 message = transport.ready.popleft()
             except IndexError:
@@ -309,7 +326,7 @@ class Node:
                 payload = subscriber.decoded(message)
             except DecodeError:
                 continue  # it is logged and an alert
-            callback(payload)
+            callback(message if with_message else payload)
             if self._stop_spin.is_set() or self._is_closed:
                 break
         return worked

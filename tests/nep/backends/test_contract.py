@@ -272,6 +272,69 @@ def test_callbacks_run_in_the_thread_that_spins(make: Make) -> None:
     assert got == [({"n": n}, threading.current_thread().name) for n in range(3)]
 
 
+def test_a_slow_callback_that_keeps_the_latest_is_never_behind(make: Make) -> None:
+    node, pub = make("b"), make("a").new_pub("example")
+    other = make("c").new_sub("example")
+    got: list[object] = []
+
+    def callback(payload: object) -> None:
+        got.append(payload)
+        if payload == 99:
+            node.stop_spin()
+            return
+        if len(got) == 1:  # meanwhile a hundred are published
+            for n in range(100):
+                pub.publish(n)
+            while other.listen(timeout_s=30.0)[1] != 99:
+                pass
+
+    sub = node.new_callback("example", "json", callback, keep="latest")
+    pub.publish("first")
+    node.spin(30.0)
+    assert (got[0], got[-1]) == ("first", 99)
+    assert len(got) < 50, "what was published meanwhile did not queue up"
+    assert sub.lost == 0
+
+
+def test_a_callback_s_full_inbox_drops_the_oldest_and_counts(make: Make) -> None:
+    node, pub = make("b"), make("a").new_pub("topic")
+    got: list[object] = []
+
+    def callback(payload: object) -> None:
+        got.append(payload)
+        if len(got) == 10:
+            node.stop_spin()
+
+    sub = node.new_callback("topic", "json", callback, max_messages=10)
+    for n in range(100):
+        pub.publish(n)
+    eventually(lambda: sub.received + (sub.lost or 0) == 100)
+    node.spin(30.0)
+    assert got == list(range(90, 100))
+    assert (sub.received, sub.lost) == (10, 90)
+
+
+def test_a_callback_gets_the_whole_message_when_it_wants_it(
+    make: Make, caplog: pytest.LogCaptureFixture
+) -> None:
+    node, pub = make("b"), make("a").new_pub("example")
+    got: list[nep.Message] = []
+
+    def callback(message: nep.Message) -> None:
+        got.append(message)
+        node.stop_spin()
+
+    node.new_callback("example", "json", callback, with_message=True)
+    pub.publish_bytes(b"{no json")
+    pub.publish({"n": 1})
+    node.spin(30.0)
+    (message,) = got
+    assert (message.topic, message.seq, message.publisher) == ("example", 2, pub.id)
+    assert (message.payload, message.msg_type) == ({"n": 1}, "json")
+    assert message.stamp_ns is not None
+    assert "a message on 'example' cannot be read (1 so far): cannot decode 8 bytes" in caplog.text
+
+
 def test_what_a_callback_raises_comes_out_of_spin(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("example")
 

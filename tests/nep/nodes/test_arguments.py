@@ -78,6 +78,24 @@ def test_a_callback_is_a_function(node: nep.Node) -> None:
     assert not node.graph().topics
 
 
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"keep": "last"}, "keep is 'last'; use 'all' or 'latest'"),
+        ({"max_messages": 0}, "max_messages is 0; give a whole number from 1 on"),
+        ({"max_messages": True}, "max_messages is True; give a whole number from 1 on"),
+        ({"with_message": 1}, "with_message is 1; give True or False"),
+        ({"topic": 5}, "a topic is a 'str'"),
+    ],
+)
+def test_a_callback_of_wrong_arguments_is_not_made(
+    node: nep.Node, given: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        node.new_callback(**{"topic": "t", "msg_type": "json", "callback": print, **given})
+    assert not node.graph().topics
+
+
 @pytest.mark.parametrize("time_s", [-1.0, -0.001, math.nan, -math.inf])
 def test_a_time_is_no_less_than_nothing(node: nep.Node, time_s: float) -> None:
     sub, pub = node.new_sub("t"), node.new_pub("t")
