@@ -26,6 +26,7 @@ from nep.messages.message import Message as Message
 from nep.nodes.node import Node as Node
 from nep.nodes.publisher import Publisher as Publisher
 from nep.nodes.subscriber import Subscriber as Subscriber
+from nep.nodes.timer import Timer as Timer
 from nep.protocol.graph_view import Alert as Alert
 from nep.protocol.graph_view import GraphView as GraphView
 from nep.protocol.graph_view import NodeInfo as NodeInfo

@@ -10,7 +10,7 @@ from nep.errors import WrongTypeError
 from nep.i18n import _, listed
 from nep.text import control_in, escaped, shortened
 
-__all__ = ["at_least", "flag", "function", "limit", "one_of", "seconds", "text"]
+__all__ = ["at_least", "flag", "function", "limit", "one_of", "period", "seconds", "text"]
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
@@ -82,6 +82,17 @@ def seconds(name: str, value: object) -> float | None:
             _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=value)
         )
     return None if math.isinf(value) else value
+
+
+def period(name: str, value: object) -> float:
+    """`value` itself when it is seconds above 0, and finite. Raises `ValueError`."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise WrongTypeError(
+            _("{name} is {value}; give seconds, more than 0").format(name=name, value=repr(value))
+        )
+    if not 0.0 < value < math.inf:  # also what is not a number
+        raise ValueError(_("{name} is {value}; give seconds, more than 0").format(name=name, value=value))
+    return value
 
 
 def limit(name: str, value: object) -> float:

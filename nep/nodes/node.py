@@ -29,10 +29,11 @@ from nep.errors import ClosedError, DecodeError, WrongTypeError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.queue import MAX_MESSAGES, Keep
-from nep.nodes.arguments import at_least, flag, function, limit, one_of, seconds, text
+from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
 from nep.nodes.log_handler import LogHandler, handler_of
 from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import SLICE_S, Subscriber
+from nep.nodes.timer import Timer, next_due
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
 from nep.protocol.wire import check_node_name, check_topic
@@ -92,6 +93,8 @@ class Node:
         self._callbacks: tuple[
             tuple[Subscriber, SubscriberTransport, Callable[[Any], object], bool], ...
         ] = ()
+        self._timers: tuple[Timer, ...] = ()
+        self._clock = time.monotonic
         self._publishers: set[Publisher] = set()
         self._subscribers: set[Subscriber] = set()
         self._is_closed = False
@@ -279,25 +282,50 @@ class Node:
 
     # ---- spinning
 
-    def spin(self, timeout_s: float | None = None) -> None:
-        """Run callbacks in this thread until `stop_spin`, `close`, or for `timeout_s` seconds.
+    def new_timer(self, period_s: float, callback: Callable[[], object]) -> Timer:
+        """A timer: `callback` is called every `period_s` seconds, in the thread that calls `spin`.
 
-        What a callback raises comes out here. A `stop_spin` that came before ends the next spin at once. In a
+        So never beside another callback. The first call comes after one period. When it is late, because
+        a callback took long or nobody span, it is called once, not once for each period that passed, and
+        goes on at whole periods. What it raises comes out of `spin`. `Timer.cancel` ends it, and so does
+        closing the node. Raises `ClosedError`, and `ValueError` for a period that is not above 0 or infinite.
+        """
+        transport = self._open_transport()
+        timer = Timer(
+            period("period_s", period_s), function("callback", callback), self._clock, self._forget_timer
+        )
+        with self._lock:
+            if self._is_closed:
+                timer.node_closes()
+            else:
+                self._timers = (*self._timers, timer)
+        transport.wake()  # who spins already waits for less long now
+        return timer
+
+    def _forget_timer(self, timer: Timer) -> None:
+        """It is cancelled."""
+        with self._lock:
+            self._timers = tuple(each for each in self._timers if each is not timer)
+
+    def spin(self, timeout_s: float | None = None) -> None:
+        """Run callbacks and timers in this thread until `stop_spin`, `close`, or for `timeout_s` seconds.
+
+        What they raise comes out here. A `stop_spin` that came before ends the next spin at once. In a
         child that is forked, also by a callback, it raises `ClosedError`.
         """
         timeout_s = seconds("timeout_s", timeout_s)
-        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        deadline = None if timeout_s is None else self._clock() + timeout_s
         try:
             while not self._stop_spin.is_set() and not self._is_closed:
-                left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
+                left = SLICE_S if deadline is None else min(SLICE_S, deadline - self._clock())
                 if left <= 0.0:
                     return
-                if not self._run_callbacks():
-                    waited = [
-                        transport
-                        for _sub, transport, _call, _whole in self._callbacks
-                        if not transport.is_closed
-                    ]
+                has_fired = self._run_timers()
+                if self._run_callbacks() or has_fired:
+                    continue
+                left = min(left, next_due(self._timers) - self._clock())
+                if left > 0.0:
+                    waited = [each[1] for each in self._callbacks if not each[1].is_closed]
                     self._transport.wait(waited, left)
             if self._is_forked:
                 raise self._closed_error()
@@ -310,10 +338,21 @@ class Node:
             self._stop_spin.set()
             self._transport.wake()
 
+    def _run_timers(self) -> bool:
+        """Each timer that is due; whether there was any."""
+        has_fired = False
+        for timer in self._timers:
+            has_fired = timer.run_if_due() or has_fired
+            if self._stop_spin.is_set() or self._is_closed:
+                break
+        return has_fired
+
     def _run_callbacks(self) -> bool:
         """One message for each callback that has one; whether there was any."""
         worked = False
         for subscriber, transport, callback, with_message in self._callbacks:
+            if self._stop_spin.is_set() or self._is_closed:
+                break
             try:
                 message = transport.ready.popleft()
             except IndexError:
@@ -327,8 +366,6 @@ class Node:
             except DecodeError:
                 continue  # it is logged and an alert
             callback(message if with_message else payload)
-            if self._stop_spin.is_set() or self._is_closed:
-                break
         return worked
 
     # ---- what it tells, the graph, and the end
@@ -379,6 +416,9 @@ class Node:
             self._publishers.clear()
             self._subscribers.clear()
             self._callbacks = ()
+            timers, self._timers = self._timers, ()
+        for timer in timers:
+            timer.node_closes()
         return True
 
     def _finish_close(self, timeout_s: float) -> None:
@@ -394,7 +434,10 @@ class Node:
             publisher.forked()
         for subscriber in self._subscribers:
             subscriber.forked()
+        for timer in self._timers:
+            timer.node_closes()
         self._callbacks = ()
+        self._timers = ()
         _alive.discard(self)
         _inherited.append(self)
 

@@ -335,6 +335,53 @@ def test_a_callback_gets_the_whole_message_when_it_wants_it(
     assert "a message on 'example' cannot be read (1 so far): cannot decode 8 bytes" in caplog.text
 
 
+def test_timers_run_in_the_thread_that_spins_and_beside_callbacks(make: Make) -> None:
+    node, pub = make("b"), make("a").new_pub("example")
+    threads: set[int] = set()
+    fired: list[int] = []
+
+    def tick() -> None:
+        threads.add(threading.get_ident())
+        fired.append(len(fired))
+        pub.publish(len(fired))
+
+    def callback(payload: object) -> None:
+        threads.add(threading.get_ident())
+        if payload == 3:
+            timer.cancel()
+            node.stop_spin()
+
+    node.new_callback("example", "json", callback)
+    timer = node.new_timer(0.001, tick)
+    node.spin(30.0)
+    assert len(fired) >= 3
+    assert threads == {threading.get_ident()}
+    count = len(fired)
+    node.spin(0.02)
+    assert (len(fired), timer.is_cancelled) == (count, True)
+
+
+def test_a_timer_that_is_made_while_a_node_spins_runs(make: Make) -> None:
+    node = make("b")
+    spinning = threading.Event()
+    node.new_timer(0.001, spinning.set)
+    thread = threading.Thread(target=node.spin)
+    thread.start()
+    assert spinning.wait(30.0)
+    node.new_timer(0.001, node.stop_spin)
+    thread.join(30.0)
+    assert not thread.is_alive()
+
+
+def test_a_timer_may_close_its_node(make: Make) -> None:
+    node = make("b")
+    timer = node.new_timer(0.001, node.close)
+    node.spin()
+    assert timer.is_cancelled
+    with pytest.raises(nep.ClosedError, match="node 'b' is closed"):
+        node.new_timer(1.0, print)
+
+
 def test_what_a_callback_raises_comes_out_of_spin(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("example")
 

@@ -96,6 +96,14 @@ def test_a_callback_of_wrong_arguments_is_not_made(
     assert not node.graph().topics
 
 
+@pytest.mark.parametrize("period_s", [0, 0.0, -1.0, math.nan, math.inf, None, "1", True])
+def test_a_period_is_more_than_nothing_and_ends(node: nep.Node, period_s: Any) -> None:
+    with pytest.raises(ValueError, match=r"period_s is .*; give seconds, more than 0"):
+        node.new_timer(period_s, print)
+    with pytest.raises(ValueError, match="callback is a 'str'; give a function"):
+        node.new_timer(1.0, "print")  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("time_s", [-1.0, -0.001, math.nan, -math.inf])
 def test_a_time_is_no_less_than_nothing(node: nep.Node, time_s: float) -> None:
     sub, pub = node.new_sub("t"), node.new_pub("t")

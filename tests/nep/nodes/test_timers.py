@@ -1,0 +1,145 @@
+"""Timers by a clock that the test moves: when they are due, and how long spin waits for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+import nep
+from nep.nodes.timer import Timer, next_due
+
+
+class Clock:
+    """Tells the time that it is given."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class Waiting:
+    """The way of a node to the others; to wait is to move the clock."""
+
+    def __init__(self, real: Any, clock: Clock) -> None:
+        self._real = real
+        self._clock = clock
+        self.waits: list[float] = []
+
+    def wait(self, _subscribers: object, timeout_s: float) -> None:
+        self.waits.append(timeout_s)
+        self._clock.now += timeout_s
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._real, name)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def node(clock: Clock) -> Iterator[nep.Node]:
+    with nep.node("timers", "memory", master="timers") as made:
+        made._clock = clock
+        made._transport = Waiting(made._transport, clock)  # type: ignore[assignment]
+        yield made
+
+
+def test_a_late_timer_is_called_once_and_keeps_its_beat(clock: Clock) -> None:
+    calls: list[float] = []
+    timer = Timer(0.5, lambda: calls.append(clock.now), clock)
+    assert not timer.run_if_due()
+    clock.now = 103.25
+    assert [timer.run_if_due(), timer.run_if_due()] == [True, False]
+    assert (calls, timer.due) == ([103.25], 103.5)
+    clock.now = 103.5
+    assert timer.run_if_due()
+    assert timer.due == 104.0
+
+
+def test_who_is_due_first() -> None:
+    clock = Clock()
+    assert next_due([Timer(2.0, print, clock), Timer(0.5, print, clock)]) == 100.5
+    assert next_due([]) == float("inf")
+
+
+def test_spin_waits_no_longer_than_until_the_next_timer(node: nep.Node, clock: Clock) -> None:
+    calls: list[float] = []
+    node.new_timer(0.03125, lambda: calls.append(clock.now))
+    node.spin(0.125)
+    assert calls == [100.03125, 100.0625, 100.09375]
+    assert node._transport.waits == [0.03125] * 4  # type: ignore[attr-defined]
+
+
+def test_a_slow_callback_makes_a_timer_late_and_not_many(node: nep.Node, clock: Clock) -> None:
+    calls: list[str] = []
+
+    def slow() -> None:
+        calls.append("slow")
+        clock.now += 10.0
+
+    node.new_timer(1.0, slow)
+    node.new_timer(0.5, lambda: calls.append("quick"))
+    node.spin(11.0)
+    assert calls == ["quick", "slow", "quick"]
+
+
+def test_what_a_timer_raises_comes_out_of_spin_and_it_goes_on(node: nep.Node, clock: Clock) -> None:
+    def fail() -> None:
+        raise ZeroDivisionError
+
+    timer = node.new_timer(0.5, fail)
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            node.spin(10.0)
+    assert (clock.now, timer.due) == (101.0, 101.5)
+
+
+def test_a_timer_that_another_one_cancels_is_not_called(node: nep.Node) -> None:
+    calls: list[str] = []
+
+    def first() -> None:
+        calls.append("first")
+        second.cancel()
+        second.cancel()
+
+    node.new_timer(0.5, first)
+    second = node.new_timer(0.5, lambda: calls.append("second"))
+    node.spin(0.75)
+    assert calls == ["first"]
+
+
+def test_a_timer_that_stops_spin_is_the_last_thing_that_is_done(node: nep.Node) -> None:
+    got: list[object] = []
+    node.new_callback("t", "json", got.append)
+    pub = node.new_pub("t")
+
+    def stop() -> None:
+        pub.publish(1)
+        node.stop_spin()
+
+    node.new_timer(0.5, stop)
+    node.spin(10.0)
+    assert got == []
+
+
+def test_a_timer_that_is_always_due_leaves_callbacks_their_turn(node: nep.Node) -> None:
+    got: list[object] = []
+
+    def callback(payload: object) -> None:
+        got.append(payload)
+        if len(got) == 3:
+            node.stop_spin()
+
+    node.new_callback("t", "json", callback)
+    pub = node.new_pub("t")
+    for n in range(3):
+        pub.publish(n)
+    node.new_timer(1e-320, lambda: None)
+    node.spin()
+    assert got == [0, 1, 2]
