@@ -1,4 +1,4 @@
-"""`nep topic hz` and `nep topic bw`: how often topics are published, and how much that is."""
+"""`nep topic hz`, `bw` and `delay`: how often topics are published, how much that is, and how late it is."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import typer
 
 from nep.cli.complete import complete_topic
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
-from nep.cli.rate_window import Bandwidth, Frequency, RateWindow
+from nep.cli.rate_window import AgeWindow, Bandwidth, Delay, Frequency, RateWindow
 from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
 from nep.cli.topic_wait import TopicWait, node_for
 from nep.errors import WaitTimeoutError
@@ -85,6 +85,23 @@ def bw(
     _Report(topics, window_s, heads, _traffic_cells).run(count, timeout_s, master, as_json=as_json)
 
 
+def delay(
+    topics: TopicsArgument,
+    window_s: WindowOption = 10.0,
+    count: CountOption = 0,
+    master: MasterOption = None,
+    as_json: JsonOption = False,
+    timeout_s: TimeoutOption = None,
+) -> None:
+    """Show how old messages are when they arrive here. Ctrl+C ends it.
+
+    The age is this computer's clock less the publisher's when it published: between two computers it is wrong
+    by what their clocks differ, and may be below 0. Programs of the original NEP send no time. A message that
+    was kept for whoever subscribes later is as old as it is.
+    """
+    _DelayReport(topics, window_s).run(count, timeout_s, master, as_json=as_json)
+
+
 class _Report:
     """Windows of some topics, and a report of them every second."""
 
@@ -93,13 +110,14 @@ class _Report:
         topics: Sequence[str],
         window_s: float,
         heads: Sequence[str],
-        figures: Callable[[RateWindow, float], tuple[Frequency | Bandwidth | None, Sequence[str]]],
+        figures: Callable[[RateWindow, float], tuple[Frequency | Bandwidth | Delay | None, Sequence[str]]],
     ) -> None:
-        self._windows = {topic: RateWindow(window_s) for topic in topics}
+        self._windows: Mapping[str, RateWindow] = {topic: RateWindow(window_s) for topic in topics}
         self._heads = heads
         self._figures = figures
         self._subscribers: dict[str, Subscriber] = {}
         self._totals: dict[str, int] = {}
+        self._never = threading.Event()
         self._heard_at = time.monotonic()
         self._width = max(_NARROWEST, *map(cells, topics))
 
@@ -114,15 +132,19 @@ class _Report:
             if not as_json:
                 say(_("measuring; Ctrl+C ends it"))
                 write(f"{self._line(_('topic'), [_(head) for head in self._heads])}\n")
-            never, started = threading.Event(), time.monotonic()
+            started = time.monotonic()
             for number in itertools.count(1):
                 while (left := started + number * _EVERY_S - time.monotonic()) > 0:
-                    never.wait(min(left, _SLICE_S))
+                    self._rest(node, min(left, _SLICE_S))
                 for topic in self._windows:
                     (self._show_json if as_json else self._show)(topic)
                 if number == count:
                     return
                 self._judge(waiting, timeout_s)
+
+    def _rest(self, node: Node, seconds: float) -> None:  # noqa: ARG002 - its thread brings messages
+        """Let time pass."""
+        self._never.wait(seconds)
 
     def _judge(self, waiting: TopicWait, timeout_s: float | None) -> None:
         """Say what is published no more; raises `WaitTimeoutError` when nothing came for so long."""
@@ -168,6 +190,45 @@ class _Report:
         return padded(topic, self._width) + "".join(figure.rjust(12) for figure in figures)
 
 
+class _DelayReport(_Report):
+    """Each message is looked at when it comes, in this thread: a sink gets them 5 ms later."""
+
+    def __init__(self, topics: Sequence[str], window_s: float) -> None:
+        heads = (
+            lazy("mean"),
+            lazy("least"),
+            lazy("greatest"),
+            lazy("std dev"),
+            lazy("messages"),
+            lazy("lost"),
+        )
+        super().__init__(topics, window_s, heads, self._delay_cells)
+        self._ages = {topic: AgeWindow(window_s) for topic in topics}
+        self._windows = self._ages
+        self._timeless: set[str] = set()
+
+    def _listen(self, node: Node, topic: str, msg_type: str) -> Subscriber:
+        window = self._ages[topic]
+
+        def take(message: Message) -> None:
+            age_s = None if message.stamp_ns is None else (time.time_ns() - message.stamp_ns) / 1e9
+            window.add_age(time.monotonic(), age_s, message.size_bytes)
+            if age_s is None and topic not in self._timeless:
+                self._timeless.add(topic)
+                say(_("messages of '{topic}' have no time; their age is not known").format(topic=topic))
+
+        return node.new_callback(topic, msg_type, take, with_message=True)
+
+    def _rest(self, node: Node, seconds: float) -> None:
+        node.spin(seconds)
+
+    def _delay_cells(self, window: RateWindow, now: float) -> tuple[Delay | None, Sequence[str]]:
+        found = window.delay(now) if isinstance(window, AgeWindow) else None
+        if found is None:
+            return None, (UNKNOWN,) * 4
+        return found, tuple(gap(each) for each in (found.mean_s, found.min_s, found.max_s, found.std_s))
+
+
 def _frequency_cells(window: RateWindow, now: float) -> tuple[Frequency | None, Sequence[str]]:
     found = window.frequency(now)
     if found is None:
@@ -184,7 +245,9 @@ def _traffic_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Se
 
 
 def gap(seconds: float) -> str:
-    """A time between messages, with three digits that count."""
+    """A time between messages, or an age, with three digits that count."""
+    if seconds < 0:
+        return f"-{gap(-seconds)}"
     if seconds >= 1:
         return f"{seconds:.3g} s"
     if seconds >= 1e-3:

@@ -1,4 +1,4 @@
-"""What `nep topic hz` and `nep topic bw` work out: figures of the messages of the last seconds."""
+"""What `nep topic hz`, `bw` and `delay` work out: figures of the messages of the last seconds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["MOST", "Bandwidth", "Frequency", "RateWindow"]
+__all__ = ["MOST", "AgeWindow", "Bandwidth", "Delay", "Frequency", "RateWindow"]
 
 MOST = 100_000
 """Messages that a window holds at most; a faster topic is measured over a shorter time."""
@@ -34,6 +34,17 @@ class Bandwidth:
     mean_bytes: float
     min_bytes: int
     max_bytes: int
+    messages: int
+
+
+@dataclass(frozen=True)
+class Delay:
+    """How old messages are when they arrive: mean, least, greatest and standard deviation (s)."""
+
+    mean_s: float
+    min_s: float
+    max_s: float
+    std_s: float
     messages: int
 
 
@@ -83,3 +94,27 @@ class RateWindow:
             while self._kept and now - self._kept[0][0] > self._seconds:
                 self._kept.popleft()
             return list(self._kept)
+
+
+class AgeWindow(RateWindow):
+    """How old the messages of one topic were that arrived within the last `seconds`. Works in any thread."""
+
+    def add_age(self, arrived: float, age_s: float | None, size_bytes: int) -> None:
+        """A message arrived (s, monotonic) and was so old (s); None, which is only counted, if nobody knows.
+
+        An age is below 0 when the publisher's clock is ahead.
+        """
+        if age_s is not None:
+            self.add(arrived, age_s, size_bytes)
+            return
+        with self._lock:
+            self.total += 1
+
+    def delay(self, now: float) -> Delay | None:
+        """None as long as there is no message whose age is known."""
+        ages = [age for _, age, _ in self._recent(now)]
+        if not ages:
+            return None
+        mean = sum(ages) / len(ages)
+        deviation = math.sqrt(sum((age - mean) ** 2 for age in ages) / len(ages))
+        return Delay(mean, min(ages), max(ages), deviation, len(ages))

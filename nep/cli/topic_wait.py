@@ -63,7 +63,7 @@ class TopicWait:
                     said = _("nobody publishes '{topic}' any more; {meant}waiting, Ctrl+C ends it")
                 else:
                     said = _("nobody publishes '{topic}' yet; {meant}waiting, Ctrl+C ends it")
-                say(said.format(topic=topic, meant=_meant(topic, others)))
+                say(said.format(topic=topic, meant=meant(topic, others)))
         self._look_at = time.monotonic() + _AGAIN_S
 
     def heard(self, topics: Collection[str]) -> None:
@@ -84,7 +84,7 @@ class TopicWait:
                 self.look(self._node.graph(_PATIENCE_S))
 
 
-def _meant(topic: str, names: Sequence[str]) -> str:
-    """Whether another topic was meant."""
+def meant(topic: str, names: Sequence[str]) -> str:
+    """Whether another of these was meant: a sentence with a space behind it, or nothing."""
     near = nearest(topic, names)
     return "" if near is None else _("did you mean '{near}'?").format(near=near) + " "

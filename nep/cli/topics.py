@@ -7,10 +7,11 @@ from dataclasses import asdict
 import typer
 
 from nep.cli.echo import echo
-from nep.cli.hz_bw import bw, hz
+from nep.cli.hz_bw import bw, delay, hz
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
 from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_alerts, show_json, show_table, size
+from nep.cli.topic_info import find, info, show_type
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import ids_as_text
 from nep.i18n import _, lazy
@@ -27,6 +28,10 @@ app.command("echo")(echo)
 app.command("pub")(publish)
 app.command("hz")(hz)
 app.command("bw")(bw)
+app.command("delay")(delay)
+app.command("info")(info)
+app.command("type")(show_type)
+app.command("find")(find)
 _COLUMNS = (
     TextColumn(lazy("topic"), style="bold", is_whole=True),
     TextColumn(lazy("type")),

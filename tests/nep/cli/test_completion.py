@@ -67,6 +67,11 @@ def test_fields_of_the_topic_are_offered(robot):
     assert complete("bash", "nep topic echo /odom j") == ["joints[0]", "joints[1]"]
 
 
+def test_topics_and_types_are_offered_to_info_and_find(robot):
+    assert complete("bash", "nep topic info /odo") == ["/odom"]
+    assert complete("bash", "nep topic find s") == ["string"]
+
+
 def test_nodes_and_levels_are_offered(robot):
     assert complete("bash", "nep log --node P") == ["Pepper"]
     assert complete("bash", "nep log --level w") == ["warning"]

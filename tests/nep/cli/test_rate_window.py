@@ -9,7 +9,7 @@ import pytest
 
 import nep
 from nep.cli.hz_bw import bw, gap, hz
-from nep.cli.rate_window import MOST, RateWindow
+from nep.cli.rate_window import MOST, AgeWindow, Delay, RateWindow
 from nep.cli.screen import say
 from nep.errors import BadTopicError, WaitTimeoutError
 
@@ -137,3 +137,13 @@ def test_what_comes_later_is_measured(master, capsys, monkeypatch):
     shown = capsys.readouterr()
     assert int(shown.out.splitlines()[-1].split()[-2]) > 1
     assert "nobody publishes '/odom' yet; waiting" in shown.err
+
+
+def test_ages_are_told_of_what_arrived_lately():
+    window = AgeWindow(10.0)
+    assert window.delay(0.0) is None
+    window.add_age(0.0, 99.0, 1)
+    for arrived, age_s in ((20.0, 0.25), (21.0, -0.25), (22.0, None)):
+        window.add_age(arrived, age_s, 1)
+    assert window.delay(25.0) == Delay(0.0, -0.25, 0.25, 0.25, 2)
+    assert window.total == 4

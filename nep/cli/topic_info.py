@@ -1,0 +1,143 @@
+"""`nep topic info`, `type` and `find`: all that is known of one topic, its type, and who has a type."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from nep.cli.complete import complete_topic, complete_type
+from nep.cli.options import JsonOption, MasterOption
+from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_alerts, show_json, show_table, size, write
+from nep.cli.topic_wait import meant
+from nep.cli.values import ids_as_text
+from nep.errors import NepError
+from nep.i18n import _, lazy
+from nep.masters.process import view
+from nep.protocol.graph_view import GraphView, TopicInfo
+from nep.protocol.wire import check_topic
+from nep.text import escaped
+
+TopicArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar=_("TOPIC"),
+        help=_("The topic to look into."),
+        show_default=False,
+        autocompletion=complete_topic,
+    ),
+]
+TypeArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar=_("TYPE"), help=_("The type to find."), show_default=False, autocompletion=complete_type
+    ),
+]
+_COLUMNS = (
+    TextColumn(lazy("node"), style="bold", is_whole=True),
+    TextColumn(lazy("what it does")),
+    TextColumn(lazy("messages"), "right"),
+    TextColumn(lazy("rate"), "right"),
+    TextColumn(lazy("bandwidth"), "right"),
+    TextColumn(lazy("lost"), "right"),
+)
+
+
+def info(topic: TopicArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
+    """Show what is known of a topic: its type, and each node that publishes or subscribes it."""
+    graph = view(master)
+    found = _found(topic, graph)
+    if as_json:
+        show_json(ids_as_text(_record(graph, found)))
+        return
+    latched = any(each.latched for each in found.publishers)
+    for head, value in (
+        (_("topic"), escaped(found.name)),
+        (_("type"), escaped(found.msg_type)),
+        (_("codec"), escaped(found.codec)),
+        (_("latched"), _("yes") if latched else _("no")),
+        (_("rate"), rate(found.rate_hz)),
+        (_("bandwidth"), size(found.bandwidth_Bps, "/s")),
+        (_("lost"), _count(found.lost)),
+    ):
+        write(f"{head}: {value}\n")
+    write("\n")
+    show_table(_COLUMNS, _rows(graph, found))
+    show_alerts(each for each in graph.alerts if each.id.partition(":")[2] == topic)
+
+
+def show_type(topic: TopicArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
+    """Show the type of a topic."""
+    found = _found(topic, view(master))
+    if as_json:
+        show_json({"topic": found.name, "msg_type": found.msg_type, "codec": found.codec})
+    else:
+        write(f"{escaped(found.msg_type)}\n")
+
+
+def find(msg_type: TypeArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
+    """List the topics that have a type."""
+    graph = view(master)
+    names = sorted(name for name, each in graph.topics.items() if each.msg_type == msg_type)
+    if as_json:
+        show_json(names)
+    elif names:
+        write("".join(f"{escaped(name)}\n" for name in names))
+    else:
+        types = sorted({each.msg_type for each in graph.topics.values()})
+        said = _("no topic has the type '{msg_type}'; {meant}'nep topic list' shows all types")
+        say(said.format(msg_type=msg_type, meant=meant(msg_type, types)))
+
+
+def _found(topic: str, graph: GraphView) -> TopicInfo:
+    """What is known of it. Raises `BadTopicError`, and `NepError` when nobody has it."""
+    found = graph.topics.get(check_topic(topic))
+    if found is None:
+        said = _("nobody publishes or subscribes '{topic}'; {meant}'nep topic list' shows all topics")
+        raise NepError(said.format(topic=topic, meant=meant(topic, list(graph.topics))))
+    return found
+
+
+def _record(graph: GraphView, topic: TopicInfo) -> dict[str, object]:
+    """As `nep topic list --json` has it, with the names of the nodes."""
+    record: dict[str, object] = asdict(topic)
+    for role, members in (("publishers", topic.publishers), ("subscribers", topic.subscribers)):
+        record[role] = [{**asdict(each), "node": _name(graph, each.node_id)} for each in members]
+    return record
+
+
+def _rows(graph: GraphView, topic: TopicInfo) -> list[tuple[str, ...]]:
+    publishers = [
+        (
+            escaped(_name(graph, each.node_id) or UNKNOWN),
+            _("publishes"),
+            str(each.count),
+            rate(each.rate_hz),
+            size(each.bandwidth_Bps, "/s"),
+            UNKNOWN,
+        )
+        for each in topic.publishers
+    ]
+    subscribers = [
+        (
+            escaped(_name(graph, each.node_id) or UNKNOWN),
+            _("subscribes"),
+            _count(each.received),
+            UNKNOWN,
+            UNKNOWN,
+            _count(each.lost),
+        )
+        for each in topic.subscribers
+    ]
+    return [*sorted(publishers), *sorted(subscribers)]
+
+
+def _name(graph: GraphView, node_id: str) -> str | None:
+    """The node's name; None when it has just left."""
+    node = graph.nodes.get(node_id)
+    return None if node is None else node.name
+
+
+def _count(value: int | None) -> str:
+    return UNKNOWN if value is None else str(value)
