@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import textwrap
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -17,6 +18,7 @@ from nep.cli.complete import complete_more, complete_topic
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import UNKNOWN, cells, console, json_painter, say, show_json, size, write
 from nep.cli.table_file import Fields, Table
+from nep.cli.topic_patterns import TopicPatterns, is_pattern
 from nep.cli.topic_wait import TopicWait, node_for
 from nep.cli.values import cleaned, json_of, presented
 from nep.errors import DecodeError, WaitTimeoutError
@@ -36,7 +38,11 @@ _SLICE_S = 0.02
 
 TopicArgument = Annotated[
     str,
-    typer.Argument(help=_("The topic to look into."), show_default=False, autocompletion=complete_topic),
+    typer.Argument(
+        help=_("The topic to look into, or a pattern such as '/*/odom'."),
+        show_default=False,
+        autocompletion=complete_topic,
+    ),
 ]
 MoreArgument = Annotated[
     list[str] | None,
@@ -70,6 +76,9 @@ def echo(
 ) -> None:
     """Show the messages of topics as they come. Ctrl+C ends it.
 
+    A pattern means all topics that match it, also those that appear later: * is any letters between slashes,
+    ? is one letter, ** is any parts or none. Put it into quotes, for the shell has patterns too.
+
     Pictures are shown by their size, and what cannot be read as its bytes. A terminal shows the beginning of
     long lists and texts; files and other programs get all of them.
     """
@@ -83,28 +92,39 @@ def echo(
                 _("name the fields: nep topic echo {topic} pose.x pose.y --csv").format(topic=topic)
             )
         picked = Fields(fields)
-        waiting = TopicWait(node, topics)
+        exact = [each for each in topics if each in graph.topics or not is_pattern(each)]
+        patterns = TopicPatterns(node, [each for each in topics if each not in exact], exact)
+        names_topic = len(topics) > 1 or bool(patterns.patterns)
+        waiting = TopicWait(node, exact)
         waiting.look(graph)
         show: Callable[[Message], object]
         if as_csv:
-            show = Table(picked, names_topic=len(topics) > 1)
+            show = Table(picked, names_topic=names_topic)
         elif as_json:
             show = partial(show_record, fields=picked)
         else:
-            show = Lines(picked, names_topic=len(topics) > 1, whole=full)
-        subscribers = [opened.enter_context(node.new_sub(each, waiting.msg_type(each))) for each in topics]
+            show = Lines(picked, names_topic=names_topic, whole=full)
+        wanted = [(each, waiting.msg_type(each)) for each in exact] + patterns.new_in(graph)
+        subscribers: list[Subscriber] = []
+
+        def hear(topics: Sequence[tuple[str, str]]) -> None:
+            for name, msg_type in topics:
+                subscribers.append(opened.enter_context(node.new_sub(name, msg_type)))
+
+        hear(wanted)
+        coming = _coming(subscribers, timeout_s, waiting, patterns, hear)
         try:
-            for message in itertools.islice(_coming(subscribers, timeout_s, waiting), count or None):
+            for message in itertools.islice(coming, count or None):
                 show(message)
         finally:
             picked.say_missing()
 
 
 def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:
-    """The topics and the fields that the words mean: what is a topic now, or begins with "/", is a topic."""
+    """The topics and fields that the words mean: what is a topic now, begins with "/", or is a pattern, is one."""
     topics, fields = [topic], []
     for word in more:
-        if word in graph.topics or word.startswith("/"):
+        if word in graph.topics or word.startswith("/") or is_pattern(word):
             topics.append(word)
         else:
             fields.append(word)
@@ -115,23 +135,33 @@ def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tupl
 
 
 def _coming(
-    subscribers: Sequence[Subscriber], timeout_s: float | None, waiting: TopicWait
+    subscribers: Sequence[Subscriber],
+    timeout_s: float | None,
+    waiting: TopicWait,
+    patterns: TopicPatterns,
+    hear: Callable[[Sequence[tuple[str, str]]], None],
 ) -> Iterator[Message]:
-    """Their messages as they come; what was lost between them is said. Raises `WaitTimeoutError`."""
-    lost = dict.fromkeys((each.topic for each in subscribers), 0)
-    last = time.monotonic()
+    """Their messages as they come; what was lost between them is said. Raises `WaitTimeoutError`.
+
+    `hear` adds to the subscribers what matches the patterns and is new.
+    """
+    lost: dict[str, int] = {}
+    last, never = time.monotonic(), threading.Event()
     while True:
+        hear(patterns.look_again())
         came = [message for each in subscribers if (message := each.receive(0.0)) is not None]
-        if not came:
+        if not came and not subscribers:
+            never.wait(waiting.slice_s(timeout_s))
+        elif not came:
             message = subscribers[0].receive(_SLICE_S if len(subscribers) > 1 else waiting.slice_s(timeout_s))
             came = [] if message is None else [message]
         now = time.monotonic()
         if came:
             last = now
             for each in subscribers:
-                missing = (each.lost or 0) - lost[each.topic]
+                missing = (each.lost or 0) - lost.get(each.topic, 0)
                 if missing > 0:
-                    lost[each.topic] += missing
+                    lost[each.topic] = each.lost or 0
                     said = ngettext(
                         "{count} message of '{topic}' did not arrive here",
                         "{count} messages of '{topic}' did not arrive here",
@@ -141,7 +171,9 @@ def _coming(
             yield from came
             waiting.heard({message.topic for message in came})
         elif timeout_s is not None and now - last >= timeout_s:
-            names = listed([f"'{each.topic}'" for each in subscribers], "or")
+            names = listed(
+                [f"'{each}'" for each in (*(sub.topic for sub in subscribers), *patterns.patterns)], "or"
+            )
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
         else:
             waiting.look_again()

@@ -1,0 +1,72 @@
+"""Patterns of topics: what matches, and what `nep topic echo` shows of topics that come later."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import nep
+from nep.cli.topic_patterns import TopicPatterns, is_pattern, matches
+from tests.nep.cli.test_command import Running
+from tests.nep.programs import eventually
+
+
+@pytest.mark.parametrize(
+    ("pattern", "topics"),
+    [
+        ("/*/odom", ["/a/odom"]),
+        ("/**/odom", ["/odom", "/a/odom", "/a/b/odom"]),
+        ("/a/**", ["/a", "/a/odom", "/a/b/odom"]),
+        ("**", ["/odom", "/a", "/a/odom", "/a/b/odom", "words", "w.rds"]),
+        ("*", ["words", "w.rds"]),
+        ("w?rds", ["words", "w.rds"]),
+        ("w.rds*", ["w.rds"]),
+        ("/**/b/**/**", ["/a/b/odom"]),
+        ("/od*m", ["/odom"]),
+        ("/x*", []),
+    ],
+)
+def test_what_a_pattern_matches(pattern, topics):
+    known = ["/odom", "/a", "/a/odom", "/a/b/odom", "words", "w.rds"]
+    assert [each for each in known if matches(pattern, each)] == topics
+
+
+def test_a_pattern_of_many_stars_takes_no_time():
+    assert not matches("/**" * 60 + "/x", "/a" * 60)
+
+
+@pytest.mark.parametrize(
+    ("word", "is_one"), [("/a/*", True), ("a?", True), ("/a", False), ('["*"]', False), ("a[3].*", False)]
+)
+def test_fields_are_no_patterns(word, is_one):
+    assert is_pattern(word) is is_one
+
+
+def test_each_topic_is_new_once_and_a_pattern_without_any_is_said_once(capfd):
+    with nep.node("n", "memory", master="patterns") as node:
+        node.new_pub("/a/odom")
+        node.new_sub("/b/odom")
+        patterns = TopicPatterns(node, ["/*/odom", "/none/*"], ["/known/odom"])
+        node.new_pub("/known/odom")
+        assert patterns.new_in(node.graph()) == [("/a/odom", "json")]
+        assert patterns.new_in(node.graph()) == []
+        node.new_pub("/b/odom", "msgpack")
+        assert patterns.new_in(node.graph()) == [("/b/odom", "msgpack")]
+    assert capfd.readouterr().err.count("no topic matches '/none/*' yet") == 1
+
+
+def test_echo_shows_topics_that_match_and_come_later(master):
+    echo = Running("topic", "echo", "/*/odom", "--json", "--count", "2")
+    try:
+        assert "no topic matches '/*/odom' yet" in echo.wait_says("matches")
+        with nep.node("robot") as node:
+            for name in ("/a/odom", "/b/odom"):
+                pub = node.new_pub(name, latched=True)
+                pub.publish({"of": name})
+                eventually(lambda pub=pub: pub.subscribers == 1)
+                record = json.loads(echo.process.stdout.readline())
+                assert (record["topic"], record["payload"]) == (name, {"of": name})
+        assert echo.process.wait(60) == 0
+    finally:
+        echo.close()
