@@ -121,7 +121,7 @@ def echo(
 
 
 def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:
-    """The topics and fields that the words mean: what is a topic now, begins with "/", or is a pattern, is one."""
+    """The topics and fields that words mean. Topics: what is one now, begins with "/", or is a pattern."""
     topics, fields = [topic], []
     for word in more:
         if word in graph.topics or word.startswith("/") or is_pattern(word):
