@@ -9,12 +9,12 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 from nep.backends.zeromq.bindings import in_reach, may_stay
 from nep.backends.zeromq.io_thread import IoThread, Rest
-from nep.backends.zeromq.publisher import NativePublisher
 from nep.backends.zeromq.rpc import PendingCall, RpcClient
 from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards
 from nep.backends.zeromq.subscriber import NativeSubscriber
@@ -38,6 +38,7 @@ from nep.protocol.requests import (
     Look,
     NodeRecord,
     PublisherCame,
+    PublisherCount,
     PublisherGone,
     PublisherRecord,
     Push,
@@ -54,7 +55,7 @@ from nep.protocol.requests import (
 from nep.system.addresses import MasterName, is_loopback, look_up
 from nep.system.cpu import CpuLoad
 
-__all__ = ["MasterSession", "Pace"]
+__all__ = ["MasterSession", "Pace", "RegisteredPublisher"]
 
 _RENEW_LONGEST_S = 30.0
 """A master cannot make a node wait for longer."""
@@ -64,6 +65,23 @@ _logger = logging.getLogger("nep")
 _FOLLOW_S = 1.0
 """How often a node looks whether its publishers have to move."""
 _JOIN_AGAIN_S = 0.5
+
+
+class RegisteredPublisher(Protocol):
+    """A publisher as its session needs it."""
+
+    @property
+    def is_local(self) -> bool:
+        """Whether programs of this computer reach it without TCP, too: see `bindings`."""
+
+    def counts(self) -> PublisherCount:
+        """The statistics for a renewal."""
+
+    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
+        """Be reached at these addresses of this computer from now on; the endpoints."""
+
+    def leave_local(self) -> None:
+        """Be reached by TCP only from now on."""
 
 
 class Pace:
@@ -105,7 +123,7 @@ class MasterSession:
         self._io = io
         self._calls = RpcClient(socket, address, after_use=lambda: io.serve_soon(self))
         self._lock = threading.Lock()
-        self._publishers: dict[int, tuple[PublisherRecord, NativePublisher]] = {}
+        self._publishers: dict[int, tuple[PublisherRecord, RegisteredPublisher]] = {}
         self._subscribers: dict[int, tuple[SubscriberRecord, NativeSubscriber]] = {}
         self._confirmed: set[int] = set()
         self._epoch, self._revision = 0, 0
@@ -161,7 +179,7 @@ class MasterSession:
         self._calls.lead_to(known)
 
     def add_publisher(
-        self, record: PublisherRecord, publisher: NativePublisher, wait_s: float | None
+        self, record: PublisherRecord, publisher: RegisteredPublisher, wait_s: float | None
     ) -> Added:
         """Register; the subscribers to expect. Raises as `RpcClient.ask` does."""
         with self._lock:

@@ -18,6 +18,7 @@ from nep.system.log_rarely import is_logged
 
 __all__ = [
     "LOOPBACK",
+    "ORIGINAL_PORTS",
     "SHORT_WAIT_S",
     "Part",
     "Refusals",
@@ -47,7 +48,7 @@ _HELD = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE,
 _MOST = 50_000
 _LEAST = 32
 _PORT_FILES = 2
-_ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
+ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
 """Ports that programs of the original NEP expect to find something else on."""
 
 
@@ -98,7 +99,7 @@ def bind_free_port(owner: Socket, host: str) -> str:
     """Bind to a free port of `host`, none of the original NEP's; the endpoint. Raises `AddressInUseError`."""
     for _port in range(100):
         endpoint = bind(owner, f"{host}:*")
-        if int(endpoint.rpartition(":")[2]) not in _ORIGINAL_PORTS:
+        if int(endpoint.rpartition(":")[2]) not in ORIGINAL_PORTS:
             return endpoint
         owner.unbind(endpoint)
     raise AddressInUseError(f"{host}:*")

@@ -1,7 +1,7 @@
 """SubSocket: a SUB socket with its publishers: reads parts, tells messages from notices, counts losses.
 
 It has no lock: it lives under its subscriber's. Nearly every message is just the next one of its publisher:
-that is read on the quick way, and everything else by `_CarefulParser`.
+that is read on the quick way, and everything else by `CarefulParser`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from nep.protocol.wire import (
 )
 from nep.system.addresses import is_endpoint
 
-__all__ = ["Into", "SubSocket"]
+__all__ = ["CarefulParser", "Into", "SubSocket"]
 
 Into = list[Message] | deque[Message]
 """Where messages are put."""
@@ -59,7 +59,7 @@ _POLLIN = int(zmq.POLLIN)
 _TOO_SHORT = lazy("a message has 3 or 4 parts, this one ends earlier")
 
 
-class _CarefulParser:
+class CarefulParser:
     """What parts mean that are not just the next message of a publisher. No sockets.
 
     For the subscriber that says `hello`. Notes what it learns in `sources`.
@@ -146,7 +146,7 @@ class SubSocket:
         self._topic = topic_part(spec.topic)
         self._hello = hello_part(spec.id, spec.topic, tells=True)
         self._id = spec.id
-        self._parser = _CarefulParser(spec, self._hello, self.sources, self.leave, self._tell)
+        self._parser = CarefulParser(spec, self._hello, self.sources, self.leave, self._tell)
         self._cut = len(self._topic)
         self._body = self._cut + HEADER_BYTES
         """Where header and payload of a message in one part begin."""

@@ -28,14 +28,15 @@ import zmq
 
 from nep.backends.base import SubscriberSpec
 from nep.backends.zeromq.io_thread import IoThread, Rest
+from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals, wait_until
-from nep.backends.zeromq.sub_socket import Into, SubSocket
+from nep.backends.zeromq.sub_socket import Into
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.system.wakeup import Waker
 
-__all__ = ["NativeSubscriber", "Readable", "SocketSubscriber"]
+__all__ = ["NativeReadable", "NativeSubscriber", "Readable", "SocketSubscriber"]
 
 _AHEAD_BYTES = 2**18
 _BRISK_S = 10e-6
@@ -94,6 +95,19 @@ class Readable(Protocol):
 
     def close(self) -> None:
         """Close the socket."""
+
+
+class NativeReadable(Readable, Protocol):
+    """One that is connected to the publishers that the master lists."""
+
+    sources: HeardPublishers
+    """Those that it hears."""
+
+    def connect(self, remote: RemotePublisher) -> None:
+        """Connect to a publisher; twice is once."""
+
+    def leave(self, publisher: int) -> None:
+        """Disconnect from a publisher and forget it."""
 
 
 class _ReadAhead:
@@ -392,11 +406,11 @@ class SocketSubscriber(Generic[R]):
             waker.wake()
 
 
-class NativeSubscriber(SocketSubscriber[SubSocket]):
+class NativeSubscriber(SocketSubscriber[NativeReadable]):
     """See `SocketSubscriber`. The methods for publishers are called by the link to the master."""
 
     def __init__(
-        self, readable: SubSocket, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
+        self, readable: NativeReadable, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
     ) -> None:
         super().__init__(readable, io, spec, on_close)
         self._closed_early: set[int] | None = set()

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Protocol
 
 import zmq
 
@@ -17,23 +18,23 @@ from nep.backends.base import (
     SubscriberTransport,
 )
 from nep.backends.connection import Configuration, Direct
-from nep.backends.zeromq.io_thread import IoThread, SharedContext, shared_context
+from nep.backends.zeromq.io_thread import IoThread, Served, SharedContext, shared_context
 from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
-from nep.backends.zeromq.master_session import MasterSession
+from nep.backends.zeromq.master_session import MasterSession, RegisteredPublisher
 from nep.backends.zeromq.publisher import NativePublisher
 from nep.backends.zeromq.sockets import Socket
 from nep.backends.zeromq.sub_socket import SubSocket
-from nep.backends.zeromq.subscriber import NativeSubscriber, SocketSubscriber
+from nep.backends.zeromq.subscriber import NativeReadable, NativeSubscriber, Readable, SocketSubscriber
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
+from nep.protocol.requests import Expected, NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import SUBSCRIPTION_MAX_BYTES
 from nep.system.descriptors import check_room
 from nep.system.forks import give_up, watch
 from nep.system.wakeup import Waker
 
-__all__ = ["ZeromqTransport"]
+__all__ = ["DIRECT_WAIT_S", "MasteredPublisher", "OwnedPublisher", "ZeromqTransport", "closed_on_error"]
 
 DIRECT_WAIT_S = 0.3
 """Without a master nobody knows whether there is another side: it gets so long to connect."""
@@ -41,8 +42,32 @@ _LEAVE_S = 0.3
 _THREAD_FILES = 4
 _MOST_SESSIONS = 8
 """So many masters' connections are kept though nothing is registered with them."""
-_Publisher = NativePublisher | OriginalPublisher
-_Subscriber = NativeSubscriber | OriginalSubscriber
+_Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber
+
+
+class OwnedPublisher(PublisherTransport, Served, Protocol):
+    """A publisher as its transport needs it, which serves and ends it."""
+
+    spec: PublisherSpec
+
+    def say_bye(self) -> None:
+        """Nothing is published any more; say so."""
+
+    def finish(self, deadline: float) -> None:
+        """Wait until what was published is delivered, until `deadline` at most."""
+
+    def release(self) -> None:
+        """Close what it has; the thread that served it has let go of it."""
+
+
+class MasteredPublisher(OwnedPublisher, RegisteredPublisher, Protocol):
+    """One that the master knows."""
+
+    def expect(self, expected: Iterable[Expected]) -> None:
+        """These subscribers are registered and will connect."""
+
+    def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
+        """Wait until these have said hello; the ids of those that did not in time."""
 
 
 class ZeromqTransport:
@@ -59,7 +84,7 @@ class ZeromqTransport:
         self._sinks: IoThread | None = None
         self._lock = threading.Lock()
         self._sessions: dict[str, MasterSession] = {}
-        self._publishers: dict[int, _Publisher] = {}
+        self._publishers: dict[int, OwnedPublisher] = {}
         self._subscribers: dict[int, _Subscriber] = {}
         self._busy_wakers: list[Waker] = []
         self._is_closed = False
@@ -76,11 +101,10 @@ class ZeromqTransport:
             return self._direct_publisher(spec, spec.configuration)
         session = self._session(spec.configuration.master)
         session.wait_for_name(spec.wait_s)
-        socket = self._xpub(spec)
-        # Made before the socket is bound: what it sets applies to connections of later binds only.
         closer = self._publisher_closer(lambda: session.remove_publisher(spec.id, publisher.count))
-        publisher = NativePublisher(socket, spec, closer, self._io.serve_soon)
-        with _closed_on_error(publisher.release):
+        # Made before the socket is bound: what it sets applies to connections of later binds only.
+        publisher = self._mastered_publisher(spec, closer)
+        with closed_on_error(publisher.release):
             endpoints = publisher.move(session.hosts)
             self._hold(publisher)
         record = PublisherRecord(
@@ -104,16 +128,21 @@ class ZeromqTransport:
             raise
         return publisher
 
+    def _mastered_publisher(
+        self, spec: PublisherSpec, closer: Callable[[OwnedPublisher, float], None]
+    ) -> MasteredPublisher:
+        return NativePublisher(self._xpub(spec), spec, closer, self._io.serve_soon)
+
     def _direct_publisher(self, spec: PublisherSpec, direct: Direct) -> PublisherTransport:
         closer = self._publisher_closer(lambda: None)
-        publisher: _Publisher
+        publisher: NativePublisher | OriginalPublisher
         if direct.wire == "native":
             socket = self._xpub(spec)
             publisher = NativePublisher(socket, spec, closer, self._io.serve_soon)
         else:
             socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
             publisher = OriginalPublisher(socket, spec, direct, closer)
-        with _closed_on_error(publisher.release):
+        with closed_on_error(publisher.release):
             self._attached[spec.id] = attach(socket, direct, is_publisher=True)
             self._hold(publisher)
         try:
@@ -129,14 +158,14 @@ class ZeromqTransport:
         socket.setsockopt(zmq.MAXMSGSIZE, SUBSCRIPTION_MAX_BYTES)  # of what it receives
         return socket
 
-    def _hold(self, publisher: _Publisher) -> None:
+    def _hold(self, publisher: OwnedPublisher) -> None:
         with self._lock:
             self._check_open()
             self._publishers[publisher.spec.id] = publisher
         self._io.add(publisher)
 
-    def _publisher_closer(self, unregister: Callable[[], None]) -> Callable[[_Publisher, float], None]:
-        def close(publisher: _Publisher, timeout_s: float) -> None:
+    def _publisher_closer(self, unregister: Callable[[], None]) -> Callable[[OwnedPublisher, float], None]:
+        def close(publisher: OwnedPublisher, timeout_s: float) -> None:
             with self._lock:
                 self._publishers.pop(publisher.spec.id, None)
                 self._attached.pop(publisher.spec.id, None)
@@ -162,9 +191,9 @@ class ZeromqTransport:
             session.remove_subscriber(subscriber)
 
         io = self._io_for(spec)
-        socket = self._sub(spec)
-        subscriber = NativeSubscriber(SubSocket(socket, spec), io, spec, forget)
-        with _closed_on_error(socket.close):
+        readable = self._mastered_readable(spec)
+        subscriber = NativeSubscriber(readable, io, spec, forget)
+        with closed_on_error(readable.close):
             self._keep(subscriber)
         try:
             reply = session.add_subscriber(
@@ -179,6 +208,9 @@ class ZeromqTransport:
             raise
         return subscriber
 
+    def _mastered_readable(self, spec: SubscriberSpec) -> NativeReadable:
+        return SubSocket(self._sub(spec), spec)
+
     def _direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
         io = self._io_for(spec)
         socket = self._sub(spec)
@@ -187,7 +219,7 @@ class ZeromqTransport:
             subscriber = NativeSubscriber(SubSocket(socket, spec), io, spec, self._forget_subscriber)
         else:
             subscriber = SocketSubscriber(OriginalSubSocket(socket, spec), io, spec, self._forget_subscriber)
-        with _closed_on_error(socket.close):
+        with closed_on_error(socket.close):
             self._attached[spec.id] = attach(socket, direct, is_publisher=False)
             self._keep(subscriber)
         io.add(subscriber)
@@ -348,7 +380,7 @@ class ZeromqTransport:
             if session is None:
                 self._forget_sessions()
                 socket = self._shared.socket(zmq.DEALER, f"a connection to the master at '{address}'")
-                with _closed_on_error(socket.close):
+                with closed_on_error(socket.close):
                     session = MasterSession(socket, self._io, self._node, address)
                 self._sessions[address] = session
                 self._io.add(session)
@@ -356,7 +388,7 @@ class ZeromqTransport:
 
 
 @contextmanager
-def _closed_on_error(close: Callable[[], object]) -> Iterator[None]:
+def closed_on_error(close: Callable[[], object]) -> Iterator[None]:
     """A socket that is left open would hold up the end of the program."""
     try:
         yield
