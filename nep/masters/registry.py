@@ -57,6 +57,7 @@ _NODE_ID = re.compile("[0-9a-f]{16}")
 _ENDPOINT = re.compile(
     r"tcp://(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}(?:%[\w.-]{1,20})?\]):(\d{1,5})", re.ASCII
 )
+_NANOMSG_ENDPOINT = re.compile(r"nanomsg://[A-Za-z0-9._-]{1,253}:(\d{1,5})/(\d{1,5})", re.ASCII)
 
 _HUNG_MAX = 100
 """So many nodes are noted that one does not answer."""
@@ -397,8 +398,14 @@ def _take_out(table: dict[str, dict[int, RegisteredNode]], topic: str, known: in
 # ---- what may be registered
 
 
+def is_nanomsg_endpoint(endpoint: str) -> bool:
+    """Whether it is `nanomsg://HOST:PORT/PORT`: where subscribers of that back end reach a publisher."""
+    found = _NANOMSG_ENDPOINT.fullmatch(endpoint)
+    return found is not None and all(1 <= int(port) <= 65535 for port in found.groups())
+
+
 def is_tcp_endpoint(endpoint: str) -> bool:
-    """Whether it is `tcp://HOST:PORT`: the only form in which a publisher says where it is to be reached."""
+    """Whether it is `tcp://HOST:PORT`: the form in which ZeroMQ's publishers say where to reach them."""
     found = _ENDPOINT.fullmatch(endpoint)
     return found is not None and 1 <= int(found.group(1)) <= 65535
 
@@ -466,7 +473,7 @@ def _check_foreign(record: PublisherRecord | SubscriberRecord) -> None:
                 )
             )
         for endpoint in record.endpoints:
-            if not is_tcp_endpoint(endpoint):
+            if not is_tcp_endpoint(endpoint) and not is_nanomsg_endpoint(endpoint):
                 said = escaped(shortened(endpoint, 80))
                 raise WireError(
                     _("'{said}' is no endpoint of a publisher; it is written 'tcp://HOST:PORT'").format(
