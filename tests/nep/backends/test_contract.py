@@ -17,11 +17,11 @@ from tests.nep.programs import eventually
 _names = count()
 
 
-@pytest.fixture(params=["memory", "zeromq"])
+@pytest.fixture(params=["memory", "zeromq", "nanomsg"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Callable[[str], nep.Node]]:
     """Makes nodes that can meet; closes them."""
     made: list[nep.Node] = []
-    where = master.address if request.param == "zeromq" else f"contract-{next(_names)}"
+    where = f"contract-{next(_names)}" if request.param == "memory" else master.address
 
     def new(name: str) -> nep.Node:
         node = nep.node(name, request.param, master=where)

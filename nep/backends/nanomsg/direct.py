@@ -1,0 +1,225 @@
+"""Direct connections: the frames of the original NEP over SP's PUB and SUB, as libnanomsg speaks them."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.connection import Direct
+from nep.backends.nanomsg.library import library, listen, queue_of
+from nep.backends.nanomsg.sub_socket import QuickSub
+from nep.backends.zeromq.io_thread import Rest
+from nep.backends.zeromq.legacy import from_frame, to_frame
+from nep.backends.zeromq.sockets import Refusals, wait_until
+from nep.backends.zeromq.sub_socket import Into
+from nep.errors import ClosedError, NepError, WireError
+from nep.i18n import _
+from nep.messages.codecs import codec_for
+from nep.messages.encoded import Encoded
+from nep.messages.message import Message
+from nep.system.addresses import in_numbers
+
+__all__ = ["DirectPublisher", "DirectSubSocket"]
+
+_logger = logging.getLogger("nep")
+_LARGEST = 2**20
+"""libnanomsg takes no larger messages unless it is told to, and says nothing."""
+
+
+def _check(direct: Direct) -> None:
+    """Raises `NepError` for what SP has no form for."""
+    if direct.mode == "many2many":
+        raise NepError(
+            _("the back end 'nanomsg' has no direct connections of mode 'many2many'; use 'one2many'")
+        )
+    if direct.wire == "native":
+        raise NepError(
+            _("direct connections of 'nanomsg' carry frames of the original NEP; leave out wire='native'")
+        )
+
+
+def _attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str:  # noqa: ANN401 - pynng's
+    """Listen or dial as the mode says; the endpoint. Raises `AddressInUseError`, `NepError`."""
+    nng = library()
+    address = f"{direct.ip}:{direct.port}"
+    if is_publisher == (direct.mode == "one2many"):
+        listen(socket, address, what)
+        return f"tcp://{address}"
+    try:
+        address = in_numbers(address)
+        socket.dial(f"tcp://{address}", block=False)
+    except nng.NNGException as error:
+        raise NepError(
+            _("'{address}' cannot be connected to; use a computer's address and a port up to 65535").format(
+                address=address
+            )
+        ) from error
+    return f"tcp://{address}"
+
+
+class DirectPublisher:
+    """Owns a PUB. SP does not tell who subscribes to what: everybody who is connected counts."""
+
+    def __init__(
+        self, spec: PublisherSpec, direct: Direct, on_close: Callable[[DirectPublisher, float], None]
+    ) -> None:
+        _check(direct)
+        self.spec = spec
+        self.count = 0
+        self.missing: tuple[str, ...] = ()
+        self._on_close = on_close
+        self._generation = direct.generation
+        self._pipes: set[int] = set()
+        self._is_closed = False
+        self._has_warned = False
+        self._changed = threading.Condition(threading.RLock())
+        self.fd = -1
+        """There is nothing to be read."""
+        self._socket: Any = library().Pub0(send_buffer_size=queue_of(spec.codec.name))
+        self._socket.add_post_pipe_connect_cb(self._came)
+        self._socket.add_post_pipe_remove_cb(self._went)
+        try:
+            self.endpoint = _attach(
+                self._socket, direct, is_publisher=True, what=f"a publisher of '{spec.topic}'"
+            )
+        except BaseException:
+            self.release()
+            raise
+
+    @property
+    def subscribers(self) -> int:
+        """How many connections there are."""
+        return len(self._pipes)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether there are any."""
+        return bool(self._pipes)
+
+    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+        with self._changed:
+            self._pipes.add(pipe.id)
+            self._changed.notify_all()
+
+    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+        with self._changed:
+            self._pipes.discard(pipe.id)
+
+    def wait_for_any(self, timeout_s: float) -> None:
+        """Wait until somebody is connected."""
+        with self._changed:
+            wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
+
+    def report(self, problem: str) -> None:
+        """There is no graph that could show it."""
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self._changed:
+            self.count += 1
+
+    def send(self, encoded: Encoded) -> None:
+        """Publish one frame; nobody can know if a full queue dropped it. Warns of the first large one."""
+        frame = to_frame(
+            self.spec.topic, self._generation, self.spec.msg_type, self.spec.codec.name, encoded.data
+        )
+        with self._changed:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'")
+            self.count += 1
+            warns = len(frame) > _LARGEST and not self._has_warned
+            self._has_warned = self._has_warned or warns
+            self._socket.send(frame, block=False)
+        if warns:
+            _logger.warning(
+                _(
+                    "a message on '{topic}' has {size} bytes; programs that use libnanomsg take no more than "
+                    "{most} and say nothing, so send less at once"
+                ).format(topic=self.spec.topic, size=len(frame), most=_LARGEST)
+            )
+
+    def serve(self, now: float) -> Rest:  # noqa: ARG002 - there is nothing to do
+        """Nothing comes here."""
+        return Rest(is_quiet=True)
+
+    def close(self, timeout_s: float) -> None:
+        """Close. pynng sends no more then: what a slow subscriber has not taken is lost to it."""
+        self._on_close(self, timeout_s)
+
+    def say_bye(self) -> None:
+        """Nothing is published any more."""
+        with self._changed:
+            self._is_closed = True
+
+    def finish(self, deadline: float) -> None:
+        """SP has no way to ask whether everything has arrived."""
+
+    def release(self) -> None:
+        """Close the socket, without the lock: pynng waits for its threads then."""
+        self.say_bye()
+        self._socket.close()
+
+
+class DirectSubSocket:
+    """A SUB that takes the frames of both generations. Nobody numbers them: `lost` is not known."""
+
+    def __init__(self, spec: SubscriberSpec, direct: Direct) -> None:
+        _check(direct)
+        self.refusals = Refusals()
+        self.received = 0
+        self.lost: int | None = None
+        self.problem = ""
+        self._spec = spec
+        self._codec = codec_for(spec.msg_type).name
+        self._sub = QuickSub(self._codec)
+        self.fd = self._sub.fd
+        self._sub.socket.subscribe(b"")  # of another generation no topic stands in front
+        try:
+            self.endpoint = _attach(
+                self._sub.socket, direct, is_publisher=False, what=f"a subscriber of '{spec.topic}'"
+            )
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def has_input(self) -> bool:
+        """Whether something can be read."""
+        return self._sub.has_input
+
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """The next message of this topic."""
+        while (frame := self._sub.recv(may_wait=may_wait)) is not None:
+            try:
+                data = from_frame(self._spec.topic, self._spec.msg_type, self._codec, frame)
+            except WireError as error:
+                self.refusals.add(error.reason)
+                continue
+            if data is not None:
+                self.received += 1
+                return Message(self._spec.topic, data, self._codec, self._spec.msg_type)
+        return None
+
+    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
+        count = 0
+        while count < most and room > 0:
+            message = self.read(may_wait=may_wait and not count)
+            if message is None:
+                break
+            into.append(message)
+            count += 1
+            room -= message.size_bytes
+        return count
+
+    def dropped(self, count: int) -> None:
+        """Dropped here for lack of room: the only losses that can be known."""
+        self.received -= count
+        self.lost = (self.lost or 0) + count
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._sub.close()

@@ -1,0 +1,272 @@
+"""NanomsgPublisher: a publisher that subscribers find through the master.
+
+SP's PUB hears nothing of its subscribers. So they greet it at a second port, and say from which address their
+connection comes: as soon as that one is there they get what is latched and an echo by it, as on the native
+wire. Messages are sent in the publisher's thread, hellos are read in the node's.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from nep.backends.base import PublisherSpec
+from nep.backends.nanomsg.endpoints import endpoint, own_part
+from nep.backends.nanomsg.library import bound_port, library, listen, queue_of
+from nep.backends.zeromq.io_thread import Rest, Served
+from nep.backends.zeromq.sockets import LOOPBACK, Refusals, wait_until
+from nep.errors import ClosedError
+from nep.messages.encoded import Encoded
+from nep.protocol.requests import Expected, PublisherCount
+from nep.protocol.wire import (
+    BYE,
+    EXTENSION,
+    LATCHED,
+    SIZE_MAX,
+    SUBSCRIPTION_MAX_BYTES,
+    Header,
+    extension_part,
+    parse_hello,
+    topic_part,
+)
+
+__all__ = ["NanomsgPublisher"]
+
+_logger = logging.getLogger("nep")
+_MOST_HELLOS = 10_000
+_HELLO_QUEUE = 1000
+_BYE_AGAIN_S = 0.05
+
+
+class NanomsgPublisher:
+    """Owns a PUB and the PULL at which it is greeted. Nothing of pynng is closed under its lock.
+
+    pynng tells of connections in threads of its own and waits for these when it closes something.
+    """
+
+    def __init__(
+        self,
+        spec: PublisherSpec,
+        on_close: Callable[[NanomsgPublisher, float], None],
+        serve_soon: Callable[[Served], None],
+    ) -> None:
+        nng = library()
+        self._again = nng.TryAgain
+        self.spec = spec
+        self.count = 0
+        self.is_local = False
+        self._on_close = on_close
+        self._serve_soon = serve_soon
+        self._out: Any = nng.Pub0(send_buffer_size=queue_of(spec.codec.name))
+        self._in: Any = nng.Pull0(recv_buffer_size=_HELLO_QUEUE, recv_max_size=SUBSCRIPTION_MAX_BYTES)
+        self.fd = int(self._in.recv_fd)
+        self._endpoint = ""
+        self._bytes = 0
+        self._last_stamp_ns: int | None = None
+        self._problem = ""
+        self._latched: bytes | None = None
+        self._topic = topic_part(spec.topic)
+        self._is_closed = False
+        self._is_released = False
+        self._seen: dict[int, int] = {}
+        """Subscribers that are greeted, and how many messages there had been then."""
+        self._pipes: dict[int, str] = {}
+        """The addresses from which connections come."""
+        self._hellos: dict[str, int] = {}
+        """Who said hello, by the address of its connection, which may not be there yet."""
+        self._events: deque[tuple[int, str]] = deque()
+        self._names: dict[int, str] = {}
+        self._waited: set[int] = set()
+        self._refusals = Refusals()
+        self._changed = threading.Condition(threading.Lock())
+        self._out.add_post_pipe_connect_cb(self._came)
+        self._out.add_post_pipe_remove_cb(self._went)
+
+    # ---- who listens
+
+    @property
+    def subscribers(self) -> int:
+        """How many said hello and have not gone."""
+        return len(self._seen)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody is connected, with or without a hello."""
+        return bool(self._pipes)
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of nodes that were expected and have not said hello."""
+        with self._changed:
+            return tuple(sorted({self._names[each] for each in self._waited - set(self._seen)}))
+
+    def expect(self, expected: Iterable[Expected]) -> None:
+        """These subscribers are registered and will connect."""
+        with self._changed:
+            for each in expected:
+                self._waited.add(each.id)
+                self._names[each.id] = each.node_name
+
+    def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
+        """Wait until these have said hello; the ids of those that did not in time."""
+        wanted = {each.id for each in expected}
+        with self._changed:
+            wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
+            return tuple(wanted - self._seen.keys())
+
+    def counts(self) -> PublisherCount:
+        """The statistics for a renewal."""
+        with self._changed:
+            return PublisherCount(
+                self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
+            )
+
+    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002 - it is reached on this computer only
+        """Listen, at the first call; the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
+        if not self._endpoint:
+            what = f"a publisher of '{self.spec.topic}'"
+            messages, hellos = (listen(each, f"{LOOPBACK}:0", what) for each in (self._out, self._in))
+            self._endpoint = endpoint(LOOPBACK, bound_port(messages), bound_port(hellos))
+        return (self._endpoint,)
+
+    def leave_local(self) -> None:
+        """It has no name beside its port."""
+
+    # ---- sending
+
+    def report(self, problem: str) -> None:
+        """The publisher's trouble with a payload, for the next renewal."""
+        self._problem = problem
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self._changed:
+            self.count += 1
+            self._last_stamp_ns = time.time_ns()
+
+    def send(self, encoded: Encoded) -> None:
+        """Publish, in one message of nanomsg. Raises `WireError` for an extension that has no form."""
+        data, beside = encoded
+        extension = extension_part(beside) if beside else b""
+        flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if beside else 0)
+        size = len(data) if isinstance(data, bytes) else data.nbytes
+        with self._changed:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'")
+            self.count += 1
+            self._bytes += size
+            self._last_stamp_ns = time.time_ns()
+            told = size if size <= SIZE_MAX else 0
+            header = Header(
+                self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, told
+            )
+            tail = b"".join((header.pack(), data, extension))
+            if self.spec.is_latched:
+                self._latched = tail
+            self._out.send(self._topic + tail, block=False)
+
+    # ---- subscribers, in the node's thread
+
+    def serve(self, now: float) -> Rest:  # noqa: ARG002 - it has nothing to do later
+        """Read hellos, and see who came and went."""
+        with self._changed:
+            while self._events:
+                self._note(*self._events.popleft())
+            while not self._is_released:
+                try:
+                    said = self._in.recv(block=False)
+                except self._again:
+                    break
+                self._hello(said)
+        return Rest()
+
+    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+        self._events.append((pipe.id, str(pipe.remote_address)))
+        self._serve_soon(self)
+
+    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+        self._events.append((pipe.id, ""))
+        self._serve_soon(self)
+
+    def _note(self, pipe: int, address: str) -> None:
+        """A connection is there, or with no address it is gone. With the lock held."""
+        if address:
+            self._pipes[pipe] = address
+            self._greet(address)
+            return
+        gone = self._hellos.pop(self._pipes.pop(pipe, ""), None)
+        if gone is not None and gone not in self._hellos.values():  # else it has connected anew
+            self._seen.pop(gone, None)
+            self._changed.notify_all()
+
+    def _hello(self, said: bytes) -> None:
+        address, _space, part = said.partition(b" ")
+        hello = parse_hello(part)
+        if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MOST_HELLOS:
+            if self._refusals.add(f"{len(said)} bytes that are no hello to it"):
+                _logger.info("'%s' was sent %s", self.spec.topic, self._refusals.told())
+            return
+        place = address.decode("ascii", "replace")
+        self._hellos[place] = hello.subscriber
+        if place in self._pipes.values():
+            self._greet(place)
+
+    def _greet(self, address: str) -> None:
+        """What was latched, then the echo: from here on the subscriber counts. With the lock held."""
+        subscriber = self._hellos.get(address)
+        if subscriber is None or self._is_released:
+            return
+        self._seen[subscriber] = self.count
+        if self._latched is not None:
+            self._out.send(own_part(subscriber, self.spec.topic) + self._latched, block=False)
+        self._tell(subscriber, 0)
+        self._changed.notify_all()
+
+    def _tell(self, subscriber: int, flags: int) -> None:
+        header = Header(self.spec.codec.number, flags, self.count, time.time_ns(), self.spec.id)
+        self._out.send(own_part(subscriber, self.spec.topic) + header.pack(), block=False)
+
+    # ---- closing
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister, deliver what is on its way, and close the sockets. Once; called by its publisher."""
+        self._on_close(self, timeout_s)
+
+    def say_bye(self) -> None:
+        """Nothing is published any more; every subscriber disconnects when it has read everything."""
+        with self._changed:
+            self._is_closed = True
+            self._bye()
+
+    def finish(self, deadline: float) -> None:
+        """Wait until all have disconnected; log what was not delivered at `deadline`, and to how many."""
+        with self._changed:
+            while self._seen and (left := deadline - time.monotonic()) > 0.0:
+                if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
+                    self._bye()  # a full queue drops it like anything else
+            owed = [max(self.count - seen, self._latched is not None) for seen in self._seen.values()]
+            if any(owed):
+                _logger.warning(
+                    "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",
+                    self.spec.topic,
+                    sum(map(bool, owed)),
+                    max(owed),
+                )
+            self._seen.clear()
+
+    def release(self) -> None:
+        """Close the sockets; the node's thread has let go of them."""
+        with self._changed:
+            if self._is_released:
+                return
+            self._is_closed = self._is_released = True
+        self._in.close()
+        self._out.close()
+
+    def _bye(self) -> None:
+        for subscriber in () if self._is_released else self._seen:
+            self._tell(subscriber, BYE)

@@ -1,0 +1,212 @@
+"""NanomsgSubSocket: a SUB with its publishers, each greeted at its second port. No lock: see `Readable`."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import Any
+
+import zmq
+
+from nep.backends.base import SubscriberSpec
+from nep.backends.nanomsg.endpoints import own_part, places_of, split_one
+from nep.backends.nanomsg.library import SOCKET_FILES, library, queue_of
+from nep.backends.zeromq.loss import HeardPublishers
+from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals
+from nep.backends.zeromq.sub_socket import CarefulParser, Into
+from nep.errors import TooManyFilesError, WireError
+from nep.i18n import _
+from nep.messages.codecs import codec_for
+from nep.messages.message import Message
+from nep.protocol.requests import RemotePublisher
+from nep.protocol.wire import hello_part, topic_part
+from nep.system.descriptors import check_room
+
+__all__ = ["NanomsgSubSocket", "QuickSub"]
+
+_logger = logging.getLogger("nep")
+_HELLO_QUEUE = 8
+
+
+class QuickSub:
+    """A SUB whose descriptor can be polled and that is read without an exception's cost to its owner."""
+
+    def __init__(self, codec: str) -> None:
+        nng = library()
+        self._nothing = (nng.TryAgain, nng.Timeout, nng.Closed)
+        self.socket: Any = nng.Sub0(
+            recv_buffer_size=queue_of(codec), recv_max_size=0, recv_timeout=round(SHORT_WAIT_S * 1000)
+        )
+        self.fd = int(self.socket.recv_fd)
+        self._is_closed = False
+
+    @property
+    def has_input(self) -> bool:
+        """Whether something can be read."""
+        return not self._is_closed and bool(zmq.zmq_poll([(self.fd, zmq.POLLIN)], 0))
+
+    def recv(self, *, may_wait: bool) -> bytes | None:
+        """What comes next; None when there is nothing, with `may_wait` within `SHORT_WAIT_S`."""
+        try:
+            return bytes(self.socket.recv(block=may_wait))
+        except self._nothing:
+            return None
+
+    def close(self) -> None:
+        """Close it."""
+        self._is_closed = True
+        self.socket.close()
+
+
+@dataclass
+class _Link:
+    """A connection to a publisher, and the PUSH that greets it."""
+
+    endpoint: str
+    place: str
+    greeter: Any
+    dialer: Any = None
+
+    def close(self) -> None:
+        if self.dialer is not None:
+            self.dialer.close()
+        self.greeter.close()
+
+
+class NanomsgSubSocket:
+    """Only publishers of this back end are connected to; another one's endpoint becomes a problem."""
+
+    def __init__(self, spec: SubscriberSpec) -> None:
+        self.sources = HeardPublishers()
+        self.refusals = Refusals()
+        self._sub = QuickSub(codec_for(spec.msg_type).name)
+        self.fd = self._sub.fd
+        self._name = spec.topic
+        self._topic = topic_part(spec.topic)
+        self._own = own_part(spec.id, spec.topic)
+        self._hello = hello_part(spec.id, spec.topic)
+        self._parser = CarefulParser(spec, self._own, self.sources, self.leave, lambda _publisher, _seq: None)
+        self._links: dict[int, _Link] = {}
+        self._greeters: dict[str, Any] = {}
+        """Through what to greet the publisher at a place; pynng's threads read it."""
+        self._sub.socket.subscribe(self._topic)
+        self._sub.socket.subscribe(self._own)
+        self._sub.socket.add_post_pipe_connect_cb(self._connected)
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+        return self.sources.received
+
+    @property
+    def lost(self) -> int:
+        """Messages that did not."""
+        return self.sources.lost
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with a publisher that the master lists; empty when nothing is."""
+        listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_lapsed)
+        return next((each.problem for each in listed), "")
+
+    @property
+    def has_input(self) -> bool:
+        """Whether something can be read."""
+        return self._sub.has_input
+
+    def connect(self, remote: RemotePublisher) -> None:
+        """Connect to a publisher; twice is once. Silent ones that it replaces are left."""
+        for old in self.sources.replaced_by(remote):
+            self.leave(old)
+        source = self.sources.listed(remote)
+        source.is_lapsed = False
+        source.ends_at = None
+        endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
+        link = self._links.get(remote.publisher.id)
+        if not endpoint or endpoint == source.refused or (link is not None and link.endpoint == endpoint):
+            return
+        if link is not None:
+            self._unlink(remote.publisher.id)
+            source.has_echoed = False
+        source.refused = source.problem = source.endpoint = ""
+        places = places_of(endpoint)
+        why = "" if places is None else self._link(remote.publisher.id, endpoint, *places)
+        if places is not None and not why:
+            source.endpoint = f"tcp://{places[0]}"
+            return
+        source.refused = endpoint
+        source.problem = _("the endpoint '{shown}' of '{name}' cannot be connected to: {why}").format(
+            shown=ascii(endpoint[:100])[1:-1], name=remote.node_name, why=why or "it is none of 'nanomsg'"
+        )
+        if self.refusals.add(source.problem):
+            _logger.warning("subscribing to '%s': %s", self._name, source.problem)
+
+    def _link(self, publisher: int, endpoint: str, place: str, hellos: str) -> str:
+        """Connect, and greet as soon as the connection is there; why that cannot be, or ""."""
+        nng = library()
+        try:
+            check_room(2 * SOCKET_FILES, f"a subscriber of '{self._name}'")
+            # It queues, so that pynng's threads never wait in it.
+            link = _Link(endpoint, place, nng.Push0(send_buffer_size=_HELLO_QUEUE))
+            self._links[publisher] = link
+            self._greeters[place] = link.greeter
+            link.greeter.dial(f"tcp://{hellos}", block=False)
+            link.dialer = self._sub.socket.dial(f"tcp://{place}", block=False)
+        except (nng.NNGException, TooManyFilesError) as error:
+            self._unlink(publisher)
+            return str(error)
+        return ""
+
+    def _connected(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+        """In one of pynng's threads: say hello, and from where the connection comes."""
+        greeter = self._greeters.get(str(pipe.remote_address))
+        if greeter is not None:
+            greeter.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
+
+    def leave(self, publisher: int) -> None:
+        """Disconnect from a publisher and forget it."""
+        self.sources.pop(publisher)
+        self._unlink(publisher)
+
+    def _unlink(self, publisher: int) -> None:
+        link = self._links.pop(publisher, None)
+        if link is not None:
+            self._greeters.pop(link.place, None)
+            link.close()
+
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """The next message; None when there is nothing more, with `may_wait` within `SHORT_WAIT_S`."""
+        while (came := self._sub.recv(may_wait=may_wait)) is not None:
+            is_alone = came.startswith(self._own)
+            first = self._own if is_alone else self._topic
+            try:
+                message = self._parser.parse(first, split_one(came, first, is_alone=is_alone))
+            except WireError as error:
+                if self.refusals.add(error.reason):
+                    _logger.warning("on '%s' came what is no message: %s", self._name, error)
+                continue
+            if message is not None:
+                return message
+        return None
+
+    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
+        count = 0
+        while count < most and room > 0:
+            message = self.read(may_wait=may_wait and not count)
+            if message is None:
+                break
+            into.append(message)
+            count += 1
+            room -= message.size_bytes
+        return count
+
+    def dropped(self, count: int) -> None:
+        """So many messages that had been received were dropped for lack of room."""
+        self.sources.dropped(count)
+
+    def close(self) -> None:
+        """Close all sockets."""
+        for publisher in list(self._links):
+            self._unlink(publisher)
+        self._sub.close()

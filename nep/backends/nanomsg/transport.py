@@ -1,0 +1,78 @@
+"""The back end `nanomsg`: messages by pynng, the master as with `zeromq`.
+
+It is that back end's transport with other sockets: sessions, threads, waiting and the end are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nep.backends.base import PublisherSpec, PublisherTransport, SubscriberSpec, SubscriberTransport
+from nep.backends.connection import Direct
+from nep.backends.nanomsg.direct import DirectPublisher, DirectSubSocket
+from nep.backends.nanomsg.library import library
+from nep.backends.nanomsg.publisher import NanomsgPublisher
+from nep.backends.nanomsg.sub_socket import NanomsgSubSocket
+from nep.backends.zeromq.master_session import MasterSession
+from nep.backends.zeromq.subscriber import NativeReadable, Readable, SocketSubscriber
+from nep.backends.zeromq.transport import (
+    DIRECT_WAIT_S,
+    MasteredPublisher,
+    OwnedPublisher,
+    ZeromqTransport,
+    closed_on_error,
+)
+from nep.errors import NepError
+from nep.i18n import _
+from nep.protocol.requests import NodeRecord
+from nep.system.addresses import is_loopback
+
+__all__ = ["NanomsgTransport"]
+
+
+class NanomsgTransport(ZeromqTransport):
+    """One node's way to the others. Raises `BackendUnavailableError` where pynng is not installed."""
+
+    def __init__(self, node: NodeRecord) -> None:
+        library()
+        super().__init__(node)
+
+    def _session(self, address: str) -> MasterSession:
+        if not is_loopback(address):
+            raise NepError(
+                _(
+                    "nodes of 'nanomsg' meet on one computer only; use its own master, or 'zeromq' to reach "
+                    "the one at '{address}'"
+                ).format(address=address)
+            )
+        return super()._session(address)
+
+    def _mastered_publisher(
+        self, spec: PublisherSpec, closer: Callable[[OwnedPublisher, float], None]
+    ) -> MasteredPublisher:
+        return NanomsgPublisher(spec, closer, self._io.serve_soon)
+
+    def _mastered_readable(self, spec: SubscriberSpec) -> NativeReadable:
+        return NanomsgSubSocket(spec)
+
+    def _direct_publisher(self, spec: PublisherSpec, direct: Direct) -> PublisherTransport:
+        publisher = DirectPublisher(spec, direct, self._publisher_closer(lambda: None))
+        with closed_on_error(publisher.release):
+            self._attached[spec.id] = publisher.endpoint
+            self._hold(publisher)
+        try:
+            publisher.wait_for_any(DIRECT_WAIT_S)
+        except BaseException:
+            publisher.close(0.0)
+            raise
+        return publisher
+
+    def _direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
+        io = self._io_for(spec)
+        readable = DirectSubSocket(spec, direct)
+        subscriber: SocketSubscriber[Readable] = SocketSubscriber(readable, io, spec, self._forget_subscriber)
+        with closed_on_error(readable.close):
+            self._attached[spec.id] = readable.endpoint
+            self._keep(subscriber)
+        io.add(subscriber)
+        return subscriber
