@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.connection import Direct
-from nep.backends.nanomsg.library import library, listen, queue_of
+from nep.backends.nanomsg.library import library, listen, new_socket, queue_of
 from nep.backends.nanomsg.sub_socket import QuickSub
 from nep.backends.zeromq.io_thread import Rest
 from nep.backends.zeromq.legacy import from_frame, to_frame
@@ -25,6 +26,9 @@ from nep.system.addresses import in_numbers
 __all__ = ["DirectPublisher", "DirectSubSocket"]
 
 _logger = logging.getLogger("nep")
+_LINGER_S = 0.2
+"""pynng throws away what it has queued when it is closed, and does not tell when that is sent: it gets so long
+after the last message."""
 _LARGEST = 2**20
 """libnanomsg takes no larger messages unless it is told to, and says nothing."""
 
@@ -75,10 +79,11 @@ class DirectPublisher:
         self._pipes: set[int] = set()
         self._is_closed = False
         self._has_warned = False
+        self._sent_at = 0.0
         self._changed = threading.Condition(threading.RLock())
         self.fd = -1
         """There is nothing to be read."""
-        self._socket: Any = library().Pub0(send_buffer_size=queue_of(spec.codec.name))
+        self._socket: Any = new_socket("Pub0", send_buffer_size=queue_of(spec.codec.name))
         self._socket.add_post_pipe_connect_cb(self._came)
         self._socket.add_post_pipe_remove_cb(self._went)
         try:
@@ -107,6 +112,7 @@ class DirectPublisher:
     def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
         with self._changed:
             self._pipes.discard(pipe.id)
+            self._changed.notify_all()
 
     def wait_for_any(self, timeout_s: float) -> None:
         """Wait until somebody is connected."""
@@ -132,6 +138,7 @@ class DirectPublisher:
             self.count += 1
             warns = len(frame) > _LARGEST and not self._has_warned
             self._has_warned = self._has_warned or warns
+            self._sent_at = time.monotonic()
             self._socket.send(frame, block=False)
         if warns:
             _logger.warning(
@@ -146,7 +153,7 @@ class DirectPublisher:
         return Rest(is_quiet=True)
 
     def close(self, timeout_s: float) -> None:
-        """Close. pynng sends no more then: what a slow subscriber has not taken is lost to it."""
+        """Deliver what is on its way, as far as `finish` can, and close. Once; called by its publisher."""
         self._on_close(self, timeout_s)
 
     def say_bye(self) -> None:
@@ -155,7 +162,10 @@ class DirectPublisher:
             self._is_closed = True
 
     def finish(self, deadline: float) -> None:
-        """SP has no way to ask whether everything has arrived."""
+        """Let pynng send what it has queued, for `_LINGER_S` at most; SP has no way to ask whether it has."""
+        until = min(deadline, self._sent_at + _LINGER_S)
+        with self._changed:
+            wait_until(self._changed, lambda: not self._pipes, until - time.monotonic())
 
     def release(self) -> None:
         """Close the socket, without the lock: pynng waits for its threads then."""

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import atexit
+import ctypes
 import importlib
+import sys
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
+from weakref import WeakSet
 
 from nep.backends.zeromq.sockets import LOOPBACK, ORIGINAL_PORTS
-from nep.errors import AddressInUseError, BackendUnavailableError
+from nep.errors import AddressInUseError, BackendUnavailableError, NepError
 from nep.i18n import _
 from nep.system.addresses import host_of
 from nep.system.descriptors import check_room
+from nep.system.forks import in_child
 
-__all__ = ["MOST", "SOCKET_FILES", "bound_port", "library", "listen", "queue_of"]
+__all__ = ["MOST", "SOCKET_FILES", "bound_port", "library", "listen", "new_socket", "queue_of"]
 
 MOST = 8192
 """The largest queue that pynng allows, in messages. Its own ones are so small that a burst overruns them."""
@@ -21,16 +26,52 @@ _QUEUES = {"image": 64, "bytes": 1000}
 SOCKET_FILES = 6
 """A socket, its port, its signals, and a connection."""
 _TRIES = 100
+_MODULE = "pynng.nng"
+_sockets: WeakSet[Any] = WeakSet()
+_inherited: set[str] = set()
+"""The names of libraries that came with a fork: nng's threads stayed behind, and it waits for them."""
 
 
 def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - it has no types
-    """Pynng. Raises `BackendUnavailableError` where it is not installed or its library does not load."""
+    """Pynng. Raises `BackendUnavailableError` where it is not installed or its library does not load.
+
+    Raises `NepError` in a child that was forked from a program that uses it.
+    """
+    if _inherited:
+        raise NepError(
+            _(
+                "'nanomsg' does not work in a program that was forked from one that uses it; start it anew, "
+                "with multiprocessing by the method 'spawn'"
+            )
+        )
     try:
         return load("pynng")
     except (ImportError, OSError) as error:
         raise BackendUnavailableError(
             "nanomsg", _("install it with 'pip install nep-studio[nanomsg]'")
         ) from error
+
+
+def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - it has no types
+    """One of pynng's sockets, such as "Pub0", with these options."""
+    made = getattr(library(), kind)(**options)
+    _sockets.add(made)
+    return made
+
+
+def _forked() -> None:
+    """In a child: nothing of nng may be closed, not even when the interpreter ends: that would never end."""
+    if _MODULE not in sys.modules:
+        return
+    _inherited.add("pynng")
+    for socket in _sockets:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(socket))  # one that is forgotten closes itself
+    at_exit = getattr(sys.modules[_MODULE], "_pynng_atexit", None)
+    if at_exit is not None:
+        atexit.unregister(at_exit)
+
+
+in_child(_forked)
 
 
 def queue_of(codec: str) -> int:

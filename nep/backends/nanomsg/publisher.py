@@ -16,7 +16,7 @@ from typing import Any
 
 from nep.backends.base import PublisherSpec
 from nep.backends.nanomsg.endpoints import endpoint, own_part
-from nep.backends.nanomsg.library import bound_port, library, listen, queue_of
+from nep.backends.nanomsg.library import bound_port, library, listen, new_socket, queue_of
 from nep.backends.zeromq.io_thread import Rest, Served
 from nep.backends.zeromq.sockets import LOOPBACK, Refusals, wait_until
 from nep.errors import ClosedError
@@ -61,8 +61,10 @@ class NanomsgPublisher:
         self.is_local = False
         self._on_close = on_close
         self._serve_soon = serve_soon
-        self._out: Any = nng.Pub0(send_buffer_size=queue_of(spec.codec.name))
-        self._in: Any = nng.Pull0(recv_buffer_size=_HELLO_QUEUE, recv_max_size=SUBSCRIPTION_MAX_BYTES)
+        self._out: Any = new_socket("Pub0", send_buffer_size=queue_of(spec.codec.name))
+        self._in: Any = new_socket(
+            "Pull0", recv_buffer_size=_HELLO_QUEUE, recv_max_size=SUBSCRIPTION_MAX_BYTES
+        )
         self.fd = int(self._in.recv_fd)
         self._endpoint = ""
         self._bytes = 0

@@ -10,7 +10,7 @@ import zmq
 
 from nep.backends.base import SubscriberSpec
 from nep.backends.nanomsg.endpoints import own_part, places_of, split_one
-from nep.backends.nanomsg.library import SOCKET_FILES, library, queue_of
+from nep.backends.nanomsg.library import SOCKET_FILES, library, new_socket, queue_of
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals
 from nep.backends.zeromq.sub_socket import CarefulParser, Into
@@ -34,8 +34,8 @@ class QuickSub:
     def __init__(self, codec: str) -> None:
         nng = library()
         self._nothing = (nng.TryAgain, nng.Timeout, nng.Closed)
-        self.socket: Any = nng.Sub0(
-            recv_buffer_size=queue_of(codec), recv_max_size=0, recv_timeout=round(SHORT_WAIT_S * 1000)
+        self.socket: Any = new_socket(
+            "Sub0", recv_buffer_size=queue_of(codec), recv_max_size=0, recv_timeout=round(SHORT_WAIT_S * 1000)
         )
         self.fd = int(self.socket.recv_fd)
         self._is_closed = False
@@ -147,7 +147,7 @@ class NanomsgSubSocket:
         try:
             check_room(2 * SOCKET_FILES, f"a subscriber of '{self._name}'")
             # It queues, so that pynng's threads never wait in it.
-            link = _Link(endpoint, place, nng.Push0(send_buffer_size=_HELLO_QUEUE))
+            link = _Link(endpoint, place, new_socket("Push0", send_buffer_size=_HELLO_QUEUE))
             self._links[publisher] = link
             self._greeters[place] = link.greeter
             link.greeter.dial(f"tcp://{hellos}", block=False)
