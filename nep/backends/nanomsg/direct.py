@@ -27,7 +27,7 @@ __all__ = ["DirectPublisher", "DirectSubSocket"]
 
 _logger = logging.getLogger("nep")
 _LINGER_S = 0.2
-"""pynng throws away what it has queued when it is closed, and does not tell when that is sent: it gets so long
+"""pynng throws away what it has queued when it is closed, and tells nobody when that is sent: it gets so long
 after the last message."""
 _LARGEST = 2**20
 """libnanomsg takes no larger messages unless it is told to, and says nothing."""

@@ -1,0 +1,121 @@
+"""What is nanomsg's alone: direct connections, programs of libnanomsg, a missing pynng, other back ends."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+import nep
+from nep.backends.nanomsg.library import library
+from nep.masters.master import Master
+from tests.nep.programs import eventually
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+@pytest.fixture
+def node() -> Iterator[nep.Node]:
+    with nep.node("n", "NN", master="127.0.0.1:1") as made:
+        yield made
+
+
+@pytest.mark.parametrize("mode", ["one2many", "many2one"])
+@pytest.mark.parametrize("subscriber_first", [True, False])
+def test_both_ends_without_a_master(node: nep.Node, port: int, mode: str, subscriber_first: bool) -> None:
+    conf = node.direct("127.0.0.1", port, mode)
+    if subscriber_first:
+        sub = node.new_sub("t", "json", conf)
+        pub = node.new_pub("t", "json", conf)
+    else:
+        pub = node.new_pub("t", "json", conf)
+        sub = node.new_sub("t", "json", conf)
+    eventually(lambda: pub.subscribers == 1)
+    pub.publish({"n": 1})
+    assert sub.listen(timeout_s=30.0) == (True, {"n": 1})
+    assert sub.lost is None
+
+
+def test_the_last_messages_arrive_though_the_publisher_closes(node: nep.Node, port: int) -> None:
+    conf = node.direct(port=port, mode="many2one")
+    sub, pub = node.new_sub("t", "json", conf), node.new_pub("t", "json", conf)
+    eventually(lambda: pub.subscribers == 1)
+    for n in range(1000):
+        pub.publish(n)
+    pub.close()
+    assert [sub.listen(timeout_s=30.0)[1] for _ in range(1000)] == list(range(1000))
+
+
+@pytest.mark.skipif(shutil.which("nanocat") is None, reason="nanocat is missing (Debian: nanomsg-utils)")
+def test_nanocat_hears_and_is_heard(node: nep.Node, port: int) -> None:
+    pub = node.new_pub("t", "json", node.direct(port=port))
+    told = ["nanocat", "--sub", "--connect-local", str(port), "--subscribe", "t ", "--raw"]
+    with subprocess.Popen(told, stdout=subprocess.PIPE) as cat:
+        eventually(lambda: pub.subscribers == 1)
+        pub.publish({"n": 1})
+        assert cat.stdout is not None
+        assert cat.stdout.read(9) == b't {"n":1}'
+        cat.terminate()
+    pub.close()
+    sub = node.new_sub("u", "json", node.direct(port=port, mode="many2one"))
+    said = ["nanocat", "--pub", "--connect-local", str(port), "--data", 'u {"n":2}', "--interval", "0.05"]
+    with subprocess.Popen(said) as cat:
+        assert sub.listen(timeout_s=30.0) == (True, {"n": 2})
+        cat.terminate()
+
+
+def test_a_large_message_is_warned_of_once(
+    node: nep.Node, port: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    conf = node.direct(port=port, mode="many2one")
+    sub, pub = node.new_sub("t", "bytes", conf), node.new_pub("t", "bytes", conf)
+    eventually(lambda: pub.subscribers == 1)
+    for _ in range(2):
+        pub.publish(bytes(2**20 + 1))
+        assert sub.listen(timeout_s=30.0)[0]
+    assert caplog.text.count("programs that use libnanomsg take no more than 1048576") == 1
+
+
+def test_what_cannot_be(node: nep.Node, port: int) -> None:
+    with pytest.raises(nep.NepError, match="no direct connections of mode 'many2many'"):
+        node.new_pub("t", "json", node.direct(port=port, mode="many2many"))
+    with pytest.raises(nep.NepError, match="leave out wire='native'"):
+        node.new_sub("t", "json", node.direct(port=port, wire="native"))
+    with pytest.raises(nep.NepError, match="meet on one computer only"):
+        node.new_pub("t", "json", node.hybrid("192.0.2.1"))
+    node.new_pub("t", "json", node.direct(port=port))
+    with pytest.raises(nep.AddressInUseError):
+        node.new_pub("t", "json", node.direct(port=port))
+
+
+def test_without_pynng_one_sentence_says_what_to_install() -> None:
+    def missing(_name: str) -> object:
+        raise ImportError
+
+    with pytest.raises(nep.NepError, match="'nanomsg' is not installed; install it with 'pip install"):
+        library(missing)  # type: ignore[arg-type]
+
+
+def test_who_does_not_ask_for_it_does_not_import_pynng() -> None:
+    code = "import sys, nep; nep.node('a').close(); sys.exit('pynng' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_subscribers_of_the_two_back_ends_leave_each_other_s_publishers_alone(master: Master) -> None:
+    with nep.node("a", "nanomsg") as ours, nep.node("b", "zeromq") as theirs:
+        pubs = ours.new_pub("t"), theirs.new_pub("t")
+        subs = ours.new_sub("t"), theirs.new_sub("t")
+        for n, pub in enumerate(pubs):
+            pub.publish(n)
+        for n, sub in enumerate(subs):
+            assert sub.listen(timeout_s=30.0) == (True, n)
+            assert sub.listen() == (False, {})
