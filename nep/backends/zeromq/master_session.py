@@ -55,7 +55,7 @@ from nep.protocol.requests import (
 from nep.system.addresses import MasterName, is_loopback, look_up
 from nep.system.cpu import CpuLoad
 
-__all__ = ["MasterSession", "Pace", "RegisteredPublisher"]
+__all__ = ["MasterSession", "Pace", "SessionPublisher"]
 
 _RENEW_LONGEST_S = 30.0
 """A master cannot make a node wait for longer."""
@@ -67,7 +67,7 @@ _FOLLOW_S = 1.0
 _JOIN_AGAIN_S = 0.5
 
 
-class RegisteredPublisher(Protocol):
+class SessionPublisher(Protocol):
     """A publisher as its session needs it."""
 
     @property
@@ -123,7 +123,7 @@ class MasterSession:
         self._io = io
         self._calls = RpcClient(socket, address, after_use=lambda: io.serve_soon(self))
         self._lock = threading.Lock()
-        self._publishers: dict[int, tuple[PublisherRecord, RegisteredPublisher]] = {}
+        self._publishers: dict[int, tuple[PublisherRecord, SessionPublisher]] = {}
         self._subscribers: dict[int, tuple[SubscriberRecord, NativeSubscriber]] = {}
         self._confirmed: set[int] = set()
         self._epoch, self._revision = 0, 0
@@ -179,7 +179,7 @@ class MasterSession:
         self._calls.lead_to(known)
 
     def add_publisher(
-        self, record: PublisherRecord, publisher: RegisteredPublisher, wait_s: float | None
+        self, record: PublisherRecord, publisher: SessionPublisher, wait_s: float | None
     ) -> Added:
         """Register; the subscribers to expect. Raises as `RpcClient.ask` does."""
         with self._lock:

@@ -20,7 +20,7 @@ from nep.backends.base import (
 from nep.backends.connection import Configuration, Direct
 from nep.backends.zeromq.io_thread import IoThread, Served, SharedContext, shared_context
 from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
-from nep.backends.zeromq.master_session import MasterSession, RegisteredPublisher
+from nep.backends.zeromq.master_session import MasterSession, SessionPublisher
 from nep.backends.zeromq.publisher import NativePublisher
 from nep.backends.zeromq.sockets import Socket
 from nep.backends.zeromq.sub_socket import SubSocket
@@ -60,7 +60,7 @@ class OwnedPublisher(PublisherTransport, Served, Protocol):
         """Close what it has; the thread that served it has let go of it."""
 
 
-class MasteredPublisher(OwnedPublisher, RegisteredPublisher, Protocol):
+class MasteredPublisher(OwnedPublisher, SessionPublisher, Protocol):
     """One that the master knows."""
 
     def expect(self, expected: Iterable[Expected]) -> None:
