@@ -208,6 +208,8 @@ class NanomsgPublisher:
     def _hello(self, said: bytes) -> None:
         address, _space, part = said.partition(b" ")
         hello = parse_hello(part)
+        if hello is not None and len(self._hellos) >= _MOST_HELLOS:
+            self._forget_lone_hellos()
         if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MOST_HELLOS:
             if self._refusals.add(f"{len(said)} bytes that are no hello to it"):
                 _logger.info("'%s' was sent %s", self.spec.topic, self._refusals.told())
@@ -216,6 +218,11 @@ class NanomsgPublisher:
         self._hellos[place] = hello.subscriber
         if place in self._pipes.values():
             self._greet(place)
+
+    def _forget_lone_hellos(self) -> None:
+        """Those whose connection never came, or went before they were read. With the lock held."""
+        there = set(self._pipes.values())
+        self._hellos = {place: each for place, each in self._hellos.items() if place in there}
 
     def _greet(self, address: str) -> None:
         """What was latched, then the echo: from here on the subscriber counts. With the lock held."""

@@ -136,7 +136,7 @@ class NanomsgSubSocket:
             return
         source.refused = endpoint
         source.problem = _("the endpoint '{shown}' of '{name}' cannot be connected to: {why}").format(
-            shown=ascii(endpoint[:100])[1:-1], name=remote.node_name, why=why or "it is none of 'nanomsg'"
+            shown=ascii(endpoint[:100])[1:-1], name=remote.node_name, why=why or _("it is none of 'nanomsg'")
         )
         if self.refusals.add(source.problem):
             _logger.warning("subscribing to '%s': %s", self._name, source.problem)

@@ -187,7 +187,8 @@ class SubSocket:
             if is_endpoint(endpoint):
                 self._connect(source, endpoint)
             else:
-                self._refuse(source, endpoint, "it is none")
+                other = endpoint.startswith("nanomsg://")
+                self._refuse(source, endpoint, _("it is one of 'nanomsg'") if other else _("it is none"))
 
     def _connect(self, source: HeardPublisher, endpoint: str) -> None:
         if source.endpoint:  # its computer has another address now, or its master listens anew

@@ -45,16 +45,6 @@ def test_both_ends_without_a_master(node: nep.Node, port: int, mode: str, subscr
     assert sub.lost is None
 
 
-def test_the_last_messages_arrive_though_the_publisher_closes(node: nep.Node, port: int) -> None:
-    conf = node.direct(port=port, mode="many2one")
-    sub, pub = node.new_sub("t", "json", conf), node.new_pub("t", "json", conf)
-    eventually(lambda: pub.subscribers == 1)
-    for n in range(1000):
-        pub.publish(n)
-    pub.close()
-    assert [sub.listen(timeout_s=30.0)[1] for _ in range(1000)] == list(range(1000))
-
-
 @pytest.mark.skipif(shutil.which("nanocat") is None, reason="nanocat is missing (Debian: nanomsg-utils)")
 def test_nanocat_hears_and_is_heard(node: nep.Node, port: int) -> None:
     pub = node.new_pub("t", "json", node.direct(port=port))
@@ -110,7 +100,9 @@ def test_who_does_not_ask_for_it_does_not_import_pynng() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_subscribers_of_the_two_back_ends_leave_each_other_s_publishers_alone(master: Master) -> None:
+def test_subscribers_of_the_two_back_ends_leave_each_other_s_publishers_alone(
+    master: Master, caplog: pytest.LogCaptureFixture
+) -> None:
     with nep.node("a", "nanomsg") as ours, nep.node("b", "zeromq") as theirs:
         pubs = ours.new_pub("t"), theirs.new_pub("t")
         subs = ours.new_sub("t"), theirs.new_sub("t")
@@ -119,3 +111,16 @@ def test_subscribers_of_the_two_back_ends_leave_each_other_s_publishers_alone(ma
         for n, sub in enumerate(subs):
             assert sub.listen(timeout_s=30.0) == (True, n)
             assert sub.listen() == (False, {})
+    assert "of 'a' cannot be connected to: it is one of 'nanomsg'" in caplog.text
+    assert "of 'b' cannot be connected to: it is none of 'nanomsg'" in caplog.text
+
+
+def test_hellos_whose_connection_never_comes_make_room_for_others(master: Master) -> None:
+    with nep.node("a", "nanomsg") as node:
+        publisher = node.new_pub("t")._transport
+        publisher._hellos = {f"127.0.0.1:{number}": number for number in range(10_000)}
+        sub = node.new_sub("t")
+        assert publisher.subscribers == 1
+        assert len(publisher._hellos) < 10
+        publisher.send(nep.Encoded(b"1"))
+        assert sub.listen(timeout_s=30.0) == (True, 1)
