@@ -210,6 +210,19 @@ def test_long_choices_wrap_and_many_scroll_to_what_an_arrow_reaches(card, window
     assert shown == last.rect()
 
 
+@pytest.mark.parametrize("away_between", [True, False])
+def test_a_question_with_more_choices_than_the_last_has_room_for_all(card, qtbot, away_between: bool) -> None:
+    card.show_question(AskedQuestion(1, 7, "Play?", ("yes", "no")), held=False)
+    QTest.qWait(1)
+    if away_between:
+        card.show_question(None, held=False)
+        QTest.qWait(1)
+    card.show_question(AskedQuestion(1, 8, "Which?", ("red", "green", "a blue like the sky")), held=False)
+    qtbot.waitUntil(
+        lambda: all(each.visibleRegion().boundingRect() == each.rect() for each in card.choices.buttons)
+    )
+
+
 def test_short_choices_stand_beside_each_other(card) -> None:
     card.show_question(AskedQuestion(1, 5, "Play?", ("yes", "no")), held=False)
     yes, no = card.choices.buttons

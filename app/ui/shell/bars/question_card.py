@@ -93,6 +93,7 @@ class QuestionCard(FloatingCard):
         self.field.setAccessibleName(words)
         self.field.clear()
         self.choices.show_choices(question.choices)
+        self._offered.updateGeometry()  # while the card is hidden nobody hears that they want another height
         self.choices.setAccessibleName(words)
         typed = not question.choices
         self.field.setVisible(typed)
