@@ -199,6 +199,7 @@ def test_what_was_deleted_comes_back_although_other_edits_came_after_it(qtbot, v
     qtbot.waitUntil(lambda: told == [1], timeout=WAIT_MS)
     them.drag("[data-id=one] > .blocklyPath", QPoint(700, 400))
     qtbot.waitUntil(lambda: them.tops()[0]["x"] > 300, timeout=WAIT_MS)
+    them.wait_for("!document.querySelector('.blocklyDragging')")
     view.undo_deletion()
     qtbot.waitUntil(lambda: ids(them) == ["one", "start"], timeout=WAIT_MS)
     assert all(top["x"] > 300 for top in them.tops() if top["id"] == "one")
