@@ -15,7 +15,7 @@ from nep.backends.nanomsg.sub_socket import QuickSub
 from nep.backends.zeromq.io_thread import Rest
 from nep.backends.zeromq.legacy import from_frame, to_frame
 from nep.backends.zeromq.sockets import Refusals, wait_until
-from nep.backends.zeromq.sub_socket import Into
+from nep.backends.zeromq.subscriber import ReadOneByOne
 from nep.errors import ClosedError, NepError, WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
@@ -173,7 +173,7 @@ class DirectPublisher:
         self._socket.close()
 
 
-class DirectSubSocket:
+class DirectSubSocket(ReadOneByOne):
     """A SUB that takes the frames of both generations. Nobody numbers them: `lost` is not known."""
 
     def __init__(self, spec: SubscriberSpec, direct: Direct) -> None:
@@ -212,18 +212,6 @@ class DirectSubSocket:
                 self.received += 1
                 return Message(self._spec.topic, data, self._codec, self._spec.msg_type)
         return None
-
-    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
-        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
-        count = 0
-        while count < most and room > 0:
-            message = self.read(may_wait=may_wait and not count)
-            if message is None:
-                break
-            into.append(message)
-            count += 1
-            room -= message.size_bytes
-        return count
 
     def dropped(self, count: int) -> None:
         """Dropped here for lack of room: the only losses that can be known."""

@@ -11,17 +11,18 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from nep.backends.base import PublisherSpec
 from nep.backends.nanomsg.endpoints import endpoint, own_part
 from nep.backends.nanomsg.library import bound_port, library, listen, new_socket, queue_of
 from nep.backends.zeromq.io_thread import Rest, Served
+from nep.backends.zeromq.publisher import GreetedPublisher
 from nep.backends.zeromq.sockets import LOOPBACK, Refusals, wait_until
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
-from nep.protocol.requests import Expected, PublisherCount
+from nep.protocol.requests import PublisherCount
 from nep.protocol.wire import (
     BYE,
     EXTENSION,
@@ -42,7 +43,7 @@ _HELLO_QUEUE = 1000
 _BYE_AGAIN_S = 0.05
 
 
-class NanomsgPublisher:
+class NanomsgPublisher(GreetedPublisher):
     """Owns a PUB and the PULL at which it is greeted. Nothing of pynng is closed under its lock.
 
     pynng tells of connections in threads of its own and waits for these when it closes something.
@@ -74,17 +75,13 @@ class NanomsgPublisher:
         self._topic = topic_part(spec.topic)
         self._is_closed = False
         self._is_released = False
-        self._seen: dict[int, int] = {}
-        """Subscribers that are greeted, and how many messages there had been then."""
         self._pipes: dict[int, str] = {}
         """The addresses from which connections come."""
         self._hellos: dict[str, int] = {}
         """Who said hello, by the address of its connection, which may not be there yet."""
         self._events: deque[tuple[int, str]] = deque()
-        self._names: dict[int, str] = {}
-        self._waited: set[int] = set()
         self._refusals = Refusals()
-        self._changed = threading.Condition(threading.Lock())
+        super().__init__(threading.Condition(threading.Lock()), {})
         self._out.add_post_pipe_connect_cb(self._came)
         self._out.add_post_pipe_remove_cb(self._went)
 
@@ -99,26 +96,6 @@ class NanomsgPublisher:
     def is_heard(self) -> bool:
         """Whether anybody is connected, with or without a hello."""
         return bool(self._pipes)
-
-    @property
-    def missing(self) -> tuple[str, ...]:
-        """Names of nodes that were expected and have not said hello."""
-        with self._changed:
-            return tuple(sorted({self._names[each] for each in self._waited - set(self._seen)}))
-
-    def expect(self, expected: Iterable[Expected]) -> None:
-        """These subscribers are registered and will connect."""
-        with self._changed:
-            for each in expected:
-                self._waited.add(each.id)
-                self._names[each.id] = each.node_name
-
-    def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
-        """Wait until these have said hello; the ids of those that did not in time."""
-        wanted = {each.id for each in expected}
-        with self._changed:
-            wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
-            return tuple(wanted - self._seen.keys())
 
     def counts(self) -> PublisherCount:
         """The statistics for a renewal."""

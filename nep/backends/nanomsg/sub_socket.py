@@ -13,7 +13,8 @@ from nep.backends.nanomsg.endpoints import own_part, places_of, split_one
 from nep.backends.nanomsg.library import SOCKET_FILES, library, new_socket, queue_of
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals
-from nep.backends.zeromq.sub_socket import CarefulParser, Into
+from nep.backends.zeromq.sub_socket import CarefulParser
+from nep.backends.zeromq.subscriber import ReadOneByOne
 from nep.errors import TooManyFilesError, WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
@@ -73,7 +74,7 @@ class _Link:
         self.greeter.close()
 
 
-class NanomsgSubSocket:
+class NanomsgSubSocket(ReadOneByOne):
     """Only publishers of this back end are connected to; another one's endpoint becomes a problem."""
 
     def __init__(self, spec: SubscriberSpec) -> None:
@@ -188,18 +189,6 @@ class NanomsgSubSocket:
             if message is not None:
                 return message
         return None
-
-    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
-        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
-        count = 0
-        while count < most and room > 0:
-            message = self.read(may_wait=may_wait and not count)
-            if message is None:
-                break
-            into.append(message)
-            count += 1
-            room -= message.size_bytes
-        return count
 
     def dropped(self, count: int) -> None:
         """So many messages that had been received were dropped for lack of room."""

@@ -29,8 +29,7 @@ from nep.backends.zeromq.sockets import (
     wait_shortly,
     wait_until,
 )
-from nep.backends.zeromq.sub_socket import Into
-from nep.backends.zeromq.subscriber import SocketSubscriber
+from nep.backends.zeromq.subscriber import ReadOneByOne, SocketSubscriber
 from nep.errors import ClosedError, WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
@@ -234,7 +233,7 @@ class OriginalPublisher:
             self._changed.notify_all()
 
 
-class OriginalSubSocket:
+class OriginalSubSocket(ReadOneByOne):
     """A SUB that takes the frames of both generations. Nobody numbers them: `lost` is not known."""
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
@@ -277,18 +276,6 @@ class OriginalSubSocket:
             if data is not None:
                 self.received += 1
                 return Message(self._spec.topic, data, self._codec.name, self._spec.msg_type)
-
-    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
-        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
-        count = 0
-        while count < most and room > 0:
-            message = self.read(may_wait=may_wait and not count)
-            if message is None:
-                break
-            into.append(message)
-            count += 1
-            room -= message.size_bytes
-        return count
 
     def dropped(self, count: int) -> None:
         """Dropped here for lack of room: the only losses that can be known."""

@@ -140,7 +140,37 @@ class Subscriptions:
             _logger.info("'%s' was sent %s", self._name, self.refusals.told())
 
 
-class NativePublisher:
+class GreetedPublisher:
+    """A publisher to which those subscribers say hello that the master lists; `changed` guards all of it."""
+
+    def __init__(self, changed: threading.Condition, seen: dict[int, int]) -> None:
+        """`seen`: who has said hello, and how many messages there had been then."""
+        self._changed, self._seen = changed, seen
+        self._names: dict[int, str] = {}
+        self._waited: set[int] = set()
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of nodes that were expected and have not said hello."""
+        with self._changed:
+            return tuple(sorted({self._names[each] for each in self._waited - set(self._seen)}))
+
+    def expect(self, expected: Iterable[Expected]) -> None:
+        """These subscribers are registered and will connect."""
+        with self._changed:
+            for each in expected:
+                self._waited.add(each.id)
+                self._names[each.id] = each.node_name
+
+    def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
+        """Wait until these have said hello; the ids of those that did not in time."""
+        wanted = {each.id for each in expected}
+        with self._changed:
+            wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
+            return tuple(wanted - self._seen.keys())
+
+
+class NativePublisher(GreetedPublisher):
     """Owns `socket`, an XPUB that is bound or connected already."""
 
     def __init__(
@@ -172,9 +202,7 @@ class NativePublisher:
         self._last_stamp_ns: int | None = None
         self._problem = ""
         self._subscriptions = Subscriptions(spec.topic, spec.id)
-        self._seen, self._apart = self._subscriptions.seen, self._subscriptions.apart
-        self._names: dict[int, str] = {}
-        self._waited: set[int] = set()
+        self._apart = self._subscriptions.apart
         self._latched: tuple[Part, ...] | None = None
         self._looked_ns = 0
         self._io_comes = False
@@ -186,31 +214,11 @@ class NativePublisher:
         self._form = form_of(self._codec, self._flags)
         # `with` is three times faster on the lock itself than on the condition over it.
         self._lock = threading.Lock()
-        self._changed = threading.Condition(self._lock)
+        super().__init__(threading.Condition(self._lock), self._subscriptions.seen)
         self._is_closed = False
         self.fd = int(socket.getsockopt(zmq.FD))
 
     # ---- who listens
-
-    @property
-    def missing(self) -> tuple[str, ...]:
-        """Names of nodes that were expected and have not said hello."""
-        with self._changed:
-            return tuple(sorted({self._names[each] for each in self._waited - set(self._seen)}))
-
-    def expect(self, expected: Iterable[Expected]) -> None:
-        """These subscribers are registered and will connect."""
-        with self._changed:
-            for each in expected:
-                self._waited.add(each.id)
-                self._names[each.id] = each.node_name
-
-    def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
-        """Wait until these have said hello; the ids of those that did not in time."""
-        wanted = {each.id for each in expected}
-        with self._changed:
-            wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
-            return tuple(wanted - self._seen.keys())
 
     def wait_for_any(self, timeout_s: float) -> None:
         """Wait until somebody has said hello."""

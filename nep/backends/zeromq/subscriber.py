@@ -36,7 +36,7 @@ from nep.messages.queue import Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.system.wakeup import Waker
 
-__all__ = ["NativeReadable", "NativeSubscriber", "Readable", "SocketSubscriber"]
+__all__ = ["NativeReadable", "NativeSubscriber", "ReadOneByOne", "Readable", "SocketSubscriber"]
 
 _AHEAD_BYTES = 2**18
 _BRISK_S = 10e-6
@@ -95,6 +95,26 @@ class Readable(Protocol):
 
     def close(self) -> None:
         """Close the socket."""
+
+
+class ReadOneByOne:
+    """The batches of a `Readable` whose library has none."""
+
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """The next message; see `Readable`."""
+        raise NotImplementedError
+
+    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
+        count = 0
+        while count < most and room > 0:
+            message = self.read(may_wait=may_wait and not count)
+            if message is None:
+                break
+            into.append(message)
+            count += 1
+            room -= message.size_bytes
+        return count
 
 
 class NativeReadable(Readable, Protocol):
