@@ -191,7 +191,8 @@ class Editor {
       this.bridge.opened();
     },
     edit: (what: 'copy' | 'cut' | 'paste' | 'duplicate' | 'selectAll') => {
-      if (!this.shown.hasFocus) this.shown.focus();
+      // What we are told may be here before the keys are: until they come Blockly knows of no chosen block.
+      if (!this.shown.hasFocus || !Blockly.getFocusManager().getFocusedNode()) this.shown.focus();
       if (what === 'selectAll') chooseAll(this.shown.workspace);
       else void this.clipboard[what]();
     },
