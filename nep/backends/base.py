@@ -47,7 +47,8 @@ Sink = Callable[[Sequence[Message]], None]
 class PublisherSpec:
     """What a publisher shall be. `wait_s`: how long to wait for a master, None without limit.
 
-    `number` proves the id: see `nep.protocol.requests.is_proven`.
+    `number` proves the id: see `nep.protocol.requests.is_proven`. `may_batch`: a back end may send messages
+    that follow each other within microseconds together.
     """
 
     id: int
@@ -58,6 +59,7 @@ class PublisherSpec:
     configuration: Configuration
     wait_s: float | None
     number: int = 0
+    may_batch: bool = True
 
 
 @dataclass(frozen=True)

@@ -69,6 +69,9 @@ HELLO_ONE = b"\xffhello1/"
 """The same of a subscriber that also reads messages of one part."""
 HELLO_TELLS = b"\xffhello2/"
 """The same of one that besides answers every later echo with what it has read."""
+HELLO_BATCHES = b"\xffhello3/"
+"""The same of one that besides reads batches: see `nep.protocol.batch`."""
+_HELLOS = (HELLO_BATCHES, HELLO_TELLS, HELLO_ONE, HELLO)
 READ = b"\xffread/"
 """How a filter starts that answers an echo. It is taken back at once."""
 
@@ -163,13 +166,15 @@ def topic_part(topic: str) -> bytes:
 class Hello(NamedTuple):
     """What a hello filter says: who subscribes to what.
 
-    `one_part`: messages may come to it in one part. `tells`: it tells what it has read.
+    `one_part`: messages may come to it in one part. `tells`: it tells what it has read. `batches`: several
+    may come to it in one part.
     """
 
     subscriber: int
     topic: str
     one_part: bool
     tells: bool = False
+    batches: bool = False
 
 
 class Read(NamedTuple):
@@ -181,23 +186,28 @@ class Read(NamedTuple):
     bound_bytes: int
 
 
-def hello_part(subscriber: int, topic: str, *, one_part: bool = False, tells: bool = False) -> bytes:
-    """The hello filter of a subscriber, and the first part of what is sent to it alone."""
-    begin = HELLO_TELLS if tells else HELLO_ONE if one_part else HELLO
+def hello_part(
+    subscriber: int, topic: str, *, one_part: bool = False, tells: bool = False, batches: bool = False
+) -> bytes:
+    """The hello filter of a subscriber, and the first part of what is sent to it alone.
+
+    Who reads batches also tells, and who tells also reads messages of one part.
+    """
+    begin = HELLO_BATCHES if batches else HELLO_TELLS if tells else HELLO_ONE if one_part else HELLO
     return begin + f"{subscriber:016x}/{topic}".encode()
 
 
 def parse_hello(part: bytes) -> Hello | None:
     """What a hello filter says; None for anything else."""
-    begin = next((each for each in (HELLO_TELLS, HELLO_ONE, HELLO) if part.startswith(each)), None)
+    begin = next((each for each in _HELLOS if part.startswith(each)), None)
     if begin is None:
         return None
     digits, slash, topic = part[len(begin) :].partition(b"/")
     try:
         if len(digits) != 16 or not slash:
             return None
-        tells = begin == HELLO_TELLS
-        return Hello(int(digits, 16), topic.decode("utf-8"), tells or begin == HELLO_ONE, tells)
+        rank = _HELLOS.index(begin)
+        return Hello(int(digits, 16), topic.decode("utf-8"), rank <= 2, rank <= 1, rank == 0)
     except ValueError:
         return None
 

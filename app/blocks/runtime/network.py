@@ -40,8 +40,8 @@ class ProgramPublisher(Protocol):
 class ProgramNode(Protocol):
     """What is needed of NEP's node."""
 
-    def new_pub(self, topic: str, msg_type: str = "json") -> ProgramPublisher:
-        """A publisher."""
+    def new_pub(self, topic: str, msg_type: str = "json", *, batch: bool) -> ProgramPublisher:
+        """A publisher; without `batch` no message waits for another."""
         ...
 
     def new_sub(
@@ -301,7 +301,7 @@ class Network:
     def _publisher(self, topic: str, msg_type: str = "json") -> ProgramPublisher:
         with self._lock:
             if topic not in self._publishers:
-                self._publishers[topic] = self._node.new_pub(topic, msg_type)
+                self._publishers[topic] = self._node.new_pub(topic, msg_type, batch=False)
             return self._publishers[topic]
 
     def _subscribe(self, topic: str) -> None:

@@ -448,7 +448,7 @@ class Fleet:
                     return  # it has changed meanwhile, and is reached by the next graph
                 world = node.new_pub(topics.world, "json") if topics.world is not None else None
                 link.world = world
-                link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json")
+                link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json", batch=False)
             finally:
                 link.is_opening = False
 

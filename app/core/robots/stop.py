@@ -257,8 +257,8 @@ class RobotStopper:
 
     def _connect(self, robot: Robot, topics: RobotTopics) -> StopWay:
         if robot.dialect == RIZE:
-            return StopWay(self._node.new_pub(topics.command, "json"), None)
-        publisher = self._node.new_pub(topics.command, "robot/command")
+            return StopWay(self._node.new_pub(topics.command, "json", batch=False), None)
+        publisher = self._node.new_pub(topics.command, "robot/command", batch=False)
         try:
             return StopWay(publisher, self._node.new_sub(topics.answer, "robot/answer", sink=self._answers))
         except NepError:

@@ -41,8 +41,8 @@ class StopNode(Protocol):
 
     id: str
 
-    def new_pub(self, topic: str, msg_type: str = "json") -> StopPublisher:
-        """A publisher."""
+    def new_pub(self, topic: str, msg_type: str = "json", *, batch: bool) -> StopPublisher:
+        """A publisher; without `batch` no message waits for another."""
         ...
 
     def new_sub(

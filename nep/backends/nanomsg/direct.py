@@ -15,6 +15,7 @@ from nep.backends.nanomsg.sub_socket import QuickSub
 from nep.backends.zeromq.io_thread import Rest
 from nep.backends.zeromq.legacy import from_frame, to_frame
 from nep.backends.zeromq.sockets import Refusals, wait_until
+from nep.backends.zeromq.sub_socket import Into
 from nep.backends.zeromq.subscriber import ReadOneByOne
 from nep.errors import ClosedError, NepError, WireError
 from nep.i18n import _
@@ -200,7 +201,7 @@ class DirectSubSocket(ReadOneByOne):
         """Whether something can be read."""
         return self._sub.has_input
 
-    def read(self, *, may_wait: bool = False) -> Message | None:
+    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - each comes alone
         """The next message of this topic."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             try:

@@ -13,7 +13,7 @@ from nep.backends.nanomsg.endpoints import own_part, places_of, split_one
 from nep.backends.nanomsg.library import SOCKET_FILES, library, new_socket, queue_of
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals
-from nep.backends.zeromq.sub_socket import CarefulParser
+from nep.backends.zeromq.sub_socket import CarefulParser, Into
 from nep.backends.zeromq.subscriber import ReadOneByOne
 from nep.errors import TooManyFilesError, WireError
 from nep.i18n import _
@@ -175,7 +175,7 @@ class NanomsgSubSocket(ReadOneByOne):
             self._greeters.pop(link.place, None)
             link.close()
 
-    def read(self, *, may_wait: bool = False) -> Message | None:
+    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - each comes alone
         """The next message; None when there is nothing more, with `may_wait` within `SHORT_WAIT_S`."""
         while (came := self._sub.recv(may_wait=may_wait)) is not None:
             is_alone = came.startswith(self._own)

@@ -18,6 +18,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import logging
+import select
 import selectors
 import threading
 import time
@@ -48,6 +49,10 @@ _SOCKET_FILES = 4
 """A socket, its port, its local name, and a connection."""
 _IDLE_WAKERS = 8
 _LOOKS, _LOOK_S = 10, 0.01
+_ROUNDED_S = 0.001
+_ROUNDING = getattr(selectors, "EpollSelector", ())
+_SELECT_MOST = 1024
+"""`select` takes descriptors below this."""
 
 
 class Rest(NamedTuple):
@@ -157,7 +162,10 @@ class IoThread:
                 done.set()
 
     def _turn(self) -> None:
-        ready = self._selector.select(self._timeout())
+        timeout_s = self._timeout()
+        if timeout_s and timeout_s < _ROUNDED_S:
+            timeout_s = _waited(self._selector, timeout_s)
+        ready = self._selector.select(timeout_s)
         self._waker.clear()
         self._obey()
         for key, _events in ready:
@@ -252,6 +260,14 @@ class IoThread:
     def _release(self) -> None:
         self._selector.close()
         self._waker.close()
+
+
+def _waited(selector: selectors.BaseSelector, timeout_s: float) -> float:
+    """Wait where epoll alone would wait for a whole millisecond; how long is left to wait."""
+    if isinstance(selector, _ROUNDING) and selector.fileno() < _SELECT_MOST:
+        select.select((selector.fileno(),), (), (), timeout_s)
+        return 0.0
+    return timeout_s
 
 
 class SharedContext:

@@ -29,6 +29,7 @@ from nep.backends.zeromq.sockets import (
     wait_shortly,
     wait_until,
 )
+from nep.backends.zeromq.sub_socket import Into
 from nep.backends.zeromq.subscriber import ReadOneByOne, SocketSubscriber
 from nep.errors import ClosedError, WireError
 from nep.i18n import _
@@ -254,7 +255,7 @@ class OriginalSubSocket(ReadOneByOne):
         """Whether something can be read."""
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
-    def read(self, *, may_wait: bool = False) -> Message | None:
+    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - each comes alone
         """The next message of this topic."""
         while True:
             try:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import zmq
 
@@ -17,14 +17,17 @@ from nep.backends.base import PublisherSpec
 from nep.backends.zeromq.bindings import SMALL, Bindings
 from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog, SendWindow
 from nep.backends.zeromq.io_thread import Rest, Served
+from nep.backends.zeromq.pending_batch import MOST, SMALL_BYTES, SOON_NS, WAIT_NS, PendingBatch
 from nep.backends.zeromq.sockets import Part, Refusals, Socket, send_mark, sendable, wait_until
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
+from nep.protocol.batch import batch_part
 from nep.protocol.requests import Expected, PublisherCount
 from nep.protocol.wire import (
     BYE,
     LATCHED,
     SIZE_MAX,
+    Hello,
     extension_part,
     form_of,
     pack_quickly,
@@ -45,7 +48,7 @@ _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
 _time_ns = time.time_ns
 _NO_COPY_BYTES = 65_536
-_ONE_PART_BYTES = 16_384
+_ONE_PART_BYTES = SMALL_BYTES
 """Smaller messages go out in one part where all who subscribe read that: see docs/adr/0009-one-part.md."""
 _LOOK_NS = 500_000
 """Whoever publishes more often than this looks for subscriptions only this often; the node's thread looks
@@ -69,6 +72,7 @@ class Subscriptions:
         """Under which first part each of them is reached alone."""
         self.apart: dict[bytes, int] = {}
         """Filters by which somebody reads who did not say that it reads messages of one part; of how many."""
+        self._without_batches: set[int] = set()
         self.windows: dict[int, SendWindow] = {}
         """What is under way to those that tell what they have read."""
         self.refusals = Refusals()
@@ -82,6 +86,11 @@ class Subscriptions:
         return bool(self.seen or self.apart)
 
     @property
+    def reads_batches(self) -> bool:
+        """Whether all who read take several messages in one part."""
+        return not self.apart and not self._without_batches
+
+    @property
     def tells_all(self) -> bool:
         """Whether all who read tell what they have read."""
         return not self.apart and len(self.windows) == len(self.seen)
@@ -91,6 +100,7 @@ class Subscriptions:
         self.seen.clear()
         self.hellos.clear()
         self.windows.clear()
+        self._without_batches.clear()
 
     def note(self, event: bytes, count: int) -> bytes | None:
         """Somebody came or went, after `count` messages; the first part under which to greet a subscriber."""
@@ -106,11 +116,12 @@ class Subscriptions:
             return None
         if hello.topic != self._name:
             return None  # a subscriber of whoever had this port before
-        if not is_wanted:
-            self.seen.pop(hello.subscriber, None)
-            self.hellos.pop(hello.subscriber, None)
-            self.windows.pop(hello.subscriber, None)
-            return None
+        if is_wanted:
+            return self._note_hello(hello, what, count)
+        self._leave(hello.subscriber)
+        return None
+
+    def _note_hello(self, hello: Hello, what: bytes, count: int) -> bytes | None:
         if len(self.seen) >= MAX_SUBSCRIBERS and hello.subscriber not in self.seen:
             self._refuse(f"the hello of one more than {MAX_SUBSCRIBERS} subscribers")
             return None
@@ -121,9 +132,18 @@ class Subscriptions:
         self.seen[hello.subscriber] = count
         self.hellos[hello.subscriber] = what
         self.windows.pop(hello.subscriber, None)
+        self._without_batches.discard(hello.subscriber)
+        if not hello.batches:
+            self._without_batches.add(hello.subscriber)
         if hello.tells:
             self.windows[hello.subscriber] = SendWindow()  # a connection of its own: nothing is under way
         return what
+
+    def _leave(self, subscriber: int) -> None:
+        self.seen.pop(subscriber, None)
+        self.hellos.pop(subscriber, None)
+        self.windows.pop(subscriber, None)
+        self._without_batches.discard(subscriber)
 
     def _note_filter(self, what: bytes, *, is_wanted: bool) -> None:
         """Each filter that comes is told, and the last of its kind that goes."""
@@ -181,7 +201,8 @@ class NativePublisher(GreetedPublisher):
         serve_soon: Callable[[Served], None],
     ) -> None:
         self.spec = spec
-        self.count = 0
+        self._count = 0
+        """Messages that were sent or skipped."""
         self.subscribers = 0
         """How many said hello and have not gone."""
         self.is_heard = False
@@ -207,6 +228,7 @@ class NativePublisher(GreetedPublisher):
         self._looked_ns = 0
         self._io_comes = False
         self._served = 0
+        self._batch = PendingBatch(may_wait=spec.may_batch and not spec.is_latched)
         self._id = spec.id
         self._topic = topic_part(spec.topic)
         self._codec = spec.codec.number
@@ -217,6 +239,12 @@ class NativePublisher(GreetedPublisher):
         super().__init__(threading.Condition(self._lock), self._subscriptions.seen)
         self._is_closed = False
         self.fd = int(socket.getsockopt(zmq.FD))
+        self.send = self._sender()
+
+    @property
+    def count(self) -> int:
+        """Messages published so far."""
+        return self._count + len(self._batch.payloads)
 
     # ---- who listens
 
@@ -270,25 +298,62 @@ class NativePublisher(GreetedPublisher):
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self._lock:
-            self.count += 1
+            self._flush()
+            self._count += 1
             self._last_stamp_ns = time.time_ns()
 
-    def send(self, encoded: Encoded) -> None:
-        """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed.
+    def _sender(self) -> Callable[[Encoded], None]:
+        """What `send` is: as a closure, because most of a small message's way is in here."""
+        batch, lock, publisher = self._batch, self._lock, self
+        payloads, put, put_stamp = batch.payloads, batch.payloads.append, batch.stamps_ns.append
+        ends_ns = 0
 
-        Raises `WireError` for an extension that has no form on the wire.
-        """
-        data: Part
-        data, beside = encoded
+        def send(encoded: Encoded) -> None:
+            """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed.
+
+            Raises `WireError` for an extension that has no form on the wire.
+            """
+            nonlocal ends_ns
+            data, beside = encoded
+            stamp_ns = _time_ns()
+            if (
+                stamp_ns < batch.until_ns
+                and beside is None
+                and type(data) is bytes
+                and len(data) < SMALL_BYTES
+            ):
+                with lock:
+                    if batch.is_allowed:
+                        put(data)
+                        put_stamp(stamp_ns)
+                        count = len(payloads)
+                        if count == MOST:
+                            publisher._flush()
+                            batch.has_gone_full = True
+                            return
+                        if count == 1:
+                            ends_ns = stamp_ns + WAIT_NS
+                            publisher._flush_soon()
+                        until_ns = stamp_ns + SOON_NS
+                        batch.until_ns = until_ns if until_ns < ends_ns else ends_ns  # noqa: FURB136 - in half the time of min
+                        return
+            publisher._send_now(data, beside)
+
+        return send
+
+    def _send_now(self, given: bytes | memoryview, beside: Mapping[str, object] | None) -> None:
+        """Send it, and what waits before it."""
+        data: Part = given
         extension = None
-        if beside or type(data) is not bytes:
-            data = sendable(data) if len(data) >= _ONE_PART_BYTES else bytes(data)
+        if beside or type(given) is not bytes:
+            data = sendable(given) if len(given) >= _ONE_PART_BYTES else bytes(given)
             extension = extension_part(beside) if beside else None
         size = len(data)
         with self._lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self.count = seq = self.count + 1
+            self._flush()
+            self._count = seq = self._count + 1
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
             if total >= self._settle_at or extension or self._flags:
@@ -296,27 +361,60 @@ class NativePublisher(GreetedPublisher):
             elif size < _ONE_PART_BYTES and not self._apart and type(data) is bytes:
                 head = pack_quickly(self._form, size, seq, stamp_ns, self._id)
                 self._send(b"".join((self._topic, head, data)))
+                self._batch.begin_after(stamp_ns)
             else:
-                send = self._send
-                send(self._topic, _SNDMORE)
-                send(
-                    pack_quickly(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id),
-                    _SNDMORE,
-                )
-                send(data, 0, size < _NO_COPY_BYTES)
-            if not 0 <= stamp_ns - self._looked_ns < _LOOK_NS:
-                self._looked_ns = stamp_ns
-                self._read_subscriptions()
-            elif not self._io_comes:
-                self._io_comes = True
-                self._serve_soon(self)
+                self._send_apart(data, size, seq, stamp_ns)
+            self._look(stamp_ns)
+
+    def _look(self, stamp_ns: int) -> None:
+        """Read subscriptions, now and then; the node's thread looks after that."""
+        if not 0 <= stamp_ns - self._looked_ns < _LOOK_NS:
+            self._looked_ns = stamp_ns
+            self._read_subscriptions()
+        elif not self._io_comes:
+            self._io_comes = True
+            self._serve_soon(self)
+
+    def _send_apart(self, data: Part, size: int, seq: int, stamp_ns: int) -> None:
+        """In three parts, with the lock held."""
+        send = self._send
+        send(self._topic, _SNDMORE)
+        send(pack_quickly(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id), _SNDMORE)
+        send(data, 0, size < _NO_COPY_BYTES)
+
+    def _flush_soon(self) -> None:
+        """Let the node's thread send what waits then. With the lock held."""
+        if not self._batch.is_looked_after:
+            self._batch.is_looked_after = self._io_comes = True
+            self._serve_soon(self)
+
+    def _flush(self) -> None:
+        """Send the messages that wait, with the lock held. They count from now on."""
+        if not self._batch.payloads:
+            return
+        payloads, stamps_ns = self._batch.take()
+        self._last_stamp_ns = stamp_ns = stamps_ns[-1]
+        count = len(payloads)
+        if count > 1 and self._batch.is_allowed and self._bytes + count * _ONE_PART_BYTES < self._settle_at:
+            part = batch_part(self._topic, self._form, self._count + 1, self._id, stamps_ns, payloads)
+            self._count += count
+            self._bytes += sum(map(len, payloads))
+            self._send(part)
+        else:
+            for stamp_ns, data in zip(stamps_ns, payloads, strict=True):
+                self._last_stamp_ns = stamp_ns
+                self._count += 1
+                self._bytes += len(data)
+                self._send_all(data, None)
+        self._look(stamp_ns)
 
     def _send_all(self, data: Part, extension: bytes | None) -> None:
         """Send what has flags, or when it is time to see what was read, with the lock held."""
+        self._flush()
         form = self._form if extension is None else self._form | EXTENSION_FLAG << 16
         stamp_ns = self._last_stamp_ns or 0
         size = len(data)
-        header = pack_quickly(form, size if size <= SIZE_MAX else 0, self.count, stamp_ns, self._id)
+        header = pack_quickly(form, size if size <= SIZE_MAX else 0, self._count, stamp_ns, self._id)
         tail = (header, data) if extension is None else (header, data, extension)
         if self.spec.is_latched:
             self._latched = tail
@@ -332,7 +430,7 @@ class NativePublisher(GreetedPublisher):
         since = self._bytes - size - self._settled_bytes  # sent to all
         if since:
             for window in windows.values():
-                window.sent(self.count - 1, since)
+                window.sent(self._count - 1, since)
         self._settled_bytes = self._bytes
         is_told = self._subscriptions.tells_all
         has_room = {each: window.has_room(size) for each, window in windows.items()}
@@ -352,7 +450,7 @@ class NativePublisher(GreetedPublisher):
                 else:
                     window.missed()
         for window in taking.values():
-            window.sent(self.count, size)
+            window.sent(self._count, size)
         now = time.monotonic()
         for each, window in windows.items():
             if window.is_to_ask(now, has_room=has_room[each]):
@@ -367,6 +465,7 @@ class NativePublisher(GreetedPublisher):
 
     def _send_parts(self, first: bytes, tail: tuple[Part, ...]) -> None:
         """Send with the lock held. XPUB never blocks: it drops for subscribers whose queue is full."""
+        self._flush()
         send = self._send
         send(first, _SNDMORE)
         for part in tail[:-1]:
@@ -376,22 +475,29 @@ class NativePublisher(GreetedPublisher):
     # ---- subscriptions
 
     def serve(self, now: float) -> Rest:
-        """Read subscriptions."""
+        """Send what waits long enough, and read subscriptions."""
         with self._lock:
             if not self._is_closed or self._seen:
                 self._read_subscriptions()
-            count, self._served = self._served, self.count
+            again_s = self._batch.look_again_s(_time_ns())
+            if not again_s:
+                self._flush()
+                again_s = self._batch.goes_on_s
+            if again_s:
+                return Rest(due=now + again_s)
+            count, self._served = self._served, self._count
             # As long as somebody publishes without looking, this thread looks again and again.
-            self._io_comes = self._io_comes and count != self.count and not self._is_closed
+            self._io_comes = self._io_comes and count != self._count and not self._is_closed
             return Rest(due=now + _SERVE_S) if self._io_comes else Rest()
 
     def _read_subscriptions(self) -> None:
         """With the lock held: until the socket has nothing more."""
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
-            own = self._subscriptions.note(self._socket.recv(zmq.DONTWAIT), self.count)
+            own = self._subscriptions.note(self._socket.recv(zmq.DONTWAIT), self._count)
             # First: whoever gets the echo may rely on being counted.
             self.subscribers = len(self._seen)
             self.is_heard = self._subscriptions.is_there
+            self._batch.allow(reads_batches=self._subscriptions.reads_batches)
             if own is not None:
                 self._greet(own)
             self._changed.notify_all()
@@ -410,11 +516,11 @@ class NativePublisher(GreetedPublisher):
             hello = parse_hello(own)
             window = self._subscriptions.windows.get(hello.subscriber) if hello is not None else None
             if window is not None:
-                window.sent(self.count, len(self._latched[1]))
+                window.sent(self._count, len(self._latched[1]))
         self._send_parts(own, (self._notice(0),))
 
     def _notice(self, flags: int) -> bytes:
-        return pack_quickly(form_of(self._codec, flags), 0, self.count, time.time_ns(), self._id)
+        return pack_quickly(form_of(self._codec, flags), 0, self._count, time.time_ns(), self._id)
 
     # ---- closing
 
@@ -426,6 +532,7 @@ class NativePublisher(GreetedPublisher):
         """Nothing is published any more; every subscriber disconnects when it has read everything."""
         with self._changed:
             self._is_closed = True
+            self._flush()
             self._bye()
 
     def finish(self, deadline: float) -> None:
@@ -435,7 +542,7 @@ class NativePublisher(GreetedPublisher):
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
                     self._bye()  # a full queue drops it like anything else
             if self._seen:
-                owed = [max(self.count - seen, self._latched is not None) for seen in self._seen.values()]
+                owed = [max(self._count - seen, self._latched is not None) for seen in self._seen.values()]
                 if any(owed):  # else only the bye was not taken
                     _logger.warning(
                         "'%s' is closed before %d subscriber(s) took everything: "

@@ -22,6 +22,7 @@ from nep.errors import WireError
 from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for, codec_numbered
 from nep.messages.message import NOTHING, UNDECODED, Message, arrived, kind_of, new_message
+from nep.protocol.batch import BATCH, BATCH_FORM, BATCH_MAX, entries, table_of
 from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import (
     BYE,
@@ -95,6 +96,26 @@ class CarefulParser:
             return None
         return self._message(*split_rest(rest), is_alone=is_alone)
 
+    def parse_batch(self, first: bytes) -> list[Message]:
+        """The messages of a batch. Raises `WireError` when it is none."""
+        topic, head, body = apart(first)
+        if topic != self._topic:
+            raise WireError(_("a message begins with something else than its topic"))
+        header = read_header(head)
+        if header.flags != BATCH or header.size != len(body):
+            raise WireError(_("a batch has no other flags, and tells its size"))
+        one = header._replace(flags=0)
+        read = (
+            self._message(
+                one._replace(seq=header.seq + each.number, stamp_ns=each.stamp_ns),
+                body[each.begin : each.end],
+                NOTHING,
+                is_alone=False,
+            )
+            for each in entries(body)
+        )
+        return [each for each in read if each is not None]
+
     def _notice(self, header: Header) -> None:
         """An echo, or the last word of a publisher that closes."""
         source = self._sources.get(header.publisher)
@@ -144,7 +165,7 @@ class SubSocket:
         self._recv: Callable[..., Any] = socket.recv
         self._name = spec.topic
         self._topic = topic_part(spec.topic)
-        self._hello = hello_part(spec.id, spec.topic, tells=True)
+        self._hello = hello_part(spec.id, spec.topic, batches=True)
         self._id = spec.id
         self._parser = CarefulParser(spec, self._hello, self.sources, self.leave, self._tell)
         self._cut = len(self._topic)
@@ -245,9 +266,9 @@ class SubSocket:
     ) -> int:
         """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were.
 
-        With `may_wait` the first is waited for; `first` is what was read of it already. Notices are dealt
-        with on the way. Nearly every message is just the next one of its publisher, has the form of the one
-        before and comes in one part: that is read here.
+        A batch is taken whole. With `may_wait` the first is waited for; `first` is what was read of it
+        already. Notices are dealt with on the way. Nearly every message is just the next one of its
+        publisher, has the form of the one before and comes in one part: that is read here.
         """
         recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, into.append
         cut, body = self._cut, self._body
@@ -277,6 +298,10 @@ class SubSocket:
                         room -= size
                         first = None
                         continue
+                    if form & BATCH_FORM:
+                        got, new = self._read_batch(first, into)
+                        count, others, room, first = count + got, others + got - new, room - len(first), None
+                        continue
                 first, other = self._in_parts(first)
                 if other is not None:
                     append(other)
@@ -288,11 +313,54 @@ class SubSocket:
         self.sources.received += count - others
         return count
 
-    def read(self, *, may_wait: bool = False) -> Message | None:
+    def _read_batch(self, first: bytes, into: Into) -> tuple[int, int]:
+        """The messages of a batch: how many, and how many of them are not counted yet."""
+        body = self._body
+        form, size, seq, _stamp_ns, publisher = unpack_at(first, self._cut)
+        source = self.sources.by_id.get(publisher)
+        count = int.from_bytes(first[body : body + 4], "little")
+        is_next = source and source.last == seq - 1 and source.form | BATCH_FORM == form
+        if not (source and is_next and 0 < count <= BATCH_MAX and len(first) == body + size):
+            return self._read_batch_carefully(first, into)
+        table = table_of(count)
+        at = body + table.size
+        if at > len(first):
+            return self._read_batch_carefully(first, into)
+        numbers = table.unpack_from(first, body)
+        sizes = numbers[1 : count + 1]
+        if at + sum(sizes) != len(first):
+            return self._read_batch_carefully(first, into)
+        kind, append = source.kind, into.append
+        for size, stamp_ns in zip(sizes, numbers[count + 1 :], strict=True):
+            message = new_message(Message)
+            message.kind, message.raw = kind, first[at : (at := at + size)]
+            message.stamp_ns = stamp_ns
+            message.seq = seq
+            message.publisher, message.extension = publisher, NOTHING
+            message.decoded = UNDECODED
+            append(message)
+            seq += 1
+        source.last = seq - 1
+        return count, count
+
+    def _read_batch_carefully(self, first: bytes, into: Into) -> tuple[int, int]:
+        """The messages of any batch."""
+        if self._socket.getsockopt(_RCVMORE):
+            self._carefully(first)
+            return 0, 0
+        try:
+            messages = self._parser.parse_batch(first)
+        except WireError as error:
+            self.refusals.add(error.reason)
+            return 0, 0
+        into.extend(messages)
+        return len(messages), 0
+
+    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:
         """The next message, waited for with `may_wait`; None when there is nothing more.
 
-        The usual message is read here as in `read_into`: calling that takes a third longer, and a program
-        that reads one message after the other does this for each.
+        Others that came with it go into `rest`. The usual message is read here as in `read_into`: calling
+        that takes a third longer, and a program that reads one message after the other does this for each.
         """
         try:
             first = self._recv(0 if may_wait else _DONTWAIT)
@@ -311,8 +379,12 @@ class SubSocket:
                 message.publisher, message.extension = publisher, NOTHING
                 message.decoded = UNDECODED
                 return message
-        one: list[Message] = []
-        return one[0] if self.read_into(one, 1, 1, first=first) else None
+        one: deque[Message] = deque()
+        if not self.read_into(one, 1, 1, first=first):
+            return None
+        message = one.popleft()
+        rest.extend(one)
+        return message
 
     def _in_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
         """A message that begins with `first`: what comes behind it, if that was read too, and the message.

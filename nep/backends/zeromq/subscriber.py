@@ -87,8 +87,11 @@ class Readable(Protocol):
         With `may_wait` the first is waited for, `SHORT_WAIT_S` at most.
         """
 
-    def read(self, *, may_wait: bool = False) -> Message | None:
-        """The next message; None when there is nothing more, with `may_wait` within `SHORT_WAIT_S`."""
+    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:
+        """The next message; None when there is nothing more, with `may_wait` within `SHORT_WAIT_S`.
+
+        Others that came with it go into `rest`.
+        """
 
     def dropped(self, count: int) -> None:
         """So many messages that had been received were dropped for lack of room."""
@@ -100,7 +103,7 @@ class Readable(Protocol):
 class ReadOneByOne:
     """The batches of a `Readable` whose library has none."""
 
-    def read(self, *, may_wait: bool = False) -> Message | None:
+    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:
         """The next message; see `Readable`."""
         raise NotImplementedError
 
@@ -108,7 +111,7 @@ class ReadOneByOne:
         """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
         count = 0
         while count < most and room > 0:
-            message = self.read(may_wait=may_wait and not count)
+            message = self.read(into, may_wait=may_wait and not count)
             if message is None:
                 break
             into.append(message)
@@ -387,15 +390,26 @@ class SocketSubscriber(Generic[R]):
             if span > self._ahead.span_s:
                 if self._ahead.now > 1:
                     self._ahead.begin()
-                return self._read(may_wait=may_wait)
+                message = self._read(self.ready, may_wait=may_wait)
+                return self._bounded(message) if self.ready else message
             most = self._ahead.more()
             if self._read_into(self.ready, most, _AHEAD_BYTES, may_wait=may_wait) < most:
                 self._ahead.begin()
         if self.ready:
-            return self.ready.popleft()
+            return self._bounded(self.ready.popleft())
         if not self._keeps_all:
             self._fill()
         return self._inbox.take()
+
+    def _bounded(self, message: Message | None) -> Message | None:
+        """The oldest that there is room for, of `message` and those that were read behind it."""
+        over = 0
+        while message is not None and len(self.ready) >= self.spec.max_messages:
+            message = self.ready.popleft()
+            over += 1
+        if over:
+            self._readable.dropped(over)
+        return message
 
     def _fill(self, most: int = _BATCH_MESSAGES) -> int:
         """Read into the inbox until the socket has nothing more, or a batch is full; how many."""

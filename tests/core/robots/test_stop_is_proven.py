@@ -178,11 +178,11 @@ class Broken:
         self.new_sub = node.new_sub
         self.tried = 0
 
-    def new_pub(self, topic: str, msg_type: str = "json") -> nep.Publisher:
+    def new_pub(self, topic: str, msg_type: str = "json", *, batch: bool = True) -> nep.Publisher:
         if topic in self.full:
             self.tried += 1
             raise AddressInUseError("tcp://127.0.0.1:7000")
-        return self._node.new_pub(topic, msg_type)
+        return self._node.new_pub(topic, msg_type, batch=batch)
 
 
 @pytest.fixture

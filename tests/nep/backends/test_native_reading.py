@@ -251,6 +251,6 @@ def test_a_publisher_that_has_another_port_is_followed(context: zmq.Context[zmq.
             said.append(there.recv())
         assert said[0] == b"\x01t\0"
         there.send_multipart([said[1][1:], wire.Header(3, 0, 0, 0, 7).pack()])
-        eventually(lambda: sub.read() is None and sub.sources.get(7).has_echoed)
+        eventually(lambda: sub.read([]) is None and sub.sources.get(7).has_echoed)
     for each in (first, second, sub):
         each.close()

@@ -91,10 +91,13 @@ def test_one_part_is_split_like_three(topic: str, header: wire.Header, payload: 
     assert wire.split([b"".join(parts)]) == wire.split(parts)
 
 
-@given(st.integers(0, 2**64 - 1), TOPICS, st.booleans(), st.booleans())
-def test_a_hello_is_read_back(subscriber: int, topic: str, one_part: bool, tells: bool) -> None:
-    part = wire.hello_part(subscriber, topic, one_part=one_part, tells=tells)
-    assert wire.parse_hello(part) == (subscriber, topic, one_part or tells, tells)
+@given(st.integers(0, 2**64 - 1), TOPICS, st.booleans(), st.booleans(), st.booleans())
+def test_a_hello_is_read_back(
+    subscriber: int, topic: str, one_part: bool, tells: bool, batches: bool
+) -> None:
+    part = wire.hello_part(subscriber, topic, one_part=one_part, tells=tells, batches=batches)
+    said = (one_part or tells or batches, tells or batches, batches)
+    assert wire.parse_hello(part) == (subscriber, topic, *said)
     assert part > wire.topic_part(topic)  # libzmq sends filters in byte order
 
 

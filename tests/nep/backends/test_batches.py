@@ -1,0 +1,297 @@
+"""Small messages that follow each other at once travel together: nobody can tell but by a shorter time."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import pytest
+import zmq
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nep
+from nep.backends.zeromq.pending_batch import MOST, SOON_NS, WAIT_NS, PendingBatch
+from nep.errors import ClosedError, WireError
+from nep.masters.master import Master
+from nep.protocol import wire
+from nep.protocol.batch import BATCH, BATCH_MAX, batch_part, entries
+from tests.nep.programs import eventually
+
+LONG_S = 30.0
+IDS = itertools.count(1)
+
+
+@pytest.fixture
+def node(master: Master) -> Iterator[nep.Node]:
+    with nep.node("batches", master=master.address) as made:
+        yield made
+
+
+@pytest.fixture
+def stranger(node: nep.Node) -> Iterator[Callable[..., zmq.Socket[bytes]]]:
+    """A subscriber of plain ZeroMQ that says this hello; what it is sent can be seen part by part."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    context.linger = 0
+    sockets = []
+
+    def made(topic: str, hello: bytes) -> zmq.Socket[bytes]:
+        socket = context.socket(zmq.SUB)
+        sockets.append(socket)
+        socket.rcvtimeo = int(LONG_S * 1000)
+        socket.subscribe(wire.topic_part(topic))
+        socket.subscribe(hello)
+        socket.connect(node.graph().topics[topic].publishers[0].endpoints[0])
+        assert socket.recv_multipart()[0] == hello  # its echo
+        return socket
+
+    yield made
+    for each in sockets:
+        each.close(0)
+    context.term()
+
+
+def able(topic: str) -> bytes:
+    return wire.hello_part(next(IDS), topic, batches=True)
+
+
+def heard(socket: zmq.Socket[bytes], count: int) -> list[tuple[int, int]]:
+    """How many messages each of the next parts has, until there are `count`; with the seq of its first."""
+    said = []
+    while sum(each for each, _seq in said) < count:
+        parts = socket.recv_multipart()
+        if parts[0].startswith(b"\xff"):
+            continue
+        if len(parts) > 1:
+            said.append((1, wire.read_header(parts[1]).seq))
+            continue
+        _topic, head, body = wire.apart(parts[0])
+        header = wire.read_header(head)
+        said.append((len(entries(body)) if header.flags & BATCH else 1, header.seq))
+    return said
+
+
+def burst(publisher: nep.Publisher, count: int) -> None:
+    publish = publisher.publish
+    for number in range(count):
+        publish(number)
+
+
+def all_of(subscriber: nep.Subscriber, count: int) -> list[nep.Message]:
+    got = []
+    for _ in range(count):
+        message = subscriber.receive(LONG_S)
+        assert message is not None
+        got.append(message)
+    return got
+
+
+# ---- what arrives
+
+
+def test_a_burst_arrives_in_order_and_each_message_is_whole(node: nep.Node) -> None:
+    sub, pub = node.new_sub("t"), node.new_pub("t")
+    burst(pub, 2000)
+    got = all_of(sub, 2000)
+    assert [each.payload for each in got] == list(range(2000))
+    assert [each.seq for each in got] == list(range(1, 2001))
+    stamps = [each.stamp_ns or 0 for each in got]
+    assert stamps == sorted(stamps)
+    assert len(set(stamps)) > 1000  # each has its own
+    assert (sub.received, sub.lost, sub.refused, pub.count) == (2000, 0, 0, 2000)
+
+
+def test_bytes_are_counted_as_they_are(node: nep.Node) -> None:
+    sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
+    for _ in range(100):
+        pub.publish(b"12345")
+    all_of(sub, 100)
+    assert pub._transport.counts().bytes == 500
+
+
+def test_those_that_read_batches_get_them(node: nep.Node, stranger: Callable[..., zmq.Socket[bytes]]) -> None:
+    pub = node.new_pub("t")
+    socket = stranger("t", able("t"))
+
+    def comes_together() -> bool:
+        before = pub.count
+        burst(pub, 500)
+        said = heard(socket, 500)
+        assert said[0] == (1, before + 1)  # the first never waits
+        assert [seq for _many, seq in said] == [
+            before + 1 + sum(each for each, _seq in said[:place]) for place in range(len(said))
+        ]
+        assert max(many for many, _seq in said) <= MOST
+        return len(said) < 250
+
+    eventually(comes_together)  # a computer with much else to do may let 20 microseconds pass each time
+
+
+@pytest.mark.parametrize("other", ["an older nep", "a debugger"])
+def test_nobody_gets_what_he_does_not_read(
+    node: nep.Node, stranger: Callable[..., zmq.Socket[bytes]], other: str
+) -> None:
+    pub, sub = node.new_pub("t"), node.new_sub("t")
+    old = wire.hello_part(next(IDS), "t", tells=True) if other == "an older nep" else wire.hello_part(7, "t")
+    socket = stranger("t", old)
+    burst(pub, 300)
+    assert {many for many, _seq in heard(socket, 300)} == {1}
+    assert [each.payload for each in all_of(sub, 300)] == list(range(300))
+
+
+@pytest.mark.parametrize("how", ["latched", "not wanted"])
+def test_some_never_wait(node: nep.Node, stranger: Callable[..., zmq.Socket[bytes]], how: str) -> None:
+    pub = node.new_pub("t", latched=how == "latched", batch=how != "not wanted")
+    socket = stranger("t", able("t"))
+    burst(pub, 300)
+    assert {many for many, _seq in heard(socket, 300)} == {1}
+
+
+def test_the_rest_of_a_burst_needs_nobody_to_publish_on(node: nep.Node) -> None:
+    sub, pub = node.new_sub("t"), node.new_pub("t")
+    for _ in range(20):
+        burst(pub, 7)
+        assert [each.payload for each in all_of(sub, 7)] == list(range(7))
+
+
+def test_closing_at_once_loses_nothing(node: nep.Node, master: Master) -> None:
+    sub = node.new_sub("t")
+    with nep.node("short", master=master.address) as short:
+        burst(short.new_pub("t"), 100)
+    assert [each.payload for each in all_of(sub, 100)] == list(range(100))
+    pub = node.new_pub("t")
+    publish = pub.publish
+    burst(pub, 5)
+    pub.close()
+    with pytest.raises(ClosedError):
+        publish(1)
+    assert [each.payload for each in all_of(sub, 5)] == list(range(5))
+    assert sub.lost == 0
+
+
+def test_large_and_odd_ones_between_keep_their_place(node: nep.Node) -> None:
+    sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
+    sizes = [1, 0, 16_383, 16_384, 5, 70_000, 2, 3, 0, 100_000, 9]
+    for turn in range(20):
+        for size in sizes:
+            pub.publish(bytes([turn]) * size)
+        pub.publish_bytes(b"beside", {"frame_id": "x"})
+    for turn in range(20):
+        got = [bytes(each.data) for each in all_of(sub, len(sizes) + 1)]
+        assert got == [*(bytes([turn]) * size for size in sizes), b"beside"]
+    assert sub.lost == 0
+
+
+def test_a_subscriber_that_comes_within_a_burst_counts_right(node: nep.Node) -> None:
+    pub, sub = node.new_pub("t"), node.new_sub("t")
+    burst(pub, 50)
+    late = node.new_sub("t")
+    burst(pub, 50)
+    assert [each.payload for each in all_of(late, 50)][-1] == 49
+    all_of(sub, 100)
+    assert (sub.lost, late.lost) == (0, 0)
+    sub.close()
+    late.close()
+    eventually(lambda: not pub.subscribers)
+    burst(pub, 50)
+    assert pub.count == 150
+
+
+def test_what_there_is_no_room_for_is_dropped_and_counted(node: nep.Node) -> None:
+    pub = node.new_pub("t")
+    latest = node.new_sub("t", keep="latest")
+    few = node.new_sub("t", max_messages=3)
+    burst(pub, 400)
+
+    def newest(sub: nep.Subscriber) -> bool:
+        message = sub.receive(0.05)
+        return message is not None and message.payload == 399
+
+    for sub in (latest, few):
+        eventually(lambda sub=sub: newest(sub))
+        assert sub.received + (sub.lost or 0) == 400
+    assert len(few._transport.ready) <= 3
+
+
+def test_no_reader_keeps_more_of_a_batch_than_it_wants(node: nep.Node) -> None:
+    sub = node.new_sub("t", "bytes", max_messages=2)
+    sub._transport.ready.extend(
+        nep.Message("t", bytes([number]), "bytes", "bytes") for number in range(5)
+    )  # as if they came in one part
+    message = sub.receive(0.0)
+    assert message is not None
+    bounded = sub._transport._bounded(sub._transport.ready.popleft())
+    assert bounded is not None
+    assert bytes(bounded.data) == b"\3"
+    assert sub.lost == 2
+
+
+# ---- the waiting
+
+
+def waiting(batch: PendingBatch, *stamps_ns: int) -> None:
+    for stamp_ns in stamps_ns:
+        batch.payloads.append(b"x")
+        batch.stamps_ns.append(stamp_ns)
+
+
+def test_who_may_wait() -> None:
+    batch = PendingBatch(may_wait=True)
+    batch.begin_after(1000)
+    assert batch.until_ns == 0  # nobody has said that he reads batches
+    batch.allow(reads_batches=True)
+    batch.begin_after(1000)
+    assert batch.until_ns == 1000 + SOON_NS
+    never = PendingBatch(may_wait=False)
+    never.allow(reads_batches=True)
+    never.begin_after(1000)
+    assert (never.is_allowed, never.until_ns) == (False, 0)
+
+
+def test_when_the_node_s_thread_comes_again() -> None:
+    batch = PendingBatch(may_wait=True)
+    batch.is_looked_after = True
+    waiting(batch, 10_000, 12_000)
+    assert batch.look_again_s(20_000) == pytest.approx((WAIT_NS - 10_000) / 1e9)
+    assert batch.look_again_s(10_000 + WAIT_NS) == 0.0
+    assert batch.take() == ([b"x", b"x"], [10_000, 12_000])
+    assert (batch.goes_on_s, batch.is_looked_after) == (0.0, False)
+    batch.is_looked_after = batch.has_gone_full = True  # it sends batch after batch itself
+    waiting(batch, 200_000)
+    assert batch.look_again_s(200_001) > WAIT_NS / 1e9
+    assert batch.look_again_s(10**9) == 0.0
+    batch.take()
+    assert batch.goes_on_s == 0.0  # nothing went since
+
+
+def test_a_clock_that_is_set_back_holds_nothing_up() -> None:
+    batch = PendingBatch(may_wait=True)
+    waiting(batch, 10**18)
+    assert batch.look_again_s(5 * 10**17) == 0.0
+
+
+# ---- the form
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 2**64 - 1), st.binary(max_size=50)), min_size=1, max_size=BATCH_MAX),
+    st.integers(1, 2**63),
+)
+def test_a_batch_is_read_back(messages: list[tuple[int, bytes]], seq: int) -> None:
+    stamps, payloads = [each[0] for each in messages], [each[1] for each in messages]
+    part = batch_part(b"t\0", wire.form_of(3, 0), seq, 9, stamps, payloads)
+    topic, head, body = wire.apart(part)
+    assert (topic, wire.read_header(head)) == (b"t\0", wire.Header(3, BATCH, seq, stamps[0], 9, len(body)))
+    read = entries(body)
+    assert [each.stamp_ns for each in read] == stamps
+    assert [body[each.begin : each.end] for each in read] == payloads
+
+
+@given(st.binary(max_size=200))
+def test_what_is_no_batch_is_refused_with_a_reason(body: bytes) -> None:
+    try:
+        read = entries(body)
+    except WireError as error:
+        assert error.reason  # noqa: PT017 - either is right
+    else:
+        assert read[-1].end == len(body)
