@@ -323,13 +323,14 @@ class Node:
                 left = SLICE_S if deadline is None else min(SLICE_S, deadline - self._clock())
                 if left <= 0.0:
                     return
-                has_fired = self._run_timers()
+                timers = self._timers
+                has_fired = self._run_timers() if timers else False
                 if self._run_callbacks() or has_fired:
                     continue
-                left = min(left, next_due(self._timers) - self._clock())
+                if timers:
+                    left = min(left, next_due(timers) - self._clock())
                 if left > 0.0:
-                    waited = [each[1] for each in self._callbacks if not each[1].is_closed]
-                    self._transport.wait(waited, left)
+                    self._transport.wait([each[1] for each in self._callbacks if not each[1].is_closed], left)
             if self._is_forked:
                 raise self._closed_error()
         finally:
@@ -351,8 +352,8 @@ class Node:
         return has_fired
 
     def _run_callbacks(self) -> bool:
-        """One message for each callback that has one; whether there was any."""
-        worked = False
+        """One message for each callback that has one; whether another was read with one of them."""
+        has_more = False
         for subscriber, transport, callback, with_message in self._callbacks:
             if self._stop_spin.is_set() or self._is_closed:
                 break
@@ -363,13 +364,14 @@ class Node:
                 if found is None:
                     continue
                 message = found
-            worked = True
+            if transport.ready:
+                has_more = True
             try:
                 payload = subscriber.decoded(message)
             except DecodeError:
                 continue  # it is logged and an alert
             callback(message if with_message else payload)
-        return worked
+        return has_more
 
     # ---- what it tells, the graph, and the end
 

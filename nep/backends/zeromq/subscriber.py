@@ -270,20 +270,24 @@ class SocketSubscriber(Generic[R]):
 
     def enter_wait(self, waker: Waker) -> bool:
         """Before its descriptor is polled: False when there is something to read already."""
-        with self._turn():
-            if self.is_closed or self.ready or len(self._inbox):
-                return False
-            if self._readable.has_input:
-                return False
-            self._waiters.append(waker)
-            return True
+        self._wanted.append(None)  # as in `_turn`, which takes longer than all of this
+        try:
+            with self._lock:
+                if self.is_closed or self.ready or self._inbox.messages or self._readable.has_input:
+                    return False
+                self._waiters.append(waker)
+                return True
+        finally:
+            self._wanted.pop()
 
     def leave_wait(self, waker: Waker) -> None:
         """After its descriptor was polled."""
         with self._lock:
             self._waiters.remove(waker)
-            self._woken.discard(waker)
-            self._changed.notify_all()
+            if waker in self._woken:
+                self._woken.discard(waker)
+            if self.is_closed:  # who closes waits for this
+                self._changed.notify_all()
 
     def read_until(self, is_met: Callable[[], bool], timeout_s: float, waker: Waker) -> bool:
         """Read into the inbox, in the caller's thread, until `is_met()`; whether it is."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import select
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol
+from weakref import WeakSet
 
 import zmq
 
@@ -70,6 +72,36 @@ class MasteredPublisher(OwnedPublisher, SessionPublisher, Protocol):
         """Wait until these have said hello; the ids of those that did not in time."""
 
 
+class ThreadWait:
+    """What one thread waits by: its waker, and what it polled last. A wake that comes early is kept."""
+
+    def __init__(self) -> None:
+        self.waker = Waker()
+        self.is_busy = False
+        """Whether its thread waits, or is about to."""
+        self._fds: list[int] | None = None
+        self._poll: Callable[[int], Sequence[tuple[int, int]]]
+
+    def wait(self, fds: list[int], timeout_s: float) -> None:
+        """Until one of these can be read, or the waker is woken."""
+        if fds != self._fds:
+            self._poll, self._fds = _poll_of((*fds, self.waker.fd)), fds
+        for fd, _events in self._poll(int(timeout_s * 1000) + 1):
+            if fd == self.waker.fd:
+                self.waker.clear()
+
+
+def _poll_of(fds: tuple[int, ...]) -> Callable[[int], Sequence[tuple[int, int]]]:
+    """Polls these for reading, for so many milliseconds at most."""
+    if not hasattr(select, "poll"):  # Windows
+        polled = [(fd, zmq.POLLIN) for fd in fds]
+        return lambda timeout_ms: zmq.zmq_poll(polled, timeout_ms)
+    poller = select.poll()
+    for fd in fds:
+        poller.register(fd, select.POLLIN)
+    return poller.poll
+
+
 class ZeromqTransport:
     """One node's sessions and sockets, in the context and the thread of its process.
 
@@ -87,6 +119,8 @@ class ZeromqTransport:
         self._publishers: dict[int, OwnedPublisher] = {}
         self._subscribers: dict[int, _Subscriber] = {}
         self._busy_wakers: list[Waker] = []
+        self._threads = threading.local()
+        self._waiting: WeakSet[ThreadWait] = WeakSet()
         self._is_closed = False
         self._is_over = False
         self._attached: dict[int, str] = {}
@@ -269,25 +303,50 @@ class ZeromqTransport:
 
     def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
         """Wait for a message in one of `subscribers`, or for `wake`."""
-        mine = [each for each in subscribers if isinstance(each, SocketSubscriber)]
-        with self._waker() as waker:
-            entered: list[_Subscriber] = []
-            try:
-                for subscriber in mine:
-                    if not subscriber.enter_wait(waker):
+        waits = self._of_thread()
+        entered: list[_Subscriber] = []
+        fds: list[int] = []
+        waits.is_busy = True
+        try:
+            if self._is_over:
+                return
+            for subscriber in subscribers:
+                if isinstance(subscriber, SocketSubscriber):
+                    if not subscriber.enter_wait(waits.waker):
                         return
                     entered.append(subscriber)
-                polled = [(subscriber.fd, zmq.POLLIN) for subscriber in entered]
-                zmq.zmq_poll([*polled, (waker.fd, zmq.POLLIN)], int(timeout_s * 1000) + 1)
-            finally:
-                for subscriber in entered:
-                    subscriber.leave_wait(waker)
+                    fds.append(subscriber.fd)
+            waits.wait(fds, timeout_s)
+        finally:
+            for subscriber in entered:
+                subscriber.leave_wait(waits.waker)
+            waits.is_busy = False
+            if self._is_over:  # whoever closed it saw that this thread is busy
+                waits.waker.close()
+
+    def _end_waits(self) -> None:
+        """With the lock held, and when it is known that all is over."""
+        for waits in self._waiting:
+            waits.waker.wake()
+            if not waits.is_busy:
+                waits.waker.close()
+
+    def _of_thread(self) -> ThreadWait:
+        """What this thread waits by, as long as it lives."""
+        waits: ThreadWait | None = getattr(self._threads, "waits", None)
+        if waits is None:
+            waits = self._threads.waits = ThreadWait()
+            with self._lock:
+                self._waiting.add(waits)
+        return waits
 
     def wake(self) -> None:
         """End all waits."""
         with self._lock:
             for waker in self._busy_wakers:
                 waker.wake()
+            for waits in self._waiting:
+                waits.waker.wake()
 
     @contextmanager
     def _waker(self) -> Iterator[Waker]:
@@ -331,6 +390,7 @@ class ZeromqTransport:
             if self._is_over:
                 return
             self._is_over = True
+            self._end_waits()
             sessions = list(self._sessions.values())
             publishers = list(self._publishers.values())
             subscribers = list(self._subscribers.values())
