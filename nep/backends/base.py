@@ -21,6 +21,7 @@ from nep.messages.message import Message
 from nep.messages.queue import MAX_BYTES, MAX_MESSAGES, Keep
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord
+from nep.system.addresses import master_address
 from nep.system.descriptors import check_room
 from nep.system.plugins import discover, discover_own
 
@@ -182,12 +183,17 @@ class Transport(Protocol):
 
 @dataclass(frozen=True)
 class Backend:
-    """A plug-in that carries bytes. `open` raises `BackendUnavailableError` when `needs` is not installed."""
+    """A plug-in that carries bytes. `open` raises `BackendUnavailableError` when `needs` is not installed.
+
+    `master` makes a `Hybrid.master` of what a node is given as `master`, None when that is nothing; it raises
+    `NepError` for what is no place where nodes of this back end meet.
+    """
 
     name: str
     open: Callable[[NodeRecord], Transport]
     needs: str = ""
     aliases: tuple[str, ...] = ()
+    master: Callable[[str | None], str] = master_address
 
 
 def backend_named(name: str) -> Backend:

@@ -356,4 +356,9 @@ class MemoryTransport:
             self._closing.wait(_BATCH_S)
 
 
-BACKEND = Backend("memory", MemoryTransport)
+def _name(master: str | None) -> str:
+    """Any name will do: nothing listens there."""
+    return master or "memory"
+
+
+BACKEND = Backend("memory", MemoryTransport, master=_name)

@@ -38,7 +38,7 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
 from nep.protocol.wire import check_node_name, check_topic
 from nep.system import forks
-from nep.system.addresses import checked_host, master_address
+from nep.system.addresses import checked_host
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -84,9 +84,7 @@ class Node:
         self._key = key
         self._numbers = itertools.count(1)
         self._backend = backend_named(text("transport", transport))
-        self._master = master or ("memory" if self._backend.name == "memory" else master_address())
-        if self._backend.name != "memory":
-            self._master = master_address(self._master)
+        self._master = self._backend.master(master)
         self._wait_s = seconds("wait_s", wait_s)
         self._lock = threading.RLock()
         self._stop_spin = threading.Event()
@@ -127,7 +125,7 @@ class Node:
         "127.0.0.1" means the node's own master.
         """
         is_own = master_ip == "127.0.0.1" or self._backend.name == "memory"
-        return Hybrid(self._master if is_own else master_address(master_ip), checked_mode(mode))
+        return Hybrid(self._master if is_own else self._backend.master(master_ip), checked_mode(mode))
 
     def direct(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import threading
 from collections.abc import Callable, Iterator
@@ -17,11 +18,15 @@ from tests.nep.programs import eventually
 _names = count()
 
 
-@pytest.fixture(params=["memory", "zeromq", "nanomsg"])
+@pytest.fixture(params=["memory", "zeromq", "nanomsg", "zenoh"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Callable[[str], nep.Node]]:
     """Makes nodes that can meet; closes them."""
     made: list[nep.Node] = []
-    where = f"contract-{next(_names)}" if request.param == "memory" else master.address
+    where = master.address
+    if request.param == "memory":
+        where = f"contract-{next(_names)}"
+    elif request.param == "zenoh":
+        where = f"local/contract-{os.getpid()}-{next(_names)}"
 
     def new(name: str) -> nep.Node:
         node = nep.node(name, request.param, master=where)

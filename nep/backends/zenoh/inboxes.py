@@ -1,0 +1,99 @@
+"""Inboxes: what one node's subscribers have in common: a condition to wait on, a thread for sinks."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Sequence
+from typing import Protocol
+
+from nep.backends.base import Sink
+from nep.messages.message import Message
+
+__all__ = ["Inboxes", "Poured"]
+
+_logger = logging.getLogger("nep")
+_BATCH_S = 0.005  # sinks are called 200 times a second at most
+_LOOK_S = 0.1
+
+
+class Poured(Protocol):
+    """A subscriber, as those who wait for its messages need it."""
+
+    is_closed: bool
+
+    @property
+    def has_input(self) -> bool:
+        """Whether a message waits. With `Inboxes.changed` held."""
+
+    @property
+    def sink(self) -> Sink | None:
+        """Where its messages go."""
+
+    def take_batch(self) -> list[Message]:
+        """What the sink gets at once."""
+
+
+class Inboxes:
+    """One for each node. `changed` guards the inboxes of all its subscribers."""
+
+    def __init__(self, name: str) -> None:
+        self.changed = threading.Condition()
+        self._name = name
+        self._wakes = 0
+        self._sinks: tuple[Poured, ...] = ()
+        self._thread: threading.Thread | None = None
+        self._closing = threading.Event()
+
+    def wait(self, subscribers: Sequence[Poured], timeout_s: float) -> None:
+        """Wait for a message in one of them, for one of them to be closed, or for `wake`."""
+        with self.changed:
+            before = self._wakes
+            self.changed.wait_for(
+                lambda: (
+                    self._wakes != before or any(each.has_input or each.is_closed for each in subscribers)
+                ),
+                timeout_s,
+            )
+
+    def wake(self) -> None:
+        """End all waits."""
+        with self.changed:
+            self._wakes += 1
+            self.changed.notify_all()
+
+    def pour(self, subscriber: Poured) -> None:
+        """Give this one's messages to its sink, until `stop_pouring`."""
+        with self.changed:
+            self._sinks = (*self._sinks, subscriber)
+            if self._thread is None and not self._closing.is_set():
+                self._thread = threading.Thread(target=self._run, name=f"nep-sinks-{self._name}", daemon=True)
+                self._thread.start()
+            self.changed.notify_all()
+
+    def stop_pouring(self, subscriber: Poured) -> None:
+        """It is closed."""
+        with self.changed:
+            self._sinks = tuple(each for each in self._sinks if each is not subscriber)
+
+    def close(self, timeout_s: float) -> None:
+        """End the thread."""
+        self._closing.set()
+        self.wake()
+        thread = self._thread
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(timeout_s)
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            self.wait(self._sinks, _LOOK_S)
+            for subscriber in self._sinks:
+                messages = subscriber.take_batch()
+                if messages and subscriber.sink is not None:
+                    try:
+                        subscriber.sink(messages)
+                    except (
+                        BaseException
+                    ):  # also SystemExit, which would end all sinks' thread: it gets the next batch
+                        _logger.exception("the sink of '%s' failed", messages[0].topic)
+            self._closing.wait(_BATCH_S)

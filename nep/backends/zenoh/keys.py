@@ -1,0 +1,129 @@
+"""Key expressions: where messages, greetings and liveliness tokens of nep lie in zenoh. Pure functions.
+
+    nep/v1/data/TOPIC              messages: the payload, and header and extension as its attachment
+    nep/v1/hello/TOPIC/PUBLISHER   a publisher answers with what is latched and the number of its last message
+    nep/v1/call/NODE               a node answers a request of `nep.protocol.requests`: who it is, its figures
+    nep/v1/live/NODE/node/...      liveliness tokens: a node, and its publishers and subscribers
+    nep/v1/live/NODE/pub/...
+    nep/v1/live/NODE/sub/...
+
+Whatever people name is one chunk, percent-encoded as in an address of the web; "" is "%".
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+from urllib.parse import quote, unquote
+
+from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
+
+__all__ = [
+    "ALL_CALLS",
+    "ALL_LIVE",
+    "Alive",
+    "call_key",
+    "data_key",
+    "hello_key",
+    "hellos_key",
+    "node_key",
+    "parse_live",
+    "publisher_key",
+    "subscriber_key",
+]
+
+_ROOT = "nep/v1"
+_LIVE = f"{_ROOT}/live/"
+ALL_CALLS = f"{_ROOT}/call/*"
+ALL_LIVE = f"{_LIVE}**"
+_ID_MOST = 2**64 - 1
+_NODE_WORDS, _PUBLISHER_WORDS, _SUBSCRIBER_WORDS = 7, 6, 4
+
+
+class Alive(NamedTuple):
+    """What a token says: `record` is there, as part of the node `node_id`."""
+
+    node_id: str
+    record: NodeRecord | PublisherRecord | SubscriberRecord
+
+
+def _word(text: str) -> str:
+    return quote(text, safe="", errors="replace") or "%"
+
+
+def _text(word: str) -> str:
+    return "" if word == "%" else unquote(word)
+
+
+def data_key(topic: str) -> str:
+    """Where the messages of a topic are published."""
+    return f"{_ROOT}/data/{_word(topic)}"
+
+
+def hello_key(topic: str, publisher: int) -> str:
+    """Where a publisher answers new subscribers."""
+    return f"{_ROOT}/hello/{_word(topic)}/{publisher:016x}"
+
+
+def hellos_key(topic: str) -> str:
+    """Where all publishers of a topic answer."""
+    return f"{_ROOT}/hello/{_word(topic)}/*"
+
+
+def call_key(node_id: str) -> str:
+    """Where a node answers."""
+    return f"{_ROOT}/call/{_word(node_id)}"
+
+
+def node_key(node: NodeRecord) -> str:
+    """The token of a node."""
+    words = (node.name, node.host, str(node.pid or 0), node.language, node.generation, str(node.since_ns))
+    return "/".join((f"{_LIVE}{_word(node.id)}/node", *map(_word, words)))
+
+
+def publisher_key(node_id: str, record: PublisherRecord) -> str:
+    """The token of a publisher."""
+    latched = "latched" if record.latched else "plain"
+    words = (f"{record.id:016x}", record.topic, record.msg_type, record.codec, latched)
+    return "/".join((f"{_LIVE}{_word(node_id)}/pub", *map(_word, words)))
+
+
+def subscriber_key(node_id: str, record: SubscriberRecord) -> str:
+    """The token of a subscriber."""
+    words = (f"{record.id:016x}", record.topic, record.msg_type)
+    return "/".join((f"{_LIVE}{_word(node_id)}/sub", *map(_word, words)))
+
+
+def parse_live(key: str) -> Alive | None:
+    """What the token at this key says; None for anything else."""
+    if not key.startswith(_LIVE):
+        return None
+    node_id, *words = map(_text, key[len(_LIVE) :].split("/"))
+    try:
+        if words[:1] == ["node"] and len(words) == _NODE_WORDS:
+            _kind, name, host, pid, language, generation, since = words
+            number, since_ns = int(pid), int(since)
+            if not (0 <= number < 2**63 and 0 <= since_ns < 2**63):
+                return None
+            return Alive(
+                node_id, NodeRecord(node_id, name, host, number or None, language, generation, since_ns)
+            )
+        if words[:1] == ["pub"] and len(words) == _PUBLISHER_WORDS:
+            _kind, id_, topic, msg_type, codec, latched = words
+            record = PublisherRecord(
+                _number(id_), topic, msg_type, codec, (data_key(topic),), latched == "latched"
+            )
+            return Alive(node_id, record)
+        if words[:1] == ["sub"] and len(words) == _SUBSCRIBER_WORDS:
+            _kind, id_, topic, msg_type = words
+            return Alive(node_id, SubscriberRecord(_number(id_), topic, msg_type))
+    except ValueError:
+        return None
+    return None
+
+
+def _number(word: str) -> int:
+    """An id. Raises `ValueError`."""
+    number = int(word, 16)
+    if not 0 < number <= _ID_MOST:
+        raise ValueError(word)
+    return number

@@ -1,0 +1,183 @@
+"""Where the nodes of zenoh meet: what a node's `master` means to this back end, and opening a session there.
+
+local, local/NAME          this user's nodes on this computer, at loopback
+tcp/HOST:7447,tls/...      a zenoh router (or peer): the node connects to it, and listens nowhere
+FILE.json5                 zenoh's own configuration: TLS, access control, other modes
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nep.backends.zenoh.library import library, open_session
+from nep.backends.zenoh.rendezvous import Entry, Rendezvous, free_port
+from nep.backends.zeromq.sockets import LOOPBACK
+from nep.errors import NepError, WrongTypeError
+from nep.i18n import _
+from nep.system.descriptors import check_room
+
+__all__ = ["CONFIG_VARIABLE", "Opened", "open_place", "place_name"]
+
+CONFIG_VARIABLE = "NEP_ZENOH_CONFIG"
+"""Names the configuration of nodes that are told nothing: a file, or what else `master` may be."""
+_LOCAL = re.compile(r"local(?:/([\w.-]{1,100}))?", re.ASCII)
+_ENDPOINT = re.compile(r"(?:tcp|tls|quic|udp|ws|unixsock-stream|serial|vsock)/[^\s,]{1,400}", re.ASCII)
+_FILES = (".json5", ".json", ".yaml", ".yml")
+_DEFAULT_LISTENS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]}
+_LONGEST_S = 10**6
+_SESSION_FILES = 16
+_PEER_FILES = 2
+_TRIES = 5
+_CONNECTED_S, _LOOK_S = 1.0, 0.005
+_TAIL = re.compile(r" at /\S+\.rs:\d+\.?")
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A session, its entry at the rendezvous, and what a forked child has to close (see `forks.give_up`)."""
+
+    session: Any
+    meeting: Rendezvous | None = None
+    entry: Entry | None = None
+    endpoints: tuple[str, ...] = ()
+
+    def leave(self) -> None:
+        """Nobody shall connect to it any more."""
+        if self.meeting is not None and self.entry is not None:
+            self.meeting.remove(self.entry)
+
+
+def place_name(master: str | None = None) -> str:
+    """`master` itself when it is a place, else $NEP_ZENOH_CONFIG, else "local". Raises `NepError`."""
+    if master is not None and not isinstance(master, str):
+        raise WrongTypeError(
+            _("a place of 'zenoh' is a 'str', not a '{kind}'").format(kind=type(master).__name__)
+        )
+    place = master or os.environ.get(CONFIG_VARIABLE, "") or "local"
+    if _LOCAL.fullmatch(place) or place.endswith(_FILES) or _endpoints_in(place):
+        return place
+    raise NepError(
+        _(
+            "'{place}' is no place where nodes of 'zenoh' meet; use 'local', an endpoint such as "
+            "'tcp/192.168.1.5:7447', or a configuration file of zenoh such as 'zenoh.json5'"
+        ).format(place=place)
+    )
+
+
+def _endpoints_in(place: str) -> tuple[str, ...]:
+    """The endpoints that it lists; none when it lists something else."""
+    words = tuple(word.strip() for word in place.split(","))
+    return words if all(map(_ENDPOINT.fullmatch, words)) else ()
+
+
+def open_place(place: str, wait_s: float | None) -> Opened:
+    """A session there; `wait_s` is how long a router may take to answer. Raises `NepError`."""
+    local = _LOCAL.fullmatch(place)
+    if local is not None:
+        return _open_local(local.group(1) or "nodes")
+    check_room(_SESSION_FILES, "a session of zenoh")
+    endpoints = _endpoints_in(place)
+    if not endpoints:
+        return Opened(_open_as_told(Path(place)))
+    told: dict[str, object] = {
+        "mode": "client",
+        "connect": {
+            "endpoints": list(endpoints),
+            "timeout_ms": round(1000 * min(_LONGEST_S, _LONGEST_S if wait_s is None else wait_s)),
+        },
+        "scouting": {"multicast": {"enabled": False}},
+    }
+    given = tuple(f"tcp://{each.removeprefix('tcp/')}" for each in endpoints if each.startswith("tcp/"))
+    return Opened(_open(_config(told), place), endpoints=given)
+
+
+def _open_local(name: str) -> Opened:
+    meeting = Rendezvous(name)
+    with meeting.alone():
+        others = [entry.port for entry in meeting.entries()]
+        check_room(_SESSION_FILES + _PEER_FILES * len(others), "a session of zenoh")
+        port, session = _open_at_free_port(others)
+        entry = meeting.add(port)
+    endpoints = tuple(f"tcp://{LOOPBACK}:{each}" for each in (port, *others))
+    return Opened(session, meeting, entry, endpoints)
+
+
+def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
+    """Another program may take the port between the look and the use of it: then another one."""
+    for left in reversed(range(_TRIES)):
+        port = free_port()
+        told: dict[str, object] = {
+            "mode": "peer",
+            "listen": {"endpoints": [f"tcp/{LOOPBACK}:{port}"], "timeout_ms": 0, "exit_on_failure": True},
+            "connect": {
+                "endpoints": [f"tcp/{LOOPBACK}:{each}" for each in others],
+                "timeout_ms": 0,
+                "exit_on_failure": False,
+            },
+            "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+            "open": {"return_conditions": {"connect_scouted": False, "declares": True}},
+        }
+        try:
+            return port, open_session(_config(told))
+        except library().ZError as error:
+            if not left:
+                raise NepError(
+                    _("zenoh cannot listen at '{host}': {error}").format(host=LOOPBACK, error=_short(error))
+                ) from error
+    raise AssertionError
+
+
+def _open_as_told(path: Path) -> Any:  # noqa: ANN401 - zenoh's
+    """A session as a file of the user's says; peers connect beside it, so that is waited for a moment."""
+    config = _config_of(path)
+    session = _open(config, str(path))
+    if json.loads(config.get_json("connect/endpoints")):
+        pause, deadline = threading.Event(), time.monotonic() + _CONNECTED_S
+        while time.monotonic() < deadline and not (session.info.routers_zid() or session.info.peers_zid()):
+            pause.wait(_LOOK_S)
+    return session
+
+
+def _config(told: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh's
+    return library().Config.from_json5(json.dumps(told))
+
+
+def _config_of(path: Path) -> Any:  # noqa: ANN401 - zenoh's
+    """The configuration in a file; where it says nothing, loopback and no multicast. Raises `NepError`."""
+    try:
+        config = library().Config.from_file(str(path.expanduser()))
+    except library().ZError as error:
+        raise NepError(
+            _("'{path}' is no configuration of zenoh: {error}; see its DEFAULT_CONFIG.json5").format(
+                path=path, error=_short(error)
+            )
+        ) from error
+    if json.loads(config.get_json("listen/endpoints")) == _DEFAULT_LISTENS:
+        ports = {mode: [f"tcp/{LOOPBACK}:{port}"] for mode, port in (("router", 7447), ("peer", 0))}
+        config.insert_json5("listen/endpoints", json.dumps(ports))
+    if json.loads(config.get_json("scouting/multicast/enabled")) is None:
+        config.insert_json5("scouting/multicast/enabled", "false")
+    return config
+
+
+def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh's
+    try:
+        return open_session(config)
+    except library().ZError as error:
+        raise NepError(
+            _(
+                "zenoh cannot open a session at '{place}': {error}; is a router there, and may it be used?"
+            ).format(place=place, error=_short(error))
+        ) from error
+
+
+def _short(error: Exception) -> str:
+    """Zenoh's sentence without the places in its source."""
+    return _TAIL.sub("", str(error)).strip().rstrip(".")

@@ -1,0 +1,143 @@
+"""ZenohPublisher: publishes messages, and answers subscribers that greet it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from nep.backends.base import PublisherSpec
+from nep.backends.zenoh.keys import data_key, hello_key
+from nep.backends.zenoh.library import callback, library
+from nep.errors import ClosedError
+from nep.messages.encoded import Encoded
+from nep.protocol.requests import PublisherCount, PublisherRecord
+from nep.protocol.wire import EXTENSION, LATCHED, SIZE_MAX, Header, extension_part
+
+__all__ = ["ZenohPublisher"]
+
+
+class ZenohPublisher:
+    """A publisher of a session. What a subscriber cannot take at once zenoh drops; the subscriber counts it.
+
+    `count_subscribers` says how many there are; `on_close` unregisters it and delivers what is on its way.
+    """
+
+    def __init__(
+        self,
+        session: Any,  # noqa: ANN401 - zenoh's
+        spec: PublisherSpec,
+        count_subscribers: Callable[[str], int],
+        on_close: Callable[[ZenohPublisher, float], None],
+    ) -> None:
+        zenoh = library()
+        self.spec = spec
+        self.record = PublisherRecord(
+            spec.id, spec.topic, spec.msg_type, spec.codec.name, (data_key(spec.topic),), spec.is_latched
+        )
+        self.count = 0
+        self.missing: tuple[str, ...] = ()
+        self.missing_ids: tuple[int, ...] = ()
+        self._count_subscribers = count_subscribers
+        self._on_close = on_close
+        self._bytes = 0
+        self._last_stamp_ns: int | None = None
+        self._problem = ""
+        self._latched: tuple[bytes, bytes] | None = None
+        self._is_closed = False
+        self._is_matched = False
+        self._lock = threading.Lock()
+        self._out: Any = session.declare_publisher(
+            data_key(spec.topic), congestion_control=zenoh.CongestionControl.DROP
+        )
+        self._listener: Any = self._out.declare_matching_listener(callback(self._matched))
+        self._is_matched = bool(self._out.matching_status.matching)
+        self._hellos: Any = session.declare_queryable(hello_key(spec.topic, spec.id), callback(self._greeted))
+
+    # ---- who listens
+
+    @property
+    def subscribers(self) -> int:
+        """How many there are."""
+        return self._count_subscribers(self.spec.topic)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody takes what is published, also programs that are none of nep's."""
+        return self._is_matched or self.subscribers > 0
+
+    def _matched(self, status: Any) -> None:  # noqa: ANN401 - zenoh's
+        self._is_matched = bool(status.matching)
+
+    def _greeted(self, query: Any) -> None:  # noqa: ANN401 - zenoh's
+        """In one of zenoh's threads: what is latched, and from which number on its messages are counted."""
+        with self._lock:
+            latched = self._latched
+            header = Header(self.spec.codec.number, 0, self.count, time.time_ns(), self.spec.id)
+            is_closed = self._is_closed
+        with query:  # without the lock: whoever does not read its answer holds up nobody else
+            if latched is not None and not is_closed:
+                query.reply(self._key, latched[0], attachment=latched[1])
+            if not is_closed:
+                query.reply(self._key, b"", attachment=header.pack())
+
+    @property
+    def _key(self) -> str:
+        return hello_key(self.spec.topic, self.spec.id)
+
+    def counts(self) -> PublisherCount:
+        """The figures for who looks at the graph."""
+        with self._lock:
+            return PublisherCount(
+                self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
+            )
+
+    def report(self, problem: str) -> None:
+        """The publisher's trouble with a payload, for who looks at the graph."""
+        self._problem = problem
+
+    # ---- sending
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self._lock:
+            self.count += 1
+            self._last_stamp_ns = time.time_ns()
+
+    def send(self, encoded: Encoded) -> None:
+        """Publish. Raises `WireError` for an extension that has no form."""
+        data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
+        extension = extension_part(encoded.extension) if encoded.extension else b""
+        flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if extension else 0)
+        size = len(data) if len(data) <= SIZE_MAX else 0
+        with self._lock:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'")
+            self.count += 1
+            self._bytes += len(data)
+            self._last_stamp_ns = time.time_ns()
+            header = Header(
+                self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, size
+            )
+            beside = header.pack() + extension
+            if self.spec.is_latched:
+                self._latched = data, beside
+            self._out.put(data, attachment=beside)
+
+    # ---- closing
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister, after what is on its way is delivered, within `timeout_s`. Called by its publisher."""
+        self._on_close(self, timeout_s)
+
+    def end(self) -> bool:
+        """Nothing is published any more; False when that was so already."""
+        with self._lock:
+            was_closed, self._is_closed = self._is_closed, True
+            return not was_closed
+
+    def release(self) -> None:
+        """Take it off the network."""
+        for each in (self._hellos, self._listener, self._out):
+            each.undeclare()

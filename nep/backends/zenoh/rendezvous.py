@@ -1,0 +1,202 @@
+"""Rendezvous: how the sessions of one computer's user find each other, without a port that all know.
+
+Each session listens at a free port of loopback and leaves a file with its number in a folder of the user's
+own. Who opens a session does that alone, under a lock: it connects to all that have left one, and leaves its
+own. So every two of them are connected, whoever came first and whoever ends first.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import socket
+import stat
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import psutil
+
+from nep.backends.zeromq.sockets import LOOPBACK, ORIGINAL_PORTS
+from nep.errors import AddressInUseError, NepError
+from nep.i18n import _
+
+__all__ = ["Entry", "Rendezvous", "free_port"]
+
+_logger = logging.getLogger("nep")
+_LOCK_S = 5.0
+_LOOK_S = 0.002
+_TRIES = 100
+_STOPPED = frozenset({psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP})
+
+
+class Entry(NamedTuple):
+    """A session's file: the port at which it listens, and whose it is. `began` tells equal pids apart."""
+
+    port: int
+    pid: int
+    began: int
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+        return f"{self.port}-{self.pid}-{self.began}"
+
+
+def free_port() -> int:
+    """A port of loopback that is free now and none of the original NEP's. Raises `AddressInUseError`."""
+    for _try in range(_TRIES):
+        with socket.socket() as probe:
+            probe.bind((LOOPBACK, 0))
+            port = int(probe.getsockname()[1])
+        if port not in ORIGINAL_PORTS:
+            return port
+    raise AddressInUseError(f"{LOOPBACK}:*")
+
+
+class Rendezvous:
+    """The folder of one name. Raises `NepError` when it cannot be this user's own."""
+
+    def __init__(self, name: str) -> None:
+        self._folder = _own_folder(_own_folder(_root()) / name)
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """While nobody else opens a session here. Who hangs while it does holds up others for 5 s."""
+        with (self._folder / "lock").open("ab") as file:
+            is_held = _lock(file.fileno())
+            if not is_held:
+                _logger.warning("somebody else opens a session at %s and does not end", self._folder)
+            try:
+                yield
+            finally:
+                if is_held:
+                    _unlock(file.fileno())
+
+    def entries(self) -> list[Entry]:
+        """Who listens. Files of programs that have ended are deleted."""
+        found = []
+        for path in self._folder.iterdir():
+            entry = _entry_in(path.name)
+            if entry is None:
+                continue
+            status = _status(entry)
+            if status is None:
+                path.unlink(missing_ok=True)
+            elif status in _STOPPED:
+                _logger.warning(
+                    "the halted program %d cannot be connected to; make new nodes later", entry.pid
+                )
+            else:
+                found.append(entry)
+        return found
+
+    def add(self, port: int) -> Entry:
+        """Leave a file: this process listens there."""
+        entry = Entry(port, os.getpid(), _began(os.getpid()))
+        (self._folder / entry.name).touch(mode=0o600)
+        return entry
+
+    def remove(self, entry: Entry) -> None:
+        """Take it back."""
+        with contextlib.suppress(OSError):
+            (self._folder / entry.name).unlink(missing_ok=True)
+
+
+def _root() -> Path:
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    if runtime and Path(runtime).is_dir() and os.access(runtime, os.W_OK):
+        return Path(runtime) / "nep-zenoh"
+    user = f"-{os.getuid()}" if sys.platform != "win32" else ""
+    return Path(tempfile.gettempdir()) / f"nep-zenoh{user}"
+
+
+def _own_folder(folder: Path) -> Path:
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+    except OSError as error:
+        raise NepError(
+            _("nodes cannot meet at '{folder}': {error}; set XDG_RUNTIME_DIR to a folder of yours").format(
+                folder=folder, error=error.strerror or error
+            )
+        ) from error
+    is_ours = sys.platform == "win32" or found.st_uid == os.getuid()
+    if not stat.S_ISDIR(found.st_mode) or not is_ours:
+        raise NepError(
+            _(
+                "nodes cannot meet at '{folder}': it is somebody else's; set XDG_RUNTIME_DIR to a folder of "
+                "yours"
+            ).format(folder=folder)
+        )
+    return folder
+
+
+def _entry_in(name: str) -> Entry | None:
+    words = name.split("-")
+    if len(words) != len(Entry._fields) or not all(each.isascii() and each.isdigit() for each in words):
+        return None
+    entry = Entry(*map(int, words))
+    return entry if 0 < entry.port < 65536 and 0 < entry.pid < 2**31 else None
+
+
+def _began(pid: int) -> int:
+    return round(psutil.Process(pid).create_time() * 100)
+
+
+def _status(entry: Entry) -> str | None:
+    """What its process does; None when that has ended."""
+    try:
+        process = psutil.Process(entry.pid)
+        status = process.status()
+        is_it = abs(round(process.create_time() * 100) - entry.began) <= 1
+    except psutil.NoSuchProcess:
+        return None
+    except psutil.Error:
+        return psutil.STATUS_RUNNING
+    return status if is_it and status != psutil.STATUS_ZOMBIE else None
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock a file for this process; False when that took too long."""
+    pause, deadline = threading.Event(), time.monotonic() + _LOCK_S
+    while not _try_lock(descriptor):
+        if time.monotonic() > deadline:
+            return False
+        pause.wait(_LOOK_S)
+    return True
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _try_lock(descriptor: int) -> bool:
+        try:
+            os.lseek(descriptor, 0, os.SEEK_SET)
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+
+    def _unlock(descriptor: int) -> None:
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        msvcrt.locking(descriptor, msvcrt.LK_UNLCK, 1)
+
+else:
+    import fcntl
+
+    def _try_lock(descriptor: int) -> bool:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return True
+
+    def _unlock(descriptor: int) -> None:
+        fcntl.flock(descriptor, fcntl.LOCK_UN)

@@ -1,0 +1,328 @@
+"""ZenohSession: one node's session at one place: who is there, what it has, and questions to others."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from nep.backends.zenoh.keys import (
+    ALL_CALLS,
+    ALL_LIVE,
+    call_key,
+    data_key,
+    hello_key,
+    hellos_key,
+    node_key,
+    parse_live,
+    publisher_key,
+    subscriber_key,
+)
+from nep.backends.zenoh.library import callback, close_session, library
+from nep.backends.zenoh.places import open_place
+from nep.backends.zenoh.publisher import ZenohPublisher
+from nep.backends.zenoh.roster import Roster
+from nep.backends.zenoh.subscriber import ZenohSubscriber
+from nep.backends.zeromq.sockets import wait_until
+from nep.errors import RequestRefusedError, WireError
+from nep.masters.graph import Graph
+from nep.masters.registry import check_record
+from nep.messages.packing import pack_saturated, unpack_bounded
+from nep.protocol import requests
+from nep.protocol.encoding import decode_request, encode_request
+from nep.protocol.graph_view import GraphView
+from nep.protocol.requests import NodeRecord, PublisherRecord, Request, SubscriberRecord
+from nep.system.cpu import CpuLoad
+
+__all__ = ["Question", "ZenohSession"]
+
+_logger = logging.getLogger("nep")
+_GRACE_S = 1.0
+"""Zenoh says itself that the time of a question is over; should it not, nobody waits much longer."""
+_GREETING_S = 10.0
+_REPLIES_MOST, _LISTS_MOST = 100, 20_000
+
+
+class Question:
+    """A question that was asked: who answered, and whether all have that could."""
+
+    def __init__(self, timeout_s: float) -> None:
+        self.answers: dict[str, bytes] = {}
+        self._ends_at = time.monotonic() + timeout_s + _GRACE_S
+        self._is_over = False
+        self._changed = threading.Condition()
+
+    def answered(self, reply: Any) -> None:  # noqa: ANN401 - zenoh's
+        """In one of zenoh's threads."""
+        if reply.ok is not None:
+            with self._changed:
+                self.answers[str(reply.ok.key_expr)] = reply.ok.payload.to_bytes()
+                self._changed.notify_all()
+
+    def over(self) -> None:
+        """All have answered, or the time is over."""
+        with self._changed:
+            self._is_over = True
+            self._changed.notify_all()
+
+    def wait(self, wanted: frozenset[str] | None = None, deadline: float | None = None) -> frozenset[str]:
+        """Wait for those that are `wanted`, or for all; the keys of those that did not answer."""
+        ends_at = self._ends_at if deadline is None else min(deadline, self._ends_at)
+        with self._changed:
+            wait_until(
+                self._changed,
+                lambda: self._is_over or (wanted is not None and wanted <= self.answers.keys()),
+                ends_at - time.monotonic(),
+            )
+            return frozenset() if wanted is None else wanted - self.answers.keys()
+
+
+class ZenohSession:
+    """Opens a session at `place`. Raises `NepError` when none can be had there within `wait_s`."""
+
+    def __init__(self, node: NodeRecord, place: str, wait_s: float | None) -> None:
+        self.node = node
+        self.roster = Roster()
+        self._lock = threading.Lock()
+        self._tokens: dict[object, Any] = {}
+        self._publishers: tuple[ZenohPublisher, ...] = ()
+        self._subscribers: tuple[ZenohSubscriber, ...] = ()
+        self._outputs: dict[int, Any] = {}
+        self._load = CpuLoad()
+        self._graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
+        self._opened = open_place(place, wait_s)
+        self.endpoints = self._opened.endpoints
+        self._zenoh: Any = self._opened.session
+        try:
+            self._declared = (
+                self._zenoh.liveliness().declare_subscriber(ALL_LIVE, callback(self._noticed), history=True),
+                self._zenoh.declare_queryable(call_key(node.id), callback(self._called)),
+            )
+        except BaseException:
+            self.close(0.0)
+            raise
+
+    # ---- questions
+
+    def ask(
+        self,
+        key: str,
+        request: Request | None,
+        timeout_s: float,
+        *,
+        take: Callable[[Any], None] | None = None,
+        is_last: bool = False,
+    ) -> Question:
+        """Ask all that answer at `key`. With `is_last` it comes behind all that was published before."""
+        zenoh = library()
+        question = Question(timeout_s)
+
+        def answered(reply: Any) -> None:  # noqa: ANN401 - zenoh's
+            if take is not None and reply.ok is not None:
+                take(reply.ok)
+            question.answered(reply)
+
+        self._zenoh.get(
+            key,
+            callback(answered, question.over),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=max(timeout_s, 0.001),
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.BACKGROUND if is_last else zenoh.Priority.DATA,
+            payload=None if request is None else encode_request(request, 0),
+        )
+        return question
+
+    def meet_all(self, timeout_s: float) -> Mapping[str, bytes]:
+        """Go to every node and back; what each declared before is known here then, and the reverse."""
+        if self._opened.meeting is None:
+            self._ask_routers(timeout_s)
+        question = self.ask(ALL_CALLS, requests.Ping(), timeout_s)
+        question.wait()
+        return question.answers
+
+    def _ask_routers(self, timeout_s: float) -> None:
+        """Go to the routers and back: they have told by then who can be asked."""
+        question = Question(timeout_s)
+        self._zenoh.liveliness().get(
+            node_key(self.node), callback(question.answered, question.over), timeout=max(timeout_s, 0.001)
+        )
+        question.wait()
+
+    def _called(self, query: Any) -> None:  # noqa: ANN401 - zenoh's
+        """In one of zenoh's threads: somebody asks this node."""
+        asked = decode_request(b"" if query.payload is None else query.payload.to_bytes()).request
+        answer = b""
+        if isinstance(asked, requests.Look):
+            answer = pack_saturated([encode_request(each, 0) for each in self._presented()])
+        elif isinstance(asked, requests.RemovePublisher):
+            for subscriber in self._subscribers:
+                subscriber.bye(asked.id, asked.last_seq)
+        with query:
+            query.reply(call_key(self.node.id), answer)
+
+    def _presented(self) -> tuple[Request, ...]:
+        """This node as it registers and renews; nothing as long as it has nothing."""
+        with self._lock:
+            publishers, subscribers = self._publishers, self._subscribers
+            if self.node.id not in self._tokens:
+                return ()
+        join = requests.Join(
+            self._own_record(),
+            0,
+            tuple(each.record for each in publishers),
+            tuple(
+                SubscriberRecord(each.spec.id, each.spec.topic, each.spec.msg_type) for each in subscribers
+            ),
+        )
+        renewal = requests.Renew(
+            self.node.id,
+            1,
+            0,
+            tuple(each.counts() for each in publishers),
+            tuple(each.counts() for each in subscribers),
+            self._load.ratio(),
+        )
+        missing = (
+            requests.ReportMissing(self.node.id, each.spec.id, each.missing_ids)
+            for each in publishers
+            if each.missing_ids
+        )
+        return (join, renewal, *missing)
+
+    def _own_record(self) -> NodeRecord:
+        """This node without its key, which proves its id to masters and is nobody else's to know."""
+        node = self.node
+        return NodeRecord(
+            node.id, node.name, node.host, node.pid, node.language, node.generation, node.since_ns
+        )
+
+    # ---- who is there
+
+    def _noticed(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
+        """In one of zenoh's threads: a token came or went."""
+        alive = parse_live(str(sample.key_expr))
+        if alive is None:
+            return
+        is_there = sample.kind == library().SampleKind.PUT
+        self.roster.note(alive, is_there=is_there)
+        record = alive.record
+        if not isinstance(record, PublisherRecord):
+            return
+        for subscriber in self._subscribers:
+            if subscriber.spec.topic == record.topic:
+                if is_there:
+                    subscriber.met(self.roster.remote(alive.node_id, record))
+                    self._greet(record, subscriber)
+                else:
+                    subscriber.lapsed(record.id)
+
+    def _greet(self, record: PublisherRecord, subscriber: ZenohSubscriber) -> None:
+        """A publisher came after its subscriber: where its counting begins, and what it has latched."""
+        self.ask(hello_key(record.topic, record.id), None, _GREETING_S, take=subscriber.told)
+
+    def look(self, timeout_s: float) -> GraphView:
+        """Everybody's records and figures of this moment; of who does not answer in time only that it is."""
+        question = self.ask(ALL_CALLS, requests.Look(), timeout_s)
+        question.wait()
+        told = [_requests_in(key, answer) for key, answer in question.answers.items()]
+        with self._lock:
+            now = time.monotonic()
+            spoken = {each.node.id for said in told for each in said if isinstance(each, requests.Join)}
+            members = [each for each in self.roster.members() if each[0].id not in spoken]
+            there = spoken | {each[0].id for each in members}
+            for gone in self._graph.members.keys() - there:
+                self._graph.apply(requests.Leave(gone), 0, now, "")
+            silent = [requests.Join(node, 0, outs, ins) for node, outs, ins in members]
+            for request in (*silent, *(each for said in told for each in said)):
+                self._graph.apply(request, 0, now, "")
+            return self._graph.view()
+
+    # ---- publishers and subscribers
+
+    def check(self, record: PublisherRecord | SubscriberRecord) -> None:
+        """Raises `RequestRefusedError` for what a master would refuse."""
+        try:
+            check_record(record)
+        except WireError as error:
+            raise RequestRefusedError(error.reason) from error
+
+    def join(self) -> None:
+        """Let others see this node."""
+        with self._lock:
+            if self.node.id not in self._tokens:
+                self._tokens[self.node.id] = self._declare(node_key(self.node))
+
+    def _declare(self, key: str) -> Any:  # noqa: ANN401 - zenoh's
+        return self._zenoh.liveliness().declare_token(key)
+
+    def add_publisher(self, publisher: ZenohPublisher) -> None:
+        """It is there: others may see it."""
+        with self._lock:
+            self._publishers = (*self._publishers, publisher)
+            self._tokens[publisher] = self._declare(publisher_key(self.node.id, publisher.record))
+
+    def add_subscriber(self, subscriber: ZenohSubscriber) -> None:
+        """It takes messages from now on, and others may see it."""
+        spec = subscriber.spec
+        record = SubscriberRecord(spec.id, spec.topic, spec.msg_type)
+        with self._lock:
+            self._subscribers = (*self._subscribers, subscriber)
+            self._outputs[spec.id] = self._zenoh.declare_subscriber(
+                data_key(spec.topic), callback(subscriber.came)
+            )
+            self._tokens[subscriber] = self._declare(subscriber_key(self.node.id, record))
+
+    def greet_all(self, subscriber: ZenohSubscriber, timeout_s: float) -> None:
+        """Ask all publishers of its topic what they have latched, and where its counting begins."""
+        for remote in self.roster.publishers_of(subscriber.spec.topic):
+            subscriber.met(remote)
+        self.ask(hellos_key(subscriber.spec.topic), None, timeout_s, take=subscriber.told).wait()
+
+    def publisher(self, make: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
+        """One that is made with zenoh's session."""
+        return make(self._zenoh)
+
+    def forget(self, closed: ZenohPublisher | ZenohSubscriber) -> None:
+        """It is closed: nobody sees it any more."""
+        with self._lock:
+            self._publishers = tuple(each for each in self._publishers if each is not closed)
+            self._subscribers = tuple(each for each in self._subscribers if each is not closed)
+            undeclared = [self._tokens.pop(closed, None)]
+            if isinstance(closed, ZenohSubscriber):
+                undeclared.append(self._outputs.pop(closed.spec.id, None))
+        for each in undeclared:
+            if each is not None:
+                each.undeclare()
+
+    # ---- the end
+
+    def close(self, timeout_s: float) -> None:
+        """Take all off the network, tell everybody, and close."""
+        self._opened.leave()
+        with self._lock:
+            tokens = list(self._tokens.values())
+            self._tokens.clear()
+        for token in tokens:
+            token.undeclare()
+        if tokens and timeout_s > 0.0:
+            self.meet_all(timeout_s)  # who looks at the graph after this does not see this node any more
+        close_session(self._zenoh)
+
+
+def _requests_in(key: str, answer: bytes) -> tuple[Request, ...]:
+    """What a node tells of itself; nothing of what is not understood, or tells of another node."""
+    try:
+        bodies = unpack_bounded(answer, _REPLIES_MOST, _LISTS_MOST) if answer else []
+    except ValueError:
+        return ()
+    if not isinstance(bodies, list) or not all(isinstance(each, bytes) for each in bodies):
+        return ()
+    said = [decode_request(each).request for each in bodies]
+    allowed = requests.Join | requests.Renew | requests.ReportMissing
+    return tuple(
+        each for each in said if isinstance(each, allowed) and key == call_key(requests.node_of(each) or "")
+    )

@@ -1,0 +1,187 @@
+"""ZenohSubscriber: what zenoh calls with each message, and the inbox that keeps it for a reader."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from nep.backends.base import Sink, SubscriberSpec
+from nep.backends.zenoh.inboxes import Inboxes
+from nep.backends.zeromq.loss import HeardPublishers
+from nep.backends.zeromq.sockets import Refusals
+from nep.backends.zeromq.sub_socket import CarefulParser
+from nep.errors import WireError
+from nep.i18n import _
+from nep.messages.message import Message
+from nep.messages.queue import Inbox
+from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+from nep.protocol.wire import HEADER_BYTES, hello_part, topic_part
+
+__all__ = ["ZenohSubscriber"]
+
+_logger = logging.getLogger("nep")
+_BATCH_BYTES = 64 * 2**20
+"""A sink works on so many bytes at once; with those that wait for it there are no more than the bound."""
+
+
+class ZenohSubscriber:
+    """A subscriber: its inbox, or its sink. `on_close` takes it off the network, once and without a lock."""
+
+    def __init__(
+        self, spec: SubscriberSpec, inboxes: Inboxes, on_close: Callable[[ZenohSubscriber], None]
+    ) -> None:
+        batch = 0 if spec.sink is None else _BATCH_BYTES
+        self.spec = spec
+        self.ready: deque[Message] = deque()
+        self.is_closed = False
+        self._inboxes = inboxes
+        self._on_close = on_close
+        self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
+        self._sources = HeardPublishers()
+        self._refusals = Refusals()
+        self._problem = ""
+        self._topic = topic_part(spec.topic)
+        self._own = hello_part(spec.id, spec.topic)
+        self._parser = CarefulParser(
+            spec, self._own, self._sources, self._leave, lambda _publisher, _seq: None
+        )
+
+    # ---- what the reader sees
+
+    def poll(self) -> Message | None:
+        """The next message if one is there."""
+        with self._inboxes.changed:
+            return None if self.is_closed else self._inbox.take()
+
+    def receive(self, timeout_s: float) -> Message | None:
+        """The next message, waited for."""
+        self._inboxes.wait((self,), timeout_s)
+        return self.poll()
+
+    @property
+    def has_input(self) -> bool:
+        """Whether a message waits."""
+        return len(self._inbox) > 0
+
+    @property
+    def sink(self) -> Sink | None:
+        """Where its messages go."""
+        return self.spec.sink
+
+    def take_batch(self) -> list[Message]:
+        """What a sink gets at once."""
+        with self._inboxes.changed:
+            return self._inbox.take_all(_BATCH_BYTES)
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+        return self._sources.received
+
+    @property
+    def lost(self) -> int:
+        """Messages that did not arrive, or were dropped here for lack of room."""
+        return self._sources.lost
+
+    @property
+    def refused(self) -> int:
+        """What came and was no message at all."""
+        return self._refusals.count
+
+    def report(self, problem: str) -> None:
+        """The reader's trouble with a message, for who looks at the graph."""
+        self._problem = problem
+
+    def counts(self) -> SubscriberCount:
+        """The figures for who looks at the graph."""
+        problem = self._problem or self._refusals.told()
+        return SubscriberCount(self.spec.id, as_count(self.received), as_count(self.lost), problem)
+
+    # ---- what zenoh's threads tell
+
+    def came(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
+        """A message on the topic."""
+        self._take(sample, self._topic)
+
+    def told(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
+        """What a publisher answers to a hello: what is latched, or the number of its last message."""
+        self._take(sample, self._own)
+
+    def _take(self, sample: Any, first: bytes) -> None:  # noqa: ANN401 - zenoh's
+        payload: bytes = sample.payload.to_bytes()
+        beside: bytes = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        rest = [beside[:HEADER_BYTES]]
+        if payload or first == self._topic or len(beside) > HEADER_BYTES or _is_latched(beside):
+            rest.append(payload)
+        if len(beside) > HEADER_BYTES:
+            rest.append(beside[HEADER_BYTES:])
+        with self._inboxes.changed:
+            if self.is_closed:
+                return
+            try:
+                if not beside:
+                    raise WireError(
+                        _("it has no header; a program of another kind published it"), len(payload)
+                    )
+                message = self._parser.parse(first, rest)
+            except WireError as error:
+                is_logged = self._refusals.add(error.reason)
+                refused = error
+            else:
+                if message is not None:
+                    self._sources.dropped(self._inbox.put(message))
+                    self._inboxes.changed.notify_all()
+                return
+        if is_logged:
+            _logger.warning("on '%s' came what is no message: %s", self.spec.topic, refused)
+
+    def met(self, remote: RemotePublisher) -> None:
+        """A publisher is there."""
+        with self._inboxes.changed:
+            for old in self._sources.replaced_by(remote):
+                self._sources.pop(old)
+            self._sources.listed(remote).is_lapsed = False
+
+    def lapsed(self, publisher: int) -> None:
+        """A publisher is not there any more; it is remembered, for it may only be out of reach."""
+        with self._inboxes.changed:
+            source = self._sources.find(publisher)
+            if source is not None:
+                source.is_lapsed = True
+            for each in self._sources.ended(0.0):
+                self._sources.pop(each)
+
+    def bye(self, publisher: int, last_seq: int) -> None:
+        """A publisher closes; nothing comes after its message `last_seq`."""
+        with self._inboxes.changed:
+            source = self._sources.find(publisher)
+            if source is not None:
+                if source.last is not None:
+                    self._sources.reached(publisher, last_seq)
+                self._sources.pop(publisher)
+
+    def _leave(self, publisher: int) -> None:
+        self._sources.pop(publisher)
+
+    # ---- closing
+
+    def close(self) -> None:
+        """Unregister and forget what was not read."""
+        with self._inboxes.changed:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            self._inbox.take_all()
+            self._inboxes.changed.notify_all()
+        self._inboxes.stop_pouring(self)
+        self._on_close(self)
+
+    def forked(self) -> None:
+        """In a child. See `SubscriberTransport.forked`."""
+        self.is_closed = True
+
+
+def _is_latched(beside: bytes) -> bool:
+    return len(beside) >= HEADER_BYTES and bool(beside[2] & 1)

@@ -1,0 +1,233 @@
+"""The back end `zenoh`: one session for each node and place; no master."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.connection import Configuration, Direct
+from nep.backends.zenoh.inboxes import Inboxes
+from nep.backends.zenoh.keys import ALL_CALLS, call_key
+from nep.backends.zenoh.library import library
+from nep.backends.zenoh.publisher import ZenohPublisher
+from nep.backends.zenoh.session import Question, ZenohSession
+from nep.backends.zenoh.subscriber import ZenohSubscriber
+from nep.errors import ClosedError, NepError
+from nep.i18n import _
+from nep.protocol.graph_view import GraphView
+from nep.protocol.requests import Expected, NodeRecord, RemovePublisher, SubscriberRecord
+from nep.system.forks import give_up, watch
+
+__all__ = ["ZenohTransport"]
+
+_logger = logging.getLogger("nep")
+_LEAVE_S = 0.3
+_FLUSH_MOST_S = 60.0
+
+
+@dataclass
+class _Farewell:
+    """A publisher that closes: what it asked of its subscribers' nodes."""
+
+    session: ZenohSession
+    question: Question
+    expected: tuple[Expected, ...]
+
+
+class ZenohTransport:
+    """One node's way to the others. Raises `BackendUnavailableError` where zenoh is not installed."""
+
+    def __init__(self, node: NodeRecord) -> None:
+        library()
+        self._node = node
+        self._inboxes = Inboxes(node.name)
+        self._lock = threading.Lock()
+        self._opening = threading.Lock()
+        self._sessions: dict[str, ZenohSession] = {}
+        self._publishers: dict[ZenohPublisher, ZenohSession] = {}
+        self._subscribers: dict[ZenohSubscriber, ZenohSession] = {}
+        self._farewells: dict[ZenohPublisher, _Farewell] = {}
+        self._is_closed = False
+        self._is_over = False
+        watch(self)
+
+    # ---- publishers and subscribers
+
+    def publisher(self, spec: PublisherSpec) -> ZenohPublisher:
+        """A new publisher. See `Transport.publisher`."""
+        session = self._session(spec.configuration, spec.wait_s)
+
+        def make(zenoh_session: Any) -> ZenohPublisher:  # noqa: ANN401 - zenoh's
+            return ZenohPublisher(
+                zenoh_session, spec, session.roster.count_subscribers, self._close_publisher
+            )
+
+        session.join()
+        publisher = session.publisher(make)
+        try:
+            session.check(publisher.record)
+            self._keep(self._publishers, publisher, session)
+            session.add_publisher(publisher)
+            answered = session.meet_all(HANDSHAKE_S)
+            expected = session.roster.subscribers_of(spec.topic)
+            missing = [each for each in expected if call_key(each.node_id) not in answered]
+            publisher.missing = tuple(dict.fromkeys(each.node_name for each in missing))
+            publisher.missing_ids = tuple(each.id for each in missing)
+        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+            publisher.close(0.0)
+            raise
+        return publisher
+
+    def subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
+        """A new subscriber. See `Transport.subscriber`."""
+        session = self._session(spec.configuration, spec.wait_s)
+        session.check(SubscriberRecord(spec.id, spec.topic, spec.msg_type))
+        session.join()
+        subscriber = ZenohSubscriber(spec, self._inboxes, self._close_subscriber)
+        self._keep(self._subscribers, subscriber, session)
+        try:
+            session.add_subscriber(subscriber)
+            session.meet_all(HANDSHAKE_S)
+            session.greet_all(subscriber, HANDSHAKE_S)
+            if spec.sink is not None:
+                self._inboxes.pour(subscriber)
+        except BaseException:
+            subscriber.close()
+            raise
+        return subscriber
+
+    def _keep(self, table: dict[Any, ZenohSession], made: object, session: ZenohSession) -> None:
+        with self._lock:
+            self._check_open()
+            table[made] = session
+
+    def _check_open(self) -> None:
+        """With the lock held. Raises `ClosedError`."""
+        if self._is_closed:
+            raise ClosedError(f"node '{self._node.name}'")
+
+    def _session(self, configuration: Configuration, wait_s: float | None) -> ZenohSession:
+        if isinstance(configuration, Direct):
+            raise NepError(
+                _(
+                    "the back end 'zenoh' has no direct connections; leave the configuration out: no master "
+                    "is needed, and master='tcp/192.168.1.5:7447' gives the node a router of another computer"
+                )
+            )
+        with self._opening:  # the session of a place is opened once
+            with self._lock:
+                self._check_open()
+                session = self._sessions.get(configuration.master)
+            if session is None:
+                session = ZenohSession(self._node, configuration.master, wait_s)
+                with self._lock:
+                    is_late = self._is_closed
+                    if not is_late:
+                        self._sessions[configuration.master] = session
+                if is_late:
+                    session.close(0.0)
+                    raise ClosedError(f"node '{self._node.name}'")
+        return session
+
+    # ---- closing one of them
+
+    def _close_subscriber(self, subscriber: ZenohSubscriber) -> None:
+        with self._lock:
+            session = self._subscribers.pop(subscriber, None)
+        if session is not None:
+            session.forget(subscriber)
+
+    def _close_publisher(self, publisher: ZenohPublisher, timeout_s: float) -> None:
+        self._say_bye(publisher)
+        self._finish(publisher, time.monotonic() + timeout_s)
+
+    def _say_bye(self, publisher: ZenohPublisher) -> None:
+        """Nothing is published any more: ask the nodes that subscribe whether all has come."""
+        with self._lock:
+            session = self._publishers.get(publisher)
+        if not publisher.end() or session is None:
+            return
+        expected = session.roster.subscribers_of(publisher.spec.topic)
+        if expected and publisher.count:
+            request = RemovePublisher(self._node.id, publisher.spec.id, publisher.count)
+            question = session.ask(ALL_CALLS, request, _FLUSH_MOST_S, is_last=True)
+            with self._lock:
+                self._farewells[publisher] = _Farewell(session, question, expected)
+
+    def _finish(self, publisher: ZenohPublisher, deadline: float) -> None:
+        """Wait until all has come, until `deadline`; log what was not delivered, and to how many."""
+        with self._lock:
+            farewell = self._farewells.pop(publisher, None)
+            session = self._publishers.pop(publisher, None)
+        if farewell is not None:
+            wanted = frozenset(call_key(each.node_id) for each in farewell.expected)
+            silent = farewell.question.wait(wanted, deadline)
+            there = {each.id for each in farewell.session.roster.subscribers_of(publisher.spec.topic)}
+            owed = sum(call_key(each.node_id) in silent and each.id in there for each in farewell.expected)
+            if owed:
+                _logger.warning(
+                    "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",
+                    publisher.spec.topic,
+                    owed,
+                    publisher.count,
+                )
+        publisher.release()
+        if session is not None:
+            session.forget(publisher)
+
+    # ---- waiting
+
+    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
+        """Wait for a message in one of `subscribers`, or for `wake`."""
+        self._inboxes.wait([each for each in subscribers if isinstance(each, ZenohSubscriber)], timeout_s)
+
+    def wake(self) -> None:
+        """End all waits."""
+        self._inboxes.wake()
+
+    # ---- who is there, and the end
+
+    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
+        """Who is there. See `Transport.graph`."""
+        return self._session(configuration, timeout_s).look(min(timeout_s, HANDSHAKE_S))
+
+    def begin_close(self) -> None:
+        """Say that all ends here, and wait for nothing. See `Transport.begin_close`."""
+        with self._lock:
+            if self._is_closed:
+                return
+            self._is_closed = True
+            publishers = list(self._publishers)
+        for publisher in publishers:
+            self._say_bye(publisher)
+
+    def close(self, timeout_s: float) -> None:
+        """Close all. See `Transport.close`."""
+        deadline = time.monotonic() + timeout_s
+        self.begin_close()
+        with self._lock:
+            if self._is_over:
+                return
+            self._is_over = True
+            publishers, subscribers = list(self._publishers), list(self._subscribers)
+        for subscriber in subscribers:
+            subscriber.close()
+        for publisher in publishers:
+            self._finish(publisher, deadline)
+        self._inboxes.close(max(_LEAVE_S, deadline - time.monotonic()))
+        with self._opening:
+            sessions = list(self._sessions.values())
+        for session in sessions:
+            session.close(min(_LEAVE_S, timeout_s))
+
+    def forked(self) -> None:
+        """In a child: its sockets are the parent's. See `nep.system.forks`."""
+        for session in self._sessions.values():
+            give_up(*session.endpoints)
+        for subscriber in self._subscribers:
+            subscriber.forked()
