@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from nep.backends.base import PublisherSpec
@@ -140,4 +141,5 @@ class ZenohPublisher:
     def release(self) -> None:
         """Take it off the network."""
         for each in (self._hellos, self._listener, self._out):
-            each.undeclare()
+            with suppress(library().ZError):  # the session was closed, and took it along
+                each.undeclare()

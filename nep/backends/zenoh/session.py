@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from nep.backends.zenoh.keys import (
@@ -296,7 +297,8 @@ class ZenohSession:
                 undeclared.append(self._outputs.pop(closed.spec.id, None))
         for each in undeclared:
             if each is not None:
-                each.undeclare()
+                with suppress(library().ZError):  # the session was closed, and took it along
+                    each.undeclare()
 
     # ---- the end
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,6 +61,10 @@ class ZenohTransport:
 
     def publisher(self, spec: PublisherSpec) -> ZenohPublisher:
         """A new publisher. See `Transport.publisher`."""
+        with self._unless_closed():
+            return self._publisher(spec)
+
+    def _publisher(self, spec: PublisherSpec) -> ZenohPublisher:
         session = self._session(spec.configuration, spec.wait_s)
 
         def make(zenoh_session: Any) -> ZenohPublisher:  # noqa: ANN401 - zenoh's
@@ -85,6 +90,10 @@ class ZenohTransport:
 
     def subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
         """A new subscriber. See `Transport.subscriber`."""
+        with self._unless_closed():
+            return self._subscriber(spec)
+
+    def _subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
         session = self._session(spec.configuration, spec.wait_s)
         session.check(SubscriberRecord(spec.id, spec.topic, spec.msg_type))
         session.join()
@@ -100,6 +109,18 @@ class ZenohTransport:
             subscriber.close()
             raise
         return subscriber
+
+    @contextmanager
+    def _unless_closed(self) -> Iterator[None]:
+        """What zenoh raises when the node was closed meanwhile becomes `ClosedError`."""
+        try:
+            yield
+        except library().ZError as error:
+            with self._lock:
+                is_closed = self._is_closed
+            if is_closed:
+                raise ClosedError(f"node '{self._node.name}'") from error
+            raise
 
     def _keep(self, table: dict[Any, ZenohSession], made: object, session: ZenohSession) -> None:
         with self._lock:
@@ -194,7 +215,8 @@ class ZenohTransport:
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Who is there. See `Transport.graph`."""
-        return self._session(configuration, timeout_s).look(min(timeout_s, HANDSHAKE_S))
+        with self._unless_closed():
+            return self._session(configuration, timeout_s).look(min(timeout_s, HANDSHAKE_S))
 
     def begin_close(self) -> None:
         """Say that all ends here, and wait for nothing. See `Transport.begin_close`."""
