@@ -16,7 +16,7 @@ from nep.errors import WireError
 from nep.i18n import _
 from nep.protocol.wire import pack_quickly
 
-__all__ = ["BATCH", "BATCH_FORM", "BATCH_MAX", "Entry", "batch_part", "entries", "table_of"]
+__all__ = ["BATCH", "BATCH_FORM", "BATCH_MAX", "BatchEntry", "batch_part", "entries", "table_of"]
 
 BATCH = 8
 """Flag: the part holds several messages. Only those get it whose hello says that they read it."""
@@ -27,7 +27,7 @@ BATCH_MAX = 256
 _COUNT = struct.Struct("<I")
 
 
-class Entry(NamedTuple):
+class BatchEntry(NamedTuple):
     """One message of a batch: its number in it, when it was published, and where its payload is."""
 
     number: int
@@ -58,7 +58,7 @@ def batch_part(
     return b"".join((topic, header, table, *payloads))
 
 
-def entries(body: bytes) -> list[Entry]:
+def entries(body: bytes) -> list[BatchEntry]:
     """The messages in what follows the header. Raises `WireError`."""
     count = _COUNT.unpack_from(body)[0] if len(body) >= _COUNT.size else 0
     if not 1 <= count <= BATCH_MAX:
@@ -75,6 +75,6 @@ def entries(body: bytes) -> list[Entry]:
         raise WireError(_("the messages of a batch have other sizes than it tells"), len(body))
     made, at = [], table.size
     for number, (size, stamp_ns) in enumerate(zip(sizes, stamps, strict=True)):
-        made.append(Entry(number, stamp_ns, at, at + size))
+        made.append(BatchEntry(number, stamp_ns, at, at + size))
         at += size
     return made

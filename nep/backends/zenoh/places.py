@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from nep.backends.zenoh.library import library, open_session
-from nep.backends.zenoh.rendezvous import Entry, Rendezvous, free_port
+from nep.backends.zenoh.rendezvous import Rendezvous, SessionPort, free_port
 from nep.backends.zeromq.sockets import LOOPBACK
 from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
@@ -45,7 +45,7 @@ class Opened:
 
     session: Any
     meeting: Rendezvous | None = None
-    entry: Entry | None = None
+    entry: SessionPort | None = None
     endpoints: tuple[str, ...] = ()
 
     def leave(self) -> None:

@@ -27,7 +27,7 @@ from nep.backends.zeromq.sockets import LOOPBACK, ORIGINAL_PORTS
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
 
-__all__ = ["Entry", "Rendezvous", "free_port"]
+__all__ = ["Rendezvous", "SessionPort", "free_port"]
 
 _logger = logging.getLogger("nep")
 _LOCK_S = 5.0
@@ -36,7 +36,7 @@ _TRIES = 100
 _STOPPED = frozenset({psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP})
 
 
-class Entry(NamedTuple):
+class SessionPort(NamedTuple):
     """A session's file: the port at which it listens, and whose it is. `began` tells equal pids apart."""
 
     port: int
@@ -79,7 +79,7 @@ class Rendezvous:
                 if is_held:
                     _unlock(file.fileno())
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[SessionPort]:
         """Who listens. Files of programs that have ended are deleted."""
         found = []
         for path in self._folder.iterdir():
@@ -97,13 +97,13 @@ class Rendezvous:
                 found.append(entry)
         return found
 
-    def add(self, port: int) -> Entry:
+    def add(self, port: int) -> SessionPort:
         """Leave a file: this process listens there."""
-        entry = Entry(port, os.getpid(), _began(os.getpid()))
+        entry = SessionPort(port, os.getpid(), _began(os.getpid()))
         (self._folder / entry.name).touch(mode=0o600)
         return entry
 
-    def remove(self, entry: Entry) -> None:
+    def remove(self, entry: SessionPort) -> None:
         """Take it back."""
         with contextlib.suppress(OSError):
             (self._folder / entry.name).unlink(missing_ok=True)
@@ -138,11 +138,11 @@ def _own_folder(folder: Path) -> Path:
     return folder
 
 
-def _entry_in(name: str) -> Entry | None:
+def _entry_in(name: str) -> SessionPort | None:
     words = name.split("-")
-    if len(words) != len(Entry._fields) or not all(each.isascii() and each.isdigit() for each in words):
+    if len(words) != len(SessionPort._fields) or not all(each.isascii() and each.isdigit() for each in words):
         return None
-    entry = Entry(*map(int, words))
+    entry = SessionPort(*map(int, words))
     return entry if 0 < entry.port < 65536 and 0 < entry.pid < 2**31 else None
 
 
@@ -150,7 +150,7 @@ def _began(pid: int) -> int:
     return round(psutil.Process(pid).create_time() * 100)
 
 
-def _status(entry: Entry) -> str | None:
+def _status(entry: SessionPort) -> str | None:
     """What its process does; None when that has ended."""
     try:
         process = psutil.Process(entry.pid)

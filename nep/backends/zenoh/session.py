@@ -37,7 +37,7 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, PublisherRecord, Request, SubscriberRecord
 from nep.system.cpu import CpuLoad
 
-__all__ = ["Question", "ZenohSession"]
+__all__ = ["Inquiry", "ZenohSession"]
 
 _logger = logging.getLogger("nep")
 _GRACE_S = 1.0
@@ -46,7 +46,7 @@ _GREETING_S = 10.0
 _REPLIES_MOST, _LISTS_MOST = 100, 20_000
 
 
-class Question:
+class Inquiry:
     """A question that was asked: who answered, and whether all have that could."""
 
     def __init__(self, timeout_s: float) -> None:
@@ -115,10 +115,10 @@ class ZenohSession:
         *,
         take: Callable[[Any], None] | None = None,
         is_last: bool = False,
-    ) -> Question:
+    ) -> Inquiry:
         """Ask all that answer at `key`. With `is_last` it comes behind all that was published before."""
         zenoh = library()
-        question = Question(timeout_s)
+        question = Inquiry(timeout_s)
 
         def answered(reply: Any) -> None:  # noqa: ANN401 - zenoh's
             if take is not None and reply.ok is not None:
@@ -147,7 +147,7 @@ class ZenohSession:
 
     def _ask_routers(self, timeout_s: float) -> None:
         """Go to the routers and back: they have told by then who can be asked."""
-        question = Question(timeout_s)
+        question = Inquiry(timeout_s)
         self._zenoh.liveliness().get(
             node_key(self.node), callback(question.answered, question.over), timeout=max(timeout_s, 0.001)
         )

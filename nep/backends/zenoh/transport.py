@@ -16,7 +16,7 @@ from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zenoh.keys import ALL_CALLS, call_key
 from nep.backends.zenoh.library import library
 from nep.backends.zenoh.publisher import ZenohPublisher
-from nep.backends.zenoh.session import Question, ZenohSession
+from nep.backends.zenoh.session import Inquiry, ZenohSession
 from nep.backends.zenoh.subscriber import ZenohSubscriber
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
@@ -36,7 +36,7 @@ class _Farewell:
     """A publisher that closes: what it asked of its subscribers' nodes."""
 
     session: ZenohSession
-    question: Question
+    question: Inquiry
     expected: tuple[Expected, ...]
 
 

@@ -17,7 +17,7 @@ import nep
 from nep.backends.zenoh import keys
 from nep.backends.zenoh.library import callback, library
 from nep.backends.zenoh.places import CONFIG_VARIABLE, place_name
-from nep.backends.zenoh.rendezvous import Entry, Rendezvous
+from nep.backends.zenoh.rendezvous import Rendezvous, SessionPort
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from tests.nep.programs import Program, eventually, running
 
@@ -340,7 +340,7 @@ def test_files_of_programs_that_ended_are_deleted(place: str, tmp_path: Path) ->
         pass
     for name in (f"5-{ended.pid}-0", f"7-{own.pid}-{own.began + 100}", "nonsense", "1-2", f"{2**70}-1-1"):
         (meeting._folder / name).touch()
-    assert meeting.entries() == [Entry(1234, os.getpid(), own.began)]
+    assert meeting.entries() == [SessionPort(1234, os.getpid(), own.began)]
     left = {path.name for path in meeting._folder.iterdir()}
     assert {"nonsense", own.name} <= left
     assert not {f"5-{ended.pid}-0", f"7-{own.pid}-{own.began + 100}"} & left
