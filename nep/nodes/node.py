@@ -166,9 +166,8 @@ class Node:
 
         `latched`: whoever subscribes later gets the last message at once. `batch`: messages published within
         20 microseconds of each other may go out together, 100 microseconds later at most (the last ones of a
-        burst that goes on for longer: 500). Raises
-        `MasterUnreachable`, `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and
-        `ValueError` for what is none of the allowed arguments.
+        burst that goes on for longer: 500). Raises `MasterUnreachable`, `BadTopicError`, `AddressInUseError`,
+        `TooManyFilesError`, `ClosedError`, and `ValueError` for what is none of the allowed arguments.
         """
         number = next(self._numbers)
         spec = PublisherSpec(
