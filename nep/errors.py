@@ -235,11 +235,15 @@ class TooManyFilesError(NepError):
 
 
 class EncodeError(NepError, ValueError):
-    """A payload of Python type `kind` cannot become `codec` bytes, for `reason`."""
+    """A payload of Python type `kind` cannot become `codec` bytes, for `reason`.
 
-    def __init__(self, codec: str, kind: str, reason: str) -> None:
+    `place` is where in the payload, for codecs that know; the reason names it, too.
+    """
+
+    def __init__(self, codec: str, kind: str, reason: str, place: str = "") -> None:
         self.codec = codec
         self.kind = kind
+        self.place = place
         self.reason = reason
         super().__init__(
             _("cannot encode a '{kind}' as '{codec}'; {reason}").format(kind=kind, codec=codec, reason=reason)

@@ -15,7 +15,7 @@ from typing import Protocol
 
 from nep.backends.connection import Configuration
 from nep.errors import PluginsMissingError, UnknownBackendError
-from nep.messages.codecs import Codec
+from nep.messages.codecs import Codec, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.messages.queue import MAX_BYTES, MAX_MESSAGES, Keep
@@ -49,7 +49,7 @@ class PublisherSpec:
     """What a publisher shall be. `wait_s`: how long to wait for a master, None without limit.
 
     `number` proves the id: see `nep.protocol.requests.is_proven`. `may_batch`: a back end may send messages
-    that follow each other within microseconds together.
+    that follow each other within microseconds together. `qos`: one of the back end's words, or "".
     """
 
     id: int
@@ -61,13 +61,14 @@ class PublisherSpec:
     wait_s: float | None
     number: int = 0
     may_batch: bool = True
+    qos: str = ""
 
 
 @dataclass(frozen=True)
 class SubscriberSpec:
     """What a subscriber shall be. With a `sink` nothing is kept for `SubscriberTransport.poll`.
 
-    `number` proves the id.
+    `number` proves the id. `qos`: one of the back end's words, or "".
     """
 
     id: int
@@ -80,6 +81,7 @@ class SubscriberSpec:
     max_bytes: int = MAX_BYTES
     sink: Sink | None = None
     number: int = 0
+    qos: str = ""
 
 
 class PublisherTransport(Protocol):
@@ -186,7 +188,9 @@ class Backend:
     """A plug-in that carries bytes. `open` raises `BackendUnavailableError` when `needs` is not installed.
 
     `master` makes a `Hybrid.master` of what a node is given as `master`, None when that is nothing; it raises
-    `NepError` for what is no place where nodes of this back end meet.
+    `NepError` for what is no place where nodes of this back end meet. `codec_for` gives the codec of a
+    publisher's message type, for a back end that has types of its own. `qos`: its words for qualities of
+    service.
     """
 
     name: str
@@ -194,6 +198,8 @@ class Backend:
     needs: str = ""
     aliases: tuple[str, ...] = ()
     master: Callable[[str | None], str] = master_address
+    codec_for: Callable[[str], Codec] = codec_for
+    qos: tuple[str, ...] = ()
 
 
 def backend_named(name: str) -> Backend:

@@ -27,7 +27,6 @@ from nep.backends.base import (
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port
 from nep.errors import ClosedError, DecodeError, WrongTypeError
 from nep.i18n import _
-from nep.messages.codecs import codec_for
 from nep.messages.queue import MAX_MESSAGES, Keep
 from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
 from nep.nodes.log_handler import LogHandler, handler_of
@@ -161,25 +160,29 @@ class Node:
         *,
         latched: bool = False,
         batch: bool = True,
+        qos: str = "",
     ) -> Publisher:
         """A publisher. The first message reaches every subscriber that was there before this returned.
 
         `latched`: whoever subscribes later gets the last message at once. `batch`: messages published within
         20 microseconds of each other may go out together, 100 microseconds later at most (the last ones of a
-        burst that goes on for longer: 500). Raises `MasterUnreachable`, `BadTopicError`, `AddressInUseError`,
-        `TooManyFilesError`, `ClosedError`, and `ValueError` for what is none of the allowed arguments.
+        burst that goes on for longer: 500). `qos`: a quality of service in one word, where the back end knows
+        such ("ros2": "reliable", "best_effort", "sensor"). Raises `MasterUnreachable`, `BadTopicError`,
+        `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and `ValueError` for what is none of the
+        allowed arguments.
         """
         number = next(self._numbers)
         spec = PublisherSpec(
             id_from(self._key, number),
             check_topic(topic),
             text("msg_type", msg_type),
-            codec_for(msg_type),
+            self._backend.codec_for(msg_type),
             flag("latched", latched),
             self._configured(configuration),
             self._wait_s,
             number,
             flag("batch", batch),
+            self._quality(qos),
         )
         publisher = Publisher(self._open_transport().publisher(spec), spec, self._publishers.discard)
         with self._lock:
@@ -197,12 +200,14 @@ class Node:
         keep: Keep = "all",
         max_messages: int = MAX_MESSAGES,
         sink: Sink | None = None,
+        qos: str = "",
     ) -> Subscriber:
         """A subscriber. What is published after this returned arrives, from every registered publisher.
 
         `keep="latest"`: only the newest message is kept for `listen`; "all": up to `max_messages` (and
         256 MB), then the oldest are dropped and counted. `sink`: takes the messages in batches, 200 times a
-        second at most, in a thread of the node's own, instead of `listen`. Raises as `new_pub` does.
+        second at most, in a thread of the node's own, instead of `listen`. `qos` as for `new_pub`. Raises as
+        `new_pub` does.
         """
         number = next(self._numbers)
         spec = SubscriberSpec(
@@ -215,6 +220,7 @@ class Node:
             at_least("max_messages", max_messages, 1),
             sink=None if sink is None else function("sink", sink),
             number=number,
+            qos=self._quality(qos),
         )
         return self._subscribed(self._open_transport().subscriber(spec), spec)
 
@@ -228,13 +234,15 @@ class Node:
         keep: Keep = "all",
         max_messages: int = MAX_MESSAGES,
         with_message: bool = False,
+        qos: str = "",
     ) -> Subscriber:
         """A subscriber whose payloads are given to `callback`, in the thread that calls `spin`.
 
         `keep` and `max_messages` as for `new_sub`: with `keep="latest"` a callback that is slower than the
         topic gets the newest message each time and never falls behind. `with_message`: it is given the
         `Message`, which has the payload, topic, stamp_ns, seq and publisher. A message that cannot be decoded
-        is skipped, logged, and an alert in the graph, either way. Raises as `new_pub` does.
+        is skipped, logged, and an alert in the graph, either way. `qos` as for `new_pub`. Raises as `new_pub`
+        does.
         """
         transport = self._open_transport()
         function("callback", callback)
@@ -249,6 +257,7 @@ class Node:
             one_of("keep", keep, ("all", "latest")),
             at_least("max_messages", max_messages, 1),
             number=number,
+            qos=self._quality(qos),
         )
         incoming = transport.subscriber(spec)
         subscriber = self._subscribed(incoming, spec)
@@ -268,6 +277,15 @@ class Node:
                 )
             )
         return configuration
+
+    def _quality(self, qos: str) -> str:
+        if qos and not self._backend.qos:
+            raise ValueError(
+                _("the back end '{name}' has no qualities of service; leave out qos").format(
+                    name=self._backend.name
+                )
+            )
+        return one_of("qos", qos, ("", *self._backend.qos))
 
     def _subscribed(self, transport: SubscriberTransport, spec: SubscriberSpec) -> Subscriber:
         subscriber = Subscriber(transport, spec, self._forget)

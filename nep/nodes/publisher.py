@@ -233,7 +233,7 @@ class Unsendable:
         now = self._clock()
         if self._known[0] != said and (now >= self._place_at or not self._known[0]):
             self._place_at = now + _LOOK_S  # looking for the place may take long
-            place = _place_of(payload, self._encode)
+            place = "" if getattr(error, "place", "") else _place_of(payload, self._encode)
             self._known = (said, f"{said}; it is at '{place}'" if place else said)
         sentence = self._known[1] if self._known[0] == said else said
         if is_logged(self.count):

@@ -41,6 +41,7 @@ def node(request: pytest.FixtureRequest, master: Master) -> Iterator[nep.Node]:
         ),
         ({"msg_type": "x" * 201}, "characters\\)'; use 200 letters at most"),
         ({"topic": b"t"}, "a topic is a 'str'"),
+        ({"qos": "sensor"}, "has no qualities of service; leave out qos"),
         (
             {"configuration": "direct"},
             "configuration is a 'str'; make one with 'node.hybrid' or 'node.direct'",
@@ -62,6 +63,7 @@ def test_a_subscriber_of_wrong_arguments_is_not_made(
         ({"latched": "no"}, "latched is 'no'; give True or False"),
         ({"msg_type": None}, "msg_type is a 'NoneType'; give a 'str'"),
         ({"topic": 5}, "a topic is a 'str'"),
+        ({"qos": "sensor"}, "has no qualities of service; leave out qos"),
     ],
 )
 def test_a_publisher_of_wrong_arguments_is_not_made(
@@ -86,6 +88,7 @@ def test_a_callback_is_a_function(node: nep.Node) -> None:
         ({"max_messages": True}, "max_messages is True; give a whole number from 1 on"),
         ({"with_message": 1}, "with_message is 1; give True or False"),
         ({"topic": 5}, "a topic is a 'str'"),
+        ({"qos": "sensor"}, "has no qualities of service; leave out qos"),
     ],
 )
 def test_a_callback_of_wrong_arguments_is_not_made(
