@@ -109,6 +109,9 @@ class PublisherTransport(Protocol):
     def report(self, problem: str) -> None:
         """The publisher cannot send what it is given, and why; an empty sentence means that it can again."""
 
+    def lend(self, size_bytes: int) -> memoryview | None:
+        """Memory that all who listen share, to write a payload into before it is sent; None without such."""
+
     def send(self, encoded: Encoded) -> None:
         """Publish. Never blocks: what a subscriber cannot take is lost to it, and it counts that."""
 

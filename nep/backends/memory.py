@@ -119,6 +119,10 @@ class MemoryPublisher:
         """Whether there is one."""
         return self.subscribers > 0
 
+    def lend(self, _size_bytes: int) -> memoryview | None:
+        """See `PublisherTransport.lend`: none here."""
+        return None
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self.hub.lock:

@@ -103,7 +103,10 @@ def encode(payload: object) -> Encoded:
 
 
 def raw_image(payload: object) -> Encoded:
-    """A picture without loss: its numbers as they are. Raises `EncodeError`."""
+    """A picture without loss: its numbers as they are, in the array's own memory. Raises `EncodeError`.
+
+    Publish it before the array changes.
+    """
     try:
         return _raw(_checked(payload))
     except ImportError as error:
@@ -128,7 +131,9 @@ def _raw(frame: NDArray[Any]) -> Encoded:
     encoding = _ENCODING.get((numbers, shape[2]))
     if encoding is None:
         encoding = f"{next(name for name, each in _NUMBERS.items() if each == numbers)}C{shape[2]}"
-    return Encoded(frame.astype(numbers, copy=False).tobytes(), {"shape": shape, "encoding": encoding})
+    # The array's own memory: a publisher copies it once, into shared memory where it can.
+    data = frame.astype(numbers, copy=False).data.cast("B")
+    return Encoded(data, {"shape": shape, "encoding": encoding})
 
 
 def _numbers(dtype: np.dtype[Any]) -> str:

@@ -9,9 +9,10 @@ docs/adr/0013-watching.md.
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nep.backends.base import PublisherSpec, PublisherTransport
 from nep.errors import ClosedError, EncodeError, WireError
@@ -24,6 +25,7 @@ from nep.system.log_rarely import is_logged
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from typing_extensions import Self
 
 __all__ = ["Publisher", "Unsendable", "place_of"]
@@ -156,6 +158,26 @@ class Publisher:
         self._check(payload)
         if self._unsendable.try_out(payload):
             self._transport.skip()
+
+    def loan(self, shape: int | tuple[int, ...], dtype: str = "uint8") -> NDArray[Any]:
+        """An array to write into and then publish: a picture (`nep.raw_image`), or `bytes` as `Encoded`.
+
+        It lies in memory that all subscribers share, where they do, and is then published without being
+        copied at all; else it is an ordinary array. After it is published it is the readers': take a new one
+        for the next message. Needs numpy. Raises `ClosedError`.
+        """
+        if self._is_closed:
+            raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
+        import numpy as np  # noqa: PLC0415 - optional and heavy
+
+        numbers = np.dtype(dtype)
+        sides = (shape,) if isinstance(shape, int) else tuple(shape)
+        size = math.prod(sides) * numbers.itemsize
+        memory = self._transport.lend(size) if size > 0 else None
+        if memory is None:
+            return np.empty(sides, numbers)
+        lent: NDArray[Any] = np.frombuffer(memory, numbers).reshape(sides)
+        return lent
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""

@@ -23,12 +23,15 @@ __all__ = [
     "EXTENSION",
     "HEADER_BYTES",
     "LATCHED",
+    "OFFER",
+    "SHARED",
     "SIZE_MAX",
     "SUBSCRIPTION_MAX_BYTES",
     "VERSION",
     "Header",
     "Hello",
     "Read",
+    "Shares",
     "apart",
     "check_node_name",
     "check_topic",
@@ -39,9 +42,11 @@ __all__ = [
     "pack_quickly",
     "parse_hello",
     "parse_read",
+    "parse_shares",
     "read_extension",
     "read_header",
     "read_part",
+    "shares_part",
     "split",
     "split_rest",
     "topic_part",
@@ -62,6 +67,10 @@ EXTENSION = 2
 """Flag: a fourth part follows, a msgpack map."""
 BYE = 4
 """Flag of a notice: the publisher is closing and has sent everything."""
+SHARED = 16
+"""Flag: the payload lies in memory that publisher and subscriber share; its part is the number, u64."""
+OFFER = 32
+"""Flag of a notice: payloads may lie in shared memory, of which the header's size says the generation."""
 
 HELLO = b"\xffhello/"
 """How a hello filter starts. 0xff sorts behind all of UTF-8, so it is installed after the topic filter."""
@@ -74,6 +83,8 @@ HELLO_BATCHES = b"\xffhello3/"
 _HELLOS = (HELLO_BATCHES, HELLO_TELLS, HELLO_ONE, HELLO)
 READ = b"\xffread/"
 """How a filter starts that answers an echo. It is taken back at once."""
+SHARES = b"\xffshares/"
+"""How a filter starts that answers an offer. It is taken back at once."""
 
 _HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
 _QUICKLY = struct.Struct("<IIQQQ")  # the first three in one
@@ -186,6 +197,14 @@ class Read(NamedTuple):
     bound_bytes: int
 
 
+class Shares(NamedTuple):
+    """A subscriber reads a publisher's memory of this generation from now on."""
+
+    subscriber: int
+    publisher: int
+    generation: int
+
+
 def hello_part(
     subscriber: int, topic: str, *, one_part: bool = False, tells: bool = False, batches: bool = False
 ) -> bytes:
@@ -219,11 +238,27 @@ def read_part(read: Read) -> bytes:
 
 def parse_read(part: bytes) -> Read | None:
     """What such a filter says; None for anything else."""
-    words = part[len(READ) :].split(b"/")
-    if not part.startswith(READ) or [len(each) for each in words] != [16] * 4:
+    numbers = _numbers_behind(READ, part, 4)
+    return None if numbers is None else Read(*numbers)
+
+
+def shares_part(shares: Shares) -> bytes:
+    """The filter that answers an offer."""
+    return SHARES + b"/".join(b"%016x" % number for number in shares)
+
+
+def parse_shares(part: bytes) -> Shares | None:
+    """What such a filter says; None for anything else."""
+    numbers = _numbers_behind(SHARES, part, 3)
+    return None if numbers is None else Shares(*numbers)
+
+
+def _numbers_behind(begin: bytes, part: bytes, count: int) -> list[int] | None:
+    words = part[len(begin) :].split(b"/")
+    if not part.startswith(begin) or [len(each) for each in words] != [16] * count:
         return None
     try:
-        return Read(*(int(each, 16) for each in words))
+        return [int(each, 16) for each in words]
     except ValueError:
         return None
 

@@ -123,6 +123,10 @@ class DirectPublisher:
     def report(self, problem: str) -> None:
         """There is no graph that could show it."""
 
+    def lend(self, _size_bytes: int) -> memoryview | None:
+        """See `PublisherTransport.lend`: none here."""
+        return None
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self._changed:

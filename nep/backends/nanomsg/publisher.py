@@ -121,6 +121,10 @@ class NanomsgPublisher(GreetedPublisher):
         """The publisher's trouble with a payload, for the next renewal."""
         self._problem = problem
 
+    def lend(self, _size_bytes: int) -> memoryview | None:
+        """See `PublisherTransport.lend`: none here."""
+        return None
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self._changed:

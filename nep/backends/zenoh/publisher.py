@@ -100,6 +100,10 @@ class ZenohPublisher:
 
     # ---- sending
 
+    def lend(self, _size_bytes: int) -> memoryview | None:
+        """See `PublisherTransport.lend`: none here."""
+        return None
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self._lock:

@@ -15,10 +15,13 @@ import zmq
 
 from nep.backends.base import PublisherSpec
 from nep.backends.zeromq.bindings import SMALL, Bindings
-from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog, SendWindow
+from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog
 from nep.backends.zeromq.io_thread import Rest, Served
 from nep.backends.zeromq.pending_batch import MOST, SMALL_BYTES, SOON_NS, WAIT_NS, PendingBatch
+from nep.backends.zeromq.shared_memory import SHARED_BYTES, begin_sharing, can_share
+from nep.backends.zeromq.shared_payloads import SharedPayloads
 from nep.backends.zeromq.sockets import Part, Refusals, Socket, send_mark, sendable, wait_until
+from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.protocol.batch import batch_part
@@ -26,23 +29,20 @@ from nep.protocol.requests import Expected, PublisherCount
 from nep.protocol.wire import (
     BYE,
     LATCHED,
+    OFFER,
+    SHARED,
     SIZE_MAX,
-    Hello,
     extension_part,
     form_of,
     pack_quickly,
     parse_hello,
-    parse_read,
     topic_part,
 )
 from nep.protocol.wire import EXTENSION as EXTENSION_FLAG
 
-__all__ = ["MAX_SUBSCRIBERS", "NativePublisher", "Subscriptions"]
+__all__ = ["NativePublisher"]
 
 _logger = logging.getLogger("nep")
-MAX_SUBSCRIBERS = 10_000
-"""Whoever says hello after so many is not greeted: it gets messages as one who says no hello."""
-
 _SNDMORE = int(zmq.SNDMORE)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
 _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
@@ -55,109 +55,6 @@ _LOOK_NS = 500_000
 after it, because sending may have swallowed the descriptor's signal."""
 _SERVE_S = 0.02
 _BYE_AGAIN_S = 0.05
-
-
-class Subscriptions:
-    """Who reads at a publisher's port, from the subscriptions that come in there. No sockets.
-
-    Those who said hello to this publisher of `topic`, and the filters of others.
-
-    It lives under its publisher's lock.
-    """
-
-    def __init__(self, topic: str, publisher: int) -> None:
-        self.seen: dict[int, int] = {}
-        """Subscribers that said hello and have not gone, and how many messages there had been then."""
-        self.hellos: dict[int, bytes] = {}
-        """Under which first part each of them is reached alone."""
-        self.apart: dict[bytes, int] = {}
-        """Filters by which somebody reads who did not say that it reads messages of one part; of how many."""
-        self._without_batches: set[int] = set()
-        self.windows: dict[int, SendWindow] = {}
-        """What is under way to those that tell what they have read."""
-        self.refusals = Refusals()
-        self._id = publisher
-        self._name = topic
-        self._topic = topic_part(topic)
-
-    @property
-    def is_there(self) -> bool:
-        """Whether anybody reads."""
-        return bool(self.seen or self.apart)
-
-    @property
-    def reads_batches(self) -> bool:
-        """Whether all who read take several messages in one part."""
-        return not self.apart and not self._without_batches
-
-    @property
-    def tells_all(self) -> bool:
-        """Whether all who read tell what they have read."""
-        return not self.apart and len(self.windows) == len(self.seen)
-
-    def forget(self) -> None:
-        """Forget all who said hello."""
-        self.seen.clear()
-        self.hellos.clear()
-        self.windows.clear()
-        self._without_batches.clear()
-
-    def note(self, event: bytes, count: int) -> bytes | None:
-        """Somebody came or went, after `count` messages; the first part under which to greet a subscriber."""
-        is_wanted, what = event[:1] == b"\1", event[1:]
-        hello = parse_hello(what)
-        if hello is None:
-            read = parse_read(what)
-            if read is not None:
-                if is_wanted and read.publisher == self._id and read.subscriber in self.windows:
-                    self.windows[read.subscriber].read(read.seq, read.bound_bytes)
-                return None
-            self._note_filter(what, is_wanted=is_wanted)
-            return None
-        if hello.topic != self._name:
-            return None  # a subscriber of whoever had this port before
-        if is_wanted:
-            return self._note_hello(hello, what, count)
-        self._leave(hello.subscriber)
-        return None
-
-    def _note_hello(self, hello: Hello, what: bytes, count: int) -> bytes | None:
-        if len(self.seen) >= MAX_SUBSCRIBERS and hello.subscriber not in self.seen:
-            self._refuse(f"the hello of one more than {MAX_SUBSCRIBERS} subscribers")
-            return None
-        if hello.one_part:  # its own filter came before
-            left = self.apart.pop(self._topic, 0) - 1
-            if left > 0:
-                self.apart[self._topic] = left
-        self.seen[hello.subscriber] = count
-        self.hellos[hello.subscriber] = what
-        self.windows.pop(hello.subscriber, None)
-        self._without_batches.discard(hello.subscriber)
-        if not hello.batches:
-            self._without_batches.add(hello.subscriber)
-        if hello.tells:
-            self.windows[hello.subscriber] = SendWindow()  # a connection of its own: nothing is under way
-        return what
-
-    def _leave(self, subscriber: int) -> None:
-        self.seen.pop(subscriber, None)
-        self.hellos.pop(subscriber, None)
-        self.windows.pop(subscriber, None)
-        self._without_batches.discard(subscriber)
-
-    def _note_filter(self, what: bytes, *, is_wanted: bool) -> None:
-        """Each filter that comes is told, and the last of its kind that goes."""
-        if not self._topic.startswith(what):
-            self._refuse(f"{len(what)} bytes that are no subscription of it")
-            return
-        if is_wanted:
-            self.apart[what] = self.apart.get(what, 0) + 1
-        else:
-            self.apart.pop(what, None)
-
-    def _refuse(self, reason: str) -> None:
-        if self.refusals.add(reason):
-            _logger.info("'%s' was sent %s", self._name, self.refusals.told())
 
 
 class GreetedPublisher:
@@ -223,6 +120,8 @@ class NativePublisher(GreetedPublisher):
         self._last_stamp_ns: int | None = None
         self._problem = ""
         self._subscriptions = Subscriptions(spec.topic, spec.id)
+        if can_share() and not spec.is_latched:
+            self._subscriptions.shared = SharedPayloads(spec.id, self._offer)
         self._apart = self._subscriptions.apart
         self._latched: tuple[Part, ...] | None = None
         self._looked_ns = 0
@@ -345,6 +244,9 @@ class NativePublisher(GreetedPublisher):
         """Send it, and what waits before it."""
         data: Part = given
         extension = None
+        if (given.nbytes if type(given) is memoryview else len(given)) >= SHARED_BYTES:
+            self._send_large(given, extension_part(beside) if beside else None)
+            return
         if beside or type(given) is not bytes:
             data = sendable(given) if len(given) >= _ONE_PART_BYTES else bytes(given)
             extension = extension_part(beside) if beside else None
@@ -357,7 +259,7 @@ class NativePublisher(GreetedPublisher):
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
             if total >= self._settle_at or extension or self._flags:
-                self._send_all(data, extension)
+                self._send_all(data, extension, size)
             elif size < _ONE_PART_BYTES and not self._apart and type(data) is bytes:
                 head = pack_quickly(self._form, size, seq, stamp_ns, self._id)
                 self._send(b"".join((self._topic, head, data)))
@@ -365,6 +267,39 @@ class NativePublisher(GreetedPublisher):
             else:
                 self._send_apart(data, size, seq, stamp_ns)
             self._look(stamp_ns)
+
+    def _send_large(self, given: bytes | memoryview, extension: bytes | None) -> None:
+        """Through shared memory to those who read that; the payload is copied at most once."""
+        shared = self._subscriptions.shared
+        # Before the lock: it takes a moment for the first time.
+        opened = begin_sharing() if shared is not None and self._seen else None
+        if opened is None:
+            shared = None
+        data = sendable(given) if shared is None or not shared.readers else None
+        size = given.nbytes if isinstance(given, memoryview) else len(given)
+        with self._lock:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'")
+            self._flush()
+            number = shared.place(given, self._seen, time.monotonic()) if shared and not self._apart else None
+            if data is None and not (number is not None and shared and shared.readers >= self._seen.keys()):
+                data = sendable(given)
+            self._count += 1
+            self._bytes += size
+            self._last_stamp_ns = stamp_ns = _time_ns()
+            self._send_all(b"" if data is None else data, extension, size, number)
+            self._look(stamp_ns)
+
+    def lend(self, size_bytes: int) -> memoryview | None:
+        """See `PublisherTransport.lend`."""
+        shared = self._subscriptions.shared
+        with self._lock:
+            return None if shared is None or self._is_closed else shared.lend(size_bytes)
+
+    def _offer(self, subscriber: int, generation: int) -> None:
+        """Let a subscriber open the shared memory of this generation. With the lock held."""
+        notice = pack_quickly(form_of(self._codec, OFFER), generation, self._count, time.time_ns(), self._id)
+        self._send_parts(self._subscriptions.hellos[subscriber], (notice,))
 
     def _look(self, stamp_ns: int) -> None:
         """Read subscriptions, now and then; the node's thread looks after that."""
@@ -405,26 +340,51 @@ class NativePublisher(GreetedPublisher):
                 self._last_stamp_ns = stamp_ns
                 self._count += 1
                 self._bytes += len(data)
-                self._send_all(data, None)
+                self._send_all(data, None, len(data))
         self._look(stamp_ns)
 
-    def _send_all(self, data: Part, extension: bytes | None) -> None:
-        """Send what has flags, or when it is time to see what was read, with the lock held."""
+    def _send_all(self, data: Part, extension: bytes | None, size: int, number: bytes | None = None) -> None:
+        """Send what has flags, or when it is time to see what was read, with the lock held.
+
+        `number` is what those get instead of `data` who read it in shared memory.
+        """
         self._flush()
-        form = self._form if extension is None else self._form | EXTENSION_FLAG << 16
-        stamp_ns = self._last_stamp_ns or 0
-        size = len(data)
-        header = pack_quickly(form, size if size <= SIZE_MAX else 0, self._count, stamp_ns, self._id)
-        tail = (header, data) if extension is None else (header, data, extension)
+        tail = self._tail(data, extension, size, 0)
+        shared = None if number is None else self._tail(number, extension, len(number), SHARED)
         if self.spec.is_latched:
             self._latched = tail
         if self._bytes < self._settle_at:
-            self._send_parts(self._topic, tail)
+            self._send_to_all(tail, shared)
         else:
             self._read_subscriptions()
-            self._send_to_those_with_room(tail, size)
+            self._send_to_those_with_room(tail, shared, size)
 
-    def _send_to_those_with_room(self, tail: tuple[Part, ...], size: int) -> None:
+    def _tail(self, data: Part, extension: bytes | None, size: int, flags: int) -> tuple[Part, ...]:
+        """What follows a message's first part."""
+        form = self._form | flags << 16 | (0 if extension is None else EXTENSION_FLAG << 16)
+        told = size if size <= SIZE_MAX else 0
+        header = pack_quickly(form, told, self._count, self._last_stamp_ns or 0, self._id)
+        return (header, data) if extension is None else (header, data, extension)
+
+    def _send_to_all(self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None) -> None:
+        """With the lock held: `shared` to those who share memory, `tail` to everybody else."""
+        if shared is None:
+            self._send_parts(self._topic, tail)
+            return
+        readers = self._shared_readers()
+        if readers >= self._seen.keys():
+            self._send_parts(self._topic, shared)
+            return
+        for each, own in self._subscriptions.hellos.items():
+            self._send_parts(own, shared if each in readers else tail)
+
+    def _shared_readers(self) -> set[int]:
+        shared = self._subscriptions.shared
+        return set() if shared is None else shared.readers
+
+    def _send_to_those_with_room(
+        self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None, size: int
+    ) -> None:
         """To all at once; while somebody has no room, to everybody else alone. With the lock held."""
         windows = self._subscriptions.windows
         since = self._bytes - size - self._settled_bytes  # sent to all
@@ -436,7 +396,7 @@ class NativePublisher(GreetedPublisher):
         has_room = {each: window.has_room(size) for each, window in windows.items()}
         if all(has_room.values()) and (is_told or self._backlog.has_room(size)):
             if is_told:
-                self._send_parts(self._topic, tail)
+                self._send_to_all(tail, shared)
             else:
                 self._send_tracked(tail, size + since)
             self._settle_at = self._bytes + (STEP_BYTES if is_told else BACKLOG_STEP_BYTES)
@@ -446,7 +406,9 @@ class NativePublisher(GreetedPublisher):
             taking = {each: window for each, window in windows.items() if has_room[each]}
             for each, window in windows.items():
                 if each in taking:
-                    self._send_parts(self._subscriptions.hellos[each], tail)
+                    is_shared = shared is not None and each in self._shared_readers()
+                    chosen = shared if is_shared and shared is not None else tail
+                    self._send_parts(self._subscriptions.hellos[each], chosen)
                 else:
                     window.missed()
         for window in taking.values():
@@ -558,6 +520,8 @@ class NativePublisher(GreetedPublisher):
         """Close the socket; the node's thread has let go of it."""
         with self._changed:
             self._is_closed = True
+            if self._subscriptions.shared is not None:
+                self._subscriptions.shared.close()
             self._socket.close(0)
 
     def _bye(self) -> None:

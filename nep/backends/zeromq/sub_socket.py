@@ -17,6 +17,7 @@ import zmq
 from nep.backends.base import SubscriberSpec
 from nep.backends.zeromq.byte_window import WINDOW_BYTES
 from nep.backends.zeromq.loss import HeardPublisher, HeardPublishers
+from nep.backends.zeromq.shared_payloads import SharedSources
 from nep.backends.zeromq.sockets import Refusals, Socket, keep_alive, receive_mark, wait_shortly
 from nep.errors import WireError
 from nep.i18n import _, lazy
@@ -29,13 +30,17 @@ from nep.protocol.wire import (
     EXTENSION,
     HEADER_BYTES,
     LATCHED,
+    OFFER,
+    SHARED,
     Header,
     Read,
+    Shares,
     apart,
     form_of,
     hello_part,
     read_header,
     read_part,
+    shares_part,
     split_rest,
     topic_part,
     unpack_at,
@@ -65,7 +70,8 @@ class CarefulParser:
 
     For the subscriber that says `hello`. Notes what it learns in `sources`.
 
-    `leave(publisher)` ends a connection, `tell(publisher, seq)` answers an echo.
+    `leave(publisher)` ends a connection, `tell(publisher, seq)` answers an echo. `shared` is where
+    payloads are read that lie in shared memory.
     """
 
     def __init__(
@@ -75,6 +81,7 @@ class CarefulParser:
         sources: HeardPublishers,
         leave: Callable[[int], None],
         tell: Callable[[int, int], None],
+        shared: SharedSources | None = None,
     ) -> None:
         self._name = spec.topic
         self._msg_type = spec.msg_type
@@ -83,6 +90,7 @@ class CarefulParser:
         self._sources = sources
         self._leave = leave
         self._tell = tell
+        self._shared = shared
 
     def parse(self, first: bytes, rest: Sequence[_Part]) -> Message | None:
         """The message in these parts; None for a notice and for what was heard before. Raises `WireError`."""
@@ -123,6 +131,9 @@ class CarefulParser:
         is_possible = self._sources.reached(header.publisher, header.seq)
         if header.flags & BYE:
             self._leave(header.publisher)
+        elif header.flags & OFFER:
+            if self._shared is not None:
+                self._shared.open(header.publisher, header.size)
         elif source.has_echoed:
             self._tell(header.publisher, header.seq)
         else:
@@ -144,10 +155,20 @@ class CarefulParser:
             )
         if not self._sources.arrived(header.publisher, header.seq, is_alone=is_alone):
             return None
+        shared: memoryview | None = None
+        if header.flags & SHARED:
+            if self._shared is None:
+                raise WireError(_("its payload lies in shared memory, which nobody offered"))
+            shared = self._shared.take(header.publisher, payload)
+            if shared is None:
+                self._sources.dropped(1)
+                return None
         source = self._sources.get(header.publisher)
         msg_type = self._msg_type if source.remote is None else source.remote.publisher.msg_type
         source.kind = kind_of(self._name, codec.name, msg_type, is_latched=bool(header.flags & LATCHED))
-        source.form = 0 if header.flags & EXTENSION else form_of(header.codec, header.flags)
+        source.form = 0 if header.flags & (EXTENSION | SHARED) else form_of(header.codec, header.flags)
+        if shared is not None:
+            return arrived(source.kind, shared, header.stamp_ns, header.seq, header.publisher, extension)
         # A small view must not keep a large receive buffer alive.
         is_large = len(payload) >= _NO_COPY_BYTES
         data = memoryview(payload).toreadonly() if is_large else bytes(payload)
@@ -167,7 +188,8 @@ class SubSocket:
         self._topic = topic_part(spec.topic)
         self._hello = hello_part(spec.id, spec.topic, batches=True)
         self._id = spec.id
-        self._parser = CarefulParser(spec, self._hello, self.sources, self.leave, self._tell)
+        self._shared = SharedSources(spec.id, self._answer)
+        self._parser = CarefulParser(spec, self._hello, self.sources, self.leave, self._tell, self._shared)
         self._cut = len(self._topic)
         self._body = self._cut + HEADER_BYTES
         """Where header and payload of a message in one part begin."""
@@ -244,13 +266,20 @@ class SubSocket:
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and forget it."""
         source = self.sources.pop(publisher)
+        self._shared.leave(publisher)
         if source is not None and source.endpoint:
             self._disconnect(source.endpoint)
 
     def _tell(self, publisher: int, seq: int) -> None:
         """Tell a publisher that everything up to `seq` was read, and what share of the room is for it."""
         bound = WINDOW_BYTES // max(1, self.sources.echoing)
-        said = read_part(Read(self._id, publisher, seq, bound))
+        self._say(read_part(Read(self._id, publisher, seq, bound)))
+
+    def _answer(self, shares: Shares) -> None:
+        self._say(shares_part(shares))
+
+    def _say(self, said: bytes) -> None:
+        """To all publishers: a filter that is taken back at once."""
         self._socket.setsockopt(zmq.SUBSCRIBE, said)
         self._socket.setsockopt(zmq.UNSUBSCRIBE, said)
 
@@ -445,4 +474,5 @@ class SubSocket:
 
     def close(self) -> None:
         """Close the socket."""
+        self._shared.close()
         self._socket.close(0)

@@ -18,7 +18,7 @@ import nep
 from nep.backends.base import Backend
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.loss import UNLISTED_MAX, HeardPublishers
-from nep.backends.zeromq.publisher import MAX_SUBSCRIBERS, Subscriptions
+from nep.backends.zeromq.subscriptions import MAX_SUBSCRIBERS, Subscriptions
 from nep.errors import PluginsMissingError, did_you_mean
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
