@@ -2,6 +2,10 @@
 
     NepError
     ├── WaitTimeoutError        nothing came within a time limit
+    │   ├── ServiceTimeoutError     a server did not answer a call in time
+    │   └── NoServerError           a service had no server
+    ├── ServiceError            a server's callback raised
+    ├── ServerGoneError         a server ended while it was called
     ├── ClosedError             the object was closed before
     ├── BadTopicError           a topic name that the grammar refuses
     ├── BadNameError            a node's name that the grammar refuses
@@ -9,7 +13,7 @@
     ├── BackendUnavailableError the back end's package is not installed
     ├── PluginsMissingError     a plug-in package is empty (a frozen build that forgot it)
     ├── MasterUnreachable       no master answers
-    ├── RequestRefusedError     the master answered with an error
+    ├── RequestRefusedError     the master, or a server, answered that it will not do it
     ├── AddressInUseError       another program holds the address
     ├── TooManyFilesError       this process may not open more files
     ├── EncodeError             a payload cannot become bytes
@@ -40,9 +44,13 @@ __all__ = [
     "EncodeError",
     "MasterUnreachable",
     "NepError",
+    "NoServerError",
     "PluginsMissingError",
     "RecordingError",
     "RequestRefusedError",
+    "ServerGoneError",
+    "ServiceError",
+    "ServiceTimeoutError",
     "TooManyFilesError",
     "UnknownBackendError",
     "WaitTimeoutError",
@@ -80,6 +88,63 @@ class WaitTimeoutError(NepError):
         self.what = what
         self.timeout_s = timeout_s
         super().__init__(_("{what} did not come within {seconds:g} s").format(what=what, seconds=timeout_s))
+
+
+class ServiceTimeoutError(WaitTimeoutError):
+    """The server of `service` did not answer within `timeout_s` seconds; it may still carry the call out."""
+
+    def __init__(self, service: str, timeout_s: float) -> None:
+        self.service = service
+        super().__init__(_("an answer of '{service}'").format(service=service), timeout_s)
+
+
+class NoServerError(WaitTimeoutError):
+    """No server for `service` within `timeout_s` seconds; `known` are the services that have one."""
+
+    def __init__(self, service: str, timeout_s: float, known: Sequence[str] = ()) -> None:
+        self.service = service
+        self.known = tuple(known)
+        super().__init__(service, timeout_s)
+        near = nearest(service, self.known)
+        step = (
+            _("did you mean '{near}'?").format(near=near)
+            if near is not None
+            else _("'nep service list' shows all services")
+        )
+        self.args = (
+            _("no server for '{service}' within {seconds:g} s; {step}").format(
+                service=service, seconds=timeout_s, step=step
+            ),
+        )
+
+
+class ServiceError(NepError):
+    """The server of `service` raised an error of class `kind`; `reason` is its sentence."""
+
+    def __init__(self, service: str, kind: str, reason: str) -> None:
+        self.service = service
+        self.kind = kind
+        self.reason = reason
+        super().__init__(
+            _("the server of '{service}' failed: {kind}: {reason}").format(
+                service=service, kind=kind, reason=reason
+            )
+            if reason
+            else _("the server of '{service}' failed: {kind}").format(service=service, kind=kind)
+        )
+
+
+class ServerGoneError(NepError):
+    """The server of `service` ended while a call was under way: nobody knows whether it was carried out."""
+
+    def __init__(self, service: str) -> None:
+        self.service = service
+        super().__init__(
+            _(
+                "the server of '{service}' ended while it was called; look whether the call was carried out, "
+                "and call again"
+            ).format(service=service)
+        )
 
 
 class ClosedError(NepError):
@@ -185,7 +250,7 @@ class MasterUnreachable(NepError):  # noqa: N818 - the name that the specificati
 
 
 class RequestRefusedError(NepError):
-    """The master refused a request; `reason` is its sentence."""
+    """The master, or a server, refused a request; `reason` is its sentence."""
 
     def __init__(self, reason: str) -> None:
         self.reason = escaped(shortened(reason, _LONGEST))

@@ -12,7 +12,11 @@ from nep.errors import DecodeError as DecodeError
 from nep.errors import EncodeError as EncodeError
 from nep.errors import MasterUnreachable as MasterUnreachable
 from nep.errors import NepError as NepError
+from nep.errors import NoServerError as NoServerError
 from nep.errors import RequestRefusedError as RequestRefusedError
+from nep.errors import ServerGoneError as ServerGoneError
+from nep.errors import ServiceError as ServiceError
+from nep.errors import ServiceTimeoutError as ServiceTimeoutError
 from nep.errors import TooManyFilesError as TooManyFilesError
 from nep.errors import UnknownBackendError as UnknownBackendError
 from nep.errors import WaitTimeoutError as WaitTimeoutError
@@ -28,11 +32,16 @@ from nep.nodes.publisher import Publisher as Publisher
 from nep.nodes.subscriber import Subscriber as Subscriber
 from nep.nodes.timer import Timer as Timer
 from nep.protocol.graph_view import Alert as Alert
+from nep.protocol.graph_view import ClientInfo as ClientInfo
 from nep.protocol.graph_view import GraphView as GraphView
 from nep.protocol.graph_view import NodeInfo as NodeInfo
 from nep.protocol.graph_view import PublisherInfo as PublisherInfo
+from nep.protocol.graph_view import ServerInfo as ServerInfo
+from nep.protocol.graph_view import ServiceInfo as ServiceInfo
 from nep.protocol.graph_view import SubscriberInfo as SubscriberInfo
 from nep.protocol.graph_view import TopicInfo as TopicInfo
+from nep.services.client import Client as Client
+from nep.services.server import Server as Server
 
 node = Node
 """A node; see `Node`. The paper's spelling."""

@@ -171,7 +171,11 @@ class Transport(Protocol):
         """A new subscriber: what is published after this arrives. Raises as `publisher` does."""
 
     def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait until one of `subscribers` may have a message or `wake` is called, `timeout_s` at most."""
+        """Wait until one of `subscribers` may have a message or `wake` is called, `timeout_s` at most.
+
+        One that has services (`nep.backends.services`) takes a third argument: the queues of calls to wait
+        for, too.
+        """
 
     def wake(self) -> None:
         """End all waits that are under way."""

@@ -81,6 +81,7 @@ class RegisteredPublisher:
     last_seq: int = 0
     last_stamp_ns: int | None = None
     problem: str = ""
+    errors: int = 0
     changed_at: float = 0.0
 
 
@@ -302,12 +303,14 @@ class Registry:
                 publisher = publishers[counts["id"]]
                 count, size_bytes, last_seq = counts["count"], counts["bytes"], counts["last_seq"]
                 stamp_ns, problem = counts.get("last_stamp_ns"), counts.get("problem", "")
-                if not type(count) is type(size_bytes) is type(last_seq) is int:
+                errors = counts.get("errors", 0)
+                if not type(count) is type(size_bytes) is type(last_seq) is type(errors) is int:
                     return False
                 if (stamp_ns is not None and type(stamp_ns) is not int) or type(problem) is not str:
                     return False
                 self.counted(publisher, count, size_bytes, now)
                 self.reached(publisher, last_seq, stamp_ns)
+                publisher.errors = as_count(errors)
                 if problem != publisher.problem:
                     self.troubled(publisher, problem)
             for seen in subscriber_counts:

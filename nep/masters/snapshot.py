@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from nep.i18n import _, listed
 from nep.masters.registry import RegisteredNode, RegisteredPublisher, RegisteredSubscriber, Registry
 from nep.protocol.encoding import make_frozen
-from nep.protocol.graph_view import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.protocol.graph_view import (
+    Alert,
+    ClientInfo,
+    GraphView,
+    NodeInfo,
+    PublisherInfo,
+    ServerInfo,
+    ServiceInfo,
+    SubscriberInfo,
+    TopicInfo,
+)
 from nep.protocol.requests import as_count
+from nep.protocol.service_wire import service_of
 
 __all__ = ["GraphViewer"]
 
@@ -28,7 +39,10 @@ class GraphViewer:
     def view(self, epoch: int) -> GraphView:
         """Everything that the registry knows now."""
         registry, touched = self._registry, self._registry.touched
-        names = registry.topics
+        names: list[str] = []
+        served: list[str] = []
+        for name in registry.topics:
+            (names if service_of(name) is None else served).append(name)
         for name in touched:
             self._topics.pop(name, None)
             self._alerts.pop(name, None)
@@ -48,7 +62,9 @@ class GraphViewer:
                     self._alerts[name] = tuple(_topic_alerts(name, publishing, subscribing))
         nodes = {each.node.id: _node_info(each) for each in registry.members.values()}
         topics = {name: known[name] for name in names}
-        return GraphView(epoch, registry.revision, nodes, topics, tuple(self._all_alerts()))
+        services = {each.name: each for each in (_service(name, registry) for name in served)}
+        alerts = (*self._all_alerts(), *_service_alerts(services, registry))
+        return GraphView(epoch, registry.revision, nodes, topics, alerts, services=services)
 
     def _all_alerts(self) -> Iterator[Alert]:
         yield from self._registry.reported_alerts
@@ -151,6 +167,43 @@ def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -
         "lost": subscriber.lost,
     }
     return make_frozen(SubscriberInfo, every_field)
+
+
+def _service(topic: str, registry: Registry) -> ServiceInfo:
+    """A service, of those that are listed under its topic."""
+    publishing, subscribing = registry.publishing(topic), registry.subscribers_of(topic)
+    servers = tuple(
+        ServerInfo(each.record.id, member.node.id, each.record.endpoints, each.count, each.errors, each.bytes)
+        for member, each in publishing
+    )
+    clients = tuple(
+        ClientInfo(each.record.id, member.node.id, each.received, each.lost) for member, each in subscribing
+    )
+    kinds = [each.record.msg_type for _member, each in publishing]
+    kinds = kinds or [each.record.msg_type for _member, each in subscribing]
+    return ServiceInfo(
+        service_of(topic) or topic,
+        kinds[0],
+        servers,
+        clients,
+        as_count(sum(each.calls for each in servers)),
+        as_count(sum(each.errors for each in servers)),
+    )
+
+
+def _service_alerts(services: Mapping[str, ServiceInfo], registry: Registry) -> Iterator[Alert]:
+    for name in sorted(services):
+        servers = services[name].servers
+        if len(servers) > 1:
+            yield Alert(
+                f"service:{name}",
+                _("The service “{service}” has {count} servers: {nodes}").format(
+                    service=name,
+                    count=len(servers),
+                    nodes=_names(registry.members[each.node_id].node.name for each in servers),
+                ),
+                _("Clients call the first one, and another when that ends. Give one of them another name."),
+            )
 
 
 def _name_alerts(registry: Registry) -> Iterator[Alert]:

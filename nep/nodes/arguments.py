@@ -1,114 +1,12 @@
-"""Arguments as callers give them: what is not allowed is refused at the call, in a sentence."""
+"""Arguments as callers give them. Services check theirs, too: see `nep.arguments`."""
 
-from __future__ import annotations
-
-import math
-from collections.abc import Callable, Sequence
-from typing import TypeVar, cast
-
-from nep.errors import WrongTypeError
-from nep.i18n import _, listed
-from nep.text import control_in, escaped, shortened
+from nep.arguments import at_least as at_least
+from nep.arguments import flag as flag
+from nep.arguments import function as function
+from nep.arguments import limit as limit
+from nep.arguments import one_of as one_of
+from nep.arguments import period as period
+from nep.arguments import seconds as seconds
+from nep.arguments import text as text
 
 __all__ = ["at_least", "flag", "function", "limit", "one_of", "period", "seconds", "text"]
-
-T = TypeVar("T")
-F = TypeVar("F", bound=Callable[..., object])
-_LETTERS = 200
-"""Of a type; the master takes no more."""
-
-
-def text(name: str, value: object) -> str:
-    """`value` itself when it is a text that can be a type's name. Raises `ValueError`."""
-    if not isinstance(value, str):
-        raise WrongTypeError(_("{name} is a '{kind}'; give a 'str'").format(name=name, kind=_kind(value)))
-    if not value:
-        raise ValueError(_("{name} is empty; give a name such as 'json'").format(name=name))
-    if len(value) > _LETTERS or control_in(value):
-        said = escaped(shortened(value, 40))
-        raise ValueError(
-            _("{name} is '{said}'; use {most} letters at most, and none that controls").format(
-                name=name, said=said, most=_LETTERS
-            )
-        )
-    return value
-
-
-def flag(name: str, value: object) -> bool:
-    """`value` itself when it is True or False. Raises `ValueError`."""
-    if not isinstance(value, bool):
-        raise WrongTypeError(_("{name} is {value}; give True or False").format(name=name, value=repr(value)))
-    return value
-
-
-def one_of(name: str, value: T, allowed: Sequence[T]) -> T:
-    """`value` itself when it is one of the allowed. Raises `ValueError`."""
-    if value not in allowed:
-        raise ValueError(
-            _("{name} is {value}; use {choices}").format(
-                name=name, value=repr(value), choices=listed([repr(each) for each in allowed], "or")
-            )
-        )
-    return value
-
-
-def at_least(name: str, value: object, least: int) -> int:
-    """`value` itself when it is a whole number and not below `least`. Raises `ValueError`."""
-    if not isinstance(value, int) or isinstance(value, bool):
-        raise WrongTypeError(
-            _("{name} is {value}; give a whole number from {least} on").format(
-                name=name, value=repr(value), least=least
-            )
-        )
-    if value < least:
-        raise ValueError(
-            _("{name} is {value}; give a whole number from {least} on").format(
-                name=name, value=value, least=least
-            )
-        )
-    return value
-
-
-def seconds(name: str, value: object) -> float | None:
-    """`value` itself when it is a time: 0 or more seconds, or None. Raises `ValueError`."""
-    if value is None:
-        return None
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        raise WrongTypeError(
-            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=repr(value))
-        )
-    if not value >= 0.0:  # also what is not a number
-        raise ValueError(
-            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=value)
-        )
-    return None if math.isinf(value) else value
-
-
-def period(name: str, value: object) -> float:
-    """`value` itself when it is seconds above 0, and finite. Raises `ValueError`."""
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        raise WrongTypeError(
-            _("{name} is {value}; give seconds, more than 0").format(name=name, value=repr(value))
-        )
-    if not 0.0 < value < math.inf:  # also what is not a number
-        raise ValueError(_("{name} is {value}; give seconds, more than 0").format(name=name, value=value))
-    return value
-
-
-def limit(name: str, value: object) -> float:
-    """`value` itself when it is a time that ends: 0 or more seconds. Raises `ValueError`."""
-    if value is None:
-        raise WrongTypeError(_("{name} is None; give seconds, 0 or more").format(name=name))
-    seconds(name, value)
-    return cast("float", value)
-
-
-def function(name: str, value: F) -> F:
-    """`value` itself when it can be called. Raises `ValueError`."""
-    if not callable(value):
-        raise WrongTypeError(_("{name} is a '{kind}'; give a function").format(name=name, kind=_kind(value)))
-    return value
-
-
-def _kind(value: object) -> str:
-    return type(value).__name__

@@ -25,7 +25,8 @@ from nep.backends.base import (
     backend_named,
 )
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port
-from nep.errors import ClosedError, DecodeError, WrongTypeError
+from nep.backends.services import ClientSpec, ServerSpec
+from nep.errors import BadTopicError, ClosedError, DecodeError, WrongTypeError
 from nep.i18n import _
 from nep.messages.queue import MAX_MESSAGES, Keep
 from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
@@ -35,7 +36,11 @@ from nep.nodes.subscriber import SLICE_S, Subscriber
 from nep.nodes.timer import Timer, next_due
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
+from nep.protocol.service_wire import PREFIX, check_service
 from nep.protocol.wire import check_node_name, check_topic
+from nep.services.client import Client
+from nep.services.owned import OwnedServices, codec_checked
+from nep.services.server import Callback, Server
 from nep.system import forks
 from nep.system.addresses import checked_host
 
@@ -107,6 +112,7 @@ class Node:
             key=key,
         )
         self._transport: Transport = self._backend.open(record)
+        self._services = OwnedServices(self._transport, self._backend.name)
         _alive.add(self)
         _close_with_worker()
         forks.watch(self)
@@ -174,7 +180,7 @@ class Node:
         number = next(self._numbers)
         spec = PublisherSpec(
             id_from(self._key, number),
-            check_topic(topic),
+            _own_topic(topic),
             text("msg_type", msg_type),
             self._backend.codec_for(msg_type),
             flag("latched", latched),
@@ -212,7 +218,7 @@ class Node:
         number = next(self._numbers)
         spec = SubscriberSpec(
             id_from(self._key, number),
-            check_topic(topic),
+            _own_topic(topic),
             text("msg_type", msg_type),
             self._configured(configuration),
             self._wait_s,
@@ -250,7 +256,7 @@ class Node:
         number = next(self._numbers)
         spec = SubscriberSpec(
             id_from(self._key, number),
-            check_topic(topic),
+            _own_topic(topic),
             text("msg_type", msg_type),
             self._configured(configuration),
             self._wait_s,
@@ -265,6 +271,58 @@ class Node:
             if not incoming.is_closed:
                 self._callbacks = (*self._callbacks, (subscriber, incoming, callback, with_message))
         return subscriber
+
+    # ---- services
+
+    def new_server(
+        self,
+        service: str,
+        callback: Callback | None = None,
+        configuration: Configuration | None = None,
+        *,
+        threads: int = 0,
+    ) -> Server:
+        """A server of a service: `callback(request)` gives the answer, in the thread that calls `spin`.
+
+        With `threads` it runs in so many threads of the server's own instead, and nobody needs to spin. What
+        it raises is raised at the client, as `ServiceError`. Without a callback, `Server.listen_info` and
+        `send_info` answer. With `node.direct(ip, port)` it serves the original NEP's `client` at that port.
+        Raises as `new_pub` does.
+        """
+        self._open_transport()
+        check_service(service)
+        if callback is not None:
+            function("callback", callback)
+        at_least("threads", threads, 0)
+        if threads and callback is None:
+            raise ValueError(_("threads need a callback to run; give one"))
+        number = next(self._numbers)
+        id_ = id_from(self._key, number)
+        spec = ServerSpec(id_, service, self._configured(configuration), self._wait_s, number)
+        return self._services.server(spec, callback, threads)
+
+    def new_client(
+        self,
+        service: str,
+        configuration: Configuration | None = None,
+        *,
+        msg_type: str = "json",
+        timeout_s: float | None = 5.0,
+    ) -> Client:
+        """A client of a service; a server need not be there yet.
+
+        `timeout_s` is how long its calls wait for a server and their answer, unless they say otherwise.
+        `msg_type="msgpack"` carries bytes, too. With `node.direct(ip, port)` it calls the original NEP's
+        `server` at that port. Raises as `new_pub` does.
+        """
+        self._open_transport()
+        check_service(service)
+        codec = codec_checked(self._backend.codec_for(text("msg_type", msg_type)))
+        seconds("timeout_s", timeout_s)
+        number = next(self._numbers)
+        id_ = id_from(self._key, number)
+        spec = ClientSpec(id_, service, codec, self._configured(configuration), self._wait_s, number)
+        return self._services.client(spec, timeout_s)
 
     def _configured(self, configuration: object) -> Configuration:
         if configuration is None:
@@ -341,16 +399,26 @@ class Node:
                     return
                 timers = self._timers
                 has_fired = self._run_timers() if timers else False
+                has_fired = self._services.run(self._stop_spin) or has_fired
                 if self._run_callbacks() or has_fired:
                     continue
                 if timers:
                     left = min(left, next_due(timers) - self._clock())
                 if left > 0.0:
-                    self._transport.wait([each[1] for each in self._callbacks if not each[1].is_closed], left)
+                    self._wait(left)
             if self._is_forked:
                 raise self._closed_error()
         finally:
             self._stop_spin.clear()
+
+    def _wait(self, timeout_s: float) -> None:
+        """For a message, a call, or `wake`."""
+        waited = [each[1] for each in self._callbacks if not each[1].is_closed]
+        calls = self._services.queues
+        if calls:  # so the transport has services
+            self._transport.wait(waited, timeout_s, calls)  # type: ignore[call-arg]
+        else:
+            self._transport.wait(waited, timeout_s)
 
     def stop_spin(self) -> None:
         """End `spin`, from any thread or from a callback."""
@@ -444,7 +512,10 @@ class Node:
 
     def _finish_close(self, timeout_s: float) -> None:
         """Deliver what was published, within `timeout_s`, and give everything back."""
-        self._transport.close(timeout_s)
+        deadline = time.monotonic() + timeout_s
+        self._services.finish_calls(timeout_s / 2)
+        self._transport.close(max(0.0, deadline - time.monotonic()))
+        self._services.end(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
         """In a child that was forked. See `nep.system.forks`."""
@@ -459,6 +530,7 @@ class Node:
             timer.node_closes()
         self._callbacks = ()
         self._timers = ()
+        self._services.forked()
         _alive.discard(self)
         _inherited.append(self)
 
@@ -478,6 +550,13 @@ class Node:
 
     def __repr__(self) -> str:
         return f"Node({self.name!r}, {self._backend.name!r}, master={self._master!r})"
+
+
+def _own_topic(topic: str) -> str:
+    """`topic` itself when messages may travel on it. Raises `BadTopicError`."""
+    if check_topic(topic).startswith(PREFIX):
+        raise BadTopicError(topic, _("names that begin with '{prefix}' are services'").format(prefix=PREFIX))
+    return topic
 
 
 def _close(nodes: Sequence[Node], timeout_s: float) -> None:

@@ -154,12 +154,14 @@ class AnswerEncoder:
     def _seen(self, answer: Seen, call: int) -> bytes:
         view = answer.view
         header = msgpack.Packer().pack_map_header
-        rest = {
+        rest: dict[str, object] = {
             "epoch": view.epoch,
             "revision": view.revision,
             "alerts": write(view.alerts),
             "listens": view.listens,
         }
+        if view.services:  # which an older node does not look for
+            rest["services"] = write(view.services)
         nodes = [self._part(f"n{key}", key, node) for key, node in view.nodes.items()]
         topics = [self._part(f"t{key}", key, topic) for key, topic in view.topics.items()]
         if len(self._parts) > 2 * (len(nodes) + len(topics)) + 100:

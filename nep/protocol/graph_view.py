@@ -1,11 +1,21 @@
-"""What the master knows, as frozen values: nodes, topics, publishers, subscribers, alerts."""
+"""What the master knows, as frozen values: nodes, topics, publishers, subscribers, services, alerts."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 
-__all__ = ["Alert", "GraphView", "NodeInfo", "PublisherInfo", "SubscriberInfo", "TopicInfo"]
+__all__ = [
+    "Alert",
+    "ClientInfo",
+    "GraphView",
+    "NodeInfo",
+    "PublisherInfo",
+    "ServerInfo",
+    "ServiceInfo",
+    "SubscriberInfo",
+    "TopicInfo",
+]
 
 
 @dataclass(frozen=True)
@@ -81,6 +91,40 @@ class TopicInfo:
 
 
 @dataclass(frozen=True)
+class ServerInfo:
+    """A server. `calls` were answered, `errors` of them with an error; `bytes` is the size of the answers."""
+
+    id: int
+    node_id: str
+    endpoints: tuple[str, ...]
+    calls: int
+    errors: int
+    bytes: int
+
+
+@dataclass(frozen=True)
+class ClientInfo:
+    """A client: calls that were answered, and that ended without an answer; None until known."""
+
+    id: int
+    node_id: str
+    answered: int | None
+    failed: int | None
+
+
+@dataclass(frozen=True)
+class ServiceInfo:
+    """A service with all its servers, the one that is called first, and its clients. Counts are sums."""
+
+    name: str
+    msg_type: str
+    servers: tuple[ServerInfo, ...] = ()
+    clients: tuple[ClientInfo, ...] = ()
+    calls: int = 0
+    errors: int = 0
+
+
+@dataclass(frozen=True)
 class GraphView:
     """The whole graph at one moment. `revision` grows when somebody comes or goes, not with statistics.
 
@@ -93,6 +137,7 @@ class GraphView:
     topics: Mapping[str, TopicInfo] = field(default_factory=dict)
     alerts: tuple[Alert, ...] = ()
     listens: tuple[str, ...] = ()
+    services: Mapping[str, ServiceInfo] = field(default_factory=dict)
 
     def to_plain(self) -> dict[str, object]:
         """The view as maps and lists, for the wire and for `--json`."""
@@ -103,4 +148,5 @@ class GraphView:
             "topics": [asdict(topic) for topic in self.topics.values()],
             "alerts": [asdict(alert) for alert in self.alerts],
             "listens": list(self.listens),
+            "services": [asdict(service) for service in self.services.values()],
         }

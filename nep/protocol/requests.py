@@ -95,7 +95,8 @@ def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | Non
 class PublisherCount:
     """A publisher's statistics: all messages and bytes so far, and the newest message.
 
-    `problem` is a sentence about payloads that cannot be sent, or empty.
+    `problem` is a sentence about payloads that cannot be sent, or empty. A server counts its calls and the
+    bytes of its answers, and those calls that ended with `errors`.
     """
 
     id: int
@@ -104,6 +105,7 @@ class PublisherCount:
     last_seq: int
     last_stamp_ns: int | None = None
     problem: str = ""
+    errors: int = 0
 
 
 @dataclass(frozen=True)

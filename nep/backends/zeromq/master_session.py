@@ -17,7 +17,6 @@ from nep.backends.zeromq.bindings import in_reach, may_stay
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.rpc import PendingCall, RpcClient
 from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards
-from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
     AddressInUseError,
     ClosedError,
@@ -50,12 +49,13 @@ from nep.protocol.requests import (
     Reply,
     ReportMissing,
     Seen,
+    SubscriberCount,
     SubscriberRecord,
 )
 from nep.system.addresses import MasterName, is_loopback, look_up
 from nep.system.cpu import CpuLoad
 
-__all__ = ["MasterSession", "Pace", "SessionPublisher"]
+__all__ = ["MasterSession", "Pace", "SessionPublisher", "SessionSubscriber"]
 
 _RENEW_LONGEST_S = 30.0
 """A master cannot make a node wait for longer."""
@@ -82,6 +82,25 @@ class SessionPublisher(Protocol):
 
     def leave_local(self) -> None:
         """Be reached by TCP only from now on."""
+
+
+class SessionSubscriber(Protocol):
+    """A subscriber as its session needs it."""
+
+    def counts(self) -> SubscriberCount:
+        """The statistics for a renewal."""
+
+    def connect(self, remotes: Iterable[RemotePublisher]) -> None:
+        """These publishers are there, too."""
+
+    def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:
+        """A publisher is not listed any more."""
+
+    def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
+        """These are all publishers that are there."""
+
+    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+        """The newest messages of publishers that the master knows."""
 
 
 class Pace:
@@ -124,7 +143,7 @@ class MasterSession:
         self._calls = RpcClient(socket, address, after_use=lambda: io.serve_soon(self))
         self._lock = threading.Lock()
         self._publishers: dict[int, tuple[PublisherRecord, SessionPublisher]] = {}
-        self._subscribers: dict[int, tuple[SubscriberRecord, NativeSubscriber]] = {}
+        self._subscribers: dict[int, tuple[SubscriberRecord, SessionSubscriber]] = {}
         self._confirmed: set[int] = set()
         self._epoch, self._revision = 0, 0
         self._join_again_at = 0.0
@@ -200,7 +219,7 @@ class MasterSession:
         return self.add_publisher(moved, publisher, wait_s)
 
     def add_subscriber(
-        self, record: SubscriberRecord, subscriber: NativeSubscriber, wait_s: float | None
+        self, record: SubscriberRecord, subscriber: SessionSubscriber, wait_s: float | None
     ) -> Found:
         """Register; the publishers to connect to. Raises as `RpcClient.ask` does."""
         with self._lock:
@@ -402,9 +421,9 @@ class MasterSession:
         for record, subscriber in self._all_subscribers():
             subscriber.reconcile(by_topic.get(record.topic, ()))
 
-    def _subscribers_of(self, topic: str) -> list[NativeSubscriber]:
+    def _subscribers_of(self, topic: str) -> list[SessionSubscriber]:
         return [subscriber for record, subscriber in self._all_subscribers() if record.topic == topic]
 
-    def _all_subscribers(self) -> list[tuple[SubscriberRecord, NativeSubscriber]]:
+    def _all_subscribers(self) -> list[tuple[SubscriberRecord, SessionSubscriber]]:
         with self._lock:
             return list(self._subscribers.values())

@@ -20,10 +20,12 @@ from nep.backends.base import (
     SubscriberTransport,
 )
 from nep.backends.connection import Configuration, Direct
+from nep.backends.services import CallQueue, ClientSpec, ClientTransport, ServerSpec, ServerTransport
 from nep.backends.zeromq.io_thread import IoThread, Served, SharedContext, shared_context
 from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
 from nep.backends.zeromq.master_session import MasterSession, SessionPublisher
 from nep.backends.zeromq.publisher import NativePublisher
+from nep.backends.zeromq.services import ZeromqServices
 from nep.backends.zeromq.sockets import Socket
 from nep.backends.zeromq.sub_socket import SubSocket
 from nep.backends.zeromq.subscriber import NativeReadable, NativeSubscriber, Readable, SocketSubscriber
@@ -123,6 +125,7 @@ class ZeromqTransport:
         self._waiting: WeakSet[ThreadWait] = WeakSet()
         self._is_closed = False
         self._is_over = False
+        self._services = ZeromqServices(self._shared, self._session, node.name)
         self._attached: dict[int, str] = {}
         """The endpoints of direct connections, by the id of their publisher or subscriber."""
         watch(self)
@@ -299,17 +302,37 @@ class ZeromqTransport:
             self._subscribers.pop(subscriber, None)
             self._attached.pop(subscriber, None)
 
+    # ---- services
+
+    def server(self, spec: ServerSpec) -> ServerTransport:
+        """A new server. See `ServiceTransport.server`."""
+        return self._services.server(spec)
+
+    def client(self, spec: ClientSpec) -> ClientTransport:
+        """A new client. See `ServiceTransport.client`."""
+        return self._services.client(spec)
+
     # ---- waiting
 
-    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait for a message in one of `subscribers`, or for `wake`."""
+    def wait(
+        self,
+        subscribers: Sequence[SubscriberTransport],
+        timeout_s: float,
+        calls: Sequence[CallQueue] = (),
+    ) -> None:
+        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
         waits = self._of_thread()
         entered: list[_Subscriber] = []
+        entered_calls: list[CallQueue] = []
         fds: list[int] = []
         waits.is_busy = True
         try:
             if self._is_over:
                 return
+            for queue in calls:
+                if not queue.enter_wait(waits.waker.wake):
+                    return
+                entered_calls.append(queue)
             for subscriber in subscribers:
                 if isinstance(subscriber, SocketSubscriber):
                     if not subscriber.enter_wait(waits.waker):
@@ -320,6 +343,8 @@ class ZeromqTransport:
         finally:
             for subscriber in entered:
                 subscriber.leave_wait(waits.waker)
+            for queue in entered_calls:
+                queue.leave_wait(waits.waker.wake)
             waits.is_busy = False
             if self._is_over:  # whoever closed it saw that this thread is busy
                 waits.waker.close()
@@ -379,6 +404,7 @@ class ZeromqTransport:
             publishers = list(self._publishers.values())
         for session in sessions:
             session.begin_leave()
+        self._services.begin_close()
         for publisher in publishers:
             publisher.say_bye()
 
@@ -404,6 +430,7 @@ class ZeromqTransport:
             session.leave(min(_LEAVE_S, timeout_s))
         for subscriber in subscribers:
             subscriber.close()
+        self._services.close(max(0.0, deadline - time.monotonic()))
         for publisher in publishers:
             publisher.finish(deadline)
             self._io.remove(publisher)
@@ -427,6 +454,7 @@ class ZeromqTransport:
     def forked(self) -> None:
         """In a child: its ports and connections are the parent's. See `nep.system.forks`."""
         give_up(*self._attached.values())
+        self._services.forked()
         for session in self._sessions.values():
             give_up(session.endpoint)
         for each in (*self._publishers.values(), *self._subscribers.values()):

@@ -1,0 +1,248 @@
+"""The contract of back ends that have services: what a server and a client need of them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from nep.backends.connection import Configuration
+from nep.errors import NepError
+from nep.messages.codecs import Codec
+from nep.protocol.service_wire import CallKind, Reply
+
+__all__ = [
+    "CALLS_MAX",
+    "CALLS_MAX_BYTES",
+    "CallQueue",
+    "ClientSpec",
+    "ClientTransport",
+    "IncomingCall",
+    "OpenCall",
+    "Outcome",
+    "ServerSpec",
+    "ServerTransport",
+    "ServiceTransport",
+    "Tally",
+]
+
+CALLS_MAX = 1000
+"""So many calls wait in a server, or are under way in a client,"""
+CALLS_MAX_BYTES = 256 * 2**20
+"""and so many bytes of them."""
+
+
+@dataclass(frozen=True)
+class ServerSpec:
+    """What a server shall be. `number` proves the id, as that of a publisher."""
+
+    id: int
+    service: str
+    configuration: Configuration
+    wait_s: float | None
+    number: int = 0
+
+
+@dataclass(frozen=True)
+class ClientSpec:
+    """What a client shall be. `codec` is that of its calls and their answers."""
+
+    id: int
+    service: str
+    codec: Codec
+    configuration: Configuration
+    wait_s: float | None
+    number: int = 0
+
+
+class Tally:
+    """What a server did. Written in one thread at a time, read in any."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self.calls = self.errors = self.refused = self.bytes = 0
+
+    def add(self, reply: Reply) -> None:
+        """One more call was answered so."""
+        with self._lock:
+            if reply.kind == CallKind.REFUSED:
+                self.refused += 1
+                return
+            self.calls += 1
+            self.bytes += len(reply.data)
+            self.errors += reply.kind == CallKind.ERROR
+
+
+@dataclass(frozen=True)
+class IncomingCall:
+    """A call that waits in a server. `answer` sends what it is given; whether it could.
+
+    `deadline` (of `time.monotonic`): afterwards nobody waits for the answer; None: for ever.
+    """
+
+    data: bytes | memoryview
+    codec: int
+    deadline: float | None
+    answer: Callable[[Reply], bool]
+
+    @property
+    def is_late(self) -> bool:
+        """Whether nobody waits for the answer any more."""
+        return self.deadline is not None and time.monotonic() >= self.deadline
+
+
+class CallQueue:
+    """Calls that wait for a server's callback, oldest first, up to a bound. May be used from any thread."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition(threading.Lock())
+        self._calls: deque[IncomingCall] = deque()
+        self._bytes = 0
+        self._wakes: list[Callable[[], None]] = []
+        self._is_closed = False
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether nothing is taken any more."""
+        return self._is_closed
+
+    def put(self, call: IncomingCall) -> bool:
+        """Append a call and wake who waits; False when there is no room, or it is closed."""
+        size = len(call.data)
+        with self._changed:
+            if self._is_closed or len(self._calls) >= CALLS_MAX or self._bytes + size > CALLS_MAX_BYTES:
+                return False
+            self._calls.append(call)
+            self._bytes += size
+            self._changed.notify()
+            wakes = tuple(self._wakes)
+        for wake in wakes:
+            wake()
+        return True
+
+    def take(self, timeout_s: float = 0.0) -> IncomingCall | None:
+        """The oldest call; waits for it at most `timeout_s` seconds, and not when closed."""
+        with self._changed:
+            if timeout_s > 0.0:
+                self._changed.wait_for(lambda: self._calls or self._is_closed, timeout_s)
+            if not self._calls:
+                return None
+            call = self._calls.popleft()
+            self._bytes -= len(call.data)
+            return call
+
+    def enter_wait(self, wake: Callable[[], None]) -> bool:
+        """From now on `wake` is called for every call; False when there is one already."""
+        with self._changed:
+            if self._calls:
+                return False
+            self._wakes.append(wake)
+            return True
+
+    def leave_wait(self, wake: Callable[[], None]) -> None:
+        """It is called no more."""
+        with self._changed:
+            self._wakes.remove(wake)
+
+    def close(self) -> tuple[IncomingCall, ...]:
+        """Take nothing any more and wake all threads; the calls that nobody took."""
+        with self._changed:
+            self._is_closed = True
+            left = tuple(self._calls)
+            self._calls.clear()
+            self._bytes = 0
+            self._changed.notify_all()
+            return left
+
+    def forked(self) -> None:
+        """In a child that was forked: be closed and empty, without taking a lock."""
+        self._changed = threading.Condition(threading.Lock())
+        self._calls = deque()
+        self._wakes = []
+        self._is_closed = True
+
+
+Outcome = Reply | NepError
+"""How a call ended: with what the server gave back, or without it."""
+
+
+class OpenCall(Protocol):
+    """A call that is under way."""
+
+    @property
+    def number(self) -> int:
+        """Its number in its client."""
+
+
+class ServerTransport(Protocol):
+    """What a server answers through."""
+
+    calls: CallQueue
+    tally: Tally
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it is reached."""
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it was closed, or its transport was."""
+
+    def begin_close(self) -> None:
+        """Unregister, and refuse the calls that wait and those that still come. Does not wait."""
+
+    def close(self, timeout_s: float) -> None:
+        """The same, and end; answers are delivered within `timeout_s`. May be called twice."""
+
+    def forked(self) -> None:
+        """In a child that was forked: be closed, without taking a lock or touching a socket."""
+
+
+class ClientTransport(Protocol):
+    """What a client calls through."""
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether a server was there a moment ago."""
+
+    @property
+    def late(self) -> int:
+        """Answers that came when nobody waited for them any more."""
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it was closed, or its transport was."""
+
+    def begin(
+        self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
+    ) -> OpenCall:
+        """Send a call as soon as there is a server. `then` gets the outcome, once; it must return soon.
+
+        It may be called in the thread that serves all sockets. Raises `ClosedError`, and `NepError` when too
+        much is under way.
+        """
+
+    def forget(self, call: OpenCall) -> None:
+        """Nobody waits for it any more; `then` is not called."""
+
+    def known(self, timeout_s: float) -> tuple[str, ...]:
+        """The services that have a server now; none when that cannot be told."""
+
+    def close(self) -> None:
+        """Unregister; calls that are under way end with `ClosedError`."""
+
+    def forked(self) -> None:
+        """In a child that was forked: be closed, without taking a lock or touching a socket."""
+
+
+class ServiceTransport(Protocol):
+    """A node's transport that has services."""
+
+    def server(self, spec: ServerSpec) -> ServerTransport:
+        """A new server. Raises as `Transport.publisher` does."""
+
+    def client(self, spec: ClientSpec) -> ClientTransport:
+        """A new client. Raises as `Transport.subscriber` does."""

@@ -1,0 +1,408 @@
+"""DealerClient: a client's socket. Calls out, answers in; it notices when its server ends.
+
+The socket is connected to one server at a time, and libzmq never connects it again by itself: so the
+moment at which a connection ends is known, and the calls that were sent over it are known to be lost.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+
+import zmq
+
+from nep.backends.services import CALLS_MAX, CALLS_MAX_BYTES, ClientSpec, OpenCall, Outcome
+from nep.backends.zeromq.io_thread import Rest
+from nep.backends.zeromq.service_server import too_large
+from nep.backends.zeromq.sockets import Refusals, Socket, keep_alive
+from nep.errors import (
+    ClosedError,
+    NepError,
+    NoServerError,
+    ServerGoneError,
+    ServiceTimeoutError,
+    WireError,
+)
+from nep.i18n import _
+from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, Framing
+
+__all__ = ["DealerClient"]
+
+_logger = logging.getLogger("nep")
+
+_READ_MAX = 100
+_FIRST_TRY_S, _LAST_TRY_S = 0.1, 2.0
+_WAITED_TRY_S = 0.8
+"""While somebody waits for a server it is tried at least so often."""
+_LARGE_BYTES = 65_536
+_HAND_OVER_S = 2.0
+"""So long new calls wait for the last answers of a server that has closed, before they go to another one."""
+
+Then = Callable[[Outcome], None]
+_Ended = list[tuple[Then, Outcome]]
+
+
+@dataclass(eq=False)
+class _Call:
+    """A call that is under way."""
+
+    number: int
+    parts: list[bytes | memoryview]
+    timeout_s: float | None
+    deadline: float
+    then: Then
+    is_sent: bool = False
+
+    @property
+    def size(self) -> int:
+        return len(self.parts[1])
+
+
+class DealerClient:
+    """`socket` is a DEALER; `soon` asks the node's thread to look at it again, `closer` ends it.
+
+    `known_services` asks the master; `endpoint` is a server's that no master tells of.
+    """
+
+    def __init__(
+        self,
+        socket: Socket,
+        spec: ClientSpec,
+        framing: Framing,
+        soon: Callable[[DealerClient], None],
+        closer: Callable[[DealerClient], None],
+        *,
+        known_services: Callable[[float], tuple[str, ...]] | None = None,
+        endpoint: str = "",
+    ) -> None:
+        self.spec = spec
+        self._socket = socket
+        self._framing = framing
+        self._soon = soon
+        self._closer = closer
+        self._known_services = known_services
+        self._lock = threading.Lock()
+        self._numbers = itertools.count(1)
+        self._calls: dict[int, _Call] = {}
+        self._unanswered: dict[int, int] = {}
+        """The numbers and sizes of all that were sent over this connection, oldest first, also those that are
+        over: answers without a number come in this order, and a server that hangs is not sent ever more."""
+        self._bytes = self._unanswered_bytes = 0
+        self._servers: dict[int, str] = {0: endpoint} if endpoint else {}
+        self._current: int | None = None
+        self._endpoint = ""
+        self._is_connected = False
+        self._leave_at = math.inf
+        """When the connection to a server that is not listed any more is given up, if new calls wait."""
+        self._tries = 0
+        self._try_at = 0.0
+        self._refusals = Refusals()
+        self._is_closed = False
+        self._answered = self._failed = self._late = 0
+        socket.setsockopt(zmq.IMMEDIATE, 1)  # nothing is queued for a server that is not there
+        socket.setsockopt(zmq.RECONNECT_IVL, -1)
+        socket.setsockopt(
+            zmq.SNDHWM, 0
+        )  # bounded by `CALLS_MAX`; so it can be written whenever it is connected
+        socket.setsockopt(zmq.MAXMSGSIZE, PAYLOAD_MAX_BYTES)
+        socket.copy_threshold = _LARGE_BYTES
+        self.fd = int(socket.getsockopt(zmq.FD))
+
+    # ---- calling, in any thread
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether a server was there a moment ago."""
+        return self._is_connected
+
+    @property
+    def late(self) -> int:
+        """Answers that came when nobody waited for them any more."""
+        return self._late
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it, or its node, was closed."""
+        return self._is_closed
+
+    @property
+    def endpoint(self) -> str:
+        """Where it is connected, or tries to be; "" when it knows no server."""
+        return self._endpoint
+
+    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> _Call:
+        """See `ClientTransport.begin`."""
+        if len(data) > PAYLOAD_MAX_BYTES:
+            raise NepError(_("the call cannot be sent: {reason}").format(reason=too_large(len(data))))
+        number = next(self._numbers)
+        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        parts = self._framing.call(number, self.spec.codec.number, timeout_s, data)
+        call = _Call(number, parts, timeout_s, deadline, then)
+        with self._lock:
+            if self._is_closed:
+                raise ClosedError(_("client of '{service}'").format(service=self.spec.service))
+            self._check_room(call.size)
+            self._calls[number] = call
+            self._bytes += call.size
+            is_there = self._is_connected and self._current in self._servers
+            if is_there and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLOUT:
+                self._send(call)
+        self._soon(self)  # it has a deadline, and the socket was used
+        return call
+
+    def _check_room(self, size: int) -> None:
+        """With the lock held."""
+        count = max(len(self._calls), len(self._unanswered))
+        used = max(self._bytes, self._unanswered_bytes)
+        if count >= CALLS_MAX or (used and used + size > CALLS_MAX_BYTES):
+            raise NepError(
+                _("{count} calls of '{service}' are under way; wait for their answers first").format(
+                    count=count, service=self.spec.service
+                )
+            )
+
+    def forget(self, call: OpenCall) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            self._take(call.number)
+
+    def known(self, timeout_s: float) -> tuple[str, ...]:
+        """The services that have a server now; none when that cannot be told."""
+        if self._known_services is None:
+            return ()
+        try:
+            return self._known_services(timeout_s)
+        except NepError:
+            return ()
+
+    def _take(self, number: int) -> _Call | None:
+        """With the lock held: it is not under way any more."""
+        call = self._calls.pop(number, None)
+        if call is not None:
+            self._bytes -= call.size
+        return call
+
+    def _send(self, call: _Call) -> None:
+        """With the lock held, and connected."""
+        try:
+            self._socket.send(call.parts[0], zmq.DONTWAIT | zmq.SNDMORE)
+            self._socket.send(call.parts[1], zmq.DONTWAIT, copy=call.size < _LARGE_BYTES)
+        except zmq.ZMQError:  # the connection ended just now
+            return
+        call.is_sent = True
+        self._unanswered[call.number] = call.size
+        self._unanswered_bytes += call.size
+
+    # ---- in the node's thread: what its session tells
+
+    def connect(self, remotes: Iterable[RemotePublisher]) -> None:
+        """These servers are there, too."""
+        with self._lock:
+            for remote in remotes:
+                if remote.publisher.endpoints:
+                    self._servers[remote.publisher.id] = remote.publisher.endpoints[0]
+            self._try_at = 0.0
+        self._soon(self)
+
+    def gone(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - counts messages
+        """A server is not listed any more. Unless it said so itself, it may only be suspended."""
+        with self._lock:
+            if is_closed or server != self._current or not self._is_connected or len(self._servers) > 1:
+                self._servers.pop(server, None)
+        self._soon(self)
+
+    def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
+        """These are all servers that are there."""
+        listed = {
+            each.publisher.id: each.publisher.endpoints[0] for each in remotes if each.publisher.endpoints
+        }
+        with self._lock:
+            current = self._current
+            if not listed and current in self._servers and self._is_connected:
+                listed = {current: self._servers[current]}
+            self._servers = listed
+            self._try_at = 0.0
+        self._soon(self)
+
+    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+        """Nothing: answers are not counted by those who send them."""
+
+    def counts(self) -> SubscriberCount:
+        """The statistics for a renewal."""
+        problem = self._refusals.told()
+        return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed), problem)
+
+    # ---- in the node's thread: the socket
+
+    def serve(self, now: float) -> Rest:
+        """Read answers, notice a server's end, send what waits, end what waited too long."""
+        ended: _Ended = []
+        with self._lock:
+            if self._is_closed:
+                return Rest()
+            has_more = self._read(ended) or self._look_at_connection(now, ended)
+            if self._is_connected and self._current in self._servers:
+                for call in [each for each in self._calls.values() if not each.is_sent]:
+                    self._send(call)
+            self._expire(now, ended)
+            due = self._due()
+            # Sending may have taken in what came meanwhile, and its descriptor tells of that only once.
+            has_more = has_more or bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
+        self._tell(ended)
+        return Rest(due=now if has_more else due if due < math.inf else None)
+
+    def _read(self, ended: _Ended) -> bool:
+        """Whether there is more."""
+        for _turn in range(_READ_MAX):
+            try:
+                parts = self._socket.recv_multipart(zmq.DONTWAIT)
+            except zmq.Again:
+                return False
+            number: int | None = None
+            outcome: Outcome
+            try:
+                number, outcome = self._framing.read_answer(parts)
+            except WireError as error:
+                if self._refusals.add(error.reason):
+                    _logger.warning("the server of '%s' says what nobody understands: %s", self._name, error)
+                if not self._framing.in_order:
+                    continue
+                outcome = error
+            if self._framing.in_order:
+                number = next(iter(self._unanswered), None)
+            self._unanswered_bytes -= self._unanswered.pop(number or 0, 0)
+            call = self._take(number or 0)
+            if call is None:
+                self._late += 1
+                continue
+            self._answered += 1
+            ended.append((call.then, outcome))
+        return True
+
+    def _look_at_connection(self, now: float, ended: _Ended) -> bool:
+        """Whether there is more to read first."""
+        is_there = bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLOUT)
+        if self._is_connected and not is_there:
+            if self._read(ended):  # what came before the end counts
+                return True
+            self._lose(ended)
+            self._tries, self._try_at = 0, 0.0
+        if self._is_connected and self._current not in self._servers:
+            self._hand_over(now, ended)
+        else:
+            self._leave_at = math.inf
+        if is_there and self._endpoint and not self._is_connected:
+            self._is_connected = True
+            self._tries = 0
+        if not self._is_connected and now >= self._try_at:
+            self._try(now)
+        return False
+
+    def _hand_over(self, now: float, ended: _Ended) -> None:
+        """The server has closed, or was replaced: take its last answers, then go to another one."""
+        is_waited_for = any(each.is_sent for each in self._calls.values())
+        if is_waited_for and self._leave_at == math.inf:
+            self._leave_at = now + _HAND_OVER_S
+        is_next_due = now >= self._leave_at and any(not each.is_sent for each in self._calls.values())
+        if not is_waited_for or is_next_due:
+            self._leave(ended)
+
+    def _lose(self, ended: _Ended) -> None:
+        """The connection has ended, and with it the calls that were sent."""
+        self._is_connected = False
+        self._leave_at = math.inf
+        self._unanswered.clear()
+        self._unanswered_bytes = 0
+        for call in [each for each in self._calls.values() if each.is_sent]:
+            self._take(call.number)
+            self._failed += 1
+            ended.append((call.then, ServerGoneError(self._name)))
+
+    def _leave(self, ended: _Ended) -> None:
+        self._lose(ended)
+        self._disconnect()
+        self._current = None
+        self._tries, self._try_at = 0, 0.0
+
+    def _try(self, now: float) -> None:
+        """Connect to the next server, from the beginning again after the last."""
+        self._disconnect()
+        known = list(self._servers)
+        if not known:
+            self._current, self._try_at = None, math.inf
+            return
+        place = known.index(self._current) + 1 if self._current in self._servers and self._tries else 0
+        self._current = known[place % len(known)]
+        endpoint = self._servers[self._current]
+        self._tries += 1
+        try:
+            keep_alive(self._socket, endpoint)
+            self._socket.connect(endpoint)
+            self._endpoint = endpoint
+        except zmq.ZMQError as error:
+            _logger.debug("a server of '%s' cannot be reached at '%s': %s", self._name, endpoint, error)
+        self._try_at = now + min(_FIRST_TRY_S * 2 ** min(self._tries, 10), _LAST_TRY_S)
+
+    def _disconnect(self) -> None:
+        if self._endpoint:
+            with suppress(zmq.ZMQError):  # libzmq has done so itself when the connection ended
+                self._socket.disconnect(self._endpoint)
+            self._endpoint = ""
+
+    def _expire(self, now: float, ended: _Ended) -> None:
+        for call in [each for each in self._calls.values() if each.deadline <= now]:
+            self._take(call.number)
+            self._failed += 1
+            kind = ServiceTimeoutError if call.is_sent else NoServerError
+            ended.append((call.then, kind(self._name, call.timeout_s or 0.0)))
+
+    def _due(self) -> float:
+        due = min((each.deadline for each in self._calls.values()), default=math.inf)
+        if self._is_connected and any(not each.is_sent for each in self._calls.values()):
+            due = min(due, self._leave_at)
+        if self._is_connected or not self._servers:
+            return due
+        if self._calls:
+            self._try_at = min(self._try_at, time.monotonic() + _WAITED_TRY_S)
+        return min(due, self._try_at)
+
+    @property
+    def _name(self) -> str:
+        return self.spec.service
+
+    def _tell(self, ended: _Ended) -> None:
+        for then, outcome in ended:
+            try:
+                then(outcome)
+            except Exception:  # the others get theirs
+                _logger.exception("the end of a call of '%s' could not be told", self._name)
+
+    # ---- the end
+
+    def close(self) -> None:
+        """Unregister; calls that are under way end with `ClosedError`. May be called twice."""
+        self._closer(self)
+
+    def release(self) -> None:
+        """Close the socket; nobody polls it any more."""
+        with self._lock:
+            left, self._calls = list(self._calls.values()), {}
+            if not self._is_closed:
+                self._is_closed = True
+                self._is_connected = False
+                self._socket.close(0)
+        what = _("client of '{service}'").format(service=self._name)
+        self._tell([(each.then, ClosedError(what)) for each in left])
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_closed = True
+        self._lock = threading.Lock()
+        self._calls = {}

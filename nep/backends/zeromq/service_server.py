@@ -1,0 +1,217 @@
+"""RouterServer: a server's socket. Calls in, answers out; the node's thread reads, any thread answers.
+
+It is a ROUTER also where it serves programs of the original NEP: their REQ does not notice, and many can be
+answered at once.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+
+import zmq
+
+from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally
+from nep.backends.zeromq.bindings import Bindings
+from nep.backends.zeromq.io_thread import Rest
+from nep.backends.zeromq.sockets import Refusals, Socket
+from nep.errors import WireError
+from nep.i18n import _
+from nep.protocol.requests import PublisherCount, as_count
+from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, CallKind, Framing, Reply, failure
+
+__all__ = ["RouterServer"]
+
+_logger = logging.getLogger("nep")
+
+_READ_MAX = 100
+"""So many calls are read in one go, then the node's other sockets have their turn."""
+_LARGE_BYTES = 65_536
+"""From here on answers are sent without a copy, and counted while they are on their way."""
+_UNREAD_MAX_BYTES = 256 * 2**20
+_SMALL_UNREAD = 1000
+"""So many answers are queued for a client that does not read them."""
+
+
+class RouterServer:
+    """`socket` is a ROUTER; `soon` asks the node's thread to look at it again, `closer` ends it.
+
+    `unregister` may be called twice.
+    """
+
+    is_local = False
+
+    def __init__(
+        self,
+        socket: Socket,
+        spec: ServerSpec,
+        framing: Framing,
+        soon: Callable[[RouterServer], None],
+        unregister: Callable[[], object],
+        closer: Callable[[RouterServer, float], None],
+    ) -> None:
+        self.spec = spec
+        self.calls = CallQueue()
+        self.tally = Tally()
+        self.fixed: tuple[str, ...] = ()
+        """Where it is bound when no master says so."""
+        self.socket = socket
+        self._framing = framing
+        self._soon = soon
+        self._unregister = unregister
+        self._closer = closer
+        self._lock = threading.Lock()
+        self._refusals = Refusals()
+        self._unread: deque[tuple[zmq.MessageTracker, int]] = deque()
+        self._is_closed = False
+        socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # an error instead of silence when a client is gone
+        socket.setsockopt(zmq.MAXMSGSIZE, PAYLOAD_MAX_BYTES)
+        socket.setsockopt(zmq.SNDHWM, _SMALL_UNREAD)
+        socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
+        socket.copy_threshold = _LARGE_BYTES
+        self._bindings = Bindings(socket, may_be_local=False)
+        self.fd = int(socket.getsockopt(zmq.FD))
+
+    # ---- what its session needs
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """All that it is bound to."""
+        return self._bindings.endpoints or self.fixed
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it, or its node, was closed."""
+        return self._is_closed
+
+    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
+        """Be reached at these addresses of this computer from now on; the endpoints."""
+        with self._lock:
+            return () if self._is_closed else self._bindings.move(hosts)
+
+    def leave_local(self) -> None:
+        """It is reached by TCP only, always."""
+
+    def counts(self) -> PublisherCount:
+        """The statistics for a renewal."""
+        tally = self.tally
+        calls, problem = as_count(tally.calls), self._refusals.told()
+        return PublisherCount(self.spec.id, calls, as_count(tally.bytes), calls, None, problem, tally.errors)
+
+    # ---- in the node's thread
+
+    def serve(self, now: float) -> Rest:
+        """Read calls into the queue; those for which there is no room are refused at once."""
+        came: list[IncomingCall] = []
+        with self._lock:
+            for _turn in range(_READ_MAX):
+                if self._is_closed:
+                    return Rest()
+                try:
+                    route, *parts = self.socket.recv_multipart(zmq.DONTWAIT)
+                except zmq.Again:
+                    break
+                call = self._read(route, parts, now)
+                if call is not None:
+                    came.append(call)
+        for call in came:
+            if not self.calls.put(call):
+                self._refuse(call)
+        return Rest(due=now if len(came) >= _READ_MAX else None)
+
+    def _read(self, route: bytes, parts: list[bytes], now: float) -> IncomingCall | None:
+        """With the lock held."""
+        try:
+            header = self._framing.read_call(parts)
+        except WireError as error:
+            if self._refusals.add(error.reason):
+                _logger.warning(
+                    "'%s' was called in a way that nobody understands (%d times so far): %s",
+                    self.spec.service,
+                    self._refusals.count,
+                    error,
+                )
+            return None
+        deadline = None if header.timeout_s is None else now + header.timeout_s
+        number = header.number
+        return IncomingCall(
+            header.data, header.codec, deadline, lambda reply: self._answer(route, number, reply)
+        )
+
+    # ---- answering, in any thread
+
+    def _answer(self, route: bytes, number: int, reply: Reply) -> bool:
+        if len(reply.data) > PAYLOAD_MAX_BYTES:
+            reply = failure(CallKind.ERROR, "EncodeError", too_large(len(reply.data)))
+        self.tally.add(reply)
+        with self._lock:
+            if self._is_closed:
+                return False
+            if len(reply.data) >= _LARGE_BYTES and not self._has_room(len(reply.data)):
+                _logger.warning("an answer of '%s' is left out: nobody reads the others", self.spec.service)
+                return False
+            is_sent = self._send(route, self._framing.answer(number, reply))
+            has_input = bool(int(self.socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
+        if has_input:
+            self._soon(self)
+        return is_sent
+
+    def _send(self, route: bytes, parts: Sequence[bytes | memoryview]) -> bool:
+        """With the lock held. False when the client is gone, or does not read."""
+        try:
+            self.socket.send(route, zmq.DONTWAIT | zmq.SNDMORE)
+            self.socket.send(parts[0], zmq.DONTWAIT | zmq.SNDMORE)
+            if len(parts[1]) < _LARGE_BYTES:
+                self.socket.send(parts[1], zmq.DONTWAIT)
+            else:
+                tracker = self.socket.send(parts[1], zmq.DONTWAIT, copy=False, track=True)
+                self._unread.append((tracker, len(parts[1])))
+        except zmq.ZMQError:  # it is gone, or a thousand answers wait for it
+            return False
+        return True
+
+    def _has_room(self, size: int) -> bool:
+        while self._unread and self._unread[0][0].done:
+            self._unread.popleft()
+        return not self._unread or sum(each for _tracker, each in self._unread) + size <= _UNREAD_MAX_BYTES
+
+    # ---- the end
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister, refuse what waits, deliver what was answered. May be called twice."""
+        self._closer(self, timeout_s)
+
+    def begin_close(self) -> None:
+        """Unregister; nothing is carried out any more, and who waits is told. May be called twice."""
+        self._unregister()
+        for call in self.calls.close():
+            self._refuse(call)
+
+    def _refuse(self, call: IncomingCall) -> None:
+        reason = (
+            _("'{service}' closes") if self.calls.is_closed else _("'{service}' has too many calls that wait")
+        )
+        call.answer(failure(CallKind.REFUSED, "", reason.format(service=self.spec.service)))
+
+    def release(self, deadline: float) -> None:
+        """Close the socket; nobody polls it any more. Answers may be on their way until `deadline`."""
+        with self._lock:
+            if not self._is_closed:
+                self._is_closed = True
+                self.socket.close(max(0, round((deadline - time.monotonic()) * 1000)))
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_closed = True
+        self._lock = threading.Lock()
+        self.calls.forked()
+
+
+def too_large(size: int) -> str:
+    """Why so many bytes cannot travel at once."""
+    return _("it has {size} bytes, {most} are allowed; send large data as messages").format(
+        size=size, most=PAYLOAD_MAX_BYTES
+    )

@@ -1,0 +1,203 @@
+"""ZeromqServices: one node's servers and clients, and how they end. Part of `ZeromqTransport`."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import zmq
+
+from nep.backends.connection import Direct
+from nep.backends.services import ClientSpec, ServerSpec
+from nep.backends.zeromq.io_thread import SharedContext
+from nep.backends.zeromq.master_session import MasterSession
+from nep.backends.zeromq.service_client import DealerClient
+from nep.backends.zeromq.service_server import RouterServer
+from nep.backends.zeromq.sockets import bind
+from nep.errors import ClosedError, NepError
+from nep.i18n import _
+from nep.protocol.requests import PublisherRecord, SubscriberRecord
+from nep.protocol.service_wire import NATIVE, ORIGINAL, Framing, topic_of
+from nep.system.addresses import endpoint_of, in_numbers, is_endpoint
+from nep.system.forks import give_up
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = ["SERVICE_TYPE", "ZeromqServices"]
+
+SERVICE_TYPE = "service"
+"""The codec under which the master lists servers."""
+
+
+class ZeromqServices:
+    """`session` gives the node's connection to a master; raises `ClosedError` when the node is closed."""
+
+    def __init__(
+        self, shared: SharedContext, session: Callable[[str], MasterSession], node_name: str
+    ) -> None:
+        self._shared = shared
+        self._session = session
+        self._node_name = node_name
+        self._lock = threading.Lock()
+        self._servers: set[RouterServer] = set()
+        self._clients: set[DealerClient] = set()
+        self._is_closed = False
+
+    # ---- servers
+
+    def server(self, spec: ServerSpec) -> RouterServer:
+        """A new server. See `ServiceTransport.server`."""
+        if isinstance(spec.configuration, Direct):
+            return self._direct_server(spec, spec.configuration)
+        session = self._session(spec.configuration.master)
+        session.wait_for_name(spec.wait_s)
+        server = self._new_server(spec, NATIVE, lambda: session.remove_publisher(spec.id, server.tally.calls))
+        with _released(server):
+            endpoints = server.move(session.hosts)
+            self._hold(server)
+        record = PublisherRecord(
+            spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, endpoints, number=spec.number
+        )
+        try:
+            session.add_publisher(record, server, spec.wait_s)
+        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+            server.close(0.0)
+            raise
+        return server
+
+    def _direct_server(self, spec: ServerSpec, direct: Direct) -> RouterServer:
+        server = self._new_server(spec, _framing(direct), lambda: None)
+        with _released(server):
+            server.fixed = (bind(server.socket, f"{direct.ip}:{direct.port}"),)
+            self._hold(server)
+        return server
+
+    def _new_server(self, spec: ServerSpec, framing: Framing, unregister: Callable[[], None]) -> RouterServer:
+        def close(server: RouterServer, timeout_s: float) -> None:
+            with self._lock:
+                self._servers.discard(server)
+            deadline = time.monotonic() + timeout_s
+            server.begin_close()
+            self._shared.io.remove(server)
+            while server.serve(now := time.monotonic()).due is not None and now < deadline:
+                pass  # what came meanwhile is refused, too
+            server.release(deadline)
+
+        socket = self._shared.socket(zmq.ROUTER, f"a server of '{spec.service}'")
+        return RouterServer(socket, spec, framing, self._shared.io.serve_soon, unregister, close)
+
+    def _hold(self, owner: RouterServer | DealerClient) -> None:
+        with self._lock:
+            if self._is_closed:
+                raise ClosedError(f"node '{self._node_name}'")
+            if isinstance(owner, RouterServer):
+                self._servers.add(owner)
+            else:
+                self._clients.add(owner)
+        self._shared.io.add(owner)
+
+    # ---- clients
+
+    def client(self, spec: ClientSpec) -> DealerClient:
+        """A new client. See `ServiceTransport.client`."""
+        if isinstance(spec.configuration, Direct):
+            return self._direct_client(spec, spec.configuration)
+        session = self._session(spec.configuration.master)
+        session.wait_for_name(spec.wait_s)
+
+        def known(timeout_s: float) -> tuple[str, ...]:
+            services = session.look(timeout_s).services
+            return tuple(sorted(name for name, each in services.items() if each.servers))
+
+        client = self._new_client(spec, NATIVE, lambda: session.remove_subscriber(spec.id), known)
+        try:
+            record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
+            client.connect(session.add_subscriber(record, client, spec.wait_s).publishers)
+        except BaseException:
+            client.close()
+            raise
+        return client
+
+    def _direct_client(self, spec: ClientSpec, direct: Direct) -> DealerClient:
+        address = f"{direct.ip}:{direct.port}"
+        if not is_endpoint(endpoint_of(address)):
+            raise NepError(
+                _("'{address}' cannot be called; use a computer's address and a port").format(address=address)
+            )
+        endpoint = endpoint_of(in_numbers(address))
+        return self._new_client(spec, _framing(direct), lambda: None, None, endpoint)
+
+    def _new_client(
+        self,
+        spec: ClientSpec,
+        framing: Framing,
+        unregister: Callable[[], None],
+        known: Callable[[float], tuple[str, ...]] | None,
+        endpoint: str = "",
+    ) -> DealerClient:
+        def close(client: DealerClient) -> None:
+            with self._lock:
+                self._clients.discard(client)
+            unregister()
+            self._shared.io.remove(client)
+            client.release()
+
+        socket = self._shared.socket(zmq.DEALER, f"a client of '{spec.service}'")
+        client = DealerClient(
+            socket, spec, framing, self._shared.io.serve_soon, close, known_services=known, endpoint=endpoint
+        )
+        with _released(client):
+            self._hold(client)
+        return client
+
+    # ---- the end
+
+    def begin_close(self) -> None:
+        """Nothing is taken any more; who waits is told."""
+        with self._lock:
+            self._is_closed = True
+            servers = tuple(self._servers)
+        for server in servers:
+            server.begin_close()
+
+    def close(self, timeout_s: float) -> None:
+        """Close all of them; answers are delivered within `timeout_s`."""
+        deadline = time.monotonic() + timeout_s
+        with self._lock:
+            clients, servers = tuple(self._clients), tuple(self._servers)
+        for client in clients:
+            client.close()
+        for server in servers:
+            server.close(max(0.0, deadline - time.monotonic()))
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        for server in self._servers:
+            give_up(*server.endpoints)
+            server.forked()
+        for client in self._clients:
+            give_up(client.endpoint)
+            client.forked()
+        self._is_closed = True
+        self._lock = threading.Lock()
+
+
+def _framing(direct: Direct) -> Framing:
+    return NATIVE if direct.wire == "native" else ORIGINAL
+
+
+@contextmanager
+def _released(owner: RouterServer | DealerClient) -> Iterator[None]:
+    """A socket that is left open would hold up the end of the program."""
+    try:
+        yield
+    except BaseException:
+        if isinstance(owner, RouterServer):
+            owner.release(0.0)
+        else:
+            owner.release()
+        raise

@@ -1,0 +1,263 @@
+"""Client: calls a service. Made by `Node.new_client`."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import queue
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import TYPE_CHECKING, Literal
+
+from nep.arguments import seconds
+from nep.backends.services import ClientTransport, OpenCall, Outcome
+from nep.errors import (
+    ClosedError,
+    DecodeError,
+    NepError,
+    NoServerError,
+    RequestRefusedError,
+    ServiceError,
+)
+from nep.i18n import _
+from nep.messages.codecs import Codec, codec_numbered
+from nep.protocol.service_wire import CallKind, read_failure
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["Client", "Limit"]
+
+Limit = float | Literal["default"] | None
+"""Seconds, None for ever, or what the client was made with."""
+
+SLICE_S = 0.1
+"""Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
+_LOOK_S = 0.5
+"""So long the master is asked which services there are, when one was not found."""
+_JOIN_S = 2.0
+
+
+class Client:
+    """Calls a service, from any thread, as many calls at once as one likes.
+
+    A call waits until there is a server, and for its answer, `timeout_s` seconds in all (None: for ever). It
+    raises `NoServerError`, `ServiceTimeoutError`, `ServerGoneError`, `ServiceError` with what the server's
+    callback raised, `RequestRefusedError` when the server would not carry it out, `ClosedError`,
+    `EncodeError` for what cannot be sent, and `DecodeError` for an answer that cannot be read.
+    """
+
+    def __init__(
+        self,
+        transport: ClientTransport,
+        service: str,
+        codec: Codec,
+        timeout_s: float | None,
+        on_close: Callable[[Client], object],
+    ) -> None:
+        self._transport = transport
+        self.service = service
+        self.timeout_s = timeout_s
+        self._codec = codec
+        self._on_close = on_close
+        self._is_forked = False
+        self._lock = threading.Lock()
+        self._ends: _Ends | None = None
+        self._sent: Future[object] | None = None
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether a server was there a moment ago."""
+        return self._transport.is_connected
+
+    @property
+    def late(self) -> int:
+        """Answers that came when nobody waited for them any more; they were dropped."""
+        return self._transport.late
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it, or its node, was closed."""
+        return self._transport.is_closed
+
+    # ---- calling
+
+    def call(self, request: object, timeout_s: Limit = "default") -> object:
+        """The answer. Raises as told above."""
+        outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        call = self._begin(request, self._limit(timeout_s), outcomes.put)
+        try:
+            while True:
+                with contextlib.suppress(queue.Empty):
+                    outcome = outcomes.get(timeout=SLICE_S)
+                    break
+                if self._is_forked:
+                    raise self._closed_error()
+        except BaseException:  # also Ctrl+C
+            self._transport.forget(call)
+            raise
+        try:
+            return self._answer(outcome)
+        except NoServerError as error:
+            raise self._with_known(error) from None
+
+    def call_async(self, request: object, timeout_s: Limit = "default") -> Future[object]:
+        """A future of the answer, at once. It can be cancelled; its callbacks run in the client's own thread.
+
+        What cannot be sent at all is raised here.
+        """
+        with self._lock:
+            if self._ends is None:
+                self._ends = _Ends(f"nep-client-{self.service}")
+            ends = self._ends
+        future: Future[object] = Future()
+        call = self._begin(
+            request, self._limit(timeout_s), lambda outcome: ends.add(lambda: self._settle(future, outcome))
+        )
+        future.add_done_callback(lambda ended: self._transport.forget(call) if ended.cancelled() else None)
+        return future
+
+    async def acall(self, request: object, timeout_s: Limit = "default") -> object:
+        """The answer, awaited: the event loop goes on meanwhile. Raises as told above."""
+        loop = asyncio.get_running_loop()
+        future: asyncio.Future[Outcome] = loop.create_future()
+
+        def then(outcome: Outcome) -> None:
+            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits
+                loop.call_soon_threadsafe(_set, future, outcome)
+
+        call = self._begin(request, self._limit(timeout_s), then)
+        try:
+            outcome = await future
+        except BaseException:  # cancelled
+            self._transport.forget(call)
+            raise
+        try:
+            return self._answer(outcome)
+        except NoServerError as error:
+            raise await loop.run_in_executor(None, self._with_known, error) from None
+
+    # ---- as the original NEP has it
+
+    def send_info(self, request: object) -> None:
+        """Call; `listen_info` gives the answer. Raises `NepError` when the last one was not taken."""
+        if self._sent is not None:
+            raise NepError(_("take the last answer first; use 'listen_info'"))
+        self._sent = self.call_async(request)
+
+    def listen_info(self) -> object:
+        """The answer to what `send_info` sent. Raises as `call` does."""
+        sent, self._sent = self._sent, None
+        if sent is None:
+            raise NepError(_("nothing was sent; call 'send_info' first"))
+        done = threading.Event()
+        sent.add_done_callback(lambda _ended: done.set())
+        while not done.wait(SLICE_S):
+            if self._is_forked:
+                raise self._closed_error()
+        return sent.result()
+
+    # ---- how it ends
+
+    def _begin(self, request: object, timeout_s: float | None, then: Callable[[Outcome], None]) -> OpenCall:
+        if self._transport.is_closed:
+            raise self._closed_error()
+        return self._transport.begin(self._codec.encode(request).data, timeout_s, then)
+
+    def _limit(self, timeout_s: Limit) -> float | None:
+        return self.timeout_s if timeout_s == "default" else seconds("timeout_s", timeout_s)
+
+    def _answer(self, outcome: Outcome) -> object:
+        if isinstance(outcome, NepError):
+            raise outcome
+        if outcome.kind == CallKind.ANSWER:
+            codec = codec_numbered(outcome.codec)
+            if codec is None:
+                said = _("this version has no such codec; update nep")
+                raise DecodeError(str(outcome.codec), len(outcome.data), said)
+            return codec.decode(outcome.data, {})
+        name, reason = read_failure(outcome.data)
+        if outcome.kind == CallKind.ERROR:
+            raise ServiceError(self.service, name, reason)
+        raise RequestRefusedError(
+            _("the server of '{service}' refused: {reason}").format(service=self.service, reason=reason)
+        )
+
+    def _with_known(self, error: NoServerError) -> NoServerError:
+        """The same error, with what there is instead."""
+        return NoServerError(error.service, error.timeout_s, self._transport.known(_LOOK_S))
+
+    def _settle(self, future: Future[object], outcome: Outcome) -> None:
+        if not future.set_running_or_notify_cancel():
+            return
+        try:
+            answer = self._answer(outcome)
+        except Exception as error:  # noqa: BLE001 - it is raised where the answer is asked for
+            future.set_exception(error)
+        else:
+            future.set_result(answer)
+
+    # ---- the end
+
+    def close(self) -> None:
+        """Unregister and end; calls that are under way raise `ClosedError`. May be called twice."""
+        if self._is_forked:
+            return
+        self._transport.close()
+        self.join()
+        self._on_close(self)
+
+    def join(self) -> None:
+        """End its own thread, when its calls have ended."""
+        with self._lock:
+            ends, self._ends = self._ends, None
+        if ends is not None:
+            ends.close()
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_forked = True
+        self._lock = threading.Lock()
+        self._ends = None
+        self._transport.forked()
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(_("client of '{service}'").format(service=self.service), is_forked=self._is_forked)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Client({self.service!r})"
+
+
+class _Ends:
+    """A thread that ends futures: what is attached to them may take its time, and holds up no socket."""
+
+    def __init__(self, name: str) -> None:
+        self._jobs: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def add(self, job: Callable[[], None]) -> None:
+        """Run this soon."""
+        self._jobs.put(job)
+
+    def _run(self) -> None:
+        while (job := self._jobs.get()) is not None:
+            job()
+
+    def close(self) -> None:
+        """End when all is done; wait for that a moment."""
+        self._jobs.put(None)
+        if self._thread is not threading.current_thread():
+            self._thread.join(_JOIN_S)
+
+
+def _set(future: asyncio.Future[Outcome], outcome: Outcome) -> None:
+    if not future.done():
+        future.set_result(outcome)

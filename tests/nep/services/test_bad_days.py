@@ -1,0 +1,340 @@
+"""Services on bad days: servers that die or hang, masters that come back, strangers, forks."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import pytest
+import zmq
+
+import nep
+from nep.backends.connection import Hybrid
+from nep.masters.master import Master
+from nep.protocol.requests import AddPublisher, NodeRecord, PublisherRecord, id_from, node_id_from
+from nep.protocol.service_wire import topic_of
+from tests.nep.programs import eventually, running
+
+LONG_S = 30.0
+SERVER = """
+    import sys, threading, nep
+    node = nep.node("server")
+    asked = threading.Event()
+    def answer(request):
+        if request == "hang":
+            asked.set()
+            threading.Event().wait()
+        return {"pid": __import__("os").getpid()}
+    server = node.new_server("/x", answer, threads=1)
+    print("ready")
+    asked.wait()
+    print("asked")
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def client(master: Master):
+    with nep.node("client") as node:
+        yield node.new_client("/x", timeout_s=LONG_S)
+
+
+def test_a_server_that_dies_while_it_is_called_is_reported_at_once(client) -> None:
+    with running(SERVER) as program:
+        assert program.line() == "ready"
+        future = client.call_async("hang", timeout_s=None)
+        assert program.line() == "asked"
+        program.kill()
+        with pytest.raises(nep.ServerGoneError, match="the server of '/x' ended while it was called"):
+            future.result(LONG_S)
+    with running(SERVER) as program:  # and the next one is found
+        assert program.line() == "ready"
+        assert client.call({}) == {"pid": program.process.pid}
+
+
+def test_a_call_made_after_the_death_waits_for_the_next_server(client) -> None:
+    with running(SERVER) as program:
+        assert program.line() == "ready"
+        client.call({})
+    eventually(lambda: not client.is_connected)
+    future = client.call_async({})
+    with running(SERVER) as program:
+        assert program.line() == "ready"
+        assert future.result(LONG_S) == {"pid": program.process.pid}
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
+def test_a_server_that_is_stopped_keeps_its_calls(client) -> None:
+    with running(SERVER) as program:
+        assert program.line() == "ready"
+        client.call({})
+        program.stop()
+        with pytest.raises(nep.ServiceTimeoutError):
+            client.call({}, timeout_s=4.0)  # so it was unlisted meanwhile
+        future = client.call_async({})
+        program.signal(signal.SIGCONT)
+        assert future.result(LONG_S) == {"pid": program.process.pid}
+
+
+def test_calls_go_on_while_the_master_is_away() -> None:
+    master = Master("127.0.0.1:0", learn_s=0.0).start()
+    address = master.address
+    with nep.node("server", master=address) as a, nep.node("client", master=address) as b:
+        server = a.new_server("/x", lambda request: request, threads=1)
+        client = b.new_client("/x", timeout_s=LONG_S)
+        assert client.call(1) == 1
+        master.close()
+        assert client.call(2) == 2
+        with Master(address):
+            eventually(lambda: "/x" in b.graph(LONG_S).services)
+            info = b.graph(LONG_S).services["/x"]
+            eventually(lambda: len(b.graph(LONG_S).services["/x"].clients) == 1)
+            assert info.servers[0].id
+            assert client.call(3) == 3
+            assert server.calls == 3
+            server.close()
+            a.new_server("/x", lambda request: "new", threads=1)
+
+            def is_new() -> bool:
+                try:
+                    return client.call(4) == "new"
+                except (nep.ServerGoneError, nep.RequestRefusedError):
+                    return False
+
+            eventually(is_new)
+
+
+def test_a_server_that_cannot_be_reached_does_not_hide_one_that_can(master: Master, client) -> None:
+    """Something is listed first whose port is closed."""
+    key = "k" * 20
+    node = NodeRecord(node_id_from(key), "ghost", "", None, key=key)
+    with zmq.Context() as context, context.socket(zmq.ROUTER) as hole:
+        port = hole.bind_to_random_port("tcp://127.0.0.1")
+    record = PublisherRecord(
+        id_from(key, 1), topic_of("/x"), "service", "service", (f"tcp://127.0.0.1:{port}",), number=1
+    )
+    master.submit(AddPublisher(node, record))
+    with nep.node("server") as real:
+        real.new_server("/x", lambda request: "real", threads=1)
+        assert client.call({}) == "real"
+
+
+def test_no_master_is_said_as_everywhere() -> None:
+    with nep.node("alone", master="127.0.0.1:1", wait_s=0.1) as node:
+        with pytest.raises(nep.MasterUnreachable):
+            node.new_server("/x", lambda request: request)
+        with pytest.raises(nep.MasterUnreachable):
+            node.new_client("/x")
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [b""],
+        [b"", b""],
+        [b"x" * 16, b"{}"],
+        [b"\1\1\1\0" + b"\0" * 12],
+        [b"\1\1\1\0" + b"\0" * 12, b"{}", b"{}"],
+        [b"\1\2\1\0" + b"\0" * 12, b"{}"],  # an answer
+        [b"\1\1\1\0" + b"\0" * 12, b"{oops"],  # no JSON: is refused
+        [b"\1\1\x63\0" + b"\xff" * 12, b"{}"],  # a codec that is not there, the largest number
+        [b"\1\1\1\0" + b"\xff" * 12, b"[" * 100_000],
+    ],
+)
+def test_strangers_do_not_end_a_server(master: Master, client, parts) -> None:
+    with nep.node("server") as node:
+        server = node.new_server("/x", lambda request: request, threads=1)
+        with zmq.Context() as context, context.socket(zmq.DEALER) as stranger:
+            stranger.linger = 0
+            stranger.connect(server.endpoints[0])
+            stranger.send_multipart(parts)
+            assert client.call({"n": 1}) == {"n": 1}
+        assert client.call({"n": 2}) == {"n": 2}
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        [b""],
+        [b"\1\2\1\0" + b"\xff" * 12, b"{}"],  # a number nobody has
+        [b"\1\1\1\0\0\0\0\0" + (1).to_bytes(8, "little"), b"{}"],  # a call
+        [b"\2\2\1\0\0\0\0\0" + (1).to_bytes(8, "little"), b"{}"],  # of a later version
+    ],
+)
+def test_a_server_that_talks_nonsense_is_a_time_out(master: Master, client, answer) -> None:
+    with _fake_server(master, lambda parts: [answer]), pytest.raises(nep.ServiceTimeoutError):
+        client.call({}, timeout_s=1.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "codec", "data", "error"),
+    [
+        (2, 1, b"{oops", nep.DecodeError),
+        (2, 99, b"{}", nep.DecodeError),
+        (3, 1, b"{oops", nep.ServiceError),
+        (3, 1, b"[]", nep.ServiceError),
+        (3, 1, b'{"nep_error":7,"reason":{"a":1}}', nep.ServiceError),
+        (4, 1, b"", nep.RequestRefusedError),
+    ],
+)
+def test_answers_that_make_no_sense_are_errors_of_nep(
+    master: Master, client, kind, codec, data, error
+) -> None:
+    def answer(parts):
+        return [[bytes([1, kind, codec, 0, 0, 0, 0, 0]) + parts[0][8:], data]]
+
+    with _fake_server(master, answer), pytest.raises(error):
+        client.call({})
+
+
+def test_an_answer_that_comes_twice_is_counted_as_late(master: Master, client) -> None:
+    def answer(parts):
+        return [[bytes([1, 2, 1, 0, 0, 0, 0, 0]) + parts[0][8:], b"1"]] * 2
+
+    with _fake_server(master, answer):
+        assert client.call({}) == 1
+        eventually(lambda: client.late == 1)
+
+
+class _fake_server:  # noqa: N801 - it reads as a function
+    """A server of "/x" that answers each call with what `answers` makes of its parts."""
+
+    def __init__(self, master: Master, answers) -> None:
+        self._answers = answers
+        self._context = zmq.Context()
+        self._socket = self._context.socket(zmq.ROUTER)
+        self._socket.linger = 0
+        endpoint = f"tcp://127.0.0.1:{self._socket.bind_to_random_port('tcp://127.0.0.1')}"
+        key = "f" * 20
+        node = NodeRecord(node_id_from(key), "fake", "", None, key=key)
+        record = PublisherRecord(id_from(key, 1), topic_of("/x"), "service", "service", (endpoint,), number=1)
+        master.submit(AddPublisher(node, record))
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="fake-server")
+
+    def _run(self) -> None:
+        while not self._over.is_set():
+            if self._socket.poll(20):
+                route, *parts = self._socket.recv_multipart()
+                for each in self._answers(parts):
+                    self._socket.send_multipart([route, *each])
+
+    def __enter__(self) -> None:
+        self._thread.start()
+
+    def __exit__(self, *_exc: object) -> None:
+        self._over.set()
+        self._thread.join(LONG_S)
+        self._socket.close()
+        self._context.term()
+
+
+def test_more_calls_than_a_server_has_room_for_are_refused(master: Master) -> None:
+    with nep.node("server") as a, nep.node("one") as one, nep.node("two") as two:
+        server = a.new_server("/full", lambda request: request)  # nobody spins
+        calls = [
+            client.call_async(n, timeout_s=LONG_S)
+            for client in (one.new_client("/full"), two.new_client("/full"))
+            for n in range(600)
+        ]
+        eventually(lambda: server.refused == 200)
+        refused = [each for each in calls if each.done()]
+        eventually(lambda: sum(each.done() for each in calls) == 200)
+        with pytest.raises(nep.RequestRefusedError, match="too many calls that wait"):
+            next(each for each in calls if each.done()).result()
+        assert len(refused) <= 200
+        stopper = threading.Thread(target=lambda: a.spin(LONG_S), name="spin")
+        stopper.start()
+        eventually(lambda: all(each.done() for each in calls))
+        a.stop_spin()
+        stopper.join(LONG_S)
+        assert server.calls == 1000
+
+
+def test_too_large_a_call_or_answer_is_an_error(master: Master) -> None:
+    with nep.node("server") as a, nep.node("client") as b:
+        a.new_server("/big", lambda n: b"x" * n, threads=1)
+        client = b.new_client("/big", msg_type="msgpack", timeout_s=LONG_S)
+        most = 64 * 2**20
+        with pytest.raises(nep.NepError, match="67108869 bytes, 67108864 are allowed"):
+            client.call(b"x" * most)
+        with pytest.raises(nep.ServiceError, match="67108869 bytes, 67108864 are allowed"):
+            client.call(most)
+        assert client.call(2) == b"xx"
+
+
+def test_ctrl_c_in_a_callback_ends_the_spin_and_tells_the_client(master: Master) -> None:
+    def answer(_request):
+        raise KeyboardInterrupt
+
+    with nep.node("server") as a, nep.node("client") as b:
+        a.new_server("/x", answer)
+        future = b.new_client("/x").call_async({}, timeout_s=LONG_S)
+        with pytest.raises(KeyboardInterrupt):
+            a.spin(LONG_S)
+        with pytest.raises(nep.ServiceError, match="KeyboardInterrupt"):
+            future.result(LONG_S)
+
+
+def test_timers_and_messages_go_on_beside_calls(master: Master) -> None:
+    with nep.node("server") as a, nep.node("client") as b:
+        ticks, heard = [], []
+        a.new_timer(0.01, lambda: ticks.append(1))
+        a.new_callback("topic", "json", heard.append)
+        a.new_server("/x", lambda request: request)
+        spinner = threading.Thread(target=lambda: a.spin(LONG_S), name="spin")
+        spinner.start()
+        pub, client = b.new_pub("topic"), b.new_client("/x", timeout_s=LONG_S)
+        for n in range(50):
+            pub.publish(n)
+            assert client.call(n) == n
+        eventually(lambda: len(heard) == 50 and len(ticks) > 2)
+        a.stop_spin()
+        spinner.join(LONG_S)
+
+
+def test_who_spins_already_is_woken_by_a_new_server_and_by_each_call(
+    master: Master, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wait without a wake takes an hour: one that is lost would be a call without an answer."""
+    monkeypatch.setattr("nep.nodes.node.SLICE_S", 3600.0)
+    with nep.node("server") as a, nep.node("client") as b:
+        spinner = threading.Thread(target=a.spin, name="spin")
+        spinner.start()  # before there is a server
+        a.new_server("/x", lambda request: request)
+        client = b.new_client("/x", timeout_s=LONG_S)
+        assert [client.call(n) for n in range(300)] == list(range(300))
+        a.stop_spin()
+        spinner.join(LONG_S)
+        assert not spinner.is_alive()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_fork_leaves_the_child_with_closed_ones_and_the_parent_as_it_was(master: Master) -> None:
+    with nep.node("server") as a, nep.node("client") as b:
+        server = a.new_server("/x", lambda request: request, threads=1)
+        client = b.new_client("/x", timeout_s=LONG_S)
+        assert client.call(1) == 1
+        child = os.fork()
+        if child == 0:
+            code = 1
+            try:
+                client.call(2)
+            except nep.ClosedError:
+                code = 0 if server.is_closed and client.is_closed else 2
+            finally:
+                server.close()
+                client.close()
+                os._exit(code)
+        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+        assert client.call(3) == 3
+
+
+def test_the_configuration_may_be_another_master(master: Master) -> None:
+    with Master("127.0.0.1:0", learn_s=0.0) as other, nep.node("a") as a, nep.node("b") as b:
+        there = Hybrid(other.address)
+        a.new_server("/x", lambda request: "there", there, threads=1)
+        assert b.new_client("/x", there, timeout_s=LONG_S).call({}) == "there"
+        assert "/x" not in b.graph().services

@@ -1,0 +1,465 @@
+"""Calls and answers: the same tests over every back end that has services."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
+from itertools import count
+
+import pytest
+
+import nep
+from nep.masters.master import Master
+from tests.nep.programs import eventually
+
+_names = count()
+LONG_S = 30.0
+Make = Callable[[str], nep.Node]
+
+
+@pytest.fixture(params=["zeromq"])
+def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
+    """Makes nodes that can meet; closes them."""
+    made: list[nep.Node] = []
+    where = f"services-{next(_names)}" if request.param == "memory" else master.address
+
+    def new(name: str) -> nep.Node:
+        made.append(nep.node(name, request.param, master=where))
+        return made[-1]
+
+    yield new
+    for node in made:
+        node.close()
+
+
+@pytest.fixture
+def spin() -> Iterator[Callable[[nep.Node], None]]:
+    """Spins a node in a thread."""
+    threads: list[tuple[nep.Node, threading.Thread]] = []
+
+    def start(node: nep.Node) -> None:
+        thread = threading.Thread(target=lambda: node.spin(LONG_S), name=f"spin-{node.name}")
+        thread.start()
+        threads.append((node, thread))
+
+    yield start
+    for node, thread in threads:
+        node.stop_spin()
+        thread.join(LONG_S)
+
+
+def doubled(request):
+    return {"n": 2 * request["n"]}
+
+
+def test_a_call_is_answered_in_the_thread_that_spins(make: Make, spin) -> None:
+    seen = []
+
+    def answer(request):
+        seen.append(threading.current_thread().name)
+        return doubled(request)
+
+    server = make("server")
+    server.new_server("/double", answer)
+    spin(server)
+    client = make("client").new_client("/double")
+    assert client.call({"n": 21}, timeout_s=LONG_S) == {"n": 42}
+    assert seen == ["spin-server"]
+
+
+def test_nobody_has_to_spin_for_threads_of_the_server_s_own(make: Make) -> None:
+    together = threading.Barrier(3)
+
+    def answer(request):
+        together.wait(LONG_S)  # all three at once, or never
+        return doubled(request)
+
+    server = make("server").new_server("/double", answer, threads=3)
+    client = make("client").new_client("/double", timeout_s=LONG_S)
+    futures = [client.call_async({"n": n}) for n in range(3)]
+    assert [each.result(LONG_S) for each in futures] == [{"n": 0}, {"n": 2}, {"n": 4}]
+    assert (server.calls, server.errors) == (3, 0)
+
+
+def test_a_callback_without_an_answer_gives_an_empty_map(make: Make) -> None:
+    make("server").new_server("/quiet", lambda request: None, threads=1)
+    assert make("client").new_client("/quiet").call({}, timeout_s=LONG_S) == {}
+
+
+def test_a_call_that_comes_before_its_server_waits_for_it(make: Make) -> None:
+    future = make("client").new_client("/later", timeout_s=LONG_S).call_async({"n": 1})
+    make("server").new_server("/later", doubled, threads=1)
+    assert future.result(LONG_S) == {"n": 2}
+
+
+def test_several_clients_at_once(make: Make) -> None:
+    server = make("server").new_server("/double", doubled, threads=2)
+    clients = [make(f"client{n}").new_client("/double", timeout_s=LONG_S) for n in range(4)]
+    futures = {each.call_async({"n": n}): n for n in range(50) for each in clients}
+    assert not wait(futures, LONG_S).not_done
+    assert all(future.result() == {"n": 2 * n} for future, n in futures.items())
+    assert server.calls == 200
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "reason"),
+    [
+        (ZeroDivisionError("division by zero"), "ZeroDivisionError", "division by zero"),
+        (KeyError(), "KeyError", ""),
+        (RuntimeError("\ud800 grüß \x1b[2J" + "x" * 9000), "RuntimeError", None),
+    ],
+)
+def test_what_the_callback_raises_is_raised_at_the_client(make: Make, error, kind, reason) -> None:
+    def answer(_request):
+        raise error
+
+    server = make("server").new_server("/fails", answer, threads=1)
+    client = make("client").new_client("/fails")
+    with pytest.raises(nep.ServiceError) as raised:
+        client.call({}, timeout_s=LONG_S)
+    assert (raised.value.service, raised.value.kind) == ("/fails", kind)
+    assert reason is None or raised.value.reason == reason
+    assert "\x1b" not in str(raised.value)
+    assert "Traceback" not in str(raised.value)
+    assert (server.calls, server.errors) == (1, 1)
+
+
+def test_an_answer_that_cannot_be_sent_is_an_error_of_the_server(make: Make) -> None:
+    make("server").new_server("/odd", lambda request: {"set": {1, 2}}, threads=1)
+    with pytest.raises(nep.ServiceError) as raised:
+        make("client").new_client("/odd").call({}, timeout_s=LONG_S)
+    assert raised.value.kind == "EncodeError"
+
+
+def test_a_request_that_cannot_be_sent_is_refused_at_the_call(make: Make) -> None:
+    client = make("client").new_client("/odd")
+    with pytest.raises(nep.EncodeError):
+        client.call({"set": {1, 2}})
+    with pytest.raises(nep.EncodeError):
+        client.call_async({"set": {1, 2}})
+
+
+@pytest.mark.parametrize("value", [{}, {"n": 0}, [1, None], "grüß", -1, 2**64 - 1, {"x": "y" * 8_000_000}])
+def test_every_value_comes_back_as_it_was(make: Make, value: object) -> None:
+    make("server").new_server("/echo", lambda request: request, threads=1)
+    assert make("client").new_client("/echo").call(value, timeout_s=LONG_S) == value
+
+
+def test_msgpack_carries_bytes_and_nan(make: Make) -> None:
+    make("server").new_server("/echo", lambda request: request, threads=1)
+    client = make("client").new_client("/echo", msg_type="msgpack")
+    answer = client.call({"data": b"\0\xff", "nan": math.nan}, timeout_s=LONG_S)
+    assert answer["data"] == b"\0\xff"
+    assert math.isnan(answer["nan"])
+
+
+def test_a_call_is_awaited_while_the_loop_goes_on(make: Make) -> None:
+    go_on = threading.Event()
+
+    def answer(request):
+        assert go_on.wait(LONG_S)
+        return doubled(request)
+
+    make("server").new_server("/double", answer, threads=1)
+    client = make("client").new_client("/double", timeout_s=LONG_S)
+
+    async def program():
+        async def other():
+            go_on.set()
+
+        answered, _ = await asyncio.gather(client.acall({"n": 3}), other())
+        return answered
+
+    assert asyncio.run(program()) == {"n": 6}
+
+
+def test_an_awaited_call_that_is_cancelled_is_forgotten(make: Make) -> None:
+    go_on = threading.Event()
+    server = make("server").new_server("/slow", lambda request: go_on.wait(LONG_S) and {}, threads=1)
+    client = make("client").new_client("/slow", timeout_s=LONG_S)
+
+    async def program():
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(client.acall({}), 0.05)
+
+    asyncio.run(program())
+    go_on.set()
+    eventually(lambda: server.calls == 1 and client.late == 1)
+
+
+def test_a_future_can_be_cancelled(make: Make) -> None:
+    client = make("client").new_client("/nobody", timeout_s=None)
+    future = client.call_async({})
+    assert future.cancel()
+    assert future.cancelled()
+
+
+def test_what_is_attached_to_a_future_holds_up_no_other_call(make: Make) -> None:
+    make("server").new_server("/echo", lambda request: request, threads=1)
+    client, other = (make(name).new_client("/echo", timeout_s=LONG_S) for name in ("a", "b"))
+    go_on = threading.Event()
+    future: Future[object] = client.call_async(1)
+    future.add_done_callback(lambda _ended: go_on.wait(LONG_S))
+    assert other.call(2) == 2
+    assert client.call(3) == 3
+    go_on.set()
+    assert future.result(LONG_S) == 1
+
+
+def test_nobody_serves_it_says_so_and_names_what_is_near(make: Make) -> None:
+    make("server").new_server("/arm/move", doubled, threads=1)
+    client = make("client").new_client("/arm/mov")
+    with pytest.raises(
+        nep.NoServerError, match=r"no server for '/arm/mov' within 0\.1 s; did you mean '/arm/m"
+    ):
+        client.call({}, timeout_s=0.1)
+    with pytest.raises(nep.NoServerError, match="no server for"):
+        asyncio.run(client.acall({}, timeout_s=0.1))
+    with pytest.raises(nep.WaitTimeoutError, match="'nep service list' shows all services"):
+        client.call_async({}, timeout_s=0).result(LONG_S)
+
+
+def test_a_server_that_takes_too_long_is_another_error_and_its_answer_is_dropped(make: Make) -> None:
+    go_on = threading.Event()
+    server = make("server").new_server("/slow", lambda request: go_on.wait(LONG_S) and {}, threads=1)
+    client = make("client").new_client("/slow")
+    eventually(lambda: client.is_connected)
+    with pytest.raises(nep.ServiceTimeoutError, match=r"an answer of '/slow' did not come within 0\.2 s"):
+        client.call({}, timeout_s=0.2)
+    go_on.set()
+    eventually(lambda: client.late == 1)
+    assert client.call({}, timeout_s=LONG_S) == {}
+    assert server.calls == 2
+
+
+def test_calls_that_nobody_waits_for_any_more_are_not_carried_out(make: Make, spin) -> None:
+    seen = []
+    node = make("server")
+    server = node.new_server("/tired", seen.append)
+    client = make("client").new_client("/tired")
+    eventually(lambda: client.is_connected)
+    with pytest.raises(nep.ServiceTimeoutError):
+        client.call("late", timeout_s=0.05)
+    eventually(lambda: node._services.queues[0]._calls[0].is_late)  # its time began when it arrived
+    spin(node)
+    assert client.call("in time", timeout_s=LONG_S) == {}
+    assert seen == ["in time"]
+    assert (server.calls, server.refused) == (1, 1)
+
+
+def test_a_server_that_closes_refuses_what_waits(make: Make) -> None:
+    node = make("server")
+    server = node.new_server("/closes", doubled)  # nobody spins
+    client = make("client").new_client("/closes", timeout_s=LONG_S)
+    eventually(lambda: client.is_connected)
+    future = client.call_async({})
+    assert node._services.queues[0].take(LONG_S) is not None  # it is carried out when the server ends
+    waiting = client.call_async({})
+    eventually(lambda: len(node._services.queues[0]._calls) == 1)
+    server.close()
+    with pytest.raises(nep.RequestRefusedError, match="'/closes' closes"):
+        waiting.result(LONG_S)
+    with pytest.raises(nep.ServerGoneError):
+        future.result(LONG_S)
+
+
+def test_a_node_that_closes_answers_what_its_servers_carry_out(make: Make) -> None:
+    is_asked = threading.Event()
+    node = make("server")
+
+    def answer(_request):
+        is_asked.set()
+        eventually(lambda: node._services._servers[0]._transport.calls.is_closed)
+        return "answered"
+
+    node.new_server("/x", answer, threads=1)
+    future = make("client").new_client("/x", timeout_s=LONG_S).call_async({})
+    assert is_asked.wait(LONG_S)
+    node.close()
+    assert future.result(LONG_S) == "answered"
+
+
+def test_a_client_that_closes_ends_its_calls(make: Make) -> None:
+    client = make("client").new_client("/nobody", timeout_s=None)
+    errors: list[BaseException] = []
+
+    def call() -> None:
+        try:
+            client.call({})
+        except nep.NepError as error:
+            errors.append(error)
+
+    caller = threading.Thread(target=call, name="caller")
+    caller.start()
+    future = client.call_async({})
+    eventually(lambda: len(client._transport._calls) == 2)
+    client.close()
+    client.close()
+    caller.join(LONG_S)
+    assert isinstance(errors[0], nep.ClosedError)
+    with pytest.raises(nep.ClosedError):
+        future.result(LONG_S)
+    with pytest.raises(nep.ClosedError, match="client of '/nobody' is closed"):
+        client.call({})
+
+
+def test_a_node_that_closes_ends_its_servers_and_clients(make: Make) -> None:
+    a, b = make("a"), make("b")
+    server = a.new_server("/x", doubled, threads=2)
+    client = b.new_client("/x", timeout_s=None)
+    assert client.call({"n": 1}) == {"n": 2}
+    future = b.new_client("/nobody", timeout_s=None).call_async({})
+    b.close()
+    a.close()
+    assert server.is_closed
+    assert client.is_closed
+    with pytest.raises(nep.ClosedError):
+        future.result(LONG_S)
+    with pytest.raises(nep.ClosedError):
+        b.new_client("/x")
+    with pytest.raises(nep.ClosedError):
+        a.new_server("/x")
+
+
+def test_a_callback_may_close_its_server_and_call_others(make: Make) -> None:
+    node = make("server")
+    inner = make("inner").new_client("/double", timeout_s=LONG_S)
+    make("other").new_server("/double", doubled, threads=1)
+    box = []
+
+    def answer(request):
+        answered = inner.call(request)
+        threading.Thread(target=box[0].close, name="closer").start()
+        return answered
+
+    box.append(node.new_server("/outer", answer, threads=1))
+    assert make("client").new_client("/outer").call({"n": 4}, timeout_s=LONG_S) == {"n": 8}
+    eventually(lambda: box[0].is_closed)
+
+
+def test_listen_and_send_as_the_original_has_it(make: Make) -> None:
+    server = make("server").new_server("/x")
+    client = make("client").new_client("/x", timeout_s=LONG_S)
+    assert server.listen_info(timeout_s=0) is None
+    with pytest.raises(nep.NepError, match="no request to answer"):
+        server.send_info({})
+    with pytest.raises(nep.NepError, match="nothing was sent"):
+        client.listen_info()
+    client.send_info({"a": 1})
+    with pytest.raises(nep.NepError, match="take the last answer first"):
+        client.send_info({"a": 2})
+    assert server.listen_info() == {"a": 1}
+    with pytest.raises(nep.NepError, match="answer the last request first"):
+        server.listen_info()
+    with pytest.raises(nep.EncodeError):
+        server.send_info({1, 2})
+    server.send_info({"b": 2})
+    assert client.listen_info() == {"b": 2}
+
+
+def test_a_second_server_is_an_alert_and_takes_over(make: Make) -> None:
+    first = make("first").new_server("/x", lambda request: "first", threads=1)
+    client = make("client").new_client("/x", timeout_s=LONG_S)
+    assert client.call({}) == "first"
+    second = make("second").new_server("/x", lambda request: "second", threads=1)
+    viewer = make("viewer")
+    alerts = {each.id: each for each in viewer.graph().alerts}
+    assert "has 2 servers: “first”, “second”" in alerts["service:/x"].sentence
+    assert client.call({}) == "first"
+    first.close()
+
+    def is_second() -> bool:
+        try:
+            return client.call({}) == "second"
+        except (nep.ServerGoneError, nep.RequestRefusedError):  # the first one was asked once more
+            return False
+
+    eventually(is_second)
+    assert "service:/x" not in {each.id for each in viewer.graph().alerts}
+    assert second.calls >= 1
+
+
+def test_the_graph_tells_of_services_and_not_of_topics(make: Make) -> None:
+    a, b = make("a"), make("b")
+    server = a.new_server("/x", lambda request: 1 / 0 if request == "bad" else request, threads=1)
+    client = b.new_client("/x", timeout_s=LONG_S)
+    assert client.call(1) == 1
+    with pytest.raises(nep.ServiceError):
+        client.call("bad")
+
+    def seen() -> bool:
+        info = b.graph().services["/x"]
+        return (info.calls, info.errors, info.clients[0].answered) == (2, 1, 2)
+
+    eventually(seen)
+    graph = b.graph()
+    assert not graph.topics
+    info = graph.services["/x"]
+    assert [each.node_id for each in info.servers] == [a.id]
+    assert [each.node_id for each in info.clients] == [b.id]
+    assert info.servers[0].endpoints
+    server.close()
+    client.close()
+    eventually(lambda: not b.graph().services)
+
+
+@pytest.mark.parametrize("name", ["", "a b", "x{", "\x07", "x" * 189, "nep.service:/x", 7, None])
+def test_a_name_that_cannot_be_one_is_refused(make: Make, name) -> None:
+    node = make("node")
+    with pytest.raises(nep.BadTopicError):
+        node.new_server(name, doubled)
+    with pytest.raises(nep.BadTopicError):
+        node.new_client(name)
+
+
+def test_the_longest_name_is_served(make: Make) -> None:
+    name = "x" * 188
+    make("server").new_server(name, doubled, threads=1)
+    assert make("client").new_client(name).call({"n": 1}, timeout_s=LONG_S) == {"n": 2}
+
+
+def test_nobody_publishes_where_services_are_listed(make: Make) -> None:
+    with pytest.raises(nep.BadTopicError, match="are services"):
+        make("node").new_pub("nep.service:/x")
+    with pytest.raises(nep.BadTopicError, match="are services"):
+        make("node").new_sub("nep.service:/x")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"timeout_s": -1},
+        {"timeout_s": math.nan},
+        {"timeout_s": "soon"},
+        {"msg_type": ""},
+        {"msg_type": "image"},
+        {"configuration": "here"},
+    ],
+)
+def test_what_no_client_can_have_is_refused(make: Make, wrong) -> None:
+    with pytest.raises((ValueError, nep.NepError)):
+        make("node").new_client("/x", **wrong)
+
+
+def test_what_no_server_can_have_is_refused(make: Make) -> None:
+    node = make("node")
+    for wrong in ({"threads": -1}, {"threads": 1.5}, {"threads": True}):
+        with pytest.raises(ValueError, match="threads"):
+            node.new_server("/x", doubled, **wrong)
+    with pytest.raises(ValueError, match="threads need a callback"):
+        node.new_server("/x", threads=1)
+    with pytest.raises(ValueError, match="callback"):
+        node.new_server("/x", "no function")
+    with pytest.raises(ValueError, match="timeout_s"):
+        node.new_client("/x").call({}, timeout_s=-0.1)
+
+
+def test_calls_beyond_the_bound_are_refused_at_the_call(make: Make) -> None:
+    client = make("client").new_client("/nobody", timeout_s=None)
+    for _ in range(1000):
+        client.call_async({})
+    with pytest.raises(nep.NepError, match="1000 calls of '/nobody' are under way"):
+        client.call_async({})

@@ -1,0 +1,19 @@
+"""docs/services.md: its example runs and prints what it says."""
+
+from __future__ import annotations
+
+import re
+
+from nep.masters.master import Master
+from tests.nep.programs import ROOT, running
+
+_PROGRAM = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def test_the_example_prints_what_is_said(master: Master) -> None:
+    guide = (ROOT / "docs" / "services.md").read_text(encoding="utf-8")
+    (program,) = _PROGRAM.findall(guide)
+    with running(program, NEP_MASTER=master.address) as example:
+        said, _errors = example.end()
+    assert f"It prints `{said.strip()}`" in guide
+    assert said.strip() == "{'sum': 5}"
