@@ -1,7 +1,7 @@
-"""DealerClient: a client's socket. Calls out, answers in; it notices when its server ends.
+"""DealerClient: a client's end. Calls out, answers in; it notices when its server ends.
 
-The socket is connected to one server at a time, and libzmq never connects it again by itself: so the
-moment at which a connection ends is known, and the calls that were sent over it are known to be lost.
+It is connected to one server at a time. When a connection has ended and its last answer was read, the calls
+that were sent over it are known to be lost.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 
 import zmq
 
 from nep.backends.services import CALLS_MAX, CALLS_MAX_BYTES, ClientSpec, OpenCall, Outcome
 from nep.backends.zeromq.io_thread import Rest
+from nep.backends.zeromq.service_connection import ServerConnection
 from nep.backends.zeromq.service_server import too_large
-from nep.backends.zeromq.sockets import Refusals, Socket, keep_alive
+from nep.backends.zeromq.sockets import Refusals
 from nep.errors import (
     ClosedError,
     NepError,
@@ -41,7 +41,6 @@ _READ_MAX = 100
 _FIRST_TRY_S, _LAST_TRY_S = 0.1, 2.0
 _WAITED_TRY_S = 0.8
 """While somebody waits for a server it is tried at least so often."""
-_LARGE_BYTES = 65_536
 _HAND_OVER_S = 2.0
 """So long new calls wait for the last answers of a server that has closed, before they go to another one."""
 
@@ -66,14 +65,14 @@ class _Call:
 
 
 class DealerClient:
-    """`socket` is a DEALER; `soon` asks the node's thread to look at it again, `closer` ends it.
+    """`connect_to` makes connections; `soon` asks the node's thread to look at it again, `closer` ends it.
 
     `known_services` asks the master; `endpoint` is a server's that no master tells of.
     """
 
     def __init__(
         self,
-        socket: Socket,
+        connect_to: Callable[[str, Callable[[float], Rest]], ServerConnection],
         spec: ClientSpec,
         framing: Framing,
         soon: Callable[[DealerClient], None],
@@ -83,7 +82,8 @@ class DealerClient:
         endpoint: str = "",
     ) -> None:
         self.spec = spec
-        self._socket = socket
+        self._connect_to = connect_to
+        self._connection: ServerConnection | None = None
         self._framing = framing
         self._soon = soon
         self._closer = closer
@@ -97,8 +97,6 @@ class DealerClient:
         self._bytes = self._unanswered_bytes = 0
         self._servers: dict[int, str] = {0: endpoint} if endpoint else {}
         self._current: int | None = None
-        self._endpoint = ""
-        self._is_connected = False
         self._leave_at = math.inf
         """When the connection to a server that is not listed any more is given up, if new calls wait."""
         self._tries = 0
@@ -106,21 +104,19 @@ class DealerClient:
         self._refusals = Refusals()
         self._is_closed = False
         self._answered = self._failed = self._late = 0
-        socket.setsockopt(zmq.IMMEDIATE, 1)  # nothing is queued for a server that is not there
-        socket.setsockopt(zmq.RECONNECT_IVL, -1)
-        socket.setsockopt(
-            zmq.SNDHWM, 0
-        )  # bounded by `CALLS_MAX`; so it can be written whenever it is connected
-        socket.setsockopt(zmq.MAXMSGSIZE, PAYLOAD_MAX_BYTES)
-        socket.copy_threshold = _LARGE_BYTES
-        self.fd = int(socket.getsockopt(zmq.FD))
 
     # ---- calling, in any thread
 
     @property
     def is_connected(self) -> bool:
         """Whether a server was there a moment ago."""
-        return self._is_connected
+        connection = self._connection
+        return connection is not None and connection.is_open
+
+    @property
+    def fd(self) -> int:
+        """It has none: its connections are polled, and it is served when something is due."""
+        return -1
 
     @property
     def late(self) -> int:
@@ -135,7 +131,8 @@ class DealerClient:
     @property
     def endpoint(self) -> str:
         """Where it is connected, or tries to be; "" when it knows no server."""
-        return self._endpoint
+        connection = self._connection
+        return "" if connection is None else connection.endpoint
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> _Call:
         """See `ClientTransport.begin`."""
@@ -151,8 +148,8 @@ class DealerClient:
             self._check_room(call.size)
             self._calls[number] = call
             self._bytes += call.size
-            is_there = self._is_connected and self._current in self._servers
-            if is_there and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLOUT:
+            if self._connection is not None:
+                self._connection.look()
                 self._send(call)
         self._soon(self)  # it has a deadline, and the socket was used
         return call
@@ -190,12 +187,11 @@ class DealerClient:
         return call
 
     def _send(self, call: _Call) -> None:
-        """With the lock held, and connected."""
-        try:
-            self._socket.send(call.parts[0], zmq.DONTWAIT | zmq.SNDMORE)
-            self._socket.send(call.parts[1], zmq.DONTWAIT, copy=call.size < _LARGE_BYTES)
-        except zmq.ZMQError:  # the connection ended just now
+        """With the lock held: to a server that is connected, and has not said that it closes."""
+        connection = self._connection
+        if connection is None or not connection.is_open or self._current not in self._servers:
             return
+        connection.send(call.parts)
         call.is_sent = True
         self._unanswered[call.number] = call.size
         self._unanswered_bytes += call.size
@@ -214,7 +210,7 @@ class DealerClient:
     def gone(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - counts messages
         """A server is not listed any more. Unless it said so itself, it may only be suspended."""
         with self._lock:
-            if is_closed or server != self._current or not self._is_connected or len(self._servers) > 1:
+            if is_closed or server != self._current or not self.is_connected or len(self._servers) > 1:
                 self._servers.pop(server, None)
         self._soon(self)
 
@@ -225,7 +221,7 @@ class DealerClient:
         }
         with self._lock:
             current = self._current
-            if not listed and current in self._servers and self._is_connected:
+            if not listed and current in self._servers and self.is_connected:
                 listed = {current: self._servers[current]}
             self._servers = listed
             self._try_at = 0.0
@@ -242,27 +238,42 @@ class DealerClient:
     # ---- in the node's thread: the socket
 
     def serve(self, now: float) -> Rest:
-        """Read answers, notice a server's end, send what waits, end what waited too long."""
+        """See `Served`."""
+        return Rest(is_quiet=True, due=self._serve(now))
+
+    def _serve_connection(self, now: float) -> Rest:
+        return Rest(due=self._serve(now))
+
+    def _serve(self, now: float) -> float | None:
+        """Read answers, notice a server's end, send what waits, end what waited too long.
+
+        When to do so again.
+        """
         ended: _Ended = []
         with self._lock:
             if self._is_closed:
-                return Rest()
-            has_more = self._read(ended) or self._look_at_connection(now, ended)
-            if self._is_connected and self._current in self._servers:
-                for call in [each for each in self._calls.values() if not each.is_sent]:
-                    self._send(call)
+                return None
+            if self._connection is not None:
+                self._connection.look()
+            has_more = self._read(ended)
+            if not has_more:  # what came before its end counts
+                self._look_at_connection(now, ended)
+            for call in [each for each in self._calls.values() if not each.is_sent]:
+                self._send(call)
             self._expire(now, ended)
             due = self._due()
             # Sending may have taken in what came meanwhile, and its descriptor tells of that only once.
-            has_more = has_more or bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
+            has_more = has_more or (self._connection is not None and self._connection.has_input)
         self._tell(ended)
-        return Rest(due=now if has_more else due if due < math.inf else None)
+        return now if has_more else due if due < math.inf else None
 
     def _read(self, ended: _Ended) -> bool:
         """Whether there is more."""
+        if self._connection is None:
+            return False
         for _turn in range(_READ_MAX):
             try:
-                parts = self._socket.recv_multipart(zmq.DONTWAIT)
+                parts = self._connection.receive()
             except zmq.Again:
                 return False
             number: int | None = None
@@ -286,24 +297,20 @@ class DealerClient:
             ended.append((call.then, outcome))
         return True
 
-    def _look_at_connection(self, now: float, ended: _Ended) -> bool:
-        """Whether there is more to read first."""
-        is_there = bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLOUT)
-        if self._is_connected and not is_there:
-            if self._read(ended):  # what came before the end counts
-                return True
+    def _look_at_connection(self, now: float, ended: _Ended) -> None:
+        """All that came was read."""
+        connection = self._connection
+        if connection is not None and connection.is_over:
             self._lose(ended)
             self._tries, self._try_at = 0, 0.0
-        if self._is_connected and self._current not in self._servers:
-            self._hand_over(now, ended)
-        else:
-            self._leave_at = math.inf
-        if is_there and self._endpoint and not self._is_connected:
-            self._is_connected = True
+        elif connection is not None and connection.is_open:
             self._tries = 0
-        if not self._is_connected and now >= self._try_at:
+            if self._current not in self._servers:
+                self._hand_over(now, ended)
+            else:
+                self._leave_at = math.inf
+        if not self.is_connected and now >= self._try_at:
             self._try(now)
-        return False
 
     def _hand_over(self, now: float, ended: _Ended) -> None:
         """The server has closed, or was replaced: take its last answers, then go to another one."""
@@ -316,7 +323,7 @@ class DealerClient:
 
     def _lose(self, ended: _Ended) -> None:
         """The connection has ended, and with it the calls that were sent."""
-        self._is_connected = False
+        self._disconnect()
         self._leave_at = math.inf
         self._unanswered.clear()
         self._unanswered_bytes = 0
@@ -327,7 +334,6 @@ class DealerClient:
 
     def _leave(self, ended: _Ended) -> None:
         self._lose(ended)
-        self._disconnect()
         self._current = None
         self._tries, self._try_at = 0, 0.0
 
@@ -343,18 +349,16 @@ class DealerClient:
         endpoint = self._servers[self._current]
         self._tries += 1
         try:
-            keep_alive(self._socket, endpoint)
-            self._socket.connect(endpoint)
-            self._endpoint = endpoint
-        except zmq.ZMQError as error:
-            _logger.debug("a server of '%s' cannot be reached at '%s': %s", self._name, endpoint, error)
+            self._connection = self._connect_to(endpoint, self._serve_connection)
+        except (zmq.ZMQError, NepError) as error:
+            _logger.warning("a server of '%s' cannot be reached at '%s': %s", self._name, endpoint, error)
         self._try_at = now + min(_FIRST_TRY_S * 2 ** min(self._tries, 10), _LAST_TRY_S)
 
     def _disconnect(self) -> None:
-        if self._endpoint:
-            with suppress(zmq.ZMQError):  # libzmq has done so itself when the connection ended
-                self._socket.disconnect(self._endpoint)
-            self._endpoint = ""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            connection.close()
+            self._soon(self)  # what was due with its sockets is not any more
 
     def _expire(self, now: float, ended: _Ended) -> None:
         for call in [each for each in self._calls.values() if each.deadline <= now]:
@@ -365,9 +369,9 @@ class DealerClient:
 
     def _due(self) -> float:
         due = min((each.deadline for each in self._calls.values()), default=math.inf)
-        if self._is_connected and any(not each.is_sent for each in self._calls.values()):
+        if self.is_connected and any(not each.is_sent for each in self._calls.values()):
             due = min(due, self._leave_at)
-        if self._is_connected or not self._servers:
+        if self.is_connected or not self._servers:
             return due
         if self._calls:
             self._try_at = min(self._try_at, time.monotonic() + _WAITED_TRY_S)
@@ -391,13 +395,13 @@ class DealerClient:
         self._closer(self)
 
     def release(self) -> None:
-        """Close the socket; nobody polls it any more."""
+        """End what is under way, and the connection. May be called twice."""
         with self._lock:
+            self._is_closed = True
             left, self._calls = list(self._calls.values()), {}
-            if not self._is_closed:
-                self._is_closed = True
-                self._is_connected = False
-                self._socket.close(0)
+            connection, self._connection = self._connection, None
+        if connection is not None:  # without the lock, for which the thread that polls it may wait
+            connection.close()
         what = _("client of '{service}'").format(service=self._name)
         self._tell([(each.then, ClosedError(what)) for each in left])
 

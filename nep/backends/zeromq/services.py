@@ -12,9 +12,10 @@ import zmq
 
 from nep.backends.connection import Direct
 from nep.backends.services import ClientSpec, ServerSpec
-from nep.backends.zeromq.io_thread import SharedContext
+from nep.backends.zeromq.io_thread import Rest, SharedContext
 from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.service_client import DealerClient
+from nep.backends.zeromq.service_connection import CONNECTION_FILES, ServerConnection
 from nep.backends.zeromq.service_server import RouterServer
 from nep.backends.zeromq.sockets import bind
 from nep.errors import ClosedError, NepError
@@ -22,6 +23,7 @@ from nep.i18n import _
 from nep.protocol.requests import PublisherRecord, SubscriberRecord
 from nep.protocol.service_wire import NATIVE, ORIGINAL, Framing, topic_of
 from nep.system.addresses import endpoint_of, in_numbers, is_endpoint
+from nep.system.descriptors import check_room
 from nep.system.forks import give_up
 
 if TYPE_CHECKING:
@@ -146,9 +148,18 @@ class ZeromqServices:
             self._shared.io.remove(client)
             client.release()
 
-        socket = self._shared.socket(zmq.DEALER, f"a client of '{spec.service}'")
+        def connect_to(endpoint: str, serve: Callable[[float], Rest]) -> ServerConnection:
+            return ServerConnection(self._shared, spec.service, endpoint, serve)
+
+        check_room(CONNECTION_FILES, f"a client of '{spec.service}'")
         client = DealerClient(
-            socket, spec, framing, self._shared.io.serve_soon, close, known_services=known, endpoint=endpoint
+            connect_to,
+            spec,
+            framing,
+            self._shared.io.serve_soon,
+            close,
+            known_services=known,
+            endpoint=endpoint,
         )
         with _released(client):
             self._hold(client)

@@ -266,6 +266,44 @@ def test_a_server_that_closes_refuses_what_waits(make: Make) -> None:
         future.result(LONG_S)
 
 
+def test_a_server_that_closes_refuses_each_call_that_waits(make: Make) -> None:
+    """None of them was carried out, and their clients are told so: not that nobody knows."""
+    node = make("server")
+    server = node.new_server("/closes", doubled)  # nobody spins
+    clients = [make(f"client {n}").new_client("/closes", timeout_s=LONG_S) for n in range(4)]
+    futures = [client.call_async({"text": "x" * 10_000}) for client in clients for _ in range(100)]
+    eventually(lambda: len(node._services.queues[0]._calls) == 400)
+    server.close()
+    assert server.refused == 400
+    for future in futures:
+        with pytest.raises(nep.RequestRefusedError, match="'/closes' closes"):
+            future.result(LONG_S)
+
+
+def test_a_server_that_closes_answers_what_it_carries_out(make: Make) -> None:
+    is_asked, go_on = threading.Event(), threading.Event()
+
+    def answer(request):
+        is_asked.set()
+        assert go_on.wait(LONG_S)
+        return request
+
+    first = make("first").new_server("/x", answer, threads=1)
+    client = make("client").new_client("/x", timeout_s=LONG_S)
+    future = client.call_async("first")
+    assert is_asked.wait(LONG_S)
+    make("second").new_server("/x", lambda _request: "second", threads=1)
+    closer = threading.Thread(target=lambda: first.close(LONG_S), name="closer")
+    closer.start()
+    viewer = make("viewer")
+    eventually(lambda: len(viewer.graph().services["/x"].servers) == 1)
+    go_on.set()
+    assert future.result(LONG_S) == "first"
+    assert client.call("next") == "second"
+    closer.join(LONG_S)
+    assert (first.calls, first.errors, first.refused) == (1, 0, 0)
+
+
 def test_a_node_that_closes_answers_what_its_servers_carry_out(make: Make) -> None:
     is_asked = threading.Event()
     node = make("server")
