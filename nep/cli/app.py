@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from typer.models import CommandInfo
 
-from nep.cli import doctor, log, masters, nodes, topics
+from nep.cli import doctor, log, masters, nodes, services, topics
 from nep.cli.screen import say_error, write
 from nep.cli.typer_words import TranslatedCommand, TranslatedGroup
 from nep.errors import NepError
@@ -40,6 +40,7 @@ app.command("log")(log.log)
 app.command("doctor")(doctor.doctor)
 app.add_typer(nodes.app, name="node")
 app.add_typer(topics.app, name="topic")
+app.add_typer(services.app, name="service")
 
 
 @app.callback()

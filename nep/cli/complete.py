@@ -1,4 +1,4 @@
-"""What the shell offers when Tab is pressed: the topics, types, nodes and fields that are there now.
+"""What the shell offers when Tab is pressed: topics, services, types, nodes and fields that are there now.
 
 Asked of the running master, within a fraction of a second; silent when there is none. Nothing here may
 print or raise: it would land in the line that a person is typing.
@@ -31,6 +31,12 @@ def complete_topic(ctx: typer.Context, incomplete: str) -> list[str]:
     given = _given(ctx)
     names = sorted(view.topics) if view is not None else []
     return [name for name in names if name.startswith(incomplete) and name not in given]
+
+
+def complete_service(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Services that begin so."""
+    view = _view(ctx)
+    return sorted(each for each in view.services if each.startswith(incomplete)) if view is not None else []
 
 
 def complete_type(ctx: typer.Context, incomplete: str) -> list[str]:

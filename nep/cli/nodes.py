@@ -26,6 +26,11 @@ _COLUMNS = (
     TextColumn(lazy("publishes"), style="green"),
     TextColumn(lazy("subscribes"), style="cyan"),
 )
+_SERVICE_COLUMNS = (
+    TextColumn(lazy("serves"), style="green"),
+    TextColumn(lazy("calls"), style="cyan"),
+)
+"""When there are services."""
 _WIRES = {
     "native": lazy("native"),
     "A": "NEP ≤ 0.5.4.5",
@@ -37,13 +42,18 @@ _WIRES = {
 
 @app.command("list")
 def list_nodes(master: MasterOption = None, as_json: JsonOption = False) -> None:
-    """List all nodes, with what they publish and subscribe."""
+    """List all nodes, with what they publish, subscribe, serve and call."""
     graph = view(master)
     nodes = sorted(graph.nodes.values(), key=lambda node: (node.generation != "native", node.name, node.id))
     if as_json:
-        show_json([{**asdict(node), **_topics_of(graph, node)} for node in nodes])
+        show_json(
+            [{**asdict(node), **_topics_of(graph, node), **_services_of(graph, node)} for node in nodes]
+        )
         return
-    if nodes:
+    if nodes and graph.services:
+        rows = [(*_row(graph, node), *_service_cells(graph, node)) for node in nodes]
+        show_table((*_COLUMNS, *_SERVICE_COLUMNS), rows)
+    elif nodes:
         show_table(_COLUMNS, [_row(graph, node) for node in nodes])
     else:
         say(_("no nodes yet; they appear as soon as a program makes one"))
@@ -71,4 +81,17 @@ def _topics_of(graph: GraphView, node: NodeInfo) -> dict[str, list[str]]:
         "subscribes": [
             each.name for each in topics if any(one.node_id == node.id for one in each.subscribers)
         ],
+    }
+
+
+def _service_cells(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
+    services = _services_of(graph, node)
+    return tuple("\n".join(map(escaped, services[role])) or UNKNOWN for role in ("serves", "calls"))
+
+
+def _services_of(graph: GraphView, node: NodeInfo) -> dict[str, list[str]]:
+    services = graph.services.values()
+    return {
+        "serves": [each.name for each in services if any(one.node_id == node.id for one in each.servers)],
+        "calls": [each.name for each in services if any(one.node_id == node.id for one in each.clients)],
     }

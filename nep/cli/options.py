@@ -22,7 +22,8 @@ MasterOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help=_("Write JSON, for programs."))]
 
 
-def _time(given: float | None) -> float | None:
+def checked_time(given: float | None) -> float | None:
+    """`given` itself when it is a time: 0 or more seconds. Raises `typer.BadParameter`."""
     if given is not None and not given >= 0.0:  # also what is not a number
         raise typer.BadParameter(_("{given:g} is no time; give seconds, 0 or more").format(given=given))
     return given
@@ -35,6 +36,6 @@ TimeoutOption = Annotated[
         metavar=_("SECONDS"),
         help=_("End when no message came for so long."),
         show_default=False,
-        callback=_time,
+        callback=checked_time,
     ),
 ]

@@ -135,7 +135,7 @@ def encoded_of(text: str, msg_type: str) -> Encoded:
 def value_of(text: str, msg_type: str) -> object:
     """The payload that `text` stands for. Raises `NepError` with a sentence."""
     if text.startswith("@"):
-        data = _read(Path(text[1:]), msg_type)
+        data = read_file(Path(text[1:]), msg_type)
         if msg_type in _BYTE_TYPES:
             return data
         try:
@@ -160,7 +160,8 @@ def value_of(text: str, msg_type: str) -> object:
         raise NepError(said.format(shown=shown, quoted=f'"{text[:20]}"')) from error
 
 
-def _read(file: Path, msg_type: str) -> bytes:
+def read_file(file: Path, msg_type: str) -> bytes:
+    """What is in it, up to what a message may have. Raises `EncodeError`."""
     try:
         with file.open("rb") as opened:  # it may be a pipe, or a device that has no end
             data = opened.read(_MOST_BYTES + 1)
