@@ -11,8 +11,9 @@ from typing import Protocol
 
 from nep.backends.connection import Configuration
 from nep.errors import NepError
+from nep.i18n import _
 from nep.messages.codecs import Codec
-from nep.protocol.service_wire import CallKind, Reply
+from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, CallKind, Reply, failure
 
 __all__ = [
     "CALLS_MAX",
@@ -27,6 +28,10 @@ __all__ = [
     "ServerTransport",
     "ServiceTransport",
     "Tally",
+    "check_calls",
+    "fitting",
+    "refusal",
+    "too_large",
 ]
 
 CALLS_MAX = 1000
@@ -246,3 +251,35 @@ class ServiceTransport(Protocol):
 
     def client(self, spec: ClientSpec) -> ClientTransport:
         """A new client. Raises as `Transport.subscriber` does."""
+
+
+def check_calls(service: str, count: int, used: int, size: int) -> None:
+    """Whether a client that has so many calls and bytes under way may send one more. Raises `NepError`."""
+    if size > PAYLOAD_MAX_BYTES:
+        raise NepError(_("the call cannot be sent: {reason}").format(reason=too_large(size)))
+    if count >= CALLS_MAX or (used and used + size > CALLS_MAX_BYTES):
+        raise NepError(
+            _("{count} calls of '{service}' are under way; wait for their answers first").format(
+                count=count, service=service
+            )
+        )
+
+
+def fitting(reply: Reply) -> Reply:
+    """`reply` itself when it can travel, else the error that says why not."""
+    if len(reply.data) <= PAYLOAD_MAX_BYTES:
+        return reply
+    return failure(CallKind.ERROR, "EncodeError", too_large(len(reply.data)))
+
+
+def refusal(service: str, *, is_closed: bool) -> Reply:
+    """Why a server does not take a call."""
+    reason = _("'{service}' closes") if is_closed else _("'{service}' has too many calls that wait")
+    return failure(CallKind.REFUSED, "", reason.format(service=service))
+
+
+def too_large(size: int) -> str:
+    """Why so many bytes cannot travel at once."""
+    return _("it has {size} bytes, {most} are allowed; send large data as messages").format(
+        size=size, most=PAYLOAD_MAX_BYTES
+    )

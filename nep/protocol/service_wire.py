@@ -27,6 +27,7 @@ __all__ = [
     "ORIGINAL",
     "PAYLOAD_MAX_BYTES",
     "PREFIX",
+    "SERVICE_TYPE",
     "CallHeader",
     "CallKind",
     "Framing",
@@ -40,6 +41,8 @@ __all__ = [
 ]
 
 PREFIX = "nep.service:"
+SERVICE_TYPE = "service"
+"""Type and codec under which the master lists servers and clients."""
 PAYLOAD_MAX_BYTES = 64 * 2**20
 """Whoever sends a larger call or answer is disconnected."""
 

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 
 import zmq
 
-from nep.backends.services import CALLS_MAX, CALLS_MAX_BYTES, ClientSpec, OpenCall, Outcome
+from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
 from nep.backends.zeromq.io_thread import Rest
 from nep.backends.zeromq.service_connection import ServerConnection
-from nep.backends.zeromq.service_server import too_large
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import (
     ClosedError,
@@ -31,7 +30,7 @@ from nep.errors import (
 )
 from nep.i18n import _
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
-from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, Framing
+from nep.protocol.service_wire import Framing
 
 __all__ = ["DealerClient"]
 
@@ -136,8 +135,6 @@ class DealerClient:
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> _Call:
         """See `ClientTransport.begin`."""
-        if len(data) > PAYLOAD_MAX_BYTES:
-            raise NepError(_("the call cannot be sent: {reason}").format(reason=too_large(len(data))))
         number = next(self._numbers)
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         parts = self._framing.call(number, self.spec.codec.number, timeout_s, data)
@@ -145,7 +142,8 @@ class DealerClient:
         with self._lock:
             if self._is_closed:
                 raise ClosedError(_("client of '{service}'").format(service=self.spec.service))
-            self._check_room(call.size)
+            count = max(len(self._calls), len(self._unanswered))
+            check_calls(self._name, count, max(self._bytes, self._unanswered_bytes), call.size)
             self._calls[number] = call
             self._bytes += call.size
             if self._connection is not None:
@@ -153,17 +151,6 @@ class DealerClient:
                 self._send(call)
         self._soon(self)  # it has a deadline, and the socket was used
         return call
-
-    def _check_room(self, size: int) -> None:
-        """With the lock held."""
-        count = max(len(self._calls), len(self._unanswered))
-        used = max(self._bytes, self._unanswered_bytes)
-        if count >= CALLS_MAX or (used and used + size > CALLS_MAX_BYTES):
-            raise NepError(
-                _("{count} calls of '{service}' are under way; wait for their answers first").format(
-                    count=count, service=self.spec.service
-                )
-            )
 
     def forget(self, call: OpenCall) -> None:
         """Nobody waits for it any more."""

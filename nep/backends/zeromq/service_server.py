@@ -14,14 +14,13 @@ from collections.abc import Callable, Sequence
 
 import zmq
 
-from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally
+from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
 from nep.backends.zeromq.bindings import Bindings
 from nep.backends.zeromq.io_thread import Rest
 from nep.backends.zeromq.sockets import Refusals, Socket
 from nep.errors import WireError
-from nep.i18n import _
 from nep.protocol.requests import PublisherCount, as_count
-from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, CallKind, Framing, Reply, failure
+from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, Framing, Reply
 
 __all__ = ["RouterServer"]
 
@@ -144,8 +143,7 @@ class RouterServer:
     # ---- answering, in any thread
 
     def _answer(self, route: bytes, number: int, reply: Reply) -> bool:
-        if len(reply.data) > PAYLOAD_MAX_BYTES:
-            reply = failure(CallKind.ERROR, "EncodeError", too_large(len(reply.data)))
+        reply = fitting(reply)
         self.tally.add(reply)
         with self._lock:
             if self._is_closed:
@@ -191,10 +189,7 @@ class RouterServer:
             self._refuse(call)
 
     def _refuse(self, call: IncomingCall) -> None:
-        reason = (
-            _("'{service}' closes") if self.calls.is_closed else _("'{service}' has too many calls that wait")
-        )
-        call.answer(failure(CallKind.REFUSED, "", reason.format(service=self.spec.service)))
+        call.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
     def release(self, deadline: float) -> None:
         """Close the socket; nobody polls it any more. Answers may be on their way until `deadline`."""
@@ -208,10 +203,3 @@ class RouterServer:
         self._is_closed = True
         self._lock = threading.Lock()
         self.calls.forked()
-
-
-def too_large(size: int) -> str:
-    """Why so many bytes cannot travel at once."""
-    return _("it has {size} bytes, {most} are allowed; send large data as messages").format(
-        size=size, most=PAYLOAD_MAX_BYTES
-    )

@@ -21,7 +21,7 @@ from nep.backends.zeromq.sockets import bind
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.requests import PublisherRecord, SubscriberRecord
-from nep.protocol.service_wire import NATIVE, ORIGINAL, Framing, topic_of
+from nep.protocol.service_wire import NATIVE, ORIGINAL, SERVICE_TYPE, Framing, topic_of
 from nep.system.addresses import endpoint_of, in_numbers, is_endpoint
 from nep.system.descriptors import check_room
 from nep.system.forks import give_up
@@ -29,10 +29,7 @@ from nep.system.forks import give_up
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-__all__ = ["SERVICE_TYPE", "ZeromqServices"]
-
-SERVICE_TYPE = "service"
-"""The codec under which the master lists servers."""
+__all__ = ["ZeromqServices"]
 
 
 class ZeromqServices:

@@ -20,7 +20,7 @@ LONG_S = 30.0
 Make = Callable[[str], nep.Node]
 
 
-@pytest.fixture(params=["zeromq"])
+@pytest.fixture(params=["zeromq", "memory"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
     """Makes nodes that can meet; closes them."""
     made: list[nep.Node] = []

@@ -1,6 +1,7 @@
 """The back end `memory`: nodes of one process, without sockets. The template for other back ends.
 
-Nodes that name the same master meet; nothing listens there. A message is put straight into the inboxes.
+Nodes that name the same master meet; nothing listens there. A message is put straight into the inboxes, a
+call into its server's queue.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from collections.abc import Sequence
 
 from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
-from nep.errors import NepError, RequestRefusedError
+from nep.backends.memory.services import MemoryClient, MemoryServer, MemoryServices, ServiceHub
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec
+from nep.errors import NepError
 from nep.i18n import _
-from nep.masters.graph import Graph
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message, arrived, kind_of
 from nep.messages.queue import Inbox
@@ -41,22 +43,14 @@ _BATCH_BYTES = 64 * 2**20
 _BATCH_S = 0.005  # sinks are called 200 times a second at most
 
 
-class _Hub:
+class _Hub(ServiceHub):
     """Where the nodes of one master's name meet. Its lock guards everything of the back end but inboxes."""
 
     def __init__(self) -> None:
-        self.lock = threading.RLock()
-        self.graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
+        super().__init__()
         self.transports: dict[str, MemoryTransport] = {}
         self.publishers: dict[str, list[MemoryPublisher]] = {}
         self.subscribers: dict[str, tuple[MemorySubscriber, ...]] = {}
-
-    def ask(self, request: requests.Request) -> None:
-        """Tell the graph. Raises `RequestRefusedError`."""
-        with self.lock:
-            for each in self.graph.apply(request, 0, time.monotonic(), ""):
-                if isinstance(each.answer, requests.Refused):
-                    raise RequestRefusedError(each.answer.reason)
 
     def forget(self, node_id: str) -> None:
         """A node leaves."""
@@ -245,6 +239,7 @@ class MemoryTransport:
         self._sinks: list[MemorySubscriber] = []
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
+        self._services = MemoryServices(node, self._join)
 
     def publisher(self, spec: PublisherSpec) -> MemoryPublisher:
         """Register a publisher."""
@@ -281,14 +276,36 @@ class MemoryTransport:
         with self.changed:
             self._sinks = [each for each in self._sinks if each is not closed]
 
-    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait for a message in one of `subscribers`, or for `wake`."""
+    def server(self, spec: ServerSpec) -> MemoryServer:
+        """Register a server."""
+        return self._services.server(spec)
+
+    def client(self, spec: ClientSpec) -> MemoryClient:
+        """Register a client."""
+        return self._services.client(spec)
+
+    def wait(
+        self,
+        subscribers: Sequence[SubscriberTransport],
+        timeout_s: float,
+        calls: Sequence[CallQueue] = (),
+    ) -> None:
+        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
         mine = [each for each in subscribers if isinstance(each, MemorySubscriber)]
-        with self.changed:
-            before = self._wakes
-            self.changed.wait_for(
-                lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
-            )
+        before = self._wakes
+        entered: list[CallQueue] = []
+        try:
+            for queue in calls:
+                if not queue.enter_wait(self.wake):
+                    return
+                entered.append(queue)
+            with self.changed:
+                self.changed.wait_for(
+                    lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
+                )
+        finally:
+            for queue in entered:
+                queue.leave_wait(self.wake)
 
     def wake(self) -> None:
         """End all waits."""
@@ -308,19 +325,22 @@ class MemoryTransport:
             self.node.id,
             hub.graph.epoch,
             hub.graph.revision,
-            tuple(
-                PublisherCount(o.spec.id, o.count, o.bytes, o.count, o.last_stamp_ns, o.problem) for o in outs
+            (*(each.counts() for each in outs), *self._services.server_counts(hub)),
+            (
+                *(SubscriberCount(i.spec.id, i.received, i.lost, i.problem) for i in ins),
+                *self._services.client_counts(hub),
             ),
-            tuple(SubscriberCount(i.spec.id, i.received, i.lost, i.problem) for i in ins),
             self._load.ratio(),
         )
 
     def begin_close(self) -> None:
-        """Everything was delivered when it was sent."""
+        """Messages were delivered when they were sent; calls that wait are refused."""
+        self._services.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Unregister all and end the thread."""
+        """Unregister all and end the threads."""
         self._closing.set()
+        self._services.close(timeout_s)
         for subscriber in self._subscribers:
             subscriber.close()
         self._sinks = []

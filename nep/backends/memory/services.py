@@ -1,0 +1,377 @@
+"""Servers and clients of one process: a call is put straight into its server's queue."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from nep.backends.connection import Configuration
+from nep.backends.services import (
+    CallQueue,
+    ClientSpec,
+    IncomingCall,
+    OpenCall,
+    Outcome,
+    ServerSpec,
+    Tally,
+    check_calls,
+    fitting,
+    refusal,
+)
+from nep.errors import ClosedError, NoServerError, RequestRefusedError, ServerGoneError, ServiceTimeoutError
+from nep.i18n import _
+from nep.masters.graph import Graph
+from nep.protocol import requests
+from nep.protocol.requests import (
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
+
+__all__ = ["MemoryClient", "MemoryServer", "MemoryServices", "ServiceHub"]
+
+_logger = logging.getLogger("nep")
+
+Then = Callable[[Outcome], None]
+
+
+class ServiceHub:
+    """Where servers and clients meet. Its lock guards all of them but queues."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
+        self.servers: dict[str, tuple[MemoryServer, ...]] = {}
+        self.clients: dict[str, tuple[MemoryClient, ...]] = {}
+
+    def ask(self, request: requests.Request) -> None:
+        """Tell the graph. Raises `RequestRefusedError`."""
+        with self.lock:
+            for each in self.graph.apply(request, 0, time.monotonic(), ""):
+                if isinstance(each.answer, requests.Refused):
+                    raise RequestRefusedError(each.answer.reason)
+
+
+@dataclass(eq=False)
+class _Call:
+    """A call that is under way; `server` has it, None: it waits for one."""
+
+    number: int
+    client: MemoryClient
+    data: bytes
+    timeout_s: float | None
+    deadline: float
+    then: Then
+    server: MemoryServer | None = None
+
+    def end(self, outcome: Outcome) -> None:
+        """Tell who waits. Without a lock."""
+        try:
+            self.then(outcome)
+        except Exception:  # the others get theirs
+            _logger.exception("the end of a call of '%s' could not be told", self.client.spec.service)
+
+
+class MemoryServer:
+    """A server: its queue."""
+
+    def __init__(self, node_id: str, hub: ServiceHub, spec: ServerSpec) -> None:
+        self._node_id = node_id
+        self.hub = hub
+        self.spec = spec
+        self.calls = CallQueue()
+        self.tally = Tally()
+        self.endpoints = ("memory",)
+        self.is_closed = False
+
+    def put(self, call: _Call) -> None:
+        """Take a call, or refuse it. With the hub's lock held."""
+        call.server = self
+        incoming = IncomingCall(
+            call.data,
+            call.client.spec.codec.number,
+            None if call.deadline == math.inf else call.deadline,
+            lambda reply: self._answer(call, reply),
+        )
+        if not self.calls.put(incoming):
+            incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+
+    def _answer(self, call: _Call, reply: Reply) -> bool:
+        reply = fitting(reply)
+        self.tally.add(reply)
+        with self.hub.lock:
+            is_waited_for = call.client.take(call)
+            call.client.answered += is_waited_for
+            call.client.late += not is_waited_for
+        if is_waited_for:
+            data = reply.data if isinstance(reply.data, bytes) else bytes(reply.data)
+            call.end(reply._replace(data=data))
+        return is_waited_for
+
+    def counts(self) -> PublisherCount:
+        """The statistics for a renewal."""
+        tally = self.tally
+        return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
+
+    def begin_close(self) -> None:
+        """Unregister, and refuse the calls that wait."""
+        with self.hub.lock:
+            left = tuple(each for each in self.hub.servers.get(self.spec.service, ()) if each is not self)
+            is_listed = self in self.hub.servers.get(self.spec.service, ())
+            self.hub.servers[self.spec.service] = left
+            if not left:
+                del self.hub.servers[self.spec.service]
+            if is_listed:
+                self.hub.ask(requests.RemovePublisher(self._node_id, self.spec.id, self.tally.calls))
+        for call in self.calls.close():
+            call.answer(refusal(self.spec.service, is_closed=True))
+
+    def close(self, timeout_s: float) -> None:  # noqa: ARG002 - answers are never on their way here
+        """The same, and end: who waits still is told that it has ended."""
+        self.begin_close()
+        with self.hub.lock:
+            self.is_closed = True
+            left = [
+                call
+                for client in self.hub.clients.get(self.spec.service, ())
+                for call in client.calls
+                if call.server is self and client.take(call)
+            ]
+            for call in left:
+                call.client.failed += 1
+        for call in left:
+            call.end(ServerGoneError(self.spec.service))
+
+    def forked(self) -> None:
+        """In a child. See `ServerTransport.forked`."""
+        self.is_closed = True
+        self.calls.forked()
+
+
+class MemoryClient:
+    """A client: its calls that are under way. Its counts are written under its hub's lock."""
+
+    def __init__(self, node_id: str, hub: ServiceHub, spec: ClientSpec, deadlines: _Deadlines) -> None:
+        self._node_id = node_id
+        self._deadlines = deadlines
+        self.hub = hub
+        self.spec = spec
+        self.answered = self.failed = self.late = 0
+        self.is_closed = False
+        self._calls: dict[int, _Call] = {}
+        self._bytes = 0
+        self._numbers = itertools.count(1)
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether there is a server."""
+        return not self.is_closed and self.spec.service in self.hub.servers
+
+    @property
+    def calls(self) -> list[_Call]:
+        """Those that are under way. With the hub's lock held."""
+        return list(self._calls.values())
+
+    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+        """See `ClientTransport.begin`."""
+        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        copied = data if isinstance(data, bytes) else bytes(data)
+        with self.hub.lock:
+            if self.is_closed:
+                raise self._closed_error()
+            check_calls(self.spec.service, len(self._calls), self._bytes, len(copied))
+            call = _Call(next(self._numbers), self, copied, timeout_s, deadline, then)
+            self._calls[call.number] = call
+            self._bytes += len(copied)
+            servers = self.hub.servers.get(self.spec.service)
+            if servers:
+                servers[0].put(call)
+        self._deadlines.add(deadline)
+        return call
+
+    def take(self, call: _Call) -> bool:
+        """It is not under way any more; whether it was. With the hub's lock held."""
+        if self._calls.pop(call.number, None) is None:
+            return False
+        self._bytes -= len(call.data)
+        return True
+
+    def forget(self, call: OpenCall) -> None:
+        """Nobody waits for it any more."""
+        with self.hub.lock:
+            known = self._calls.get(call.number)
+            if known is not None:
+                self.take(known)
+
+    def served_by(self, server: MemoryServer) -> None:
+        """There is one now: it gets what waits. With the hub's lock held."""
+        for call in self.calls:
+            if call.server is None:
+                server.put(call)
+
+    def expire(self, now: float) -> float:
+        """End what waited too long; when to do so again."""
+        with self.hub.lock:
+            late = [each for each in self.calls if each.deadline <= now and self.take(each)]
+            self.failed += len(late)
+            due = min((each.deadline for each in self._calls.values()), default=math.inf)
+        for call in late:
+            kind = NoServerError if call.server is None else ServiceTimeoutError
+            call.end(kind(self.spec.service, call.timeout_s or 0.0))
+        return due
+
+    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - at once
+        """The services that have a server now."""
+        with self.hub.lock:
+            return tuple(sorted(self.hub.servers))
+
+    def counts(self) -> SubscriberCount:
+        """The statistics for a renewal."""
+        return SubscriberCount(self.spec.id, self.answered, self.failed)
+
+    def close(self) -> None:
+        """Unregister; calls that are under way end."""
+        with self.hub.lock:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            others = tuple(each for each in self.hub.clients[self.spec.service] if each is not self)
+            self.hub.clients[self.spec.service] = others
+            if not others:
+                del self.hub.clients[self.spec.service]
+            self._deadlines.forget(self)
+            left, self._calls = self.calls, {}
+            self.hub.ask(requests.RemoveSubscriber(self._node_id, self.spec.id))
+        for call in left:
+            call.end(self._closed_error())
+
+    def forked(self) -> None:
+        """In a child. See `ClientTransport.forked`."""
+        self.is_closed = True
+        self._calls = {}
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(_("client of '{service}'").format(service=self.spec.service))
+
+
+class _Deadlines:
+    """A thread, once there is a client, that ends calls that waited too long."""
+
+    def __init__(self, node_name: str) -> None:
+        self._name = f"nep-calls-{node_name}"
+        self._changed = threading.Condition(threading.Lock())
+        self._clients: tuple[MemoryClient, ...] = ()
+        self._due = math.inf
+        self._is_closing = False
+        self._thread: threading.Thread | None = None
+
+    def watch(self, client: MemoryClient) -> None:
+        """Its calls, too."""
+        with self._changed:
+            self._clients = (*self._clients, client)
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+                self._thread.start()
+
+    def forget(self, client: MemoryClient) -> None:
+        """It is closed."""
+        with self._changed:
+            self._clients = tuple(each for each in self._clients if each is not client)
+
+    def add(self, deadline: float) -> None:
+        """A call ends then at the latest."""
+        with self._changed:
+            if deadline < self._due:
+                self._due = deadline
+                self._changed.notify()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                while not self._is_closing and (left := self._due - time.monotonic()) > 0.0:
+                    self._changed.wait(min(left, threading.TIMEOUT_MAX))
+                if self._is_closing:
+                    return
+                self._due = math.inf
+                clients = self._clients
+            for client in clients:
+                self.add(client.expire(time.monotonic()))
+
+    def close(self, timeout_s: float) -> None:
+        """End the thread."""
+        with self._changed:
+            self._is_closing = True
+            self._changed.notify()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(timeout_s)
+
+
+class MemoryServices:
+    """The servers and clients of one node. Part of `MemoryTransport`; `join` gives the hub."""
+
+    def __init__(self, node: NodeRecord, join: Callable[[Configuration], ServiceHub]) -> None:
+        self._node = node
+        self._join = join
+        self._deadlines = _Deadlines(node.name)
+        self._servers: tuple[MemoryServer, ...] = ()
+        self._clients: tuple[MemoryClient, ...] = ()
+
+    def server(self, spec: ServerSpec) -> MemoryServer:
+        """Register a server; it gets the calls that wait."""
+        hub = self._join(spec.configuration)
+        with hub.lock:
+            record = PublisherRecord(
+                spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, ("memory",), number=spec.number
+            )
+            hub.ask(requests.AddPublisher(self._node, record))
+            server = MemoryServer(self._node.id, hub, spec)
+            hub.servers[spec.service] = (*hub.servers.get(spec.service, ()), server)
+            self._servers = (*(each for each in self._servers if not each.is_closed), server)
+            for client in hub.clients.get(spec.service, ()):
+                client.served_by(server)
+        return server
+
+    def client(self, spec: ClientSpec) -> MemoryClient:
+        """Register a client."""
+        hub = self._join(spec.configuration)
+        with hub.lock:
+            record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
+            hub.ask(requests.AddSubscriber(self._node, record))
+            client = MemoryClient(self._node.id, hub, spec, self._deadlines)
+            hub.clients[spec.service] = (*hub.clients.get(spec.service, ()), client)
+            self._clients = (*(each for each in self._clients if not each.is_closed), client)
+            self._deadlines.watch(client)
+        return client
+
+    def server_counts(self, hub: ServiceHub) -> Iterable[PublisherCount]:
+        """The statistics of those that meet there. With its lock held."""
+        return [
+            each.counts()
+            for each in self._servers
+            if each.hub is hub and each in hub.servers.get(each.spec.service, ())
+        ]
+
+    def client_counts(self, hub: ServiceHub) -> Iterable[SubscriberCount]:
+        """The statistics of those that meet there. With its lock held."""
+        return [each.counts() for each in self._clients if each.hub is hub and not each.is_closed]
+
+    def begin_close(self) -> None:
+        """Nothing is carried out any more; who waits is told."""
+        for server in self._servers:
+            server.begin_close()
+
+    def close(self, timeout_s: float) -> None:
+        """Close all of them and end the thread."""
+        for client in self._clients:
+            client.close()
+        for server in self._servers:
+            server.close(timeout_s)
+        self._deadlines.close(timeout_s)
