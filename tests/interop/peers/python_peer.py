@@ -2,6 +2,7 @@
 
 Arguments: ROLE TOPIC TYPE MODE NAME. A publisher publishes each line of JSON that comes in; a subscriber
 writes each message as a line of JSON; a client asks what comes in and writes the answer; a server answers.
+A client_at and a server_at do so without a master: TOPIC is the port.
 A picture is told as the colour that fills it: {"bgr": [b, g, r], "shape": [height, width, 3]}.
 """
 
@@ -53,14 +54,14 @@ elif role == "subscriber":
             say({"got": seen(message)})
         elif msg_type == "image":
             pause.wait(0.01)
-elif role == "client":
-    client = node.new_client(topic)
+elif role in ("client", "client_at"):
+    client = node.new_client(topic) if role == "client" else nep.client("127.0.0.1", int(topic))
     say("ready")
     for line in sys.stdin:
         client.send_info(json.loads(line))
         say({"got": client.listen_info()})
-elif role == "server":
-    server = node.new_server(topic)
+elif role in ("server", "server_at"):
+    server = node.new_server(topic) if role == "server" else nep.server("127.0.0.1", int(topic))
     say("ready")
     while True:
         asked = server.listen_info()

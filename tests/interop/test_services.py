@@ -1,0 +1,84 @@
+"""Services with the original NEP's `client` and `server`, without a master."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+
+import pytest
+
+import nep
+from tests.interop.conftest import LONG_S, Peers
+
+pytestmark = [pytest.mark.interop]
+VERSIONS = ("0.5.3.5", "0.5.4.5", "0.5.4.8")
+
+
+@pytest.fixture
+def originals() -> Iterator[Peers]:
+    """Programs of the original NEP, which need none of its fixed ports here."""
+    started = Peers()
+    yield started
+    started.close()
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_an_original_client_is_answered(originals: Peers, port: int, version: str) -> None:
+    client = originals.start(version, "client_at", str(port)).wait_ready()
+    with nep.node("server") as node:
+
+        def answer(request):
+            if request == {"fail": True}:
+                raise LookupError("no such thing")
+            return {"heard": request}
+
+        server = node.new_server("/any", answer, node.direct("127.0.0.1", port), threads=1)
+        asked = [
+            {"n": 1},
+            {"text": "gr\u00fc\u00df \u65e5\u672c"},
+            {"list": [1, None, 2.5], "map": {"a": {}}},
+        ]
+        for number, request in enumerate(asked, 1):
+            client.tell(request)
+            client.wait(lambda number=number: len(client.got) == number, "an answer", LONG_S)
+        assert client.got == [{"heard": each} for each in asked]
+        client.tell({"fail": True})  # and it has to get an answer, else it waits for ever
+        assert client.hears({"nep_error": "LookupError", "reason": "no such thing"})
+        client.tell({"n": 2})
+        assert client.hears({"heard": {"n": 2}})
+        assert (server.calls, server.errors) == (5, 1)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_two_original_clients_are_answered_at_once(originals: Peers, port: int, version: str) -> None:
+    clients = [originals.start(version, "client_at", str(port)) for _ in range(2)]
+    with nep.node("server") as node:
+        node.new_server("/any", lambda request: request, node.direct("127.0.0.1", port), threads=2)
+        for number, client in enumerate(clients):
+            client.wait_ready().tell({"from": number})
+        assert clients[0].hears({"from": 0})
+        assert clients[1].hears({"from": 1})
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_an_original_server_answers_in_the_order_of_the_calls(
+    originals: Peers, port: int, version: str
+) -> None:
+    with nep.node("client") as node:
+        client = node.new_client("/any", node.direct("127.0.0.1", port), timeout_s=LONG_S)
+        server = originals.start(version, "server_at", str(port)).wait_ready()
+        assert client.call({"text": "gr\u00fc\u00df"}) == {"echo": {"text": "gr\u00fc\u00df"}}
+        futures = [client.call_async({"n": n}) for n in range(20)]
+        assert [each.result(LONG_S) for each in futures] == [{"echo": {"n": n}} for n in range(20)]
+        server.kill()
+        with pytest.raises(nep.NoServerError):
+            client.call({}, timeout_s=0.3)
+        originals.start(version, "server_at", str(port)).wait_ready()
+        assert client.call({"again": 1}) == {"echo": {"again": 1}}
