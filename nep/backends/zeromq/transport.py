@@ -25,7 +25,7 @@ from nep.backends.zeromq.io_thread import IoThread, Served, SharedContext, share
 from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
 from nep.backends.zeromq.master_session import MasterSession, SessionPublisher
 from nep.backends.zeromq.publisher import NativePublisher
-from nep.backends.zeromq.services import ZeromqServices
+from nep.backends.zeromq.services.node_services import ZeromqServices
 from nep.backends.zeromq.sockets import Socket
 from nep.backends.zeromq.sub_socket import SubSocket
 from nep.backends.zeromq.subscriber import NativeReadable, NativeSubscriber, Readable, SocketSubscriber

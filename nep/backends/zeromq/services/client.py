@@ -1,4 +1,4 @@
-"""DealerClient: a client's end. Calls out, answers in; it notices when its server ends.
+"""SocketClient: a client's end. Calls out, answers in; it notices when its server ends.
 
 It is connected to one server at a time. When a connection has ended and its last answer was read, the calls
 that were sent over it are known to be lost.
@@ -18,7 +18,7 @@ import zmq
 
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
 from nep.backends.zeromq.io_thread import Rest
-from nep.backends.zeromq.service_connection import ServerConnection
+from nep.backends.zeromq.services.connection import ServerConnection
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import (
     ClosedError,
@@ -32,7 +32,7 @@ from nep.i18n import _
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.protocol.service_wire import Framing
 
-__all__ = ["DealerClient"]
+__all__ = ["SocketClient"]
 
 _logger = logging.getLogger("nep")
 
@@ -63,7 +63,7 @@ class _Call:
         return len(self.parts[1])
 
 
-class DealerClient:
+class SocketClient:
     """`connect_to` makes connections; `soon` asks the node's thread to look at it again, `closer` ends it.
 
     `known_services` asks the master; `endpoint` is a server's that no master tells of.
@@ -74,8 +74,8 @@ class DealerClient:
         connect_to: Callable[[str, Callable[[float], Rest]], ServerConnection],
         spec: ClientSpec,
         framing: Framing,
-        soon: Callable[[DealerClient], None],
-        closer: Callable[[DealerClient], None],
+        soon: Callable[[SocketClient], None],
+        closer: Callable[[SocketClient], None],
         *,
         known_services: Callable[[float], tuple[str, ...]] | None = None,
         endpoint: str = "",

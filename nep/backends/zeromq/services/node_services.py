@@ -14,9 +14,9 @@ from nep.backends.connection import Direct
 from nep.backends.services import ClientSpec, ServerSpec
 from nep.backends.zeromq.io_thread import Rest, SharedContext
 from nep.backends.zeromq.master_session import MasterSession
-from nep.backends.zeromq.service_client import DealerClient
-from nep.backends.zeromq.service_connection import CONNECTION_FILES, ServerConnection
-from nep.backends.zeromq.service_server import RouterServer
+from nep.backends.zeromq.services.client import SocketClient
+from nep.backends.zeromq.services.connection import CONNECTION_FILES, ServerConnection
+from nep.backends.zeromq.services.server import RouterServer
 from nep.backends.zeromq.sockets import bind
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
@@ -43,7 +43,7 @@ class ZeromqServices:
         self._node_name = node_name
         self._lock = threading.Lock()
         self._servers: set[RouterServer] = set()
-        self._clients: set[DealerClient] = set()
+        self._clients: set[SocketClient] = set()
         self._is_closed = False
 
     # ---- servers
@@ -89,7 +89,7 @@ class ZeromqServices:
         socket = self._shared.socket(zmq.ROUTER, f"a server of '{spec.service}'")
         return RouterServer(socket, spec, framing, self._shared.io.serve_soon, unregister, close)
 
-    def _hold(self, owner: RouterServer | DealerClient) -> None:
+    def _hold(self, owner: RouterServer | SocketClient) -> None:
         with self._lock:
             if self._is_closed:
                 raise ClosedError(f"node '{self._node_name}'")
@@ -101,7 +101,7 @@ class ZeromqServices:
 
     # ---- clients
 
-    def client(self, spec: ClientSpec) -> DealerClient:
+    def client(self, spec: ClientSpec) -> SocketClient:
         """A new client. See `ServiceTransport.client`."""
         if isinstance(spec.configuration, Direct):
             return self._direct_client(spec, spec.configuration)
@@ -121,7 +121,7 @@ class ZeromqServices:
             raise
         return client
 
-    def _direct_client(self, spec: ClientSpec, direct: Direct) -> DealerClient:
+    def _direct_client(self, spec: ClientSpec, direct: Direct) -> SocketClient:
         address = f"{direct.ip}:{direct.port}"
         if not is_endpoint(endpoint_of(address)):
             raise NepError(
@@ -137,8 +137,8 @@ class ZeromqServices:
         unregister: Callable[[], None],
         known: Callable[[float], tuple[str, ...]] | None,
         endpoint: str = "",
-    ) -> DealerClient:
-        def close(client: DealerClient) -> None:
+    ) -> SocketClient:
+        def close(client: SocketClient) -> None:
             with self._lock:
                 self._clients.discard(client)
             unregister()
@@ -149,7 +149,7 @@ class ZeromqServices:
             return ServerConnection(self._shared, spec.service, endpoint, serve)
 
         check_room(CONNECTION_FILES, f"a client of '{spec.service}'")
-        client = DealerClient(
+        client = SocketClient(
             connect_to,
             spec,
             framing,
@@ -199,7 +199,7 @@ def _framing(direct: Direct) -> Framing:
 
 
 @contextmanager
-def _released(owner: RouterServer | DealerClient) -> Iterator[None]:
+def _released(owner: RouterServer | SocketClient) -> Iterator[None]:
     """A socket that is left open would hold up the end of the program."""
     try:
         yield
