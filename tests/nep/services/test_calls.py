@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
@@ -20,19 +21,50 @@ LONG_S = 30.0
 Make = Callable[[str], nep.Node]
 
 
-@pytest.fixture(params=["zeromq", "memory"])
+@pytest.fixture(params=["zeromq", "memory", "direct"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them."""
+    """Makes nodes that can meet; closes them. With "direct" their servers bind and no master is asked."""
     made: list[nep.Node] = []
     where = f"services-{next(_names)}" if request.param == "memory" else master.address
+    ports: dict[str, int] = {}
 
     def new(name: str) -> nep.Node:
-        made.append(nep.node(name, request.param, master=where))
+        made.append(nep.node(name, "memory" if request.param == "memory" else "zeromq", master=where))
+        if request.param == "direct":
+            connect_directly(made[-1], "native", ports)
         return made[-1]
 
     yield new
     for node in made:
         node.close()
+
+
+@pytest.fixture
+def registered(make: Make, request: pytest.FixtureRequest) -> Make:
+    """As `make`, for what needs a master, or a hub: names, graphs, several servers."""
+    if request.node.callspec.params["make"] not in {"zeromq", "memory"}:
+        pytest.skip("nobody knows who is there without a master")
+    return make
+
+
+def connect_directly(node: nep.Node, wire: str, ports: dict[str, int]) -> None:
+    """Let the node's servers and clients of one service meet at one port."""
+
+    def at(service: str) -> nep.Direct:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = ports.setdefault(service, probe.getsockname()[1])
+        return node.direct("127.0.0.1", port, wire=wire)
+
+    new_server, new_client = node.new_server, node.new_client
+
+    def server(service, callback=None, configuration=None, **more):
+        return new_server(service, callback, configuration or at(service), **more)
+
+    def client(service, configuration=None, **more):
+        return new_client(service, configuration or at(service), **more)
+
+    node.new_server, node.new_client = server, client  # type: ignore[method-assign]
 
 
 @pytest.fixture
@@ -209,9 +241,9 @@ def test_what_is_attached_to_a_future_holds_up_no_other_call(make: Make) -> None
     assert future.result(LONG_S) == 1
 
 
-def test_nobody_serves_it_says_so_and_names_what_is_near(make: Make) -> None:
-    make("server").new_server("/arm/move", doubled, threads=1)
-    client = make("client").new_client("/arm/mov")
+def test_nobody_serves_it_says_so_and_names_what_is_near(registered: Make) -> None:
+    registered("server").new_server("/arm/move", doubled, threads=1)
+    client = registered("client").new_client("/arm/mov")
     with pytest.raises(
         nep.NoServerError, match=r"no server for '/arm/mov' within 0\.1 s; did you mean '/arm/m"
     ):
@@ -280,7 +312,7 @@ def test_a_server_that_closes_refuses_each_call_that_waits(make: Make) -> None:
             future.result(LONG_S)
 
 
-def test_a_server_that_closes_answers_what_it_carries_out(make: Make) -> None:
+def test_a_server_that_closes_answers_what_it_carries_out(registered: Make) -> None:
     is_asked, go_on = threading.Event(), threading.Event()
 
     def answer(request):
@@ -288,14 +320,14 @@ def test_a_server_that_closes_answers_what_it_carries_out(make: Make) -> None:
         assert go_on.wait(LONG_S)
         return request
 
-    first = make("first").new_server("/x", answer, threads=1)
-    client = make("client").new_client("/x", timeout_s=LONG_S)
+    first = registered("first").new_server("/x", answer, threads=1)
+    client = registered("client").new_client("/x", timeout_s=LONG_S)
     future = client.call_async("first")
     assert is_asked.wait(LONG_S)
-    make("second").new_server("/x", lambda _request: "second", threads=1)
+    registered("second").new_server("/x", lambda _request: "second", threads=1)
     closer = threading.Thread(target=lambda: first.close(LONG_S), name="closer")
     closer.start()
-    viewer = make("viewer")
+    viewer = registered("viewer")
     eventually(lambda: len(viewer.graph().services["/x"].servers) == 1)
     go_on.set()
     assert future.result(LONG_S) == "first"
@@ -398,12 +430,12 @@ def test_listen_and_send_as_the_original_has_it(make: Make) -> None:
     assert client.listen_info() == {"b": 2}
 
 
-def test_a_second_server_is_an_alert_and_takes_over(make: Make) -> None:
-    first = make("first").new_server("/x", lambda request: "first", threads=1)
-    client = make("client").new_client("/x", timeout_s=LONG_S)
+def test_a_second_server_is_an_alert_and_takes_over(registered: Make) -> None:
+    first = registered("first").new_server("/x", lambda request: "first", threads=1)
+    client = registered("client").new_client("/x", timeout_s=LONG_S)
     assert client.call({}) == "first"
-    second = make("second").new_server("/x", lambda request: "second", threads=1)
-    viewer = make("viewer")
+    second = registered("second").new_server("/x", lambda request: "second", threads=1)
+    viewer = registered("viewer")
     alerts = {each.id: each for each in viewer.graph().alerts}
     assert "has 2 servers: “first”, “second”" in alerts["service:/x"].sentence
     assert client.call({}) == "first"
@@ -420,8 +452,8 @@ def test_a_second_server_is_an_alert_and_takes_over(make: Make) -> None:
     assert second.calls >= 1
 
 
-def test_the_graph_tells_of_services_and_not_of_topics(make: Make) -> None:
-    a, b = make("a"), make("b")
+def test_the_graph_tells_of_services_and_not_of_topics(registered: Make) -> None:
+    a, b = registered("a"), registered("b")
     server = a.new_server("/x", lambda request: 1 / 0 if request == "bad" else request, threads=1)
     client = b.new_client("/x", timeout_s=LONG_S)
     assert client.call(1) == 1
