@@ -8,7 +8,7 @@ from typing import Literal
 from nep.errors import NepError, did_you_mean
 from nep.i18n import _
 
-__all__ = ["Configuration", "Direct", "Hybrid", "Mode", "checked_mode", "checked_port"]
+__all__ = ["Configuration", "Direct", "Hybrid", "Mode", "checked_mode", "checked_port", "for_messages"]
 
 Mode = Literal["one2many", "many2one", "many2many"]
 
@@ -29,17 +29,24 @@ class Direct:
 
     one2many: the publisher binds the port. many2one: the subscriber does. many2many: both connect, publishers
     to `port`, subscribers to `port + 1`, and a proxy of the original NEP has to run there. `wire`: "original"
-    frames of `generation` "A" (`topic {…}`) or "B" (`{…}`), or the "native" wire.
+    frames of `generation` "A" (`topic {…}`) or "B" (`{…}`), the "native" wire, or plain "tcp" (calls only).
     """
 
     ip: str
     port: int
     mode: Mode
     generation: Literal["A", "B"] = "A"
-    wire: Literal["original", "native"] = "original"
+    wire: Literal["original", "native", "tcp"] = "original"
 
 
 Configuration = Hybrid | Direct
+
+
+def for_messages(configuration: Configuration) -> Configuration:
+    """`configuration` itself when it carries messages. Raises `NepError`."""
+    if isinstance(configuration, Direct) and configuration.wire == "tcp":
+        raise NepError(_("plain TCP carries calls of services only; leave out wire='tcp' for a topic"))
+    return configuration
 
 
 def checked_mode(mode: str) -> Mode:

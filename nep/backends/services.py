@@ -68,7 +68,7 @@ class Tally:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self.calls = self.errors = self.refused = self.bytes = 0
+        self.calls = self.errors = self.refused = self.bytes = self.unreadable = 0
 
     def add(self, reply: Reply) -> None:
         """One more call was answered so."""
@@ -79,6 +79,11 @@ class Tally:
             self.calls += 1
             self.bytes += len(reply.data)
             self.errors += reply.kind == CallKind.ERROR
+
+    def add_unreadable(self) -> None:
+        """Something came that was no call at all."""
+        with self._lock:
+            self.unreadable += 1
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from nep.backends.base import (
     Transport,
     backend_named,
 )
-from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port
+from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port, for_messages
 from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import BadTopicError, ClosedError, DecodeError, WrongTypeError
 from nep.i18n import _
@@ -140,20 +140,21 @@ class Node:
         transport: str = "",  # noqa: ARG002 - the node's transport is used, as in the original
         *,
         generation: Literal["A", "B"] = "A",
-        wire: Literal["original", "native"] = "original",
+        wire: Literal["original", "native", "tcp"] = "original",
     ) -> Direct:
         """Connected without a master to `ip:port`; see `Direct` for the modes.
 
         Sends the frames of the original NEP up to 0.5.4.5, or from 0.5.4.8 on (`generation="B"`), or native
-        ones; receives both forms of the original. Raises `NepError` for what is no address, mode or
-        port, `ValueError` for another generation or wire.
+        ones; receives both forms of the original. `wire="tcp"` carries calls of services, also of programs
+        that have no ZeroMQ. Raises `NepError` for what is no address, mode or port, `ValueError` for another
+        generation or wire.
         """
         return Direct(
             checked_host(ip),
             checked_port(port),
             checked_mode(mode),
             one_of("generation", generation, ("A", "B")),
-            one_of("wire", wire, ("original", "native")),
+            one_of("wire", wire, ("original", "native", "tcp")),
         )
 
     # ---- publishers and subscribers
@@ -184,7 +185,7 @@ class Node:
             text("msg_type", msg_type),
             self._backend.codec_for(msg_type),
             flag("latched", latched),
-            self._configured(configuration),
+            for_messages(self._configured(configuration)),
             self._wait_s,
             number,
             flag("batch", batch),
@@ -220,7 +221,7 @@ class Node:
             id_from(self._key, number),
             _own_topic(topic),
             text("msg_type", msg_type),
-            self._configured(configuration),
+            for_messages(self._configured(configuration)),
             self._wait_s,
             one_of("keep", keep, ("all", "latest")),
             at_least("max_messages", max_messages, 1),
@@ -258,7 +259,7 @@ class Node:
             id_from(self._key, number),
             _own_topic(topic),
             text("msg_type", msg_type),
-            self._configured(configuration),
+            for_messages(self._configured(configuration)),
             self._wait_s,
             one_of("keep", keep, ("all", "latest")),
             at_least("max_messages", max_messages, 1),

@@ -23,6 +23,7 @@ from nep.protocol.wire import check_topic
 from nep.text import escaped, shortened
 
 __all__ = [
+    "HEADER_BYTES",
     "NATIVE",
     "ORIGINAL",
     "PAYLOAD_MAX_BYTES",
@@ -48,6 +49,7 @@ PAYLOAD_MAX_BYTES = 64 * 2**20
 
 _VERSION = 1
 _HEADER = struct.Struct("<BBHIQ")  # version, kind, codec, timeout_ms, number
+HEADER_BYTES = _HEADER.size
 _TIMEOUT_MAX_MS = 2**32 - 1
 _JSON = 1
 _CLASS_LETTERS, _REASON_LETTERS = 100, 2000

@@ -77,6 +77,11 @@ class Server:
         return self._transport.tally.refused
 
     @property
+    def unreadable(self) -> int:
+        """What came and was no call at all; each reason is logged."""
+        return self._transport.tally.unreadable
+
+    @property
     def endpoints(self) -> tuple[str, ...]:
         """Where it is reached."""
         return self._transport.endpoints

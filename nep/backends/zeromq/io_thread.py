@@ -56,10 +56,14 @@ _SELECT_MOST = 1024
 
 
 class Rest(NamedTuple):
-    """What an owner wants next: to be served at `due`; with `is_quiet` not to be polled until then."""
+    """What an owner wants next: to be served at `due`; with `is_quiet` not to be polled for input until then.
+
+    With `sends` it is served, too, as soon as its descriptor can be written: never said of ZeroMQ's.
+    """
 
     is_quiet: bool = False
     due: float | None = None
+    sends: bool = False
 
 
 class Served(Protocol):
@@ -85,7 +89,8 @@ class IoThread:
         self._selector.register(self._waker.fd, selectors.EVENT_READ)
         self._orders: deque[tuple[str, Served, threading.Event | None]] = deque()
         self._served: set[Served] = set()
-        self._polled: dict[Served, int] = {}
+        self._polled: dict[Served, tuple[int, int]] = {}
+        """The descriptor of each, and what it is polled for."""
         self._due: dict[Served, float] = {}
         self._heap: list[tuple[float, int, Served]] = []
         self._numbers = itertools.count()
@@ -213,7 +218,7 @@ class IoThread:
         if served not in self._served or self._is_closing:
             return  # it was removed while it was served
         try:
-            self._poll(served, not rest.is_quiet)
+            self._poll(served, _events(rest))
         except (OSError, ValueError, KeyError) as error:
             _logger.error("a socket cannot be polled, it is served each second: %s", error)  # noqa: TRY400
             self._polled.pop(served, None)
@@ -241,25 +246,33 @@ class IoThread:
             heapq.heappop(self._heap)
         return max(0.0, self._heap[0][0] - time.monotonic()) if self._heap else None
 
-    def _poll(self, served: Served, wanted: bool) -> None:
+    def _poll(self, served: Served, wanted: int) -> None:
         polled = self._polled.get(served)
-        if wanted and polled is None:
-            self._selector.register(served.fd, selectors.EVENT_READ, (served,))
-            self._polled[served] = served.fd
-        elif not wanted and polled is not None:
+        if polled is None:
+            if wanted:
+                self._selector.register(served.fd, wanted, (served,))
+                self._polled[served] = (served.fd, wanted)
+        elif not wanted:
             del self._polled[served]
-            self._selector.unregister(polled)
+            self._selector.unregister(polled[0])
+        elif wanted != polled[1]:
+            self._selector.modify(polled[0], wanted, (served,))
+            self._polled[served] = (polled[0], wanted)
 
     def _forget(self, served: Served) -> None:
         self._served.discard(served)
         self._due.pop(served, None)
         if served in self._polled:
             with suppress(OSError, ValueError, KeyError):  # the poll is closed, or was begun anew without it
-                self._poll(served, wanted=False)
+                self._poll(served, 0)
 
     def _release(self) -> None:
         self._selector.close()
         self._waker.close()
+
+
+def _events(rest: Rest) -> int:
+    return (0 if rest.is_quiet else selectors.EVENT_READ) | (selectors.EVENT_WRITE if rest.sends else 0)
 
 
 def _waited(selector: selectors.BaseSelector, timeout_s: float) -> float:

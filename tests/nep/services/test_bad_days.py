@@ -153,6 +153,20 @@ def test_strangers_do_not_end_a_server(master: Master, client, parts) -> None:
         assert client.call({"n": 2}) == {"n": 2}
 
 
+def test_many_that_are_no_calls_do_not_hold_up_the_one_behind_them(master: Master) -> None:
+    with nep.node("server") as node:
+        server = node.new_server("/x", lambda request: request, threads=1)
+        with zmq.Context() as context, context.socket(zmq.DEALER) as stranger:
+            stranger.linger = 0
+            stranger.connect(server.endpoints[0])
+            for _ in range(1000):
+                stranger.send_multipart([b"no header", b""])
+            stranger.send_multipart([b"\1\1\1\0" + b"\0" * 4 + b"\7" + b"\0" * 7, b"[1]"])
+            assert stranger.poll(LONG_S * 1000)
+            assert stranger.recv_multipart() == [b"\1\2\1\0" + b"\0" * 4 + b"\7" + b"\0" * 7, b"[1]"]
+        assert (server.unreadable, server.calls) == (1000, 1)
+
+
 @pytest.mark.parametrize(
     "answer",
     [

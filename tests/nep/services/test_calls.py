@@ -21,7 +21,7 @@ LONG_S = 30.0
 Make = Callable[[str], nep.Node]
 
 
-@pytest.fixture(params=["zeromq", "memory", "direct"])
+@pytest.fixture(params=["zeromq", "memory", "direct", "tcp"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
     """Makes nodes that can meet; closes them. With "direct" their servers bind and no master is asked."""
     made: list[nep.Node] = []
@@ -30,8 +30,8 @@ def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
 
     def new(name: str) -> nep.Node:
         made.append(nep.node(name, "memory" if request.param == "memory" else "zeromq", master=where))
-        if request.param == "direct":
-            connect_directly(made[-1], "native", ports)
+        if request.param in {"direct", "tcp"}:
+            connect_directly(made[-1], "native" if request.param == "direct" else "tcp", ports)
         return made[-1]
 
     yield new
@@ -408,6 +408,32 @@ def test_a_callback_may_close_its_server_and_call_others(make: Make) -> None:
     box.append(node.new_server("/outer", answer, threads=1))
     assert make("client").new_client("/outer").call({"n": 4}, timeout_s=LONG_S) == {"n": 8}
     eventually(lambda: box[0].is_closed)
+
+
+def test_a_callback_that_waits_for_its_own_thread_is_told_so_in_time(make: Make) -> None:
+    """A service that calls itself has one thread too few: a time-out, and everything goes on."""
+    node = make("server")
+    inner = make("inner").new_client("/self", timeout_s=0.3)
+    server = node.new_server("/self", lambda deep: inner.call(deep - 1) if deep else "done", threads=1)
+    client = make("client").new_client("/self", timeout_s=LONG_S)
+    with pytest.raises(
+        nep.ServiceError, match="ServiceTimeoutError: an answer of '/self' did not come within"
+    ):
+        client.call(1)
+    assert client.call(0) == "done"
+    assert server.errors == 1
+    node.new_server("/two", lambda deep: two.call(deep - 1) if deep else "done", threads=2)
+    two = make("two").new_client("/two", timeout_s=LONG_S)
+    assert two.call(1) == "done"
+
+
+def test_fifty_clients_at_once(make: Make) -> None:
+    server = make("server").new_server("/echo", lambda request: request, threads=4)
+    node = make("callers")
+    clients = [node.new_client("/echo", timeout_s=LONG_S) for _ in range(50)]
+    futures = [(n, client.call_async(n)) for client in clients for n in range(20)]
+    assert all(future.result(LONG_S) == n for n, future in futures)
+    assert (server.calls, server.errors, server.refused) == (1000, 0, 0)
 
 
 def test_listen_and_send_as_the_original_has_it(make: Make) -> None:

@@ -11,14 +11,14 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import zmq
 
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
 from nep.backends.zeromq.io_thread import Rest
-from nep.backends.zeromq.services.connection import ServerConnection
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import (
     ClosedError,
@@ -63,6 +63,36 @@ class _Call:
         return len(self.parts[1])
 
 
+class Connection(Protocol):
+    """What a client needs of its connection to a server. It lives under the client's lock."""
+
+    endpoint: str
+    is_open: bool
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it was open and has ended; what came before can be read."""
+
+    @property
+    def has_input(self) -> bool:
+        """Whether there is an answer of which no descriptor tells any more."""
+
+    def look(self) -> None:
+        """Let `is_open` and `is_over` be true of now."""
+
+    def send(self, parts: Sequence[bytes | memoryview]) -> None:
+        """Send a call."""
+
+    def receive(self) -> Sequence[bytes] | None:
+        """The parts of the next answer. Raises `WireError`."""
+
+    def close(self) -> None:
+        """Close it; what was not read is dropped."""
+
+    def forked(self) -> None:
+        """In a child that was forked."""
+
+
 class SocketClient:
     """`connect_to` makes connections; `soon` asks the node's thread to look at it again, `closer` ends it.
 
@@ -71,7 +101,7 @@ class SocketClient:
 
     def __init__(
         self,
-        connect_to: Callable[[str, Callable[[float], Rest]], ServerConnection],
+        connect_to: Callable[[str, Callable[[float], Rest]], Connection],
         spec: ClientSpec,
         framing: Framing,
         soon: Callable[[SocketClient], None],
@@ -82,7 +112,7 @@ class SocketClient:
     ) -> None:
         self.spec = spec
         self._connect_to = connect_to
-        self._connection: ServerConnection | None = None
+        self._connection: Connection | None = None
         self._framing = framing
         self._soon = soon
         self._closer = closer
@@ -259,13 +289,12 @@ class SocketClient:
         if self._connection is None:
             return False
         for _turn in range(_READ_MAX):
-            try:
-                parts = self._connection.receive()
-            except zmq.Again:
-                return False
             number: int | None = None
             outcome: Outcome
             try:
+                parts = self._connection.receive()
+                if parts is None:
+                    return False
                 number, outcome = self._framing.read_answer(parts)
             except WireError as error:
                 if self._refusals.add(error.reason):
@@ -337,7 +366,7 @@ class SocketClient:
         self._tries += 1
         try:
             self._connection = self._connect_to(endpoint, self._serve_connection)
-        except (zmq.ZMQError, NepError) as error:
+        except (OSError, zmq.ZMQError, NepError) as error:
             _logger.warning("a server of '%s' cannot be reached at '%s': %s", self._name, endpoint, error)
         self._try_at = now + min(_FIRST_TRY_S * 2 ** min(self._tries, 10), _LAST_TRY_S)
 
@@ -397,3 +426,5 @@ class SocketClient:
         self._is_closed = True
         self._lock = threading.Lock()
         self._calls = {}
+        if self._connection is not None:
+            self._connection.forked()

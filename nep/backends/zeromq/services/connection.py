@@ -80,13 +80,19 @@ class ServerConnection:
         return _has_input(self._socket)
 
     def send(self, parts: Sequence[Part]) -> None:
-        """Send a call. Raises `zmq.ZMQError`."""
+        """Send a call."""
         self._socket.send(parts[0], zmq.DONTWAIT | zmq.SNDMORE)
         self._socket.send(parts[1], zmq.DONTWAIT, copy=len(parts[1]) < _LARGE_BYTES)
 
-    def receive(self) -> list[bytes]:
-        """The parts of the next answer. Raises `zmq.Again`."""
-        return self._socket.recv_multipart(zmq.DONTWAIT)
+    def receive(self) -> list[bytes] | None:
+        """The parts of the next answer."""
+        try:
+            return self._socket.recv_multipart(zmq.DONTWAIT)
+        except zmq.Again:
+            return None
+
+    def forked(self) -> None:
+        """In a child that was forked: nothing is touched, see `nep.system.forks`."""
 
     def close(self) -> None:
         """Close it; what was not read is dropped."""

@@ -14,9 +14,11 @@ from nep.backends.connection import Direct
 from nep.backends.services import ClientSpec, ServerSpec
 from nep.backends.zeromq.io_thread import Rest, SharedContext
 from nep.backends.zeromq.master_session import MasterSession
-from nep.backends.zeromq.services.client import SocketClient
+from nep.backends.zeromq.services.client import Connection, SocketClient
 from nep.backends.zeromq.services.connection import CONNECTION_FILES, ServerConnection
 from nep.backends.zeromq.services.server import RouterServer
+from nep.backends.zeromq.services.tcp_server import TcpServer
+from nep.backends.zeromq.services.tcp_stream import TcpConnection
 from nep.backends.zeromq.sockets import bind
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
@@ -42,13 +44,13 @@ class ZeromqServices:
         self._session = session
         self._node_name = node_name
         self._lock = threading.Lock()
-        self._servers: set[RouterServer] = set()
+        self._servers: set[RouterServer | TcpServer] = set()
         self._clients: set[SocketClient] = set()
         self._is_closed = False
 
     # ---- servers
 
-    def server(self, spec: ServerSpec) -> RouterServer:
+    def server(self, spec: ServerSpec) -> RouterServer | TcpServer:
         """A new server. See `ServiceTransport.server`."""
         if isinstance(spec.configuration, Direct):
             return self._direct_server(spec, spec.configuration)
@@ -68,10 +70,25 @@ class ZeromqServices:
             raise
         return server
 
-    def _direct_server(self, spec: ServerSpec, direct: Direct) -> RouterServer:
+    def _direct_server(self, spec: ServerSpec, direct: Direct) -> RouterServer | TcpServer:
+        if direct.wire == "tcp":
+            return self._tcp_server(spec, direct)
         server = self._new_server(spec, _framing(direct), lambda: None)
         with _released(server):
             server.fixed = (bind(server.socket, f"{direct.ip}:{direct.port}"),)
+            self._hold(server)
+        return server
+
+    def _tcp_server(self, spec: ServerSpec, direct: Direct) -> TcpServer:
+        def close(server: TcpServer, timeout_s: float) -> None:
+            with self._lock:
+                self._servers.discard(server)
+            deadline = time.monotonic() + timeout_s
+            server.begin_close()
+            server.release(deadline)
+
+        server = TcpServer(self._shared.io, spec, f"{direct.ip}:{direct.port}", close)
+        with _released(server):
             self._hold(server)
         return server
 
@@ -89,14 +106,14 @@ class ZeromqServices:
         socket = self._shared.socket(zmq.ROUTER, f"a server of '{spec.service}'")
         return RouterServer(socket, spec, framing, self._shared.io.serve_soon, unregister, close)
 
-    def _hold(self, owner: RouterServer | SocketClient) -> None:
+    def _hold(self, owner: RouterServer | TcpServer | SocketClient) -> None:
         with self._lock:
             if self._is_closed:
                 raise ClosedError(f"node '{self._node_name}'")
-            if isinstance(owner, RouterServer):
-                self._servers.add(owner)
-            else:
+            if isinstance(owner, SocketClient):
                 self._clients.add(owner)
+            else:
+                self._servers.add(owner)
         self._shared.io.add(owner)
 
     # ---- clients
@@ -128,7 +145,9 @@ class ZeromqServices:
                 _("'{address}' cannot be called; use a computer's address and a port").format(address=address)
             )
         endpoint = endpoint_of(in_numbers(address))
-        return self._new_client(spec, _framing(direct), lambda: None, None, endpoint)
+        return self._new_client(
+            spec, _framing(direct), lambda: None, None, endpoint, is_tcp=direct.wire == "tcp"
+        )
 
     def _new_client(
         self,
@@ -137,6 +156,8 @@ class ZeromqServices:
         unregister: Callable[[], None],
         known: Callable[[float], tuple[str, ...]] | None,
         endpoint: str = "",
+        *,
+        is_tcp: bool = False,
     ) -> SocketClient:
         def close(client: SocketClient) -> None:
             with self._lock:
@@ -145,7 +166,9 @@ class ZeromqServices:
             self._shared.io.remove(client)
             client.release()
 
-        def connect_to(endpoint: str, serve: Callable[[float], Rest]) -> ServerConnection:
+        def connect_to(endpoint: str, serve: Callable[[float], Rest]) -> Connection:
+            if is_tcp:
+                return TcpConnection(self._shared.io, endpoint.removeprefix("tcp://"), serve)
             return ServerConnection(self._shared, spec.service, endpoint, serve)
 
         check_room(CONNECTION_FILES, f"a client of '{spec.service}'")
@@ -195,17 +218,17 @@ class ZeromqServices:
 
 
 def _framing(direct: Direct) -> Framing:
-    return NATIVE if direct.wire == "native" else ORIGINAL
+    return ORIGINAL if direct.wire == "original" else NATIVE
 
 
 @contextmanager
-def _released(owner: RouterServer | SocketClient) -> Iterator[None]:
+def _released(owner: RouterServer | TcpServer | SocketClient) -> Iterator[None]:
     """A socket that is left open would hold up the end of the program."""
     try:
         yield
     except BaseException:
-        if isinstance(owner, RouterServer):
-            owner.release(0.0)
-        else:
+        if isinstance(owner, SocketClient):
             owner.release()
+        else:
+            owner.release(0.0)
         raise

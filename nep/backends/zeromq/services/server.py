@@ -11,6 +11,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import zmq
 
@@ -22,7 +23,7 @@ from nep.errors import WireError
 from nep.protocol.requests import PublisherCount, as_count
 from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, Framing, Reply
 
-__all__ = ["RouterServer"]
+__all__ = ["CallReader", "RouterServer"]
 
 _logger = logging.getLogger("nep")
 
@@ -33,6 +34,49 @@ _LARGE_BYTES = 65_536
 _UNREAD_MAX_BYTES = 256 * 2**20
 _SMALL_UNREAD = 1000
 """So many answers are queued for a client that does not read them."""
+
+
+class CallReader:
+    """Reads calls; what is none is counted, and its reason is logged now and then.
+
+    Not thread-safe: it lives under its server's lock.
+    """
+
+    def __init__(self, service: str, framing: Framing, tally: Tally) -> None:
+        self._service = service
+        self._framing = framing
+        self._tally = tally
+        self._refusals = Refusals()
+
+    def read(
+        self,
+        parts: Sequence[bytes | memoryview],
+        now: float,
+        answer: Callable[[int, Reply], bool],
+    ) -> IncomingCall | None:
+        """The call that these parts are; None when they are none. `answer` takes its number."""
+        try:
+            header = self._framing.read_call(parts)
+        except WireError as error:
+            self.refuse(error)
+            return None
+        deadline = None if header.timeout_s is None else now + header.timeout_s
+        return IncomingCall(header.data, header.codec, deadline, partial(answer, header.number))
+
+    def refuse(self, error: WireError) -> None:
+        """Something came that is no call."""
+        self._tally.add_unreadable()
+        if self._refusals.add(error.reason):
+            _logger.warning(
+                "'%s' was called in a way that nobody understands (%d times so far): %s",
+                self._service,
+                self._refusals.count,
+                error,
+            )
+
+    def told(self) -> str:
+        """See `Refusals.told`."""
+        return self._refusals.told()
 
 
 class RouterServer:
@@ -63,7 +107,7 @@ class RouterServer:
         self._unregister = unregister
         self._closer = closer
         self._lock = threading.Lock()
-        self._refusals = Refusals()
+        self._reader = CallReader(spec.service, framing, self.tally)
         self._unread: deque[tuple[zmq.MessageTracker, int]] = deque()
         self._is_closed = False
         socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # an error instead of silence when a client is gone
@@ -97,7 +141,7 @@ class RouterServer:
     def counts(self) -> PublisherCount:
         """The statistics for a renewal."""
         tally = self.tally
-        calls, problem = as_count(tally.calls), self._refusals.told()
+        calls, problem = as_count(tally.calls), self._reader.told()
         return PublisherCount(self.spec.id, calls, as_count(tally.bytes), calls, None, problem, tally.errors)
 
     # ---- in the node's thread
@@ -106,39 +150,25 @@ class RouterServer:
         """Read calls into the queue; those for which there is no room are refused at once."""
         came: list[IncomingCall] = []
         with self._lock:
-            for _turn in range(_READ_MAX):
-                if self._is_closed:
-                    return Rest()
-                try:
-                    route, *parts = self.socket.recv_multipart(zmq.DONTWAIT)
-                except zmq.Again:
-                    break
-                call = self._read(route, parts, now)
-                if call is not None:
-                    came.append(call)
+            if self._is_closed:
+                return Rest()
+            has_more = self._read(came, now)
         for call in came:
             if not self.calls.put(call):
                 self._refuse(call)
-        return Rest(due=now if len(came) >= _READ_MAX else None)
+        return Rest(due=now if has_more else None)
 
-    def _read(self, route: bytes, parts: list[bytes], now: float) -> IncomingCall | None:
-        """With the lock held."""
-        try:
-            header = self._framing.read_call(parts)
-        except WireError as error:
-            if self._refusals.add(error.reason):
-                _logger.warning(
-                    "'%s' was called in a way that nobody understands (%d times so far): %s",
-                    self.spec.service,
-                    self._refusals.count,
-                    error,
-                )
-            return None
-        deadline = None if header.timeout_s is None else now + header.timeout_s
-        number = header.number
-        return IncomingCall(
-            header.data, header.codec, deadline, lambda reply: self._answer(route, number, reply)
-        )
+    def _read(self, came: list[IncomingCall], now: float) -> bool:
+        """With the lock held. Whether there is more: its descriptor tells only once."""
+        for _turn in range(_READ_MAX):
+            try:
+                route, *parts = self.socket.recv_multipart(zmq.DONTWAIT)
+            except zmq.Again:
+                return False
+            call = self._reader.read(parts, now, partial(self._answer, route))
+            if call is not None:
+                came.append(call)
+        return True
 
     # ---- answering, in any thread
 

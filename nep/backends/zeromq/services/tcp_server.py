@@ -1,0 +1,247 @@
+"""TcpServer: a server that programs without ZeroMQ call over plain TCP, many of them at once."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+
+from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
+from nep.backends.zeromq.io_thread import IoThread, Rest
+from nep.backends.zeromq.services.server import CallReader
+from nep.backends.zeromq.services.tcp_stream import TcpStream, keep_alive
+from nep.backends.zeromq.sockets import wait_until
+from nep.errors import AddressInUseError, WireError
+from nep.protocol.service_wire import NATIVE, Reply
+from nep.system.addresses import host_of
+from nep.system.descriptors import check_room, has_room
+from nep.system.log_rarely import is_logged
+
+__all__ = ["TcpServer"]
+
+_logger = logging.getLogger("nep")
+
+_WAITING = 128
+"""So many connections wait to be accepted."""
+_PEERS_MAX = 1000
+_READ_MAX = 100
+_UNREAD_MAX_BYTES = 256 * 2**20
+"""Answers that clients do not take; with more, they are left out."""
+_LISTENER_FILES = 2
+_FULL_S = 0.5
+"""So long nobody is accepted when there is no room."""
+
+
+class TcpServer:
+    """Binds `address`. `io` polls, `closer` ends it. Raises `AddressInUseError`, `TooManyFilesError`."""
+
+    def __init__(
+        self, io: IoThread, spec: ServerSpec, address: str, closer: Callable[[TcpServer, float], None]
+    ) -> None:
+        self.spec = spec
+        self.calls = CallQueue()
+        self.tally = Tally()
+        self.is_closed = False
+        self._io = io
+        self._closer = closer
+        self._changed = threading.Condition(threading.Lock())
+        self._reader = CallReader(spec.service, NATIVE, self.tally)
+        self._peers: set[_Peer] = set()
+        self._turned_away = 0
+        self._listener = _bound(address, spec.service)
+        self.fd = self._listener.fileno()
+        host, port = self._listener.getsockname()[:2]
+        self.endpoints = (f"tcp://{host}:{port}",)
+
+    # ---- in the node's thread
+
+    def serve(self, now: float) -> Rest:
+        """Accept who comes. See `Served`."""
+        for _turn in range(_READ_MAX):
+            if self.is_closed:
+                return Rest()
+            try:
+                connected, (host, port) = self._listener.accept()
+            except (BlockingIOError, InterruptedError):
+                return Rest()
+            except OSError as error:  # it has gone already, or there are too many files
+                if error.errno in {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}:
+                    return Rest(is_quiet=True, due=now + _FULL_S)
+                continue
+            if len(self._peers) >= _PEERS_MAX or not has_room(_LISTENER_FILES):
+                self._turn_away(connected)
+                continue
+            self._accept(connected, f"{host}:{port}")
+        return Rest(due=now)
+
+    def _turn_away(self, connected: socket.socket) -> None:
+        connected.close()
+        self._turned_away += 1
+        if is_logged(self._turned_away):
+            _logger.warning(
+                "a client of '%s' was turned away (%d so far): there is no room for more connections",
+                self.spec.service,
+                self._turned_away,
+            )
+
+    def _accept(self, connected: socket.socket, address: str) -> None:
+        connected.setblocking(False)
+        with suppress(OSError):  # it may have ended already
+            keep_alive(connected, address)
+        peer = _Peer(connected, self)
+        with self._changed:
+            self._peers.add(peer)
+        self._io.add(peer)
+
+    def serve_peer(self, peer: _Peer, now: float) -> Rest:
+        """Read its calls into the queue, and send what it has not taken yet."""
+        came: list[IncomingCall] = []
+        with self._changed:
+            if peer not in self._peers:
+                return Rest(is_quiet=True)
+            peer.stream.flush()
+            has_more = self._read(peer, came, now)
+            is_over = peer.stream.is_over and not has_more
+            if is_over and (peer.stream.is_broken or not (peer.waiting or peer.stream.backlog)):
+                self._drop(peer)  # else it has said all, and takes its answers
+            elif peer.is_last and not peer.stream.backlog:
+                peer.stream.end_sending()  # and it is read until it ends, else it may lose what is on its way
+                self._changed.notify_all()
+        for call in came:
+            if not self.calls.put(call):
+                self._refuse(call)
+        return Rest(is_over, now if has_more else None, sends=peer.stream.backlog > 0)
+
+    def _read(self, peer: _Peer, came: list[IncomingCall], now: float) -> bool:
+        """Whether there is more."""
+        for turn in range(_READ_MAX):
+            try:
+                parts = peer.stream.next()
+                if (
+                    parts is None and not turn
+                ):  # once: others have their turn, and the descriptor tells of more
+                    peer.stream.read()
+                    parts = peer.stream.next()
+                if parts is None:
+                    return False
+            except WireError as error:
+                self._reader.refuse(error)
+                return False
+            call = self._reader.read(parts, now, partial(self._answer, peer))
+            if call is not None:
+                came.append(call)
+                peer.waiting += 1
+        return True
+
+    def _drop(self, peer: _Peer) -> None:
+        """With the lock held, in the node's thread or after it let go of all."""
+        self._peers.discard(peer)
+        self._io.remove(peer)
+        peer.stream.close()
+        self._changed.notify_all()
+
+    # ---- answering, in any thread
+
+    def _answer(self, peer: _Peer, number: int, reply: Reply) -> bool:
+        reply = fitting(reply)
+        self.tally.add(reply)
+        with self._changed:
+            stream = peer.stream
+            peer.waiting -= 1
+            if peer not in self._peers or stream.is_broken:
+                return False
+            if stream.backlog + len(reply.data) > _UNREAD_MAX_BYTES and stream.backlog:
+                _logger.warning("an answer of '%s' is left out: nobody reads the others", self.spec.service)
+                return False
+            stream.send(NATIVE.answer(number, reply))
+            is_served = stream.backlog > 0 or stream.is_over
+        if is_served:
+            self._io.serve_soon(peer)
+        return True
+
+    def _refuse(self, call: IncomingCall) -> None:
+        call.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+
+    # ---- the end
+
+    def close(self, timeout_s: float) -> None:
+        """Refuse what waits, deliver what was answered, and end. May be called twice."""
+        self._closer(self, timeout_s)
+
+    def begin_close(self) -> None:
+        """Nothing is carried out any more, and who waits is told."""
+        for call in self.calls.close():
+            self._refuse(call)
+
+    def release(self, deadline: float) -> None:
+        """Accept nobody any more; clients may take their answers until `deadline`."""
+        self._io.remove(self)
+        with self._changed:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            self._listener.close()
+            peers = tuple(self._peers)
+            for peer in peers:
+                peer.is_last = True
+        for peer in peers:
+            self._io.serve_soon(peer)
+        with self._changed:
+            wait_until(self._changed, lambda: not self._peers, max(0.0, deadline - time.monotonic()))
+            left = tuple(self._peers)
+            self._peers.clear()
+        for peer in left:
+            self._io.remove(peer)
+            peer.stream.close()
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self.is_closed = True
+        self._changed = threading.Condition(threading.Lock())
+        self._listener.detach()
+        for peer in self._peers:
+            peer.stream.forked()
+        self.calls.forked()
+
+
+class _Peer:
+    """A client's connection, for the thread that polls.
+
+    `waiting` of its calls have no answer yet; `is_last`: the server closes.
+    """
+
+    def __init__(self, connected: socket.socket, server: TcpServer) -> None:
+        self.stream = TcpStream(connected)
+        self.fd = self.stream.fd
+        self.waiting = 0
+        self.is_last = False
+        self._server = server
+
+    def serve(self, now: float) -> Rest:
+        """See `Served`."""
+        return self._server.serve_peer(self, now)
+
+
+def _bound(address: str, service: str) -> socket.socket:
+    host, port = host_of(address), int(address.rpartition(":")[2])
+    check_room(_LISTENER_FILES, f"a server of '{service}'")
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        if sys.platform == "win32":  # where another program could bind it as well
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+        else:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(("" if host == "*" else host, port))
+        listener.listen(_WAITING)
+        listener.setblocking(False)
+    except OSError as error:
+        listener.close()
+        is_own = error.errno in {errno.EADDRINUSE, errno.EACCES}
+        raise AddressInUseError(address, is_own=is_own) from error
+    return listener

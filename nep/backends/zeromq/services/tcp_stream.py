@@ -1,0 +1,251 @@
+"""Calls and answers over plain TCP: a header and a payload behind their size, and a client's connection.
+
+For programs that have sockets and no ZeroMQ; the specification is `docs/services.md`.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+from nep.backends.zeromq.io_thread import IoThread, Rest
+from nep.errors import WireError
+from nep.i18n import _
+from nep.protocol.service_wire import HEADER_BYTES, PAYLOAD_MAX_BYTES
+from nep.system.addresses import host_of, is_loopback
+
+__all__ = ["TcpConnection", "TcpStream"]
+
+_SIZE = struct.Struct("<I")
+_CHUNK_BYTES, _TURN_BYTES = 262_144, 1_048_576
+_SMALL_BYTES = 65_536
+"""Below this a copy is cheaper than another call of the system."""
+_IDLE_S, _AGAIN_S, _TIMES = 4, 2, 4
+
+
+class TcpStream:
+    """Sends and receives pairs of parts over a socket that does not block.
+
+    Not thread-safe: it lives under its owner's lock.
+    """
+
+    def __init__(self, connected: socket.socket) -> None:
+        self._socket = connected
+        self.fd = connected.fileno()
+        self.is_over = False
+        """Nothing comes but what was read already."""
+        self.is_broken = False
+        """Nothing can be sent any more."""
+        self._input = bytearray()
+        self._start = 0
+        self._output: deque[memoryview] = deque()
+        self.backlog = 0
+        """Bytes that the other side has not taken."""
+        with suppress(OSError):  # it may have ended already
+            connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    # ---- receiving
+
+    def read(self) -> bool:
+        """Take in what has come, a bounded part of it; whether there was any."""
+        was = len(self._input)
+        while not self.is_over and len(self._input) - was < _TURN_BYTES:
+            try:
+                data = self._socket.recv(_CHUNK_BYTES)
+            except (BlockingIOError, InterruptedError):
+                break
+            except OSError:
+                data = b""
+                self._break()
+            if not data:
+                self.is_over = True
+            self._input += data
+        return len(self._input) > was
+
+    def next(self) -> list[bytes] | None:
+        """The oldest pair that is whole; None when there is none.
+
+        Raises `WireError` for what cannot be one, and for half a pair at the end: nothing comes afterwards.
+        """
+        there = len(self._input) - self._start
+        if there < _SIZE.size:
+            self._check_end(there)
+            return None
+        (size,) = _SIZE.unpack_from(self._input, self._start)
+        if not HEADER_BYTES <= size <= HEADER_BYTES + PAYLOAD_MAX_BYTES:
+            self._forget_input()
+            self.is_over = True
+            self._break()
+            raise WireError(_("its size is {size} bytes; it is no call, or too large").format(size=size))
+        if there < _SIZE.size + size:
+            self._check_end(there)
+            return None
+        begin = self._start + _SIZE.size
+        self._start = begin + size
+        with memoryview(self._input) as view:
+            pair = [
+                bytes(view[begin : begin + HEADER_BYTES]),
+                bytes(view[begin + HEADER_BYTES : self._start]),
+            ]
+        if self._start == len(self._input):
+            self._forget_input()
+        elif self._start > _TURN_BYTES:
+            del self._input[: self._start]
+            self._start = 0
+        return pair
+
+    def _check_end(self, there: int) -> None:
+        if self.is_over and there:
+            self._forget_input()
+            raise WireError(_("it ends in the middle"))
+
+    def _forget_input(self) -> None:
+        self._input = bytearray()
+        self._start = 0
+
+    # ---- sending
+
+    def send(self, parts: Sequence[bytes | memoryview]) -> None:
+        """Send a pair, as much of it as the other side takes now; `flush` sends the rest."""
+        if self.is_broken:
+            return
+        header, payload = parts
+        head = _SIZE.pack(len(header) + len(payload)) + header
+        pieces = [head + payload] if len(payload) < _SMALL_BYTES else [head, payload]
+        self._output.extend(memoryview(each) for each in pieces)
+        self.backlog += len(head) + len(payload)
+        self.flush()
+
+    def flush(self) -> None:
+        """Send what the other side takes now."""
+        while self._output:
+            try:
+                sent = self._socket.send(self._output[0])
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError:  # what the other side has sent before can still be read
+                self._break()
+                return
+            self.backlog -= sent
+            if sent == len(self._output[0]):
+                self._output.popleft()
+            else:
+                self._output[0] = self._output[0][sent:]
+
+    def _break(self) -> None:
+        self.is_broken = True
+        self._output.clear()
+        self.backlog = 0
+
+    # ---- the end
+
+    def end_sending(self) -> None:
+        """Tell the other side that nothing comes any more."""
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_WR)
+
+    def close(self) -> None:
+        """Close the socket; nobody polls it any more."""
+        self.is_over = True
+        self._break()
+        self._socket.close()
+
+    def forked(self) -> None:
+        """In a child that was forked: the descriptor is closed by its address, see `nep.system.forks`."""
+        self.is_over = self.is_broken = True
+        self._socket.detach()
+
+
+class TcpConnection:
+    """A client's connection to `address`, as `ServerConnection` is one. Connects at once.
+
+    Not thread-safe: it lives under its client's lock.
+    """
+
+    def __init__(self, io: IoThread, address: str, serve: Callable[[float], Rest]) -> None:
+        self.endpoint = f"tcp://{address}"
+        self._io = io
+        self._serve = serve
+        self._is_dead = False
+        """It could not be connected."""
+        self.is_open = False
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            self._socket.setblocking(False)
+            keep_alive(self._socket, address)
+            self._stream = TcpStream(self._socket)
+            self.fd = self._stream.fd
+            self._socket.connect_ex((host_of(address), int(address.rpartition(":")[2])))
+        except BaseException:
+            self._socket.close()
+            raise
+        io.add(self)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it was open, and has ended."""
+        return self.is_open and self._stream.is_over
+
+    @property
+    def has_input(self) -> bool:
+        """Its descriptor tells."""
+        return False
+
+    def look(self) -> None:
+        """Look whether it is connected by now."""
+        if self.is_open or self._is_dead:
+            return
+        if self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
+            self._is_dead = True
+            return
+        with suppress(OSError):  # not yet
+            other = self._socket.getpeername()
+            # A port that nobody listens on may be given to the one who asks for it: then it talks to itself.
+            self._is_dead = other == self._socket.getsockname()
+            self.is_open = not self._is_dead
+
+    def serve(self, now: float) -> Rest:
+        """See `Served`."""
+        rest = self._serve(now)
+        is_quiet = self._is_dead or self._stream.is_over
+        return Rest(is_quiet, rest.due, sends=not self.is_open or self._stream.backlog > 0)
+
+    def send(self, parts: Sequence[bytes | memoryview]) -> None:
+        """Send a call; what is not taken now is sent by the thread that polls."""
+        self._stream.send(parts)
+        if self._stream.backlog:
+            self._io.serve_soon(self)
+
+    def receive(self) -> list[bytes] | None:
+        """The parts of the next answer. Raises `WireError`."""
+        if not self.is_open:
+            return None
+        self._stream.flush()
+        pair = self._stream.next()
+        if pair is None and self._stream.read():
+            pair = self._stream.next()
+        return pair
+
+    def close(self) -> None:
+        """Close it; what was not read is dropped."""
+        self._io.remove(self)
+        self._is_dead = True
+        self._stream.close()
+
+    def forked(self) -> None:
+        """In a child that was forked."""
+        self._stream.forked()
+
+
+def keep_alive(connected: socket.socket, address: str) -> None:
+    """Notice within a dozen seconds when the other end's computer has vanished; see `sockets.keep_alive`."""
+    connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    if is_loopback(address):
+        return
+    for name, value in (("TCP_KEEPIDLE", _IDLE_S), ("TCP_KEEPINTVL", _AGAIN_S), ("TCP_KEEPCNT", _TIMES)):
+        option = getattr(socket, name, None)  # not every system has all of them
+        if option is not None:
+            connected.setsockopt(socket.IPPROTO_TCP, option, value)
