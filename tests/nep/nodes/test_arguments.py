@@ -145,7 +145,7 @@ def test_a_time_is_no_less_than_nothing(node: nep.Node, time_s: float) -> None:
         ({"ip": None}, "'None' is no address of a computer"),
         ({"port": 0}, "'0' is no port"),
         ({"port": True}, "'True' is no port"),
-        ({"wire": "nativ"}, "wire is 'nativ'; use 'original' or 'native'"),
+        ({"wire": "nativ"}, "wire is 'nativ'; use 'original', 'native' or 'tcp'"),
         ({"generation": "C"}, "generation is 'C'; use 'A' or 'B'"),
     ],
 )
