@@ -28,6 +28,7 @@ from nep.messages.encoded import Encoded as Encoded
 from nep.messages.image_codec import raw_image as raw_image
 from nep.messages.message import Message as Message
 from nep.nodes.node import Node as Node
+from nep.nodes.node import spin as spin
 from nep.nodes.publisher import Publisher as Publisher
 from nep.nodes.subscriber import Subscriber as Subscriber
 from nep.nodes.timer import Timer as Timer

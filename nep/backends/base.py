@@ -34,6 +34,7 @@ __all__ = [
     "SubscriberSpec",
     "SubscriberTransport",
     "Transport",
+    "Wakes",
     "backend_named",
 ]
 
@@ -84,6 +85,13 @@ class SubscriberSpec:
     qos: str = ""
 
 
+class Wakes(Protocol):
+    """Somebody who waits: a `nep.system.wakeup.Waker`, or what acts as one."""
+
+    def wake(self) -> None:
+        """There may be something to do. From any thread, also under locks; does not wait."""
+
+
 class PublisherTransport(Protocol):
     """What a publisher sends through."""
 
@@ -125,6 +133,20 @@ class SubscriberTransport(Protocol):
     ready: deque[Message]
     """Messages that come next and were read already; whoever reads may take them from its left. May be empty
     while others wait elsewhere."""
+
+    @property
+    def fd(self) -> int:
+        """What tells of messages between `enter_wait` and `leave_wait` when it can be read; -1: nothing."""
+
+    def enter_wait(self, waker: Wakes) -> bool:
+        """Before waiting: False when there is something to read already, or it is closed.
+
+        Else `waker` is woken by what does not show at `fd`, also by closing, until `leave_wait`. Who is woken
+        leaves soon: meanwhile it may be that nobody takes messages from the network.
+        """
+
+    def leave_wait(self, waker: Wakes) -> None:
+        """After waiting."""
 
     @property
     def received(self) -> int:

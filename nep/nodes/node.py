@@ -26,28 +26,31 @@ from nep.backends.base import (
 )
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port, for_messages
 from nep.backends.services import ClientSpec, ServerSpec
-from nep.errors import BadTopicError, ClosedError, DecodeError, WrongTypeError
+from nep.errors import BadTopicError, ClosedError, WrongTypeError
 from nep.i18n import _
 from nep.messages.queue import MAX_MESSAGES, Keep
 from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
+from nep.nodes.executor import spin_all
 from nep.nodes.log_handler import LogHandler, handler_of
 from nep.nodes.publisher import Publisher
-from nep.nodes.subscriber import SLICE_S, Subscriber
-from nep.nodes.timer import Timer, next_due
+from nep.nodes.subscriber import Subscriber
+from nep.nodes.timer import Timer
+from nep.nodes.work import Callback, Work
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
 from nep.protocol.service_wire import PREFIX, check_service
 from nep.protocol.wire import check_node_name, check_topic
 from nep.services.client import Client
 from nep.services.owned import OwnedServices, codec_checked
-from nep.services.server import Callback, Server
+from nep.services.server import Callback as ServerCallback
+from nep.services.server import Server
 from nep.system import forks
 from nep.system.addresses import checked_host
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Node"]
+__all__ = ["Node", "spin"]
 
 FLUSH_S = 2.0
 """How long closing waits for what was published to be delivered."""
@@ -91,12 +94,6 @@ class Node:
         self._master = self._backend.master(master)
         self._wait_s = seconds("wait_s", wait_s)
         self._lock = threading.RLock()
-        self._stop_spin = threading.Event()
-        self._callbacks: tuple[
-            tuple[Subscriber, SubscriberTransport, Callable[[Any], object], bool], ...
-        ] = ()
-        self._timers: tuple[Timer, ...] = ()
-        self._clock = time.monotonic
         self._publishers: set[Publisher] = set()
         self._subscribers: set[Subscriber] = set()
         self._is_closed = False
@@ -113,6 +110,7 @@ class Node:
         )
         self._transport: Transport = self._backend.open(record)
         self._services = OwnedServices(self._transport, self._backend.name)
+        self._work = Work(name, self._transport, time.monotonic, self._services)
         _alive.add(self)
         _close_with_worker()
         forks.watch(self)
@@ -268,9 +266,7 @@ class Node:
         )
         incoming = transport.subscriber(spec)
         subscriber = self._subscribed(incoming, spec)
-        with self._lock:
-            if not incoming.is_closed:
-                self._callbacks = (*self._callbacks, (subscriber, incoming, callback, with_message))
+        self._work.add_callback(Callback(subscriber, incoming, callback, with_message))
         return subscriber
 
     # ---- services
@@ -278,7 +274,7 @@ class Node:
     def new_server(
         self,
         service: str,
-        callback: Callback | None = None,
+        callback: ServerCallback | None = None,
         configuration: Configuration | None = None,
         *,
         threads: int = 0,
@@ -356,7 +352,7 @@ class Node:
         """It is closed."""
         with self._lock:
             self._subscribers.discard(subscriber)
-            self._callbacks = tuple(each for each in self._callbacks if each[0] is not subscriber)
+        self._work.forget_callback(subscriber)
 
     # ---- spinning
 
@@ -368,95 +364,22 @@ class Node:
         goes on at whole periods. What it raises comes out of `spin`. `Timer.cancel` ends it, and so does
         closing the node. Raises `ClosedError`, and `ValueError` for a period that is not above 0 or infinite.
         """
-        transport = self._open_transport()
-        timer = Timer(
-            period("period_s", period_s), function("callback", callback), self._clock, self._forget_timer
-        )
-        with self._lock:
-            if self._is_closed:
-                timer.node_closes()
-            else:
-                self._timers = (*self._timers, timer)
-        transport.wake()  # who spins already waits for less long now
-        return timer
-
-    def _forget_timer(self, timer: Timer) -> None:
-        """It is cancelled."""
-        with self._lock:
-            self._timers = tuple(each for each in self._timers if each is not timer)
+        self._open_transport()
+        return self._work.new_timer(period("period_s", period_s), function("callback", callback))
 
     def spin(self, timeout_s: float | None = None) -> None:
         """Run callbacks and timers in this thread until `stop_spin`, `close`, or for `timeout_s` seconds.
 
         What they raise comes out here. A `stop_spin` that came before ends the next spin at once. In a
-        child that is forked, also by a callback, it raises `ClosedError`.
+        child that is forked, also by a callback, it raises `ClosedError`. `nep.spin` does it for several
+        nodes.
         """
-        timeout_s = seconds("timeout_s", timeout_s)
-        deadline = None if timeout_s is None else self._clock() + timeout_s
-        try:
-            while not self._stop_spin.is_set() and not self._is_closed:
-                left = SLICE_S if deadline is None else min(SLICE_S, deadline - self._clock())
-                if left <= 0.0:
-                    return
-                timers = self._timers
-                has_fired = self._run_timers() if timers else False
-                has_fired = self._services.run(self._stop_spin) or has_fired
-                if self._run_callbacks() or has_fired:
-                    continue
-                if timers:
-                    left = min(left, next_due(timers) - self._clock())
-                if left > 0.0:
-                    self._wait(left)
-            if self._is_forked:
-                raise self._closed_error()
-        finally:
-            self._stop_spin.clear()
-
-    def _wait(self, timeout_s: float) -> None:
-        """For a message, a call, or `wake`."""
-        waited = [each[1] for each in self._callbacks if not each[1].is_closed]
-        calls = self._services.queues
-        if calls:  # so the transport has services
-            self._transport.wait(waited, timeout_s, calls)  # type: ignore[call-arg]
-        else:
-            self._transport.wait(waited, timeout_s)
+        self._work.spin(seconds("timeout_s", timeout_s))
 
     def stop_spin(self) -> None:
         """End `spin`, from any thread or from a callback."""
         if not self._is_forked:
-            self._stop_spin.set()
-            self._transport.wake()
-
-    def _run_timers(self) -> bool:
-        """Each timer that is due; whether there was any."""
-        has_fired = False
-        for timer in self._timers:
-            has_fired = timer.run_if_due() or has_fired
-            if self._stop_spin.is_set() or self._is_closed:
-                break
-        return has_fired
-
-    def _run_callbacks(self) -> bool:
-        """One message for each callback that has one; whether another was read with one of them."""
-        has_more = False
-        for subscriber, transport, callback, with_message in self._callbacks:
-            if self._stop_spin.is_set() or self._is_closed:
-                break
-            try:
-                message = transport.ready.popleft()
-            except IndexError:
-                found = None if transport.is_closed else transport.poll()
-                if found is None:
-                    continue
-                message = found
-            if transport.ready:
-                has_more = True
-            try:
-                payload = subscriber.decoded(message)
-            except DecodeError:
-                continue  # it is logged and an alert
-            callback(message if with_message else payload)
-        return has_more
+            self._work.stop()
 
     # ---- what it tells, the graph, and the end
 
@@ -498,17 +421,13 @@ class Node:
             self._is_closed = True
             publishers = tuple(self._publishers)
         _alive.discard(self)
-        self._stop_spin.set()
+        self._work.close()
         for publisher in publishers:
             publisher.node_closes()
         self._transport.begin_close()
         with self._lock:
             self._publishers.clear()
             self._subscribers.clear()
-            self._callbacks = ()
-            timers, self._timers = self._timers, ()
-        for timer in timers:
-            timer.node_closes()
         return True
 
     def _finish_close(self, timeout_s: float) -> None:
@@ -522,15 +441,11 @@ class Node:
         """In a child that was forked. See `nep.system.forks`."""
         self._is_closed = self._is_forked = True
         self._lock = threading.RLock()
-        self._stop_spin = threading.Event()
+        self._work.forked()
         for publisher in self._publishers:
             publisher.forked()
         for subscriber in self._subscribers:
             subscriber.forked()
-        for timer in self._timers:
-            timer.node_closes()
-        self._callbacks = ()
-        self._timers = ()
         self._services.forked()
         _alive.discard(self)
         _inherited.append(self)
@@ -558,6 +473,20 @@ def _own_topic(topic: str) -> str:
     if check_topic(topic).startswith(PREFIX):
         raise BadTopicError(topic, _("names that begin with '{prefix}' are services'").format(prefix=PREFIX))
     return topic
+
+
+def spin(*nodes: Node, timeout_s: float | None = None) -> None:
+    """Run callbacks and timers of all these nodes in this thread, as `Node.spin` does for one.
+
+    They may be of different back ends. They take turns: in each round every timer that is due is called, and
+    every callback that has a message is given one. `stop_spin` of a node ends its part; the others go on.
+    Ends when all nodes are stopped or closed, or after `timeout_s` seconds. Raises `ValueError` for what are
+    no nodes, or none.
+    """
+    if not nodes or not all(isinstance(each, Node) for each in nodes):
+        raise WrongTypeError(_("spin was given something else than nodes; give it one node or more"))
+    works = dict.fromkeys(each._work for each in nodes)  # noqa: SLF001 - they are one with the node
+    spin_all(tuple(works), seconds("timeout_s", timeout_s))
 
 
 def _close(nodes: Sequence[Node], timeout_s: float) -> None:

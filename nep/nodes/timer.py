@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Sequence
 
 __all__ = ["Timer", "next_due"]
@@ -13,7 +14,7 @@ class Timer:
 
     So a timer whose periods passed while something else ran does not make up for them, and keeps its beat:
     it is due at whole periods after it was made. `clock` tells seconds that never go back. May be used from
-    any thread; only who spins calls `run_if_due`.
+    any thread, and by several that spin.
     """
 
     def __init__(
@@ -28,12 +29,18 @@ class Timer:
         self._clock = clock
         self._on_cancel = on_cancel
         self._is_cancelled = False
+        self._lock = threading.Lock()
         self._due = clock() + period_s
 
     @property
     def period_s(self) -> float:
         """Seconds from one call to the next."""
         return self._period_s
+
+    @property
+    def callback(self) -> Callable[[], object]:
+        """What it calls."""
+        return self._callback
 
     @property
     def is_cancelled(self) -> bool:
@@ -47,12 +54,23 @@ class Timer:
 
     def run_if_due(self) -> bool:
         """Call the function if it is time; whether it was. What the function raises comes out here."""
+        is_due = self.take_turn()
+        if is_due:
+            self._callback()
+        return is_due
+
+    def take_turn(self) -> bool:
+        """Whether it is time to call the function; True to one of several threads that ask, which then does.
+
+        It is not due again before the next period, also when the function raises, or spins itself.
+        """
         now = self._clock()
         if self._is_cancelled or now < self._due:
             return False
-        # Before the call, which may raise, or spin itself: it is not due again for that.
-        self._due = now + self._period_s - math.fmod(now - self._due, self._period_s)
-        self._callback()
+        with self._lock:
+            if now < self._due:  # another thread was first
+                return False
+            self._due = now + self._period_s - math.fmod(now - self._due, self._period_s)
         return True
 
     def cancel(self) -> None:

@@ -12,7 +12,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 
-from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport, Wakes
 from nep.backends.connection import Configuration, Hybrid
 from nep.backends.memory.services import MemoryClient, MemoryServer, MemoryServices, ServiceHub
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec
@@ -178,6 +178,8 @@ class MemorySubscriber:
         self.received = self.lost = self.refused = 0
         self.problem = ""
         self.is_closed = False
+        self.fd = -1
+        self._waiting: tuple[Wakes, ...] = ()
 
     def put(self, message: Message) -> None:
         """Called by publishers."""
@@ -186,6 +188,21 @@ class MemorySubscriber:
             self.received += 1 - dropped
             self.lost += dropped
             self._transport.changed.notify_all()
+            for each in self._waiting:
+                each.wake()
+
+    def enter_wait(self, waker: Wakes) -> bool:
+        """Before waiting. See `SubscriberTransport.enter_wait`."""
+        with self._transport.changed:
+            if self.is_closed or len(self.inbox):
+                return False
+            self._waiting = (*self._waiting, waker)
+            return True
+
+    def leave_wait(self, waker: Wakes) -> None:
+        """After waiting."""
+        with self._transport.changed:
+            self._waiting = tuple(each for each in self._waiting if each is not waker)
 
     def poll(self) -> Message | None:
         """The next message if one is there."""
@@ -223,6 +240,8 @@ class MemorySubscriber:
             self._transport.forget(self)
             self.hub.ask(requests.RemoveSubscriber(self._transport.node.id, self.spec.id))
         self._transport.wake()
+        for each in self._waiting:
+            each.wake()
 
 
 class MemoryTransport:

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from nep.backends.base import Sink, SubscriberSpec
+from nep.backends.base import Sink, SubscriberSpec, Wakes
 from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import Refusals
@@ -36,6 +36,8 @@ class ZenohSubscriber:
         self.spec = spec
         self.ready: deque[Message] = deque()
         self.is_closed = False
+        self.fd = -1
+        self._waiting: tuple[Wakes, ...] = ()
         self._inboxes = inboxes
         self._on_close = on_close
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
@@ -59,6 +61,25 @@ class ZenohSubscriber:
         """The next message, waited for."""
         self._inboxes.wait((self,), timeout_s)
         return self.poll()
+
+    def enter_wait(self, waker: Wakes) -> bool:
+        """Before waiting. See `SubscriberTransport.enter_wait`."""
+        with self._inboxes.changed:
+            if self.is_closed or self.has_input:
+                return False
+            self._waiting = (*self._waiting, waker)
+            return True
+
+    def leave_wait(self, waker: Wakes) -> None:
+        """After waiting."""
+        with self._inboxes.changed:
+            self._waiting = tuple(each for each in self._waiting if each is not waker)
+
+    def _tell_waiting(self) -> None:
+        """Something is there, or will not be any more. With the lock of the inboxes held."""
+        self._inboxes.changed.notify_all()
+        for each in self._waiting:
+            each.wake()
 
     @property
     def has_input(self) -> bool:
@@ -132,7 +153,7 @@ class ZenohSubscriber:
             else:
                 if message is not None:
                     self._sources.dropped(self._inbox.put(message))
-                    self._inboxes.changed.notify_all()
+                    self._tell_waiting()
                 return
         if is_logged:
             _logger.warning("on '%s' came what is no message: %s", self.spec.topic, refused)
@@ -174,7 +195,7 @@ class ZenohSubscriber:
                 return
             self.is_closed = True
             self._inbox.take_all()
-            self._inboxes.changed.notify_all()
+            self._tell_waiting()
         self._inboxes.stop_pouring(self)
         self._on_close(self)
 

@@ -26,7 +26,7 @@ from typing import Generic, Protocol, TypeVar
 
 import zmq
 
-from nep.backends.base import SubscriberSpec
+from nep.backends.base import SubscriberSpec, Wakes
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals, wait_until
@@ -185,9 +185,9 @@ class SocketSubscriber(Generic[R]):
         self._io_comes_at = _NEVER
         self._is_brisk = False
         self._wanted: deque[None] = deque()
-        self._waiters: list[Waker] = []
+        self._waiters: list[Wakes] = []
         self._waker: Waker | None = None
-        self._woken: set[Waker] = set()
+        self._woken: set[Wakes] = set()
         self._problem = ""
         # `with` is three times faster on the lock itself than on the condition over it.
         self._lock = threading.Lock()
@@ -268,7 +268,7 @@ class SocketSubscriber(Generic[R]):
 
     # ---- waiting
 
-    def enter_wait(self, waker: Waker) -> bool:
+    def enter_wait(self, waker: Wakes) -> bool:
         """Before its descriptor is polled: False when there is something to read already."""
         self._wanted.append(None)  # as in `_turn`, which takes longer than all of this
         try:
@@ -280,7 +280,7 @@ class SocketSubscriber(Generic[R]):
         finally:
             self._wanted.pop()
 
-    def leave_wait(self, waker: Waker) -> None:
+    def leave_wait(self, waker: Wakes) -> None:
         """After its descriptor was polled."""
         with self._lock:
             self._waiters.remove(waker)

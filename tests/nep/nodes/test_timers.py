@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -45,8 +46,8 @@ def clock() -> Clock:
 @pytest.fixture
 def node(clock: Clock) -> Iterator[nep.Node]:
     with nep.node("timers", "memory", master="timers") as made:
-        made._clock = clock
-        made._transport = Waiting(made._transport, clock)  # type: ignore[assignment]
+        made._work.clock = clock
+        made._work.transport = Waiting(made._transport, clock)  # type: ignore[assignment]
         yield made
 
 
@@ -62,6 +63,29 @@ def test_a_late_timer_is_called_once_and_keeps_its_beat(clock: Clock) -> None:
     assert timer.due == 104.0
 
 
+def test_two_threads_that_spin_call_a_timer_once_each_time_it_is_due() -> None:
+    both = threading.Barrier(2)
+    calls: list[int] = []
+    now = 0.0
+
+    def clock() -> float:
+        """Both threads have read the time before one of them looks whether the timer is due."""
+        if threading.current_thread() is not threading.main_thread():
+            both.wait(30.0)
+        return now
+
+    timer = Timer(1.0, lambda: calls.append(1), clock)
+
+    for _ in range(2):
+        now += 1.0
+        threads = [threading.Thread(target=timer.run_if_due) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(30.0)
+    assert len(calls) == 2
+
+
 def test_who_is_due_first() -> None:
     clock = Clock()
     assert next_due([Timer(2.0, print, clock), Timer(0.5, print, clock)]) == 100.5
@@ -73,7 +97,7 @@ def test_spin_waits_no_longer_than_until_the_next_timer(node: nep.Node, clock: C
     node.new_timer(0.03125, lambda: calls.append(clock.now))
     node.spin(0.125)
     assert calls == [100.03125, 100.0625, 100.09375]
-    assert node._transport.waits == [0.03125] * 4  # type: ignore[attr-defined]
+    assert node._work.transport.waits == [0.03125] * 4  # type: ignore[attr-defined]
 
 
 def test_a_slow_callback_makes_a_timer_late_and_not_many(node: nep.Node, clock: Clock) -> None:

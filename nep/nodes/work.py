@@ -1,0 +1,257 @@
+"""Work: what a node does when it spins: its callbacks, timers and servers. One for each node."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import threading
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from nep.backends.base import SubscriberTransport, Transport, Wakes
+from nep.errors import ClosedError, DecodeError, NepError
+from nep.i18n import _
+from nep.nodes.subscriber import SLICE_S, Subscriber
+from nep.nodes.timer import Timer, next_due
+from nep.services.owned import OwnedServices
+
+__all__ = ["NOTHING", "Callback", "Work", "is_coroutine_function"]
+
+NOTHING = object()
+"""There is no message for a callback."""
+
+
+class Callback(NamedTuple):
+    """A function, and whose messages it is given: whole ones, or their payloads."""
+
+    subscriber: Subscriber
+    transport: SubscriberTransport
+    call: Callable[[Any], object]
+    with_message: bool
+
+
+class Work:
+    """Callbacks, timers and servers of one node, and whether they are to run. May be used from any thread.
+
+    `clock` tells seconds that never go back.
+    """
+
+    def __init__(
+        self, node_name: str, transport: Transport, clock: Callable[[], float], services: OwnedServices
+    ) -> None:
+        self.clock = clock
+        self.transport = transport
+        self.services = services
+        self.callbacks: tuple[Callback, ...] = ()
+        self.timers: tuple[Timer, ...] = ()
+        self.is_closed = self.is_forked = False
+        self._node_name = node_name
+        self._lock = threading.Lock()
+        self._is_stopped = threading.Event()
+        self._watchers: tuple[Wakes, ...] = ()
+        self._coroutine = ""
+        """What only a loop of asyncio can run; empty when there is nothing."""
+
+    # ---- what there is to do
+
+    def add_callback(self, callback: Callback) -> None:
+        """Give it messages from now on."""
+        with self._lock:
+            if not callback.transport.is_closed and not self.is_closed:
+                self.callbacks = (*self.callbacks, callback)
+                if is_coroutine_function(callback.call):
+                    self._coroutine = self._coroutine or callback.subscriber.topic
+        self.wake()
+
+    def forget_callback(self, subscriber: Subscriber) -> None:
+        """It is closed."""
+        with self._lock:
+            self.callbacks = tuple(each for each in self.callbacks if each.subscriber is not subscriber)
+            self._coroutine = self._first_coroutine()
+
+    def new_timer(self, period_s: float, callback: Callable[[], object]) -> Timer:
+        """A timer that runs from now on. See `Timer`."""
+        timer = Timer(period_s, callback, self.clock, self._forget_timer)
+        with self._lock:
+            if self.is_closed:
+                timer.node_closes()
+            else:
+                self.timers = (*self.timers, timer)
+                self._coroutine = self._first_coroutine()
+        self.wake()  # who spins already waits for less long now
+        return timer
+
+    def _forget_timer(self, timer: Timer) -> None:
+        """It is cancelled."""
+        with self._lock:
+            self.timers = tuple(each for each in self.timers if each is not timer)
+            self._coroutine = self._first_coroutine()
+
+    def _first_coroutine(self) -> str:
+        for each in self.callbacks:
+            if is_coroutine_function(each.call):
+                return each.subscriber.topic
+        return next((repr(each) for each in self.timers if is_coroutine_function(each.callback)), "")
+
+    # ---- whether it is to be done
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it was neither stopped nor closed."""
+        return not self._is_stopped.is_set() and not self.is_closed
+
+    def stop(self) -> None:
+        """End the spin that is under way, or the next one."""
+        self._is_stopped.set()
+        self.wake()
+
+    def begin_anew(self) -> None:
+        """Who span has ended: the next spin is not stopped."""
+        self._is_stopped.clear()
+
+    def wake(self) -> None:
+        """Whoever waits looks again at what there is to do."""
+        self.transport.wake()
+        for each in self._watchers:
+            each.wake()
+
+    def watch(self, watcher: Wakes) -> None:
+        """Wake this one as well, until `unwatch`."""
+        with self._lock:
+            self._watchers = (*self._watchers, watcher)
+
+    def unwatch(self, watcher: Wakes) -> None:
+        """Wake it no more."""
+        with self._lock:
+            self._watchers = tuple(each for each in self._watchers if each is not watcher)
+
+    def close(self) -> None:
+        """The node is closed: nothing is called any more."""
+        with self._lock:
+            self.is_closed = True
+            self.callbacks = ()
+            timers, self.timers = self.timers, ()
+        self._is_stopped.set()
+        for timer in timers:
+            timer.node_closes()
+        for each in self._watchers:
+            each.wake()
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self.is_closed = self.is_forked = True
+        self._lock = threading.Lock()
+        self._is_stopped = threading.Event()
+        for timer in self.timers:
+            timer.node_closes()
+        self.callbacks, self.timers, self._watchers = (), (), ()
+
+    def check_not_forked(self) -> None:
+        """Raises `ClosedError` in a child that was forked."""
+        if self.is_forked:
+            raise ClosedError(f"node '{self._node_name}'", is_forked=True)
+
+    # ---- doing it
+
+    def run(self) -> bool:
+        """Each timer that is due, one call for each server and one message for each callback that has one.
+
+        Whether there is more.
+
+        Raises what they raise, and `NepError` when one is a coroutine function.
+        """
+        if self._coroutine:
+            raise NepError(
+                _(
+                    "the callback of '{what}' is a coroutine function, which 'spin' cannot run; use "
+                    "'await node.spin_async()'"
+                ).format(what=self._coroutine)
+            )
+        has_run = self._run_timers() if self.timers else False
+        has_run = self.services.run(self._is_stopped) or has_run
+        return self._run_callbacks() or has_run
+
+    def _run_timers(self) -> bool:
+        """Each timer that is due; whether there was any."""
+        has_fired = False
+        for timer in self.timers:
+            has_fired = timer.run_if_due() or has_fired
+            if not self.is_running:
+                break
+        return has_fired
+
+    def _run_callbacks(self) -> bool:
+        """One message for each callback that has one; whether another was read with one of them."""
+        has_more = False
+        for callback in self.callbacks:
+            if not self.is_running:
+                break
+            given = self.given(callback)
+            if callback.transport.ready:
+                has_more = True
+            if given is not NOTHING:
+                callback.call(given)
+        return has_more
+
+    def given(self, callback: Callback) -> object:
+        """What a callback is given next; `NOTHING` when no message is there, or it cannot be decoded."""
+        transport = callback.transport
+        try:
+            message = transport.ready.popleft()
+        except IndexError:
+            found = None if transport.is_closed else transport.poll()
+            if found is None:
+                return NOTHING
+            message = found
+        try:
+            payload = callback.subscriber.decoded(message)
+        except DecodeError:
+            return NOTHING  # it is logged and an alert
+        return message if callback.with_message else payload
+
+    # ---- waiting
+
+    @property
+    def waiting(self) -> list[SubscriberTransport]:
+        """Those whose messages there is a callback for."""
+        return [each.transport for each in self.callbacks if not each.transport.is_closed]
+
+    @property
+    def due_s(self) -> float:
+        """So long until the first timer is due; infinite when there is none."""
+        return next_due(self.timers) - self.clock()
+
+    def _wait(self, timeout_s: float) -> None:
+        """For a message, a call, or `wake`."""
+        calls = self.services.queues
+        if calls:  # so the transport has services
+            self.transport.wait(self.waiting, timeout_s, calls)  # type: ignore[call-arg]
+        else:
+            self.transport.wait(self.waiting, timeout_s)
+
+    def spin(self, timeout_s: float | None) -> None:
+        """See `Node.spin`."""
+        deadline = None if timeout_s is None else self.clock() + timeout_s
+        try:
+            while self.is_running:
+                left = SLICE_S if deadline is None else min(SLICE_S, deadline - self.clock())
+                if left <= 0.0:
+                    return
+                if self.run():
+                    continue
+                if self.timers:
+                    left = min(left, self.due_s)
+                if left > 0.0:
+                    self._wait(left)
+            self.check_not_forked()
+        finally:
+            self.begin_anew()
+
+
+def is_coroutine_function(call: object) -> bool:
+    """Whether calling it makes a coroutine, as far as can be seen before."""
+    while isinstance(call, functools.partial):
+        call = call.func
+    return inspect.iscoroutinefunction(call) or (
+        callable(call) and inspect.iscoroutinefunction(call.__call__)
+    )
