@@ -30,6 +30,7 @@ from nep.errors import BadTopicError, ClosedError, WrongTypeError
 from nep.i18n import _
 from nep.messages.queue import MAX_MESSAGES, Keep
 from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
+from nep.nodes.async_spinning import spin as spin_in_loop
 from nep.nodes.executor import spin_all
 from nep.nodes.log_handler import LogHandler, handler_of
 from nep.nodes.publisher import Publisher
@@ -376,8 +377,16 @@ class Node:
         """
         self._work.spin(seconds("timeout_s", timeout_s))
 
+    async def spin_async(self, timeout_s: float | None = None) -> None:
+        """As `spin`, in a loop of asyncio, whose other coroutines run while this one waits.
+
+        Callbacks, and those of timers, may be coroutine functions. One at a time is called, and awaited: no
+        callback of the node runs beside another one. Whatever is to go on meanwhile is a task of its own.
+        """
+        await spin_in_loop(self._work, seconds("timeout_s", timeout_s))
+
     def stop_spin(self) -> None:
-        """End `spin`, from any thread or from a callback."""
+        """End `spin` or `spin_async`, from any thread or from a callback."""
         if not self._is_forked:
             self._work.stop()
 

@@ -12,6 +12,7 @@ from nep.errors import ClosedError, DecodeError
 from nep.messages.codecs import codec_for
 from nep.messages.message import Message
 from nep.nodes.arguments import seconds
+from nep.nodes.async_reading import AsyncMessages, AsyncReader
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ _logger = logging.getLogger("nep")
 
 
 class Subscriber:
-    """Receives from one topic, in order. Iterating yields `Message`s until it is closed."""
+    """Receives from one topic, in order. Iterating yields `Message`s until it is closed, also `async for`."""
 
     def __init__(
         self,
@@ -40,6 +41,7 @@ class Subscriber:
         self._spec = spec
         self._ready = transport.ready
         self._empty = codec_for(spec.msg_type).empty
+        self._async_reader = AsyncReader(transport, self._poll_first)
         self._problem = ""
         self._unreadable = 0
 
@@ -147,6 +149,30 @@ class Subscriber:
             if message is not None:
                 return message
 
+    async def receive_async(self, timeout_s: float | None = None) -> Message | None:
+        """As `receive`, while other coroutines of the loop run. Whoever is cancelled has taken no message."""
+        return await self._async_reader.receive(seconds("timeout_s", timeout_s))
+
+    async def listen_async(self, timeout_s: float | None = None) -> tuple[bool, object]:
+        """As `listen`, while other coroutines of the loop run; waits for ever without `timeout_s`."""
+        limit = seconds("timeout_s", timeout_s)
+        deadline = None if limit is None else time.monotonic() + limit
+        while True:
+            came = await self.receive_async(limit)
+            if came is None:
+                return False, self._empty()
+            try:
+                return True, self.decoded(came)
+            except DecodeError:
+                limit = None if deadline is None else max(0.0, deadline - time.monotonic())
+
+    def _poll_first(self) -> Message | None:
+        """What was read already, or what is there. Raises `ClosedError`."""
+        try:
+            return self._ready.popleft()
+        except IndexError:
+            return self._poll()
+
     def _poll(self) -> Message | None:
         if self._transport.is_closed:
             raise self._closed()
@@ -201,6 +227,9 @@ class Subscriber:
             if message is not None:
                 yield message
                 message = None  # what was read can be given back before the next one comes
+
+    def __aiter__(self) -> AsyncMessages:
+        return AsyncMessages(self._async_reader)
 
     def __enter__(self) -> Self:
         return self

@@ -1,0 +1,113 @@
+"""Spinning in a loop of asyncio. See `Node.spin_async`."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from nep.backends.base import SubscriberTransport
+from nep.nodes.loop_wait import LoopWait, give_way, loop_wait
+from nep.nodes.work import NOTHING, Work
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    import asyncio
+else:
+    asyncio = lazy_module("asyncio")
+
+__all__ = ["spin"]
+
+_TURNS = 64
+"""After so many turns without a rest other coroutines of the loop have theirs."""
+
+
+async def spin(work: Work, timeout_s: float | None) -> None:
+    """See `Node.spin_async`."""
+    loop = asyncio.get_running_loop()
+    deadline = math.inf if timeout_s is None else work.clock() + timeout_s
+    rests = _Rests(work, loop, loop_wait())
+    work.watch(rests)
+    turns = 0
+    try:
+        while work.is_running and work.clock() < deadline:
+            if await _turn(work):
+                turns = (turns + 1) % _TURNS
+                if not turns:
+                    await give_way()
+                continue
+            await rests.rest(min(work.due_s, deadline - work.clock()))
+        work.check_not_forked()
+    finally:
+        work.unwatch(rests)
+        rests.end()
+        work.begin_anew()
+
+
+async def _turn(work: Work) -> bool:
+    """Each timer that is due, and one message for each callback that has one; whether there was anything."""
+    has_called = False
+    for timer in work.timers:
+        if timer.take_turn():
+            has_called = True
+            await _until_done(timer.callback())
+        if not work.is_running:
+            return True
+    for callback in work.callbacks:
+        if not work.is_running:
+            break
+        given = work.given(callback)
+        if given is not NOTHING:
+            has_called = True
+            await _until_done(callback.call(given))
+    return has_called
+
+
+async def _until_done(returned: object) -> None:
+    if inspect.isawaitable(returned):
+        await returned
+
+
+class _Rests:
+    """How a node that spins in a loop waits: what came rings, and so does what others order. A `Wakes`."""
+
+    def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, waits: LoopWait) -> None:
+        self._work = work
+        self._loop = loop
+        self._waits = waits
+        self._rung = asyncio.Event()
+        self._watched: dict[SubscriberTransport, Callable[[], None]] = {}
+
+    def wake(self) -> None:
+        """From any thread."""
+        with suppress(RuntimeError):  # the loop is closed
+            self._loop.call_soon_threadsafe(self._rung.set)
+
+    async def rest(self, timeout_s: float) -> None:
+        """Until there may be something to do, `timeout_s` at most."""
+        for subscriber in self._work.waiting:
+            if subscriber not in self._watched:
+                call = self._watched[subscriber] = self._caller(subscriber)
+                self._waits.watch(subscriber, call)
+        late = None if math.isinf(timeout_s) else self._loop.call_later(max(0.0, timeout_s), self._rung.set)
+        try:
+            await self._rung.wait()
+        finally:
+            self._rung.clear()
+            if late is not None:
+                late.cancel()
+
+    def _caller(self, subscriber: SubscriberTransport) -> Callable[[], None]:
+        def call() -> None:
+            self._watched.pop(subscriber, None)
+            self._rung.set()
+
+        return call
+
+    def end(self) -> None:
+        """Watch nothing any more."""
+        for subscriber, call in self._watched.items():
+            self._waits.unwatch(subscriber, call)
+        self._watched.clear()
