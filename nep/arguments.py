@@ -10,7 +10,7 @@ from nep.errors import WrongTypeError
 from nep.i18n import _, listed
 from nep.text import control_in, escaped, shortened
 
-__all__ = ["at_least", "flag", "function", "limit", "one_of", "period", "seconds", "text"]
+__all__ = ["at_least", "flag", "function", "limit", "one_of", "period", "seconds", "text", "within"]
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
@@ -64,6 +64,23 @@ def at_least(name: str, value: object, least: int) -> int:
         raise ValueError(
             _("{name} is {value}; give a whole number from {least} on").format(
                 name=name, value=value, least=least
+            )
+        )
+    return value
+
+
+def within(name: str, value: object, least: int, most: int) -> int:
+    """`value` itself when it is a whole number from `least` to `most`. Raises `ValueError`."""
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise WrongTypeError(
+            _("{name} is {value}; give a whole number from {least} to {most}").format(
+                name=name, value=repr(value), least=least, most=most
+            )
+        )
+    if not least <= value <= most:
+        raise ValueError(
+            _("{name} is {value}; give a whole number from {least} to {most}").format(
+                name=name, value=value, least=least, most=most
             )
         )
     return value

@@ -51,6 +51,7 @@ class PublisherSpec:
 
     `number` proves the id: see `nep.protocol.requests.is_proven`. `may_batch`: a back end may send messages
     that follow each other within microseconds together. `qos`: one of the back end's words, or "".
+    `history`: so many messages are kept for subscribers that come late; 1 when it is only latched, else 0.
     """
 
     id: int
@@ -63,6 +64,7 @@ class PublisherSpec:
     number: int = 0
     may_batch: bool = True
     qos: str = ""
+    history: int = 0
 
 
 @dataclass(frozen=True)
@@ -219,7 +221,7 @@ class Backend:
     `master` makes a `Hybrid.master` of what a node is given as `master`, None when that is nothing; it raises
     `NepError` for what is no place where nodes of this back end meet. `codec_for` gives the codec of a
     publisher's message type, for a back end that has types of its own. `qos`: its words for qualities of
-    service.
+    service. `has_history`: its publishers keep more than the last message for subscribers that come late.
     """
 
     name: str
@@ -229,6 +231,7 @@ class Backend:
     master: Callable[[str | None], str] = master_address
     codec_for: Callable[[str], Codec] = codec_for
     qos: tuple[str, ...] = ()
+    has_history: bool = False
 
 
 def backend_named(name: str) -> Backend:

@@ -155,7 +155,8 @@ class CallQueue:
     def leave_wait(self, wake: Callable[[], None]) -> None:
         """It is called no more."""
         with self._changed:
-            self._wakes.remove(wake)
+            if wake in self._wakes:  # else this is a child that was forked
+                self._wakes.remove(wake)
 
     def close(self) -> tuple[IncomingCall, ...]:
         """Take nothing any more and wake all threads; the calls that nobody took."""

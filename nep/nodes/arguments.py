@@ -8,5 +8,6 @@ from nep.arguments import one_of as one_of
 from nep.arguments import period as period
 from nep.arguments import seconds as seconds
 from nep.arguments import text as text
+from nep.arguments import within as within
 
-__all__ = ["at_least", "flag", "function", "limit", "one_of", "period", "seconds", "text"]
+__all__ = ["at_least", "flag", "function", "limit", "one_of", "period", "seconds", "text", "within"]

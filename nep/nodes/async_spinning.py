@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from nep.backends.base import SubscriberTransport
+from nep.backends.services import CallQueue
 from nep.nodes.loop_wait import LoopWait, give_way, loop_wait
 from nep.nodes.work import NOTHING, Work
 from nep.system.lazy_import import lazy_module
@@ -47,8 +48,11 @@ async def spin(work: Work, timeout_s: float | None) -> None:
 
 
 async def _turn(work: Work) -> bool:
-    """Each timer that is due, and one message for each callback that has one; whether there was anything."""
-    has_called = False
+    """Each timer that is due, one call for each server, and one message for each callback that has one.
+
+    Whether there was anything.
+    """
+    has_called = work.run_servers()
     for timer in work.timers:
         if timer.take_turn():
             has_called = True
@@ -79,6 +83,8 @@ class _Rests:
         self._waits = waits
         self._rung = asyncio.Event()
         self._watched: dict[SubscriberTransport, Callable[[], None]] = {}
+        self._calls: list[CallQueue] = []
+        """Those of servers, which ring as long as this rests or works."""
 
     def wake(self) -> None:
         """From any thread."""
@@ -91,6 +97,11 @@ class _Rests:
             if subscriber not in self._watched:
                 call = self._watched[subscriber] = self._caller(subscriber)
                 self._waits.watch(subscriber, call)
+        for queue in self._work.services.queues:
+            if queue not in self._calls:
+                if not queue.enter_wait(self.wake):
+                    return
+                self._calls.append(queue)
         late = None if math.isinf(timeout_s) else self._loop.call_later(max(0.0, timeout_s), self._rung.set)
         try:
             await self._rung.wait()
@@ -111,3 +122,6 @@ class _Rests:
         for subscriber, call in self._watched.items():
             self._waits.unwatch(subscriber, call)
         self._watched.clear()
+        for queue in self._calls:
+            queue.leave_wait(self.wake)
+        self._calls.clear()

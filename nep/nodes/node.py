@@ -28,8 +28,9 @@ from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode,
 from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import BadTopicError, ClosedError, WrongTypeError
 from nep.i18n import _
+from nep.messages.history import MAX_HISTORY
 from nep.messages.queue import MAX_MESSAGES, Keep
-from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
+from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text, within
 from nep.nodes.async_spinning import spin as spin_in_loop
 from nep.nodes.executor import spin_all
 from nep.nodes.log_handler import LogHandler, handler_of
@@ -165,30 +166,35 @@ class Node:
         configuration: Configuration | None = None,
         *,
         latched: bool = False,
+        history: int = 0,
         batch: bool = True,
         qos: str = "",
     ) -> Publisher:
         """A publisher. The first message reaches every subscriber that was there before this returned.
 
-        `latched`: whoever subscribes later gets the last message at once. `batch`: messages published within
-        20 microseconds of each other may go out together, 100 microseconds later at most (the last ones of a
-        burst that goes on for longer: 500). `qos`: a quality of service in one word, where the back end knows
-        such ("ros2": "reliable", "best_effort", "sensor"). Raises `MasterUnreachable`, `BadTopicError`,
-        `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and `ValueError` for what is none of the
-        allowed arguments.
+        `latched`: whoever subscribes later gets the last message at once. `history`: it gets so many of the
+        last ones, up to 1000 and 64 MB, in order and before those that follow. `batch`: messages published
+        within 20 microseconds of each other may go out together, 100 microseconds later at most (the last
+        ones of a burst that goes on for longer: 500). `qos`: a quality of service in one word, where the back
+        end knows such ("ros2": "reliable", "best_effort", "sensor"). Raises `MasterUnreachable`,
+        `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and `ValueError` for what is
+        none of the allowed arguments.
         """
+        connected = self._configured(configuration)
+        kept = max(self._history(history, connected), 1 if latched is True else 0)
         number = next(self._numbers)
         spec = PublisherSpec(
             id_from(self._key, number),
             _own_topic(topic),
             text("msg_type", msg_type),
             self._backend.codec_for(msg_type),
-            flag("latched", latched),
-            for_messages(self._configured(configuration)),
+            flag("latched", latched) or kept > 0,
+            for_messages(connected),
             self._wait_s,
             number,
             flag("batch", batch),
             self._quality(qos),
+            kept,
         )
         publisher = Publisher(self._open_transport().publisher(spec), spec, self._publishers.discard)
         with self._lock:
@@ -333,6 +339,18 @@ class Node:
                 )
             )
         return configuration
+
+    def _history(self, history: int, configuration: Configuration) -> int:
+        within("history", history, 0, MAX_HISTORY)
+        is_original = isinstance(configuration, Direct) and configuration.wire == "original"
+        if history and (is_original or not self._backend.has_history):
+            where = _("the original wire") if is_original else _("the back end '{name}'")
+            raise ValueError(
+                _("{where} keeps no history for subscribers that come late; leave out history").format(
+                    where=where.format(name=self._backend.name)
+                )
+            )
+        return history
 
     def _quality(self, qos: str) -> str:
         if qos and not self._backend.qos:

@@ -168,8 +168,12 @@ class Work:
                 ).format(what=self._coroutine)
             )
         has_run = self._run_timers() if self.timers else False
-        has_run = self.services.run(self._is_stopped) or has_run
+        has_run = self.run_servers() or has_run
         return self._run_callbacks() or has_run
+
+    def run_servers(self) -> bool:
+        """One call for each server that has one; whether there was any."""
+        return self.services.run(self._is_stopped)
 
     def _run_timers(self) -> bool:
         """Each timer that is due; whether there was any."""

@@ -50,7 +50,8 @@ class PublisherRecord:
     """A publisher as its node presents it. `endpoints` is empty when nobody can connect to it directly.
 
     `local` says that it is bound to the name of this computer that goes with its loopback endpoint, too.
-    `number` proves its id: see `is_proven`.
+    `number` proves its id: see `is_proven`. `history`: so many messages it keeps for subscribers that come
+    late, when these may be more than the last one.
     """
 
     id: int
@@ -61,6 +62,7 @@ class PublisherRecord:
     latched: bool = False
     local: bool = False
     number: int = 0
+    history: int = 0
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from nep.backends.services import CallQueue, ClientSpec, ServerSpec
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.encoded import Encoded
+from nep.messages.history import History
 from nep.messages.message import Message, arrived, kind_of
 from nep.messages.queue import Inbox
 from nep.protocol import requests
@@ -99,7 +100,7 @@ class MemoryPublisher:
         self._kind = kind_of(spec.topic, spec.codec.name, spec.msg_type, is_latched=spec.is_latched)
         self.last_stamp_ns: int | None = None
         self.problem = ""
-        self.latched: Message | None = None
+        self.history: History[Message] = History(spec.history)
         self.missing: tuple[str, ...] = ()
         self.is_closed = False
 
@@ -147,8 +148,7 @@ class MemoryPublisher:
             message = arrived(
                 self._kind, data, self.last_stamp_ns, self.count, self.spec.id, encoded.extension or {}
             )
-            if self.spec.is_latched:
-                self.latched = message
+            self.history.add(message, len(data))
             for subscriber in self.hub.subscribers.get(self.spec.topic, ()):
                 subscriber.put(message)
 
@@ -265,7 +265,13 @@ class MemoryTransport:
         hub = self._join(spec.configuration)
         with hub.lock:
             record = PublisherRecord(
-                spec.id, spec.topic, spec.msg_type, spec.codec.name, ("memory",), spec.is_latched
+                spec.id,
+                spec.topic,
+                spec.msg_type,
+                spec.codec.name,
+                ("memory",),
+                spec.is_latched,
+                history=spec.history,
             )
             hub.ask(requests.AddPublisher(self.node, record))
             publisher = MemoryPublisher(self, hub, spec)
@@ -280,8 +286,8 @@ class MemoryTransport:
             hub.ask(requests.AddSubscriber(self.node, SubscriberRecord(spec.id, spec.topic, spec.msg_type)))
             subscriber = MemorySubscriber(self, hub, spec)
             for publisher in hub.publishers.get(spec.topic, ()):
-                if publisher.latched is not None:
-                    subscriber.put(publisher.latched)
+                for message in publisher.history:
+                    subscriber.put(message)
             hub.subscribers[spec.topic] = (*hub.subscribers.get(spec.topic, ()), subscriber)
             self._subscribers = (*self._subscribers, subscriber)
         if spec.sink is not None:
@@ -404,4 +410,4 @@ def _name(master: str | None) -> str:
     return master or "memory"
 
 
-BACKEND = Backend("memory", MemoryTransport, master=_name)
+BACKEND = Backend("memory", MemoryTransport, master=_name, has_history=True)

@@ -9,4 +9,4 @@ from nep.backends.nanomsg.transport import NanomsgTransport
 
 __all__ = ["BACKEND"]
 
-BACKEND = Backend("nanomsg", NanomsgTransport, needs="pynng", aliases=("nn",))
+BACKEND = Backend("nanomsg", NanomsgTransport, needs="pynng", aliases=("nn",), has_history=True)

@@ -22,6 +22,7 @@ from nep.backends.zeromq.publisher import GreetedPublisher
 from nep.backends.zeromq.sockets import LOOPBACK, Refusals, wait_until
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
+from nep.messages.history import History
 from nep.protocol.requests import PublisherCount
 from nep.protocol.wire import (
     BYE,
@@ -62,7 +63,8 @@ class NanomsgPublisher(GreetedPublisher):
         self.is_local = False
         self._on_close = on_close
         self._serve_soon = serve_soon
-        self._out: Any = new_socket("Pub0", send_buffer_size=queue_of(spec.codec.name))
+        queue = max(queue_of(spec.codec.name), 2 * spec.history)  # it goes out at once
+        self._out: Any = new_socket("Pub0", send_buffer_size=queue)
         self._in: Any = new_socket(
             "Pull0", recv_buffer_size=_HELLO_QUEUE, recv_max_size=SUBSCRIPTION_MAX_BYTES
         )
@@ -71,7 +73,7 @@ class NanomsgPublisher(GreetedPublisher):
         self._bytes = 0
         self._last_stamp_ns: int | None = None
         self._problem = ""
-        self._latched: bytes | None = None
+        self._history: History[bytes] = History(spec.history)
         self._topic = topic_part(spec.topic)
         self._is_closed = False
         self._is_released = False
@@ -148,8 +150,7 @@ class NanomsgPublisher(GreetedPublisher):
                 self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, told
             )
             tail = b"".join((header.pack(), data, extension))
-            if self.spec.is_latched:
-                self._latched = tail
+            self._history.add(tail, size)
             self._out.send(self._topic + tail, block=False)
 
     # ---- subscribers, in the node's thread
@@ -211,8 +212,8 @@ class NanomsgPublisher(GreetedPublisher):
         if subscriber is None or self._is_released:
             return
         self._seen[subscriber] = self.count
-        if self._latched is not None:
-            self._out.send(own_part(subscriber, self.spec.topic) + self._latched, block=False)
+        for kept in self._history:
+            self._out.send(own_part(subscriber, self.spec.topic) + kept, block=False)
         self._tell(subscriber, 0)
         self._changed.notify_all()
 
@@ -238,7 +239,7 @@ class NanomsgPublisher(GreetedPublisher):
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
                     self._bye()  # a full queue drops it like anything else
-            owed = [max(self.count - seen, self._latched is not None) for seen in self._seen.values()]
+            owed = [max(self.count - seen, len(self._history)) for seen in self._seen.values()]
             if any(owed):
                 _logger.warning(
                     "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",

@@ -18,6 +18,7 @@ from nep.backends.zeromq.subscriber import ReadOneByOne
 from nep.errors import TooManyFilesError, WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
+from nep.messages.history import MAX_HISTORY
 from nep.messages.message import Message
 from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import hello_part, topic_part
@@ -39,12 +40,19 @@ class QuickSub:
             "Sub0", recv_buffer_size=queue_of(codec), recv_max_size=0, recv_timeout=round(SHORT_WAIT_S * 1000)
         )
         self.fd = int(self.socket.recv_fd)
+        self._room = queue_of(codec)
         self._is_closed = False
 
     @property
     def has_input(self) -> bool:
         """Whether something can be read."""
         return not self._is_closed and bool(zmq.zmq_poll([(self.fd, zmq.POLLIN)], 0))
+
+    def make_room(self, history: int) -> None:
+        """So many messages may come at once."""
+        room = 2 * min(history, MAX_HISTORY)
+        if room > self._room:
+            self._room = self.socket.recv_buffer_size = room
 
     def recv(self, *, may_wait: bool) -> bytes | None:
         """What comes next; None when there is nothing, with `may_wait` within `SHORT_WAIT_S`."""
@@ -120,6 +128,7 @@ class NanomsgSubSocket(ReadOneByOne):
         for old in self.sources.replaced_by(remote):
             self.leave(old)
         source = self.sources.listed(remote)
+        self._sub.make_room(remote.publisher.history)
         source.is_lapsed = False
         source.ends_at = None
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""

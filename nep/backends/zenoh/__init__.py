@@ -10,4 +10,4 @@ from nep.backends.zenoh.transport import ZenohTransport
 
 __all__ = ["BACKEND"]
 
-BACKEND = Backend("zenoh", ZenohTransport, needs="eclipse-zenoh", master=place_name)
+BACKEND = Backend("zenoh", ZenohTransport, needs="eclipse-zenoh", master=place_name, has_history=True)

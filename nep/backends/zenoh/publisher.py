@@ -13,6 +13,7 @@ from nep.backends.zenoh.keys import data_key, hello_key
 from nep.backends.zenoh.library import callback, library
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
+from nep.messages.history import History
 from nep.protocol.requests import PublisherCount, PublisherRecord
 from nep.protocol.wire import EXTENSION, LATCHED, SIZE_MAX, Header, extension_part
 
@@ -45,7 +46,7 @@ class ZenohPublisher:
         self._bytes = 0
         self._last_stamp_ns: int | None = None
         self._problem = ""
-        self._latched: tuple[bytes, bytes] | None = None
+        self._history: History[tuple[bytes, bytes]] = History(spec.history)
         self._is_closed = False
         self._is_matched = False
         self._lock = threading.Lock()
@@ -74,12 +75,12 @@ class ZenohPublisher:
     def _greeted(self, query: Any) -> None:  # noqa: ANN401 - zenoh's
         """In one of zenoh's threads: what is latched, and from which number on its messages are counted."""
         with self._lock:
-            latched = self._latched
+            history = () if self._is_closed else tuple(self._history)
             header = Header(self.spec.codec.number, 0, self.count, time.time_ns(), self.spec.id)
             is_closed = self._is_closed
         with query:  # without the lock: whoever does not read its answer holds up nobody else
-            if latched is not None and not is_closed:
-                query.reply(self._key, latched[0], attachment=latched[1])
+            for data, beside in history:
+                query.reply(self._key, data, attachment=beside)
             if not is_closed:
                 query.reply(self._key, b"", attachment=header.pack())
 
@@ -126,8 +127,7 @@ class ZenohPublisher:
                 self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, size
             )
             beside = header.pack() + extension
-            if self.spec.is_latched:
-                self._latched = data, beside
+            self._history.add((data, beside), len(data))
             self._out.put(data, attachment=beside)
 
     # ---- closing

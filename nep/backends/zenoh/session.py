@@ -49,7 +49,8 @@ _REPLIES_MOST, _LISTS_MOST = 100, 20_000
 class Inquiry:
     """A question that was asked: who answered, and whether all have that could."""
 
-    def __init__(self, timeout_s: float) -> None:
+    def __init__(self, timeout_s: float, on_over: Callable[[], None] | None = None) -> None:
+        self._on_over = on_over
         self.answers: dict[str, bytes] = {}
         self._ends_at = time.monotonic() + timeout_s + _GRACE_S
         self._is_over = False
@@ -67,6 +68,8 @@ class Inquiry:
         with self._changed:
             self._is_over = True
             self._changed.notify_all()
+        if self._on_over is not None:
+            self._on_over()
 
     def wait(self, wanted: frozenset[str] | None = None, deadline: float | None = None) -> frozenset[str]:
         """Wait for those that are `wanted`, or for all; the keys of those that did not answer."""
@@ -114,11 +117,12 @@ class ZenohSession:
         timeout_s: float,
         *,
         take: Callable[[Any], None] | None = None,
+        over: Callable[[], None] | None = None,
         is_last: bool = False,
     ) -> Inquiry:
         """Ask all that answer at `key`. With `is_last` it comes behind all that was published before."""
         zenoh = library()
-        question = Inquiry(timeout_s)
+        question = Inquiry(timeout_s, over)
 
         def answered(reply: Any) -> None:  # noqa: ANN401 - zenoh's
             if take is not None and reply.ok is not None:
@@ -223,7 +227,13 @@ class ZenohSession:
 
     def _greet(self, record: PublisherRecord, subscriber: ZenohSubscriber) -> None:
         """A publisher came after its subscriber: where its counting begins, and what it has latched."""
-        self.ask(hello_key(record.topic, record.id), None, _GREETING_S, take=subscriber.told)
+        self.ask(
+            hello_key(record.topic, record.id),
+            None,
+            _GREETING_S,
+            take=subscriber.told,
+            over=lambda: subscriber.greeted((record.id,)),
+        )
 
     def look(self, timeout_s: float) -> GraphView:
         """Everybody's records and figures of this moment; of who does not answer in time only that it is."""
@@ -270,6 +280,8 @@ class ZenohSession:
         """It takes messages from now on, and others may see it."""
         spec = subscriber.spec
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type)
+        for remote in self.roster.publishers_of(spec.topic):  # what comes before they are greeted waits
+            subscriber.met(remote)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
             self._outputs[spec.id] = self._zenoh.declare_subscriber(
@@ -279,9 +291,11 @@ class ZenohSession:
 
     def greet_all(self, subscriber: ZenohSubscriber, timeout_s: float) -> None:
         """Ask all publishers of its topic what they have latched, and where its counting begins."""
-        for remote in self.roster.publishers_of(subscriber.spec.topic):
+        there = self.roster.publishers_of(subscriber.spec.topic)
+        for remote in there:
             subscriber.met(remote)
         self.ask(hellos_key(subscriber.spec.topic), None, timeout_s, take=subscriber.told).wait()
+        subscriber.greeted(each.publisher.id for each in there)
 
     def publisher(self, make: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
         """One that is made with zenoh's session."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from nep.backends.base import Sink, SubscriberSpec, Wakes
+from nep.backends.zenoh.early import EarlyMessages
 from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import Refusals
@@ -17,7 +18,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
-from nep.protocol.wire import HEADER_BYTES, hello_part, topic_part
+from nep.protocol.wire import HEADER_BYTES, hello_part, read_header, topic_part
 
 __all__ = ["ZenohSubscriber"]
 
@@ -43,6 +44,7 @@ class ZenohSubscriber:
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
         self._sources = HeardPublishers()
         self._refusals = Refusals()
+        self._early = EarlyMessages(self._sources, spec.max_messages)
         self._problem = ""
         self._topic = topic_part(spec.topic)
         self._own = hello_part(spec.id, spec.topic)
@@ -139,24 +141,44 @@ class ZenohSubscriber:
         if len(beside) > HEADER_BYTES:
             rest.append(beside[HEADER_BYTES:])
         with self._inboxes.changed:
-            if self.is_closed:
+            if not self.is_closed:
+                self._take_parts(first, rest)
+
+    def _take_parts(self, first: bytes, rest: list[bytes]) -> None:
+        """With the lock of the inboxes held."""
+        try:
+            if not rest[0]:
+                raise WireError(_("it has no header; a program of another kind published it"), len(rest[-1]))
+            if first == self._topic and _is_latched(rest[0]) and self._is_early(rest):
                 return
-            try:
-                if not beside:
-                    raise WireError(
-                        _("it has no header; a program of another kind published it"), len(payload)
-                    )
-                message = self._parser.parse(first, rest)
-            except WireError as error:
-                is_logged = self._refusals.add(error.reason)
-                refused = error
-            else:
-                if message is not None:
-                    self._sources.dropped(self._inbox.put(message))
-                    self._tell_waiting()
-                return
-        if is_logged:
-            _logger.warning("on '%s' came what is no message: %s", self.spec.topic, refused)
+            self._hear(self._parser.parse(first, rest))
+            if first == self._own and len(rest) == 1:  # the end of an answer
+                self._take_early(read_header(rest[0]).publisher)
+        except WireError as error:
+            if self._refusals.add(error.reason):
+                _logger.warning("on '%s' came what is no message: %s", self.spec.topic, error)
+
+    def _is_early(self, rest: list[bytes]) -> bool:
+        header = read_header(rest[0])
+        is_early = self._early.keep(header, rest)
+        if not is_early:  # nor does any before it wait any longer
+            self._take_early(header.publisher)
+        return is_early
+
+    def _hear(self, message: Message | None) -> None:
+        if message is not None:
+            self._sources.dropped(self._inbox.put(message))
+            self._tell_waiting()
+
+    def _take_early(self, publisher: int) -> None:
+        for parts in self._early.take(publisher):
+            self._hear(self._parser.parse(self._topic, parts))
+
+    def greeted(self, publishers: Iterable[int]) -> None:
+        """Who of these has not answered a hello by now is not waited for."""
+        with self._inboxes.changed:
+            for publisher in publishers:
+                self._take_early(publisher)
 
     def met(self, remote: RemotePublisher) -> None:
         """A publisher is there."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 from nep.errors import WireError
@@ -12,6 +13,7 @@ __all__ = ["UNLISTED_MAX", "HeardPublisher", "HeardPublishers"]
 
 FAREWELL_S = 3.0
 """So long after a publisher has unregistered its last messages may still come."""
+EARLY_S = 5.0
 GAP_MAX = 2**32
 """More messages than these nobody misses at once: an hour of a million a second."""
 UNLISTED_MAX = 1000
@@ -33,6 +35,8 @@ class HeardPublisher:
     refused: str = ""
     """The endpoint to which it could not be connected, and `problem` why."""
     problem: str = ""
+    early_until: float | None = None
+    """Until then at most, what comes before the echo is left out: see `HeardPublishers.is_early`."""
     last: int | None = None
     has_echoed: bool = False
     is_lapsed: bool = False
@@ -116,6 +120,23 @@ class HeardPublishers:
             return False
         self.received += 1
         return True
+
+    def is_early(self, publisher: int) -> bool:
+        """Whether a message, not for this subscriber alone, is one that comes again before the echo.
+
+        Between a publisher's first look at a filter and at the hello behind it, messages go out to a new
+        subscriber: newer ones than those of its history, which follows with all of them. For a publisher that
+        does not greet that is over in a moment.
+        """
+        source = self.by_id.get(publisher)
+        if source is None or source.has_echoed or source.last is not None or source.remote is None:
+            return False
+        if source.remote.publisher.history <= 1:
+            return False
+        now = time.monotonic()
+        if source.early_until is None:
+            source.early_until = now + EARLY_S
+        return now < source.early_until
 
     def reached(self, publisher: int, seq: int) -> bool:
         """An echo or a bye: messages up to `seq` were sent before it, on the same connection.

@@ -24,6 +24,7 @@ from nep.backends.zeromq.sockets import Part, Refusals, Socket, send_mark, senda
 from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
+from nep.messages.history import History
 from nep.protocol.batch import batch_part
 from nep.protocol.requests import Expected, PublisherCount
 from nep.protocol.wire import (
@@ -120,10 +121,10 @@ class NativePublisher(GreetedPublisher):
         self._last_stamp_ns: int | None = None
         self._problem = ""
         self._subscriptions = Subscriptions(spec.topic, spec.id)
-        if can_share() and not spec.is_latched:
+        if can_share() and not spec.history:
             self._subscriptions.shared = SharedPayloads(spec.id, self._offer)
         self._apart = self._subscriptions.apart
-        self._latched: tuple[Part, ...] | None = None
+        self._history: History[tuple[Part, ...]] = History(spec.history)
         self._looked_ns = 0
         self._io_comes = False
         self._served = 0
@@ -255,6 +256,8 @@ class NativePublisher(GreetedPublisher):
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self._flush()
+            if self._flags:  # whoever is greeted now gets what was kept, and then this one like all others
+                self._read_subscriptions()
             self._count = seq = self._count + 1
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
@@ -281,6 +284,8 @@ class NativePublisher(GreetedPublisher):
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self._flush()
+            if self._flags:
+                self._read_subscriptions()
             number = shared.place(given, self._seen, time.monotonic()) if shared and not self._apart else None
             if data is None and not (number is not None and shared and shared.readers >= self._seen.keys()):
                 data = sendable(given)
@@ -351,12 +356,12 @@ class NativePublisher(GreetedPublisher):
         self._flush()
         tail = self._tail(data, extension, size, 0)
         shared = None if number is None else self._tail(number, extension, len(number), SHARED)
-        if self.spec.is_latched:
-            self._latched = tail
+        self._history.add(tail, size)
         if self._bytes < self._settle_at:
             self._send_to_all(tail, shared)
         else:
-            self._read_subscriptions()
+            if not self._flags:
+                self._read_subscriptions()
             self._send_to_those_with_room(tail, shared, size)
 
     def _tail(self, data: Part, extension: bytes | None, size: int, flags: int) -> tuple[Part, ...]:
@@ -473,12 +478,13 @@ class NativePublisher(GreetedPublisher):
 
     def _greet(self, own: bytes) -> None:
         """What was latched, then the echo: from here on the subscriber counts."""
-        if self._latched is not None:
-            self._send_parts(own, self._latched)
+        for kept in self._history:
+            self._send_parts(own, kept)
+        if self._history:
             hello = parse_hello(own)
             window = self._subscriptions.windows.get(hello.subscriber) if hello is not None else None
             if window is not None:
-                window.sent(self._count, len(self._latched[1]))
+                window.sent(self._count, self._history.size_bytes)
         self._send_parts(own, (self._notice(0),))
 
     def _notice(self, flags: int) -> bytes:
@@ -504,7 +510,7 @@ class NativePublisher(GreetedPublisher):
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
                     self._bye()  # a full queue drops it like anything else
             if self._seen:
-                owed = [max(self._count - seen, self._latched is not None) for seen in self._seen.values()]
+                owed = [max(self._count - seen, len(self._history)) for seen in self._seen.values()]
                 if any(owed):  # else only the bye was not taken
                     _logger.warning(
                         "'%s' is closed before %d subscriber(s) took everything: "

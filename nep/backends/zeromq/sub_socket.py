@@ -153,6 +153,8 @@ class CarefulParser:
                     codec=header.codec
                 )
             )
+        if not is_alone and self._sources.is_early(header.publisher):
+            return None
         if not self._sources.arrived(header.publisher, header.seq, is_alone=is_alone):
             return None
         shared: memoryview | None = None

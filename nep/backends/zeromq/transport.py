@@ -153,6 +153,7 @@ class ZeromqTransport:
             spec.is_latched,
             publisher.is_local,
             spec.number,
+            spec.history,
         )
         try:
             reply = session.add_publisher(record, publisher, spec.wait_s)

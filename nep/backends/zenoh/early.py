@@ -1,0 +1,59 @@
+"""EarlyMessages: live messages that come before what a publisher answers to a hello. No network, no lock.
+
+A publisher's history and the messages that it publishes meanwhile come by two ways. What comes too early
+waits until the history is there with all that it has, and goes on behind it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from nep.backends.zeromq.loss import HeardPublishers
+from nep.messages.history import HISTORY_BYTES
+from nep.protocol.wire import Header
+
+__all__ = ["EarlyMessages"]
+
+Parts = Sequence[bytes]
+_LONGEST_S = 15.0
+"""Nothing waits for longer; greetings take ten seconds at most."""
+
+
+class EarlyMessages:
+    """Those of one subscriber, which lives under its own lock. `sources`: whom it hears."""
+
+    def __init__(
+        self, sources: HeardPublishers, max_messages: int, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._sources = sources
+        self._max_messages = max_messages
+        self._clock = clock
+        self._kept: dict[int, list[tuple[int, Parts]]] = {}
+        self._until: dict[int, float] = {}
+        self._bytes = 0
+
+    def keep(self, header: Header, parts: Parts) -> bool:
+        """Whether this live message comes too early, and waits now. What waits is taken by `take`."""
+        source = self._sources.find(header.publisher)
+        if source is None or source.remote is None or source.has_echoed:
+            return False
+        now = self._clock()
+        if now >= self._until.setdefault(header.publisher, now + _LONGEST_S) or not self._has_room(header):
+            return False
+        self._kept.setdefault(header.publisher, []).append((header.seq, parts))
+        self._bytes += sum(map(len, parts))
+        return True
+
+    def _has_room(self, header: Header) -> bool:
+        count = len(self._kept.get(header.publisher, ()))
+        return count < self._max_messages and self._bytes < HISTORY_BYTES
+
+    def take(self, publisher: int) -> list[Parts]:
+        """Those of a publisher that were not heard since, in order."""
+        self._until.pop(publisher, None)
+        kept = self._kept.pop(publisher, [])
+        self._bytes -= sum(len(part) for _seq, parts in kept for part in parts)
+        source = self._sources.find(publisher)
+        last = 0 if source is None or source.last is None else source.last
+        return [parts for seq, parts in sorted(kept) if seq > last]

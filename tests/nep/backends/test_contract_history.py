@@ -1,0 +1,290 @@
+"""The contract of back ends: whoever subscribes later gets the last messages, then those that follow."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterator
+from itertools import count
+
+import numpy as np
+import pytest
+
+import nep
+from nep.backends.zenoh.early import EarlyMessages
+from nep.backends.zeromq.loss import EARLY_S, HeardPublishers
+from nep.masters.master import Master
+from nep.messages.history import HISTORY_BYTES, History
+from nep.protocol.requests import PublisherRecord, RemotePublisher
+from nep.protocol.wire import Header
+from tests.nep.programs import eventually, running
+
+_names = count()
+Make = Callable[[str], nep.Node]
+
+
+@pytest.fixture(params=["memory", "zeromq", "nanomsg", "zenoh"])
+def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
+    """Makes nodes that can meet; closes them."""
+    made: list[nep.Node] = []
+    where = master.address
+    if request.param == "memory":
+        where = f"history-{next(_names)}"
+    elif request.param == "zenoh":
+        where = f"local/history-{os.getpid()}-{next(_names)}"
+
+    def new(name: str) -> nep.Node:
+        node = nep.node(name, request.param, master=where)
+        made.append(node)
+        return node
+
+    yield new
+    for node in made:
+        node.close()
+
+
+def read(sub: nep.Subscriber, most: int) -> list[object]:
+    """What comes, `most` messages or until nothing comes for a moment."""
+    got: list[object] = []
+    while len(got) < most:
+        ok, payload = sub.listen(timeout_s=30.0)
+        assert ok, got
+        got.append(payload)
+    assert sub.listen(timeout_s=0.05) == (False, sub._empty())
+    return got
+
+
+@pytest.mark.parametrize("published", [0, 1, 3, 4, 10])
+def test_a_late_subscriber_gets_the_last_ones_in_order_then_what_follows(make: Make, published: int) -> None:
+    pub = make("a").new_pub("topic", history=3)
+    early = make("early").new_sub("topic")
+    for n in range(published):
+        pub.publish(n)
+    late = make("late").new_sub("topic")
+    pub.publish("live")
+    kept = list(range(published))[-3:]
+    assert read(late, len(kept) + 1) == [*kept, "live"]
+    assert read(early, published + 1) == [*range(published), "live"]
+    assert (early.lost, late.lost, late.received) == (0, 0, len(kept) + 1)
+    late_again = make("again").new_sub("topic")
+    assert read(late_again, min(3, published + 1)) == [*range(published), "live"][-3:]
+
+
+def test_what_is_published_before_anybody_subscribes_is_kept(make: Make) -> None:
+    pub = make("a").new_pub("topic", history=100)
+    for n in range(250):
+        pub.publish(n)
+    assert read(make("b").new_sub("topic"), 100) == list(range(150, 250))
+
+
+def test_latched_is_a_history_of_one(make: Make) -> None:
+    node = make("a")
+    pubs = [
+        node.new_pub("latched", latched=True),
+        node.new_pub("one", history=1),
+        node.new_pub("both", latched=True, history=2),
+    ]
+    for pub in pubs:
+        for n in range(3):
+            pub.publish(n)
+    other = make("b")
+    assert [read(other.new_sub(pub.topic), most) for pub, most in zip(pubs, (1, 1, 2), strict=True)] == [
+        [2],
+        [2],
+        [1, 2],
+    ]
+    topics = node.graph().topics
+    assert all(topics[pub.topic].publishers[0].latched for pub in pubs)
+
+
+def test_none_twice_none_missing_while_it_is_published_all_the_time(make: Make) -> None:
+    """Subscribers come in the middle of a stream: what each gets begins `history` before, without a gap."""
+    pub = make("a").new_pub("topic", history=50)
+    others = make("b")
+    is_over = threading.Event()
+    pause = threading.Event()
+
+    def publish() -> None:
+        n = 0
+        while not is_over.is_set():
+            pub.publish(n)
+            n += 1
+            if n % 5 == 0:
+                pause.wait(0.001)
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    try:
+        for _ in range(15):
+            with others.new_sub("topic") as sub:
+                before = pub.count
+                got = []
+                while not got or got[-1] < before + 100:
+                    ok, payload = sub.listen(timeout_s=30.0)
+                    assert ok
+                    got.append(int(str(payload)))
+                assert got == list(range(got[0], got[0] + len(got)))
+                assert got[0] <= max(0, before - 50)
+                assert sub.lost == 0
+    finally:
+        is_over.set()
+        thread.join(30.0)
+
+
+def test_each_publisher_of_a_topic_has_its_own(make: Make) -> None:
+    pubs = [make(f"p{n}").new_pub("topic", history=2) for n in range(3)]
+    for number in range(5):
+        for n, pub in enumerate(pubs):
+            pub.publish([n, number])
+    got = read(make("s").new_sub("topic"), 6)
+    for n in range(3):
+        assert [each for each in got if each[0] == n] == [[n, 3], [n, 4]]  # type: ignore[index]
+
+
+def test_pictures_and_large_messages_are_kept(make: Make) -> None:
+    node = make("a")
+    pictures = [np.full((90, 120, 3), n, np.uint8) for n in range(100)]
+    pub = node.new_pub("camera", "image", history=80)
+    for picture in pictures:
+        pub.publish(picture)
+    sub = make("b").new_sub("camera", "image")
+    for n in range(20, 100):
+        ok, picture = sub.listen(timeout_s=30.0)
+        assert ok
+        assert np.array_equal(np.asarray(picture), pictures[n])
+    assert sub.lost == 0
+
+
+def test_the_bytes_are_bounded_and_the_newest_stays(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(History.__init__, "__defaults__", (1_000_000,))
+    pub = make("a").new_pub("topic", "bytes", history=1000)
+    for n in range(10):
+        pub.publish(bytes([n]) * 300_000)
+    got = read(make("b").new_sub("topic", "bytes"), 3)
+    assert [each[0] for each in got] == [7, 8, 9]  # type: ignore[index]
+    pub.publish(b"\x0a" * 8_000_000)
+    assert [len(each) for each in read(make("c").new_sub("topic", "bytes"), 1)] == [8_000_000]  # type: ignore[arg-type]
+
+
+def test_a_sink_and_keep_latest_take_part(make: Make) -> None:
+    pub = make("a").new_pub("topic", history=10)
+    for n in range(20):
+        pub.publish(n)
+    node = make("b")
+    got: list[object] = []
+    node.new_sub("topic", sink=lambda messages: got.extend(each.payload for each in messages))
+    latest = node.new_sub("topic", keep="latest")
+    eventually(lambda: len(got) == 10)
+    assert got == list(range(10, 20))
+    eventually(lambda: latest.received >= 1)
+    last: object = None
+    while last != 19:
+        _ok, last = latest.listen(timeout_s=30.0)
+
+
+def test_what_is_refused(make: Make) -> None:
+    node = make("a")
+    for wrong in (-1, 1001, 2**64, True, 1.5, "3", None, float("nan")):
+        with pytest.raises(ValueError, match=r"history is .*; give a whole number from 0 to 1000"):
+            node.new_pub("topic", history=wrong)  # type: ignore[arg-type]
+    assert node.new_pub("topic", history=0).count == 0
+
+
+def test_a_back_end_without_says_so(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = make("a")
+    monkeypatch.setattr("nep.backends.base.Backend.has_history", False, raising=False)
+    object.__setattr__(node._backend, "has_history", False)
+    try:
+        with pytest.raises(ValueError, match=f"the back end '{node._backend.name}' keeps no history"):
+            node.new_pub("topic", history=1)
+    finally:
+        object.__setattr__(node._backend, "has_history", True)
+
+
+def test_the_original_wire_has_none() -> None:
+    with nep.node("a") as node:
+        direct = node.direct(port=9999)
+        with pytest.raises(ValueError, match="the original wire keeps no history"):
+            node.new_pub("topic", "json", direct, history=2)
+
+
+def test_the_history_of_a_program_that_is_killed_is_gone_and_of_its_successor_there(master: Master) -> None:
+    code = """
+    import sys, nep
+    pub = nep.node("a").new_pub("t", history=3)
+    for n in range(5): pub.publish([sys.argv[1], n])
+    print("there")
+    input()
+    """
+    with nep.node("b") as node:
+        early = node.new_sub("t")
+        with running(code, "first") as program:
+            assert program.line() == "there"
+            assert read(node.new_sub("t"), 3) == [["first", n] for n in (2, 3, 4)]
+            program.process.kill()
+            program.process.wait()
+        with running(code, "second") as program:
+            assert program.line() == "there"
+            got = [early.listen(timeout_s=30.0)[1] for _ in range(10)]
+            assert got == [[which, n] for which in ("first", "second") for n in range(5)]
+
+
+# ---- its parts
+
+
+def test_the_newest_stay() -> None:
+    history: History[int] = History(3, 100)
+    for n in range(5):
+        history.add(n, 10)
+    assert (list(history), len(history), history.size_bytes) == ([2, 3, 4], 3, 30)
+    history.add(5, 85)
+    assert (list(history), history.size_bytes) == ([4, 5], 95)
+    history.add(6, 1000)
+    assert (list(history), history.size_bytes) == ([6], 1000)
+    empty: History[int] = History(0)
+    empty.add(1, 1)
+    assert not empty
+    assert HISTORY_BYTES == 64 * 2**20
+
+
+def _remote(history: int) -> RemotePublisher:
+    return RemotePublisher(PublisherRecord(5, "t", "json", "json", history=history), "n", "name")
+
+
+def test_what_comes_before_the_echo_is_left_out_only_where_it_comes_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr("nep.backends.zeromq.loss.time.monotonic", lambda: now[0])
+    sources = HeardPublishers()
+    assert not sources.is_early(5)
+    sources.listed(_remote(1))
+    assert not sources.is_early(5)
+    sources.listed(_remote(2))
+    assert sources.is_early(5)
+    now[0] += EARLY_S
+    assert not sources.is_early(5), "it greets nobody"
+    now[0] -= 1.0
+    assert sources.is_early(5)
+    sources.get(5).has_echoed = True
+    assert not sources.is_early(5)
+
+
+def test_early_messages_wait_for_the_history_and_are_bounded() -> None:
+    now = [0.0]
+    sources = HeardPublishers()
+    early = EarlyMessages(sources, 3, lambda: now[0])
+    assert not early.keep(Header(1, 1, 7, 0, 5), [b"7"]), "nobody has met it"
+    sources.listed(_remote(2))
+    for seq in (9, 7, 8):
+        assert early.keep(Header(1, 1, seq, 0, 5), [b"%d" % seq])
+    assert not early.keep(Header(1, 1, 10, 0, 5), [b"10"]), "there is room for three"
+    assert sources.arrived(5, 7, is_alone=True)
+    assert early.take(5) == [[b"8"], [b"9"]], "those that the history had are left out"
+    assert early.take(5) == []
+    sources.get(5).has_echoed = True
+    assert not early.keep(Header(1, 1, 11, 0, 5), [b"11"]), "it has answered"
+    sources.get(5).has_echoed = False
+    assert early.keep(Header(1, 1, 12, 0, 5), [b"12"])
+    now[0] = 20.0
+    assert not early.keep(Header(1, 1, 13, 0, 5), [b"13"])
