@@ -43,7 +43,6 @@ EARNED = {
     "nep.backends.zenoh.early": "pure, and tested alone",
     "nep.cli.doctor": "one of a list: the commands of nep",
     "nep.cli.interrupts": "imported before all else of a command, under the guard of its caller",
-    "nep.masters.rates": "pure, and tested alone",
     "app.core.run.edits_since_run": "pure, and tested alone",
     "app.core.run.run_warnings": "pure, and tested alone",
     "app.core.run.trial": "pure, and tested alone",

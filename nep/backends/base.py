@@ -222,6 +222,7 @@ class Backend:
     `NepError` for what is no place where nodes of this back end meet. `codec_for` gives the codec of a
     publisher's message type, for a back end that has types of its own. `qos`: its words for qualities of
     service. `has_history`: its publishers keep more than the last message for subscribers that come late.
+    `has_extensions`: what travels beside a payload arrives. `is_in_process`: only nodes of one process meet.
     """
 
     name: str
@@ -232,6 +233,8 @@ class Backend:
     codec_for: Callable[[str], Codec] = codec_for
     qos: tuple[str, ...] = ()
     has_history: bool = False
+    has_extensions: bool = True
+    is_in_process: bool = False
 
 
 def backend_named(name: str) -> Backend:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from typer.models import CommandInfo
 
-from nep.cli import doctor, log, masters, nodes, services, topics
+from nep.cli import bridge, doctor, log, masters, nodes, services, topics
 from nep.cli.screen import say_error, write
 from nep.cli.typer_words import TranslatedCommand, TranslatedGroup
 from nep.errors import NepError
@@ -36,6 +36,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.command("master")(masters.master)
+app.command("bridge")(bridge.bridge)
 app.command("log")(log.log)
 app.command("doctor")(doctor.doctor)
 app.add_typer(nodes.app, name="node")

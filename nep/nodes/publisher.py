@@ -100,6 +100,11 @@ class Publisher:
         """Payloads that could not be encoded, and so nobody got; why is logged and an alert in the graph."""
         return self._unsendable.count
 
+    @property
+    def problem(self) -> str:
+        """Why the newest payload was refused; empty when it could be sent."""
+        return self._unsendable.problem
+
     def publish(self, payload: object) -> None:
         """Encode and send `payload`; an `Encoded` is sent as it is. Never blocks.
 
@@ -128,6 +133,10 @@ class Publisher:
             self._skip(Encoded(data, extension))
         else:
             self._send(encoded((data, extension)))
+
+    def refuse(self, payload: object, error: Exception) -> None:
+        """Count and tell a payload that its owner could not encode, as `publish` does what it refuses."""
+        self._unsendable.add(payload, error)
 
     def _send(self, made: Encoded) -> None:
         if type(made.data) is not bytes or made.extension is not None:

@@ -410,4 +410,4 @@ def _name(master: str | None) -> str:
     return master or "memory"
 
 
-BACKEND = Backend("memory", MemoryTransport, master=_name, has_history=True)
+BACKEND = Backend("memory", MemoryTransport, master=_name, has_history=True, is_in_process=True)

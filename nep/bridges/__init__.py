@@ -1,0 +1,30 @@
+"""Bridges: topics of two back ends, or of two networks of one, joined.
+
+`configuration` has what a bridge is told and `toml_file` reads it, `bridge` joins two of `side`, a `route`
+carries one topic one way at the pace of `pacer`, and `trail` keeps a message from coming back.
+"""
+
+from nep.bridges.bridge import Bridge
+from nep.bridges.configuration import (
+    BridgeConfiguration,
+    BridgeTopic,
+    SideConfiguration,
+    TopicEnd,
+    join_line,
+    side_of,
+)
+from nep.bridges.route import Route, RouteCounts
+from nep.bridges.toml_file import read_configuration
+
+__all__ = [
+    "Bridge",
+    "BridgeConfiguration",
+    "BridgeTopic",
+    "Route",
+    "RouteCounts",
+    "SideConfiguration",
+    "TopicEnd",
+    "join_line",
+    "read_configuration",
+    "side_of",
+]

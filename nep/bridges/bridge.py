@@ -1,0 +1,227 @@
+"""Bridge: two nodes, and the routes between them."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from nep.bridges.configuration import (
+    SIDES,
+    BridgeConfiguration,
+    BridgeTopic,
+    SideName,
+    checked_topic_names,
+)
+from nep.bridges.pacer import Pacer
+from nep.bridges.route import Route, RouteEnd, type_in
+from nep.bridges.side import BridgeSide
+from nep.bridges.trail import Echoes
+from nep.errors import NepError
+from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["Bridge", "check_installed"]
+
+ROUTES_MOST = 500
+"""Patterns find no more topics than these, both ways together."""
+_OWN_TOPICS = "/nep/"
+_SLICE_S = 0.05
+_FLUSH_S = 2.0
+_logger = logging.getLogger("nep")
+
+
+class Bridge:
+    """Joins what `configuration` says, from when it is made until it is closed; a context manager.
+
+    A network that is not there is waited for, and so is a topic. Raises `NepError` for a back end that is not
+    installed, or does not know a type.
+    """
+
+    def __init__(self, configuration: BridgeConfiguration) -> None:
+        self.configuration = configuration
+        self.id = secrets.token_hex(8)
+        self._own: set[int] = set()
+        self._echoes: dict[tuple[SideName, str], Echoes] = {}
+        self._lock = threading.Lock()
+        self._pacer = Pacer(f"bridge-{configuration.name}-pace")
+        self._routes: tuple[Route, ...] = ()
+        self._known: set[tuple[SideName, str, str]] = set()
+        self._is_full = False
+        self._closed = threading.Event()
+        self.own_nodes: frozenset[str] = frozenset()
+        """The ids of its two nodes."""
+        self.sides: dict[SideName, BridgeSide] = {}
+        try:
+            for name in SIDES:
+                side = configuration.side(name)
+                self.sides[name] = BridgeSide(name, side, configuration.node_name(name))
+            _check_types(configuration)
+            self.own_nodes = frozenset(side.node.id for side in self.sides.values())
+            self._begin()
+        except BaseException:
+            self.close(0.0)
+            raise
+
+    def _begin(self) -> None:
+        for topic in self.configuration.topics:
+            if not topic.is_pattern:
+                for origin in topic.origins:
+                    self._add(topic, origin, topic.a.name, topic.b.name)
+        for side in self.sides.values():
+            side.start(self)
+
+    @property
+    def routes(self) -> tuple[Route, ...]:
+        """One for each topic and way, those of patterns behind the others."""
+        return self._routes
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether all topics that are named are subscribed, and both networks were seen for patterns."""
+        return all(each.is_subscribed for each in self._routes) and all(
+            side.view is not None for side in self.sides.values()
+        )
+
+    def wait_until_ready(self, timeout_s: float | None = None) -> bool:
+        """Wait until it is ready or closed, None without a limit; whether it is ready."""
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        while not self.is_ready:
+            if self._closed.is_set() or (deadline is not None and time.monotonic() >= deadline):
+                return False
+            self._closed.wait(_SLICE_S)
+        return True
+
+    def status(self) -> dict[str, object]:
+        """What it joins and what became of the messages, as it is published on `/nep/bridges`."""
+        return {
+            "bridge": self.configuration.name,
+            "is_ready": self.is_ready,
+            "sides": [
+                {
+                    "side": name,
+                    "backend": side.configuration.backend.name,
+                    "network": side.configuration.network,
+                    "problem": side.problem,
+                }
+                for name, side in self.sides.items()
+            ],
+            "routes": [
+                {
+                    "from": {"side": each.origin.side, "topic": each.origin.topic},
+                    "to": {"side": each.end.side, "topic": each.end.topic},
+                    "trouble": each.trouble,
+                    **asdict(each.counts()),
+                }
+                for each in self._routes
+            ],
+        }
+
+    # ---- routes
+
+    def _add(self, topic: BridgeTopic, origin: SideName, a: str, b: str) -> None:
+        """A route from that side, if there is none yet."""
+        with self._lock:
+            way = (origin, a, b)
+            if way in self._known:
+                return
+            self._known.add(way)
+            ends = {"a": self._end(topic, "a", a), "b": self._end(topic, "b", b)}
+            end: SideName = "b" if origin == "a" else "a"
+            route = Route(
+                ends[origin],
+                ends[end],
+                bridge=self.id,
+                own=self._own,
+                wake=self.sides[end].wake,
+                pacer=self._pacer,
+                max_rate_hz=topic.max_rate_hz,
+            )
+            self._routes = (*self._routes, route)
+
+    def _end(self, topic: BridgeTopic, side: SideName, name: str) -> RouteEnd:
+        told, end = self.configuration.side(side), topic.end(side)
+        echoes = self._echoes.setdefault((side, name), Echoes())
+        return RouteEnd(side, told.network, told.backend, name, end.msg_type, end.qos, echoes)
+
+    def find(self, side: BridgeSide, view: GraphView) -> None:
+        """Make routes for topics that others publish there and a pattern matches. In the side's thread."""
+        named = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
+        for name in view.topics:
+            if name in named or name.startswith(_OWN_TOPICS) or not type_in(view, name, self.own_nodes):
+                continue
+            for topic, a, b in self._matches(side.name, name):
+                if len(self._routes) < ROUTES_MOST:
+                    self._add(topic, side.name, a, b)
+                elif not self._is_full and (side.name, a, b) not in self._known:
+                    self._is_full = True
+                    _logger.warning(
+                        "'%s' and others are not carried: the patterns match more than %d topics; make them "
+                        "narrower",
+                        name,
+                        ROUTES_MOST,
+                    )
+
+    def _matches(self, side: SideName, name: str) -> Iterator[tuple[BridgeTopic, str, str]]:
+        """The first pattern that matches a topic of that side, with its names on both."""
+        for topic in self.configuration.topics:
+            if topic.is_pattern and side in topic.origins:
+                part = topic.end(side).part_in(name)
+                if not part:
+                    continue
+                a, b = topic.a.with_part(part), topic.b.with_part(part)
+                try:
+                    checked_topic_names(a, b)
+                except NepError:
+                    continue  # its name would be too long there
+                yield topic, a, b
+                return
+
+    # ---- the end
+
+    def close(self, timeout_s: float = _FLUSH_S) -> None:
+        """Carry nothing any more; what was carried is delivered first, within `timeout_s`.
+
+        May be called twice.
+        """
+        deadline = time.monotonic() + timeout_s
+        self._closed.set()
+        for side in self.sides.values():
+            side.begin_close()
+        for route in self._routes:
+            route.end_taking()
+        self._pacer.close(max(0.1, timeout_s))
+        for side in self.sides.values():
+            side.node.close(max(0.0, deadline - time.monotonic()))
+        for side in self.sides.values():
+            side.join(max(_FLUSH_S, timeout_s))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+
+def check_installed(configuration: BridgeConfiguration) -> None:
+    """Raises `NepError` for what is not installed, or a type that its side's back end does not know."""
+    for name in SIDES:
+        side = configuration.side(name)
+        with Node(configuration.node_name(name), side.backend.name, master=side.master):
+            pass
+    _check_types(configuration)
+
+
+def _check_types(configuration: BridgeConfiguration) -> None:
+    for topic in configuration.topics:
+        for side in SIDES:
+            msg_type = topic.end(side).msg_type
+            if msg_type:
+                configuration.side(side).backend.codec_for(msg_type)

@@ -1,0 +1,428 @@
+"""Route: carries the messages of one topic one way, and counts what becomes of each of them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
+
+from nep.backends.base import Backend
+from nep.bridges.configuration import SideName
+from nep.bridges.pacer import Limit, Pacer
+from nep.bridges.trail import TRAIL_KEY, Echoes, Trail, read_trail
+from nep.errors import ClosedError, EncodeError, NepError
+from nep.messages.codecs import CODECS, Codec, JsonEncoder
+from nep.messages.encoded import Encoded
+from nep.messages.message import Message
+from nep.messages.queue import Inbox
+from nep.nodes.node import Node
+from nep.nodes.publisher import Publisher
+from nep.nodes.subscriber import Subscriber
+from nep.protocol.graph_view import GraphView
+from nep.text import escaped, shortened
+
+__all__ = ["Route", "RouteCounts", "RouteEnd", "own_type"]
+
+HELD_MESSAGES = 10_000
+"""So many wait for the other side, 64 MB at most; then the oldest are dropped and counted."""
+_HELD_BYTES = 64 * 2**20
+_LATCHED_MOST = 256
+"""Publishers of one topic whose last message is kept each for itself."""
+_GONE_S = 10.0
+"""Who is not in the graph for so long is gone; a master that was started again knows it sooner."""
+_PROBLEM_MOST = 300
+_DEFAULT_TYPE = "json"
+
+
+@dataclass(frozen=True)
+class RouteEnd:
+    """A topic on one side, and what that side is. `msg_type` is "" when the bridge shall find out."""
+
+    side: SideName
+    network: str
+    backend: Backend
+    topic: str
+    msg_type: str = ""
+    qos: str = ""
+    echoes: Echoes = field(default_factory=Echoes)
+
+
+@dataclass(frozen=True)
+class RouteCounts:
+    """What became of the messages so far: `received` are `sent`, `thinned`, `failed`, `dropped` or `waiting`.
+
+    `lost`: they did not reach the bridge, and are not among those received; None when nobody can know.
+    `thinned`: a newer one took their place, because there were more than `max_rate_hz`. `failed`: they could
+    not be read, or not be written for the other side; `problem` says why the last one could not. `dropped`:
+    the other side was not there, and there was no more room. `returned`: a bridge had brought them from where
+    they would go; they are not among those received.
+    """
+
+    received: int = 0
+    sent: int = 0
+    bytes: int = 0
+    lost: int | None = 0
+    thinned: int = 0
+    failed: int = 0
+    dropped: int = 0
+    waiting: int = 0
+    returned: int = 0
+    problem: str = ""
+
+
+class _Ear:
+    """Takes what one subscriber brings: at once, or from when it is opened."""
+
+    def __init__(self, take: Callable[[Sequence[Message]], None], *, is_open: bool) -> None:
+        self.is_open = is_open
+        self.is_muted = False
+        self._take = take
+        self._kept: list[Message] = []
+        self._lock = threading.Lock()
+
+    def hear(self, messages: Sequence[Message]) -> None:
+        """See `nep.backends.base.Sink`."""
+        with self._lock:
+            if self.is_muted:
+                return
+            if not self.is_open:
+                self._kept.extend(messages)
+                return
+        self._take(messages)
+
+    def open(self) -> None:
+        """Hand over what came, and from now on everything."""
+        with self._lock:
+            self._take(self._kept)
+            self._kept = []
+            self.is_open = True
+
+    def mute(self) -> None:
+        """Take nothing any more."""
+        self.is_muted = True
+
+
+class Route:
+    """From `origin` to `end`. It takes messages in threads of the origin's node.
+
+    The threads of the two sides call `subscribe` and `open_publishers` with their nodes. `bridge` is the
+    bridge's id, `own` the ids of all that it publishes. `wake` is called when `open_publishers` is to be.
+    """
+
+    def __init__(
+        self,
+        origin: RouteEnd,
+        end: RouteEnd,
+        *,
+        bridge: str,
+        own: set[int],
+        wake: Callable[[], None],
+        pacer: Pacer,
+        max_rate_hz: float = 0.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.origin = origin
+        self.end = end
+        self.trouble = ""
+        """Why it cannot subscribe or publish at present."""
+        self._bridge = bridge
+        self._own = own
+        self._wake = wake
+        self._clock = clock
+        self._pacer = pacer
+        self._limit = Limit(max_rate_hz) if max_rate_hz else None
+        self._newest: Message | None = None
+        self._lock = threading.RLock()
+        self._held = Inbox("all", HELD_MESSAGES, _HELD_BYTES)
+        self._subscriber: Subscriber | None = None
+        self._ear: _Ear | None = None
+        self._lost_before: int | None = 0
+        self._publishers: dict[tuple[bool, int | None], Publisher] = {}
+        self._gone_since: dict[tuple[bool, int | None], float] = {}
+        self._form: _Form | None = None
+        self._has_room = end.backend.has_extensions
+        self._received = self._sent = self._bytes = 0
+        self._thinned = self._failed = self._dropped = self._returned = 0
+        self._problem = ""
+
+    def counts(self) -> RouteCounts:
+        """What became of the messages so far."""
+        lost = self._lost()  # a back end may have a lock of its own for it
+        with self._lock:
+            return RouteCounts(
+                self._received,
+                self._sent,
+                self._bytes,
+                lost,
+                self._thinned,
+                self._failed,
+                self._dropped,
+                len(self._held) + (self._newest is not None),
+                self._returned,
+                self._problem,
+            )
+
+    def _lost(self) -> int | None:
+        now = 0 if self._subscriber is None else self._subscriber.lost
+        return None if now is None or self._lost_before is None else now + self._lost_before
+
+    @property
+    def is_subscribed(self) -> bool:
+        """Whether messages of its topic come."""
+        return self._subscriber is not None
+
+    @property
+    def needs_publisher(self) -> bool:
+        """Whether messages wait for a publisher on the other side."""
+        return len(self._held) > 0
+
+    # ---- in the thread of the origin's side
+
+    def subscribe(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
+        """Be subscribed; again when it is found out that the topic has another type. Raises `NepError`."""
+        known = type_in(view, self.origin.topic, own_nodes)
+        if self._subscriber is None:
+            ear = _Ear(self._take, is_open=True)
+            subscriber = self._new_sub(node, self.origin.msg_type or known or _DEFAULT_TYPE, ear)
+            with self._lock:
+                self._subscriber, self._ear = subscriber, ear
+        elif not self.origin.msg_type and known not in {"", self._subscriber.msg_type}:
+            self._subscribe_again(node, known)
+
+    def _subscribe_again(self, node: Node, msg_type: str) -> None:
+        """By another type, unless messages come by this one: some back ends mind, others do not."""
+        old, old_ear = self._subscriber, self._ear
+        if old is None or old_ear is None or _has_heard(old):
+            return
+        ear = _Ear(self._take, is_open=False)
+        new = self._new_sub(node, msg_type, ear)
+        if _has_heard(old):  # meanwhile
+            ear.mute()
+            new.close()
+            return
+        old_ear.mute()
+        lost = old.lost
+        with self._lock:
+            self._lost_before = (
+                None if lost is None or self._lost_before is None else self._lost_before + lost
+            )
+            self._subscriber, self._ear = new, ear
+        old.close()
+        ear.open()
+
+    def _new_sub(self, node: Node, msg_type: str, ear: _Ear) -> Subscriber:
+        return node.new_sub(self.origin.topic, msg_type, sink=ear.hear, qos=self.origin.qos)
+
+    def end_taking(self) -> None:
+        """Subscribe no more, and carry at once what waits for its turn."""
+        with self._lock:
+            subscriber, self._limit = self._subscriber, None
+        if subscriber is not None:
+            subscriber.close()
+        self._take_newest()
+
+    # ---- messages come
+
+    def _take(self, messages: Sequence[Message]) -> None:
+        for message in messages:
+            now = self._clock()
+            with self._lock:
+                if message.publisher in self._own:
+                    self.origin.echoes.not_needed()
+                elif self._is_back(message, now):
+                    self._returned += 1
+                else:
+                    self._received += 1
+                    self._offer(message, now)
+
+    def _is_back(self, message: Message, now: float) -> bool:
+        """Whether a bridge brought it here from where it would go."""
+        if message.publisher is not None:
+            self.origin.echoes.not_needed()
+        trail = read_trail(message.extension)
+        if not trail.may_go(self.end.network, self._bridge):
+            return True
+        is_nameless = message.publisher is None and not trail.bridges
+        return is_nameless and self.origin.echoes.is_echo(message.raw, now)
+
+    def _offer(self, message: Message, now: float) -> None:
+        """Carry it now, or when its turn comes and no newer one has taken its place."""
+        if self._limit is None:
+            self._carry(message)
+        elif self._newest is not None:
+            self._thinned += 1
+            self._newest = message
+        elif self._limit.has_room(now):
+            self._carry(message)
+        else:
+            self._newest = message
+            self._pacer.call_at(self._limit.next_at, self._take_newest)
+
+    def _take_newest(self) -> None:
+        """The turn of the message that waits."""
+        with self._lock:
+            message, self._newest = self._newest, None
+            if message is not None:
+                if self._limit is not None:
+                    self._limit.has_room(max(self._clock(), self._limit.next_at))
+                self._carry(message)
+
+    def _carry(self, message: Message) -> None:
+        publisher = self._publishers.get(self._key(message))
+        if publisher is None or len(self._held):
+            self._dropped += self._held.put(message)
+            self._wake()
+        else:
+            self._send(publisher, message)
+
+    def _key(self, message: Message) -> tuple[bool, int | None]:
+        """Which publisher: what is latched is so for each of its publishers alone."""
+        if not message.is_latched:
+            return False, None
+        key = (True, message.publisher)
+        return key if key in self._publishers or len(self._publishers) < _LATCHED_MOST else (True, None)
+
+    # ---- in the thread of the end's side
+
+    def open_publishers(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
+        """Make the publishers that messages wait for, and send these. Raises `NepError`."""
+        while True:
+            with self._lock:
+                if not self._held.messages:
+                    return
+                message = self._held.messages[0]
+                key = self._key(message)
+                publisher = self._publishers.get(key)
+                if publisher is not None:
+                    self._held.take()
+                    self._send(publisher, message)
+                    continue
+            form = self._form_for(message, view, own_nodes)
+            publisher = node.new_pub(self.end.topic, form.msg_type, latched=key[0], qos=self.end.qos)
+            with self._lock:
+                self._own.add(publisher.id)
+                self._publishers[key] = publisher
+
+    def _form_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> _Form:
+        """As what it is published: decided by the first message, and kept."""
+        if self._form is None:
+            msg_type = self.end.msg_type or own_type(self.end, view, own_nodes) or message.msg_type
+            self._form = _Form(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
+        return self._form
+
+    def close_gone(self, origin: GraphView, now: float) -> None:
+        """What was latched goes with its publisher: end what repeats those that are gone from the origin."""
+        there = origin.topics.get(self.origin.topic)
+        ids = {each.id for each in there.publishers} if there is not None else set()
+        ended = []
+        with self._lock:
+            for key in list(self._publishers):
+                if not key[0] or key[1] is None or key[1] in ids:
+                    self._gone_since.pop(key, None)
+                elif now - self._gone_since.setdefault(key, now) >= _GONE_S:
+                    del self._gone_since[key]
+                    ended.append(self._publishers.pop(key))
+        for publisher in ended:
+            publisher.close()
+
+    # ---- messages go
+
+    def _send(self, publisher: Publisher, message: Message) -> None:
+        form = self._form
+        if form is None:  # `open_publishers` makes it before the first publisher
+            return
+        try:
+            if form.has(message):
+                try:
+                    self._publish(publisher, message, Encoded(message.raw, message.extension))
+                except EncodeError:  # the other side takes less of this codec than ours: as a payload it may
+                    self._publish(publisher, message, form.codec.encode(message.payload))
+            else:
+                self._publish(publisher, message, self._converted(publisher, message, form))
+        except ClosedError:
+            self._dropped += 1
+        except Exception as error:  # noqa: BLE001 - payloads and back ends may be of any kind; others go on
+            self._fail(str(error) if isinstance(error, NepError) else f"{type(error).__name__}: {error}")
+
+    def _converted(self, publisher: Publisher, message: Message, form: _Form) -> Encoded:
+        """Its payload in the other side's form. What cannot be read or written is an alert in the graph."""
+        subscriber = self._subscriber
+        payload = message.payload if subscriber is None else subscriber.decoded(message)
+        try:
+            return form.encode(payload)
+        except Exception as error:
+            publisher.refuse(payload, error)
+            raise
+
+    def _publish(self, publisher: Publisher, message: Message, made: Encoded) -> None:
+        beside = {key: value for key, value in (made.extension or {}).items() if key != TRAIL_KEY}
+        self.end.echoes.sent(made.data, self._clock())
+        refused = publisher.refused
+        if self._has_room:
+            publisher.publish_bytes(made.data, {**beside, TRAIL_KEY: self._trail(message).to_plain()})
+            if publisher.refused == refused:
+                self._count(message)
+                return
+            self._has_room = False  # a back end that did not say so
+            refused = publisher.refused
+        publisher.publish_bytes(made.data, beside or None)
+        if publisher.refused == refused:
+            self._count(message)
+        else:
+            self._fail(publisher.problem)
+
+    def _trail(self, message: Message) -> Trail:
+        return read_trail(message.extension).carried(self.origin.network, self.end.network, self._bridge)
+
+    def _count(self, message: Message) -> None:
+        self._sent += 1
+        self._bytes += message.size_bytes
+
+    def _fail(self, reason: str) -> None:
+        self._failed += 1
+        self._problem = escaped(shortened(reason, _PROBLEM_MOST))
+
+
+def _has_heard(subscriber: Subscriber) -> bool:
+    return subscriber.received > 0
+
+
+class _Form:
+    """How messages are written on the other side."""
+
+    def __init__(self, msg_type: str, codec: Codec, topic: str) -> None:
+        self.msg_type = msg_type
+        self.codec = codec
+        self.encode: Callable[[object], Encoded] = codec.encode
+        if codec is CODECS["json"]:
+            self.encode = JsonEncoder(topic).encode
+
+    def has(self, message: Message) -> bool:
+        """Whether a message has it already. A codec of a back end's own says nothing without the type."""
+        if message.codec != self.codec.name:
+            return False
+        return message.codec in CODECS or message.msg_type == self.msg_type
+
+
+def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
+    """The type under which others publish a topic; "" when nobody does."""
+    known = view.topics.get(topic)
+    if known is None or all(each.node_id in own_nodes for each in known.publishers):
+        return ""
+    return known.msg_type if known.msg_type != "*" else ""
+
+
+def own_type(end: RouteEnd, view: GraphView, own_nodes: Collection[str]) -> str:
+    """The type that others have for a topic, when it is one that only this back end knows; else ""."""
+    known = view.topics.get(end.topic)
+    if known is None or known.msg_type in {"", "*"}:
+        return ""
+    members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
+    if members <= set(own_nodes):
+        return ""
+    try:
+        is_own = end.backend.codec_for(known.msg_type).name not in CODECS
+    except NepError:
+        return ""
+    return known.msg_type if is_own else ""

@@ -1,0 +1,170 @@
+"""BridgeSide: one of the two networks of a bridge, with the node there and the thread that looks after it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from typing import Protocol
+
+from nep.bridges.configuration import SideConfiguration, SideName
+from nep.bridges.route import Route
+from nep.errors import ClosedError, NepError
+from nep.nodes.node import Node
+from nep.nodes.publisher import Publisher
+from nep.protocol.graph_view import GraphView
+
+__all__ = ["STATUS_TOPIC", "STATUS_TYPE", "BridgeSide"]
+
+STATUS_TOPIC = "/nep/bridges"
+STATUS_TYPE = "nep/bridge"
+"""Each bridge tells here, on both sides, what it joins and how many messages it has carried (latched)."""
+_logger = logging.getLogger("nep")
+_LOOK_S = 1.0
+_ANSWER_S = 1.0
+"""So long may a master take to answer, and to let something be made."""
+
+
+class BridgeOfSide(Protocol):
+    """The bridge that a side belongs to."""
+
+    own_nodes: frozenset[str]
+
+    @property
+    def routes(self) -> tuple[Route, ...]:
+        """All routes, both ways."""
+
+    def find(self, side: BridgeSide, view: GraphView) -> None:
+        """Told each new graph of a side."""
+
+    def status(self) -> dict[str, object]:
+        """What is published of the bridge."""
+
+
+class BridgeSide:
+    """Makes what routes need on this side, as soon as the network is there.
+
+    Raises `NepError` for a back end that is not installed.
+    """
+
+    def __init__(self, name: SideName, configuration: SideConfiguration, node_name: str) -> None:
+        self.name = name
+        self.configuration = configuration
+        self.view: GraphView | None = None
+        self.problem = ""
+        """Why the network cannot be used; empty when it can, or when nobody has looked yet."""
+        self.node = Node(node_name, configuration.backend.name, master=configuration.master, wait_s=_ANSWER_S)
+        self._wanted = threading.Event()
+        self._is_closing = False
+        self._thread: threading.Thread | None = None
+        self._look_at = 0.0
+        self._told: object = None
+        self._status: Publisher | None = None
+
+    def start(self, owner: BridgeOfSide) -> None:
+        """Begin to look after it."""
+        run = partial(self._run, owner)
+        self._thread = threading.Thread(target=run, name=self.node.name, daemon=True)
+        self._thread.start()
+
+    def wake(self) -> None:
+        """Something is to be made here."""
+        self._wanted.set()
+
+    def begin_close(self) -> None:
+        """Make nothing any more."""
+        self._is_closing = True
+        self._wanted.set()
+
+    def join(self, timeout_s: float) -> None:
+        """Wait for the end of its thread."""
+        if self._thread is not None:
+            self._thread.join(max(0.0, timeout_s))
+
+    # ---- in its thread
+
+    def _run(self, owner: BridgeOfSide) -> None:
+        while not self._is_closing:
+            self._wanted.clear()
+            is_due = time.monotonic() >= self._look_at
+            if is_due:
+                self._look(owner)
+                self._look_at = time.monotonic() + _LOOK_S
+            if self.view is not None:
+                self._look_after(owner, self.view)
+                if is_due:
+                    self._tell(owner.status())
+            self._wanted.wait(max(0.0, self._look_at - time.monotonic()))
+
+    def _look(self, owner: BridgeOfSide) -> None:
+        """Ask who is there; say when nobody answers, and when somebody does again."""
+        try:
+            view = self.node.graph(_ANSWER_S)
+        except ClosedError:
+            return
+        except Exception as error:  # noqa: BLE001 - back ends of others may raise anything
+            said = _said(error)
+            if said != self.problem:
+                self.problem = said
+                _logger.warning(
+                    "side %s of the bridge, %s, is waited for: %s",
+                    self.name,
+                    self.configuration.network,
+                    said,
+                )
+            self.view = None
+            return
+        if self.problem:
+            self.problem = ""
+            _logger.warning("side %s of the bridge, %s, is there", self.name, self.configuration.network)
+        self.view = view
+        owner.find(self, view)
+        for route in owner.routes:
+            if route.origin.side == self.name:
+                route.close_gone(view, time.monotonic())
+
+    def _look_after(self, owner: BridgeOfSide, view: GraphView) -> None:
+        for route in owner.routes:
+            if self._is_closing:
+                return
+            if route.origin.side == self.name:
+                self._try(route, partial(route.subscribe, self.node, view, owner.own_nodes))
+            elif route.needs_publisher:
+                self._try(route, partial(route.open_publishers, self.node, view, owner.own_nodes))
+
+    def _try(self, route: Route, make: Callable[[], None]) -> None:
+        """One route that cannot be served does not stop the others; it is tried again."""
+        try:
+            make()
+        except ClosedError:
+            return
+        except Exception as error:  # noqa: BLE001 - see `_look`
+            said = _said(error)
+            if said != route.trouble:
+                route.trouble = said
+                _logger.warning(
+                    "'%s' on side %s is not carried to '%s' yet: %s",
+                    route.origin.topic,
+                    route.origin.side,
+                    route.end.topic,
+                    said,
+                )
+            return
+        route.trouble = ""
+
+    def _tell(self, status: dict[str, object]) -> None:
+        """Publish how the bridge stands, when that has changed since it was told last."""
+        if status == self._told or self._is_closing:
+            return
+        with suppress(NepError):  # with the next look it is tried again
+            if self._status is None:
+                self._status = self.node.new_pub(STATUS_TOPIC, STATUS_TYPE, latched=True)
+            self._status.publish({**status, "stamp_ns": time.time_ns()})
+            self._told = status
+
+
+def _said(error: Exception) -> str:
+    return str(error) if isinstance(error, NepError | ValueError) else f"{type(error).__name__}: {error}"

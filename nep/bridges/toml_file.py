@@ -1,0 +1,325 @@
+"""The file of a bridge: TOML → `BridgeConfiguration`. What is wrong is a sentence with its line and key."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+from nep.backends.base import Backend, backend_named
+from nep.bridges.configuration import (
+    SIDES,
+    BridgeConfiguration,
+    BridgeTopic,
+    SideConfiguration,
+    SideName,
+    TopicEnd,
+    check_apart,
+    checked_name,
+    checked_topic_names,
+    direction_named,
+    side_of,
+)
+from nep.errors import NepError, did_you_mean
+from nep.i18n import _
+from nep.nodes.arguments import text as checked_type
+from nep.text import escaped, shortened
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+__all__ = ["EXAMPLE", "read_configuration", "read_text"]
+
+EXAMPLE = """\
+# A bridge of nep: which topics of two networks are one. Start it with: nep bridge FILE.toml
+# Every key is told of in docs/bridges.md; those with a # in front show what may be there.
+
+# name = "lab"                    # of its nodes; without it the file's
+
+[a]
+backend = "zeromq"                # as in nep.node(name, "zeromq")
+# master = "127.0.0.1:7780"       # as in nep.node(..., master=...)
+# network = "lab"                 # its name for all bridges, where two of them know it by two addresses
+
+[b]
+backend = "ros"
+
+[[topics]]                        # one topic, both ways
+a = "/chatter"
+# b = "/chatter"                  # what it is called on the other side; without it the same
+
+[[topics]]                        # commands to the robot, as the type that it takes
+a = "/cmd_vel"
+direction = "a->b"                # or "b->a", or "both"
+b_type = "geometry_msgs/Twist"
+
+[[topics]]                        # what the robot sees, ten times a second at most, the newest each time
+a = "/camera"
+b = "/usb_cam/image_raw/compressed"
+direction = "b->a"
+max_rate_hz = 10
+# a_type = "image"                # without types: the one that it has there, or else on the other side
+# b_qos = "sensor"                # a quality of service, where the back end has words for it
+
+[[topics]]                        # a pattern: * is what stands between slashes, ** takes slashes, too
+a = "/robot/*"
+b = "/r2d2/*"
+direction = "b->a"
+"""
+"""What `nep bridge --example` prints."""
+
+_KEYS = ("name", *SIDES, "topics")
+_SIDE_KEYS = ("backend", "master", "network")
+_TOPIC_KEYS = (*SIDES, "direction", "max_rate_hz", "type", "a_type", "b_type", "a_qos", "b_qos")
+_MOST_BYTES = 10**6
+_MOST_TOPICS = 1000
+_NETWORK_MOST = 200
+_HEAD = re.compile(r"\s*\[\[?\s*([^\[\]#]+?)\s*\]")
+_AT = re.compile(r"\s*\((?:at line (\d+), column \d+|at end of document)\)")
+_SAID_MOST = 200
+_CHECKED = TypeVar("_CHECKED")
+
+
+def read_configuration(path: Path) -> BridgeConfiguration:
+    """The configuration in a file. Raises `NepError`."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(_MOST_BYTES + 1)
+    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+        reason = getattr(error, "strerror", None) or str(error)
+        raise NepError(
+            _(
+                "'{path}' cannot be read: {reason}; 'nep bridge --example' shows what a file looks like"
+            ).format(path=path, reason=reason[:1].lower() + reason[1:])
+        ) from error
+    if len(data) > _MOST_BYTES:
+        raise NepError(
+            _("'{path}' is larger than {most} bytes, so it is no file of a bridge; give another").format(
+                path=path, most=_MOST_BYTES
+            )
+        )
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise NepError(
+            _("line {line} of '{path}' is no UTF-8; save it as UTF-8").format(line=line, path=path)
+        ) from error
+    return read_text(text, str(path), path.stem)
+
+
+def read_text(text: str, path: str, stem: str) -> BridgeConfiguration:
+    """The configuration in the text of a file at `path`; a bridge without a name is called `stem`.
+
+    Raises `NepError`.
+    """
+    try:
+        table = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # also a number with thousands of digits
+        raise NepError(_toml_sentence(path, text, str(error))) from error
+    return _Reader(path, text).configuration(table, stem)
+
+
+def _toml_sentence(path: str, text: str, said: str) -> str:
+    at = _AT.search(said)
+    line = int(at.group(1)) if at and at.group(1) else text.count("\n") + 1
+    reason = escaped(shortened(_AT.sub("", said).strip(), _SAID_MOST))
+    return _(
+        "line {line} of '{path}' is no TOML: {reason}; 'nep bridge --example' shows what a file looks like"
+    ).format(line=line, path=path, reason=reason[:1].lower() + reason[1:])
+
+
+class _Reader:
+    """Turns tables into values, and knows where in the text each key is.
+
+    `where` is the name of a table, "" for the root; `number` tells which of the `[[topics]]`.
+    """
+
+    def __init__(self, path: str, text: str) -> None:
+        self._path = path
+        self._lines = text.splitlines()
+
+    def configuration(self, table: Mapping[str, Any], stem: str) -> BridgeConfiguration:
+        self._check_keys(table, _KEYS, "")
+        name = self._text(table, "name", "", default=_plain(stem))
+        name = self._checked(lambda: checked_name(name), "name", "")
+        a, b = (self._side(table, each) for each in SIDES)
+        self._checked(lambda: check_apart(a, b), "b", "")
+        topics = table.get("topics")
+        if not isinstance(topics, list) or not topics or not all(isinstance(each, dict) for each in topics):
+            self._fail("topics", "", _('no topic is named; write [[topics]] and a = "/a/topic" below it'))
+        if len(topics) > _MOST_TOPICS:
+            self._fail("topics", "", _("there are more than {most}; use patterns").format(most=_MOST_TOPICS))
+        found = tuple(self._topic(each, number, a, b) for number, each in enumerate(topics))
+        self._check_once(found)
+        return BridgeConfiguration(name, a, b, found)
+
+    def _side(self, table: Mapping[str, Any], side: SideName) -> SideConfiguration:
+        told = table.get(side)
+        if not isinstance(told, dict):
+            self._fail(
+                side,
+                "",
+                _("the side '{side}' is missing; write [{side}] and backend = \"zeromq\" below it").format(
+                    side=side
+                ),
+            )
+        self._check_keys(told, _SIDE_KEYS, side)
+        backend = self._text(told, "backend", side)
+        if not backend:
+            self._fail("backend", side, _('no back end is named; write backend = "zeromq"'))
+        self._checked(lambda: backend_named(backend), "backend", side)
+        master, network = (self._text(told, key, side) for key in ("master", "network"))
+        if len(network) > _NETWORK_MOST:
+            self._fail(
+                "network", side, _("it has more than {most} letters; shorten it").format(most=_NETWORK_MOST)
+            )
+        return self._checked(lambda: side_of(backend, master, network), "master", side)
+
+    def _topic(
+        self, told: Mapping[str, Any], number: int, a: SideConfiguration, b: SideConfiguration
+    ) -> BridgeTopic:
+        self._check_keys(told, _TOPIC_KEYS, "topics", number)
+        on_a, on_b = (self._text(told, side, "topics", number) for side in SIDES)
+        on_a, on_b = on_a or on_b, on_b or on_a
+        if not on_a:
+            self._fail("a", "topics", _('the topic has no name; write a = "/a/topic"'), number)
+        key = "b" if told.get("b") else "a"
+        self._checked(lambda: checked_topic_names(on_a, on_b), key, "topics", number)
+        direction = self._text(told, "direction", "topics", number, default="both")
+        way = self._checked(lambda: direction_named(direction), "direction", "topics", number)
+        ends = [
+            TopicEnd(
+                name, self._type(told, side, number), self._quality(told, f"{side}_qos", number, of.backend)
+            )
+            for name, side, of in ((on_a, "a", a), (on_b, "b", b))
+        ]
+        return BridgeTopic(ends[0], ends[1], way, self._rate(told, number))
+
+    def _type(self, told: Mapping[str, Any], side: str, number: int) -> str:
+        key = f"{side}_type" if f"{side}_type" in told else "type"
+        name = self._text(told, key, "topics", number)
+        if key in told:
+            self._checked(lambda: checked_type(key, name), key, "topics", number)
+        return name
+
+    def _quality(self, told: Mapping[str, Any], key: str, number: int, backend: Backend) -> str:
+        word = self._text(told, key, "topics", number)
+        if word and not backend.qos:
+            self._fail(
+                key,
+                "topics",
+                _("the back end '{name}' has no qualities of service; leave it out").format(
+                    name=backend.name
+                ),
+                number,
+            )
+        if word and word not in backend.qos:
+            self._fail(
+                key,
+                "topics",
+                _("there is no quality '{word}'; {did_you_mean}").format(
+                    word=_said(word), did_you_mean=did_you_mean(word, backend.qos)
+                ),
+                number,
+            )
+        return word
+
+    def _rate(self, told: Mapping[str, Any], number: int) -> float:
+        value = told.get("max_rate_hz")
+        if value is None:
+            return 0.0
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not 1e-6 <= value <= 1e6:
+            self._fail(
+                "max_rate_hz",
+                "topics",
+                _("it is no number from 0.000001 to 1000000; write one such as 10, or leave it out"),
+                number,
+            )
+        return float(value)
+
+    def _check_once(self, topics: Sequence[BridgeTopic]) -> None:
+        """No topic goes the same way twice: all would arrive twice."""
+        known: set[tuple[SideName, str, str]] = set()
+        for number, topic in enumerate(topics):
+            for side in topic.origins:
+                way = (side, topic.a.name, topic.b.name)
+                if way in known:
+                    self._fail(
+                        "a",
+                        "topics",
+                        _("'{topic}' goes that way already; leave one of the two out").format(
+                            topic=_said(topic.end(side).name)
+                        ),
+                        number,
+                    )
+                known.add(way)
+
+    # ---- keys, texts, and where they are
+
+    def _check_keys(
+        self, table: Mapping[str, Any], known: Sequence[str], where: str, number: int = 0
+    ) -> None:
+        for key in table:
+            if key not in known:
+                said = _("there is no such key; {did_you_mean}")
+                self._fail(key, where, said.format(did_you_mean=did_you_mean(key, known)), number)
+
+    def _text(
+        self, table: Mapping[str, Any], key: str, where: str, number: int = 0, default: str = ""
+    ) -> str:
+        value = table.get(key, default)
+        if not isinstance(value, str):
+            self._fail(key, where, _("it is no text; put it into quotes"), number)
+        return value
+
+    def _checked(self, check: Callable[[], _CHECKED], key: str, where: str, number: int = 0) -> _CHECKED:
+        """What `check` gives; its error says where."""
+        try:
+            return check()
+        except (NepError, ValueError) as error:
+            self._fail(key, where, str(error), number)
+
+    def _fail(self, key: str, where: str, reason: str, number: int = 0) -> NoReturn:
+        shown = _said(key)
+        if where:
+            shown = f"{where}[{number + 1}].{shown}" if where == "topics" else f"{where}.{shown}"
+        line = self._line_of(key, where, number)
+        said = _("line {line} of '{path}', {key}: {reason}") if line else _("'{path}', {key}: {reason}")
+        raise NepError(escaped(said.format(line=line, path=self._path, key=shown, reason=reason)))
+
+    def _line_of(self, key: str, where: str, number: int) -> int:
+        """The line of a key in its table, else that of the table, else 0."""
+        table, seen, table_line = "", -1, 0
+        name = re.escape(key)
+        assigned = re.compile(rf"\s*[\"']?{name}[\"']?\s*[=.]")
+        dotted = re.compile(rf"\s*{re.escape(where or key)}\s*[.=]")
+        for at, line in enumerate(self._lines, 1):
+            head = _HEAD.match(line)
+            if head is not None:
+                table = head.group(1).strip("\"' ")
+                seen += table == "topics"
+                if not where and table == key:
+                    return at
+            is_here = table == where and (where != "topics" or seen == number)
+            if is_here and head is not None:
+                table_line = at
+            elif is_here and assigned.match(line):
+                return at
+            elif not table and not table_line and dotted.match(line):
+                table_line = at
+        return table_line
+
+
+def _plain(stem: str) -> str:
+    """A file's name as a bridge's."""
+    return escaped(stem)[:40] or "bridge"
+
+
+def _said(word: str) -> str:
+    return escaped(shortened(word, 80))

@@ -1,0 +1,398 @@
+"""Bridges with real nodes on every pair of back ends: names, types, both ways, latched, and exact counts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nep.bridges import Bridge, side_of
+from nep.bridges.configuration import check_apart
+from nep.bridges.side import STATUS_TOPIC
+from nep.errors import NepError
+from nep.masters.master import Master
+from tests.nep.bridges.joined import Net, bridged, configured, nets, route, settled, silent, taken, topic
+from tests.nep.programs import eventually
+
+PAIRS = [
+    ("zeromq", "memory"), ("memory", "zeromq"), ("zeromq", "nanomsg"), ("nanomsg", "zenoh"),
+    ("zenoh", "zeromq"), ("zeromq", "zeromq"), ("memory", "memory"),
+]  # fmt: skip
+
+
+@pytest.fixture(params=PAIRS, ids="-".join)
+def pair(request):
+    with nets(*request.param) as found:
+        yield found
+
+
+def test_all_that_is_published_is_received_and_all_that_is_received_is_sent_in_order(pair):
+    a, b = pair
+    with bridged(a, b, topic("/count", "other/name", "a->b")) as bridge:
+        sub = b.node("hears").new_sub("other/name")
+        pub = a.node("says").new_pub("/count")
+        for number in range(2000):
+            pub.publish(number)
+        counts = settled(route(bridge, "a", "/count"), 2000)
+        assert pub.count == counts.received + counts.lost == 2000
+        assert (counts.sent, counts.thinned, counts.failed, counts.returned) == (2000, 0, 0, 0)
+        assert taken(sub, 2000) == list(range(2000))
+        assert sub.lost == 0
+        assert counts.bytes == sum(len(str(number)) for number in range(2000))
+
+
+def test_both_ways_nothing_comes_back_to_who_said_it(pair):
+    a, b = pair
+    with bridged(a, b, topic("/chat")) as bridge:
+        on_a, on_b = a.node("a"), b.node("b")
+        hears_a, hears_b = on_a.new_sub("/chat"), on_b.new_sub("/chat")
+        says_a, says_b = on_a.new_pub("/chat"), on_b.new_pub("/chat")
+        for number in range(50):
+            says_a.publish({"from": "a", "n": number})
+            says_b.publish({"from": "b", "n": number})
+        for hears in (hears_a, hears_b):
+            came = taken(hears, 100)
+            for who in ("a", "b"):
+                assert [each["n"] for each in came if each["from"] == who] == list(range(50))
+            assert silent(hears)
+        for side in ("a", "b"):
+            counts = settled(route(bridge, side, "/chat"), 50)
+            assert (counts.received, counts.sent, counts.lost) == (50, 50, 0)
+
+
+@pytest.mark.parametrize(
+    ("msg_type", "payload"),
+    [("json", {"a": [1, None]}), ("string", "grüß"), ("bytes", b"\0\xff"), ("msgpack", {"b": b"x"})],
+)
+def test_what_both_sides_have_passes_as_the_same_bytes_and_type(pair, msg_type, payload):
+    a, b = pair
+    with bridged(a, b, topic("/t", direction="b->a")):
+        sub = a.node("a").new_sub("/t", msg_type)
+        b.node("b").new_pub("/t", msg_type).publish(payload)
+        message = sub.receive(30.0)
+        assert (message.payload, message.codec, message.msg_type) == (payload, msg_type, msg_type)
+
+
+def test_a_picture_keeps_its_bytes_and_shape():
+    with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/camera")):
+        sub, direct = b.node("b").new_sub("/camera", "image"), a.node("c").new_sub("/camera", "image")
+        picture = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
+        a.node("a").new_pub("/camera", "image").publish(picture)
+        came, original = sub.receive(30.0), direct.receive(30.0)
+        assert bytes(came.data) == bytes(original.data)
+        assert came.extension["shape"] == original.extension["shape"] == [4, 6, 3]
+        assert came.payload.shape == (4, 6, 3)
+
+
+def test_a_large_message_passes():
+    with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/big")):
+        sub = b.node("b").new_sub("/big", "bytes")
+        a.node("a").new_pub("/big", "bytes").publish(bytes(8_000_000))
+        assert sub.receive(30.0).size_bytes == 8_000_000
+
+
+def test_a_type_of_its_own_stays_that_type():
+    with nets("zeromq", "memory") as (a, b), bridged(a, b, topic("/robot/description")):
+        sub = b.node("b").new_sub("/robot/description")
+        a.node("a").new_pub("/robot/description", "robot/description").publish({"v": 1})
+        assert sub.receive(30.0).msg_type == "robot/description"
+
+
+def test_types_that_differ_are_converted_by_their_payload():
+    with (
+        nets("memory", "zeromq") as (a, b),
+        bridged(a, b, topic("/t", a_type="msgpack", b_type="json")) as bridge,
+    ):
+        on_a, on_b = a.node("a"), b.node("b")
+        hears_a, hears_b = on_a.new_sub("/t", "msgpack"), on_b.new_sub("/t")
+        says_a, says_b = on_a.new_pub("/t", "msgpack"), on_b.new_pub("/t")
+        says_a.publish({"x": 1})
+        assert [hears.receive(30.0).codec for hears in (hears_a, hears_b)] == ["msgpack", "json"]
+        says_b.publish({"y": 2})
+        message = hears_a.receive(30.0)
+        assert (message.codec, message.payload) == ("msgpack", {"y": 2})
+        assert settled(route(bridge, "a", "/t"), 1).failed == 0
+
+
+def test_what_cannot_be_converted_is_counted_with_its_reason_and_an_alert(caplog):
+    with (
+        nets("memory", "zeromq") as (a, b),
+        bridged(a, b, topic("/t", direction="a->b", b_type="string"), topic("/other")) as bridge,
+    ):
+        on_b = b.node("b")
+        sub, other = on_b.new_sub("/t", "string"), on_b.new_sub("/other")
+        pub = a.node("a").new_pub("/t", "json")
+        for payload in ("good", {"no": "text"}, 7, "good again"):
+            pub.publish(payload)
+        counts = settled(route(bridge, "a", "/t"), 4)
+        assert (counts.received, counts.sent, counts.failed) == (4, 2, 2)
+        assert counts.problem == "cannot encode a 'int' as 'string'; publish a 'str', or use the type 'json'"
+        assert taken(sub, 2) == ["good", "good again"]
+        pub.publish({})
+        settled(route(bridge, "a", "/t"), 5)
+
+        def alerts():
+            return {each.id: each.sentence for each in on_b.graph().alerts}
+
+        eventually(lambda: "encode:/t" in alerts())
+        assert alerts()["encode:/t"].startswith("“bridge-test-to-memory” cannot send on “/t”")
+        pub.publish("cured")
+        eventually(lambda: "encode:/t" not in alerts())
+        a.node("a2").new_pub("/other").publish(1)
+        assert other.listen(timeout_s=30.0) == (True, 1)
+
+
+def test_what_cannot_be_read_is_counted_too():
+    with (
+        nets("memory", "memory") as (a, b),
+        bridged(a, b, topic("/t", direction="a->b", b_type="msgpack")) as bridge,
+    ):
+        pub = a.node("a").new_pub("/t")
+        pub.publish(1)
+        pub.publish_bytes(b"{oops")
+        pub.publish(2)
+        counts = settled(route(bridge, "a", "/t"), 3)
+        assert (counts.sent, counts.failed) == (2, 1)
+        assert counts.problem.startswith("cannot decode 5 bytes as 'json'")
+
+
+def test_bytes_that_are_no_json_pass_where_nobody_has_to_read_them():
+    with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")):
+        sub = b.node("b").new_sub("/t")
+        a.node("a").new_pub("/t").publish_bytes(b"{oops")
+        assert bytes(sub.receive(30.0).data) == b"{oops"
+
+
+# ---- latched
+
+
+def test_what_is_latched_stays_latched_for_who_comes_later(pair):
+    a, b = pair
+    pub = a.node("robot").new_pub("/description", latched=True)
+    pub.publish({"v": 1})
+    with bridged(a, b, topic("/description")) as bridge:
+        settled(route(bridge, "a", "/description"), 1)
+        late = b.node("late").new_sub("/description").receive(30.0)
+        assert (late.payload, late.is_latched) == ({"v": 1}, True)
+        pub.publish({"v": 2})
+        settled(route(bridge, "a", "/description"), 2)
+        assert b.node("later").new_sub("/description").receive(30.0).payload == {"v": 2}
+
+
+def test_each_publisher_s_latched_message_is_kept_and_goes_with_it(monkeypatch):
+    monkeypatch.setattr("nep.bridges.route._GONE_S", 0.0)
+    with nets("memory", "memory") as (a, b), bridged(a, b, topic("/robots")) as bridge:
+        pubs = [a.node(f"robot{n}").new_pub("/robots", latched=True) for n in range(3)]
+        for number, pub in enumerate(pubs):
+            pub.publish(number)
+        settled(route(bridge, "a", "/robots"), 3)
+        late = b.node("late").new_sub("/robots")
+        assert sorted(taken(late, 3)) == [0, 1, 2]
+        pubs[1].close()
+        watcher = b.node("watcher")
+        eventually(lambda: len(watcher.graph().topics["/robots"].publishers) == 2)
+        assert sorted(taken(b.node("later").new_sub("/robots"), 2)) == [0, 2]
+
+
+def test_latched_and_other_messages_of_one_topic_both_pass():
+    with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")):
+        sub, node = b.node("b").new_sub("/t"), a.node("a")
+        node.new_pub("/t", latched=True).publish("kept")
+        node.new_pub("/t").publish("passing")
+        came = {message.payload: message.is_latched for message in (sub.receive(30.0) for _ in range(2))}
+        assert came == {"kept": True, "passing": False}
+
+
+# ---- patterns
+
+
+def test_a_pattern_renames_every_topic_that_it_matches(pair):
+    a, b = pair
+    with bridged(a, b, topic("/robot/*", "ros/*/now", "a->b")) as bridge:
+        on_a, on_b = a.node("a"), b.node("b")
+        pubs = {
+            name: on_a.new_pub(name) for name in ("/robot/arm", "/robot/leg", "/robot/a/b", "/robots/arm")
+        }
+        eventually(lambda: len(bridge.routes) == 2 and all(each.is_subscribed for each in bridge.routes))
+        subs = {name: on_b.new_sub(f"ros/{name}/now") for name in ("arm", "leg")}
+        for name, pub in pubs.items():
+            pub.publish(name)
+        assert subs["arm"].listen(timeout_s=30.0) == (True, "/robot/arm")
+        assert subs["leg"].listen(timeout_s=30.0) == (True, "/robot/leg")
+        assert {each.end.topic for each in bridge.routes} == {"ros/arm/now", "ros/leg/now"}
+
+
+def test_a_pattern_both_ways_finds_topics_of_both_and_never_its_own():
+    with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/a/**", "/b/**")) as bridge:
+        on_a, on_b = a.node("a"), b.node("b")
+        says_a, says_b = on_a.new_pub("/a/x/y"), on_b.new_pub("/b/z")
+        eventually(lambda: len(bridge.routes) == 2 and all(each.is_subscribed for each in bridge.routes))
+        hears_a, hears_b = on_a.new_sub("/a/z"), on_b.new_sub("/b/x/y")
+        says_a.publish(1)
+        says_b.publish(2)
+        assert (taken(hears_b, 1), taken(hears_a, 1)) == ([1], [2])
+        looked = on_b.graph().topics[STATUS_TOPIC].publishers[0].count
+        eventually(lambda: on_b.graph().topics[STATUS_TOPIC].publishers[0].count > looked)
+        ways = {(each.origin.side, each.origin.topic) for each in bridge.routes}
+        assert ways == {("a", "/a/x/y"), ("b", "/b/z")}
+
+
+def test_a_topic_that_is_named_is_not_matched_again():
+    with (
+        nets("memory", "memory") as (a, b),
+        bridged(a, b, topic("/**", "/all/**"), topic("/named", "/own")) as bridge,
+    ):
+        on_a = a.node("a")
+        on_a.new_pub("/named")
+        on_a.new_pub("/found")
+        eventually(lambda: len(bridge.routes) == 3)
+        assert {each.end.topic for each in bridge.routes if each.origin.side == "a"} == {"/own", "/all/found"}
+
+
+def test_patterns_have_a_bound(monkeypatch, caplog):
+    monkeypatch.setattr("nep.bridges.bridge.ROUTES_MOST", 2)
+    with nets("memory", "memory") as (a, b), bridged(a, b, topic("/**", "/all/**")) as bridge:
+        node = a.node("a")
+        for number in range(4):
+            node.new_pub(f"/{number}")
+        eventually(lambda: "make them narrower" in caplog.text)
+        assert len(bridge.routes) == 2
+
+
+# ---- who is not there
+
+
+def test_a_network_that_is_not_there_is_waited_for_and_said_and_the_rest_works(caplog):
+    with Master("127.0.0.1:0", learn_s=0.0) as first:
+        address = first.address
+    with nets("memory") as (a,):
+        away = Net("memory")
+        away.backend, away.master = "zeromq", address
+        with Bridge(configured(a, away, topic("/t"))) as bridge:
+            pub = a.node("a").new_pub("/t")
+            eventually(lambda: route(bridge, "a", "/t").is_subscribed)
+            for number in range(5):
+                pub.publish(number)
+            eventually(lambda: route(bridge, "a", "/t").counts().waiting == 5)
+            eventually(lambda: "no master answers at" in bridge.sides["b"].problem)
+            assert caplog.text.count("is waited for: no master answers at") == 1
+            assert not bridge.is_ready
+            with Master(address, learn_s=0.0), away:
+                assert bridge.wait_until_ready(30.0)
+                counts = settled(route(bridge, "a", "/t"), 5)
+                assert (counts.sent, counts.dropped, counts.waiting) == (5, 0, 0)
+                assert bridge.sides["b"].problem == ""
+                assert f"side b of the bridge, zeromq:{address}" in caplog.text
+                sub = away.node("b").new_sub("/t")
+                pub.publish("now")
+                assert sub.listen(timeout_s=30.0) == (True, "now")
+
+
+def test_more_than_there_is_room_for_is_dropped_and_counted(monkeypatch):
+    monkeypatch.setattr("nep.bridges.route.HELD_MESSAGES", 10)
+    with Master("127.0.0.1:0", learn_s=0.0) as first:
+        address = first.address
+    with nets("memory") as (a,):
+        away = Net("memory")
+        away.backend, away.master = "zeromq", address
+        with Bridge(configured(a, away, topic("/t", direction="a->b"))) as bridge:
+            pub = a.node("a").new_pub("/t")
+            eventually(lambda: bridge.routes[0].is_subscribed)
+            for number in range(25):
+                pub.publish(number)
+            eventually(lambda: bridge.routes[0].counts().received == 25)
+            counts = bridge.routes[0].counts()
+            assert (counts.waiting, counts.dropped, counts.sent) == (10, 15, 0)
+
+
+def test_a_route_that_cannot_be_served_does_not_stop_the_others(caplog):
+    class Bad:
+        """A node of whom one topic is refused."""
+
+        def __init__(self, node):
+            self._node = node
+
+        def __getattr__(self, name):
+            return getattr(self._node, name)
+
+        def new_sub(self, name, *args, **more):
+            if name == "/bad":
+                raise RuntimeError("no such type")
+            return self._node.new_sub(name, *args, **more)
+
+    with nets("memory", "memory") as (a, b):
+        bridge = Bridge(configured(a, b, topic("/good")))
+        try:
+            bridge.sides["a"].node = Bad(bridge.sides["a"].node)
+            bridge._add(topic("/bad"), "a", "/bad", "/bad")
+            bridge._add(topic("/late"), "a", "/late", "/late")
+            eventually(lambda: route(bridge, "a", "/late").is_subscribed)
+            eventually(lambda: route(bridge, "a", "/bad").trouble == "RuntimeError: no such type")
+            assert "'/bad' on side a is not carried to '/bad' yet: RuntimeError" in caplog.text
+            sub = b.node("b").new_sub("/good")
+            a.node("a").new_pub("/good").publish(1)
+            assert sub.listen(timeout_s=30.0) == (True, 1)
+        finally:
+            bridge.close()
+
+
+def test_a_publisher_that_comes_with_another_type_is_heard_by_that_type():
+    with nets("memory", "memory") as (a, b), bridged(a, b, topic("/t", direction="a->b")) as bridge:
+        watcher = a.node("watcher")
+        assert watcher.graph().topics["/t"].msg_type == "json"
+        pub = a.node("a").new_pub("/t", "string")
+        found = route(bridge, "a", "/t")
+        eventually(lambda: found._subscriber.msg_type == "string")
+        pub.publish("x")
+        assert settled(found, 1).sent == 1
+        assert len(watcher.graph().topics["/t"].subscribers) == 1
+
+
+# ---- what others see, and the end
+
+
+def test_the_graph_shows_the_bridge_and_its_counts_are_published_on_both_sides(pair):
+    a, b = pair
+    with bridged(a, b, topic("/t")) as bridge:
+        on_a, on_b = a.node("a"), b.node("b")
+        assert f"bridge-test-to-{b.backend}" in {each.name for each in on_a.graph().nodes.values()}
+        assert f"bridge-test-to-{a.backend}" in {each.name for each in on_b.graph().nodes.values()}
+        pub = on_a.new_pub("/t")
+        for number in range(7):
+            pub.publish(number)
+        settled(route(bridge, "a", "/t"), 7)
+        for node in (on_a, on_b):
+            sub = node.new_sub(STATUS_TOPIC)
+            told = {}
+            while told.get("sent") != 7:
+                status = sub.listen(timeout_s=30.0)[1]
+                told = {each["from"]["side"]: each for each in status["routes"]}["a"]
+            assert (status["bridge"], told["received"], told["lost"], told["thinned"]) == ("test", 7, 0, 0)
+            assert [each["backend"] for each in status["sides"]] == [a.backend, b.backend]
+
+
+def test_closing_delivers_what_came_and_may_be_done_twice(pair):
+    a, b = pair
+    sub, pub = b.node("b").new_sub("/t"), a.node("a").new_pub("/t")
+    with bridged(a, b, topic("/t")) as bridge:
+        for number in range(500):
+            pub.publish(number)
+        settled(route(bridge, "a", "/t"), 500)
+    bridge.close()
+    assert taken(sub, 500) == list(range(500))
+    assert bridge.routes[0].counts().sent == 500
+
+
+def test_closing_while_a_network_is_waited_for_ends_soon():
+    with nets("memory") as (a,):
+        away = Net("memory")
+        away.backend, away.master = "zeromq", "127.0.0.1:9"
+        with Bridge(configured(a, away, topic("/t"))) as bridge:
+            assert not bridge.wait_until_ready(0.1)
+        assert not bridge.wait_until_ready(None), "closed"
+
+
+def test_a_back_end_or_type_that_is_not_there_is_said_at_once():
+    with pytest.raises(NepError, match="no back end 'zeromk'; did you mean 'zeromq'"):
+        side_of("zeromk")
+    with nets("memory") as (a,), pytest.raises(NepError, match="both sides are the network"):
+        check_apart(side_of(a.backend, a.master), side_of(a.backend, a.master))

@@ -1,0 +1,287 @@
+"""`nep bridge` as a process: what it joins, what it shows, and how it ends."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+import nep
+from nep.cli.screen import UNKNOWN
+from nep.masters.master import Master
+from tests.nep.bridges.joined import taken
+from tests.nep.programs import ROOT, eventually, running
+
+COMMAND = "from nep.cli import main; main()"
+_numbers = itertools.count()
+INTERRUPTED = 130
+
+
+@pytest.fixture
+def place():
+    return f"local/bridge-command-{os.getpid()}-{next(_numbers)}"
+
+
+@pytest.fixture
+def file(tmp_path, master, place):
+    """A file that joins the master's network with one of zenoh; more may be put behind it."""
+
+    def write(topics, address=master.address):
+        path = tmp_path / "lab.toml"
+        sides = f'[a]\nbackend = "zeromq"\nmaster = "{address}"\n[b]\nbackend = "zenoh"\nmaster = "{place}"\n'
+        path.write_text(sides + topics, encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+@pytest.fixture
+def nodes(master, place):
+    with nep.node("on-a", master=master.address) as a, nep.node("on-b", "zenoh", master=place) as b:
+        yield a, b
+
+
+def reports(program):
+    """The JSON texts that it writes."""
+    while True:
+        yield json.loads(program.line())
+
+
+def when(program, is_met):
+    """The first report of which this is so."""
+    return next(each for each in reports(program) if is_met(each))
+
+
+def way(report, side):
+    return next(each for each in report["routes"] if each["from"]["side"] == side)
+
+
+def test_between_processes_every_message_is_accounted_for(file, nodes):
+    on_a, on_b = nodes
+    path = file('[[topics]]\na = "/count"\nb = "zenoh/count"\n[[topics]]\na = "/thin"\nmax_rate_hz = 0.001\n')
+    with running(COMMAND, "bridge", path, "--json") as program:
+        when(program, lambda report: report["is_ready"])
+        hears, says, thin = on_b.new_sub("zenoh/count"), on_a.new_pub("/count"), on_a.new_pub("/thin")
+        answers, back = on_b.new_pub("zenoh/count"), on_a.new_sub("/count")
+        for number in range(500):
+            says.publish(number)
+            thin.publish(number)
+        report = when(
+            program,
+            lambda it: all(each["received"] >= 500 for each in it["routes"] if each["from"]["side"] == "a"),
+        )
+        routes = {each["from"]["topic"]: each for each in report["routes"] if each["from"]["side"] == "a"}
+        for topic, pub in (("/count", says), ("/thin", thin)):
+            told = routes[topic]
+            assert pub.count == told["received"] + told["lost"] == 500
+            parts = ("sent", "thinned", "failed", "dropped", "waiting")
+            assert told["received"] == sum(told[each] for each in parts)
+        assert (routes["/thin"]["sent"], routes["/thin"]["thinned"]) == (1, 498)
+        assert hears.received + hears.lost == routes["/count"]["sent"] == 500
+        assert taken(back, 500) == list(range(500))
+        answers.publish("from b")
+        assert taken(back, 1) == ["from b"]
+        report = when(program, lambda it: way(it, "b")["received"] == 1)
+        assert way(report, "b")["sent"] == 1
+        program.signal(signal.SIGTERM)
+        out, err = program.end()
+        assert program.process.returncode == 0
+        assert err == ""
+        thinned = next(each for each in json.loads(out.splitlines()[-1])["routes"] if each["thinned"])
+        assert (thinned["sent"], thinned["waiting"]) in {(1, 1), (2, 0)}
+
+
+def test_ctrl_c_ends_it_without_a_word_and_its_nodes_are_gone(file, nodes):
+    on_a, on_b = nodes
+    with running(COMMAND, "bridge", file('[[topics]]\na = "/t"\n')) as program:
+        heads = "topic rate received sent lost thinned failed dropped waiting returned"
+        assert program.line().split() == heads.split()
+        for node, name in ((on_a, "bridge-lab-to-zenoh"), (on_b, "bridge-lab-to-zeromq")):
+            eventually(
+                lambda node=node, name=name: name in {each.name for each in node.graph().nodes.values()}
+            )
+        program.signal(signal.SIGINT)
+        _out, err = program.end()
+        assert program.process.returncode == INTERRUPTED
+        assert re.fullmatch(
+            r"lab joins a, zeromq:127\.0\.0\.1:\d+@.*, and b, zenoh:local/bridge-.*; Ctrl\+C ends it\n",
+            err,
+        )
+        for node in nodes:
+            eventually(
+                lambda node=node: (
+                    not any(each.name.startswith("bridge") for each in node.graph().nodes.values())
+                )
+            )
+
+
+def test_plain_output_has_a_line_for_what_has_changed(file, nodes):
+    on_a, on_b = nodes
+    with running(COMMAND, "bridge", file('[[topics]]\na = "/t"\nb = "/u"\ndirection = "a->b"\n')) as program:
+        program.line()
+        assert program.line().split() == ["zeromq", "→", "zenoh", "/t", "→", "/u", UNKNOWN, *["0"] * 8]
+        eventually(lambda: "/t" in on_a.graph().topics)
+        hears, says = on_b.new_sub("/u"), on_a.new_pub("/t")
+        for number in range(3):
+            says.publish(number)
+        assert taken(hears, 3) == [0, 1, 2]
+        figures = program.line().split()[-8:]
+        while figures[0] != "3":
+            figures = program.line().split()[-8:]
+        assert figures == ["3", "3", "0", "0", "0", "0", "0", "0"]
+
+
+def test_one_line_joins_one_topic(nodes, master, place):
+    on_a, on_b = nodes
+    words = (f"zmq@{master.address}:/chatter", f"Zenoh@{place}:")
+    with running(COMMAND, "bridge", *words, "--direction", "b->a", "--rate", "100", "--json") as program:
+        when(program, lambda report: report["is_ready"])
+        hears = on_a.new_sub("/chatter")
+        on_b.new_pub("/chatter").publish({"hello": "there"})
+        assert taken(hears, 1) == [{"hello": "there"}]
+        name = f"bridge-{program.process.pid}-to-zenoh"
+        assert name in {each.name for each in on_a.graph().nodes.values()}
+
+
+def test_a_master_that_is_not_there_yet_is_waited_for(file, place):
+    with Master("127.0.0.1:0", learn_s=0.0) as first:
+        address = first.address
+    path = file('[[topics]]\na = "/t"\ndirection = "b->a"\n', address)
+    with running(COMMAND, "bridge", path, "--json") as program, nep.node("b", "zenoh", master=place) as on_b:
+        report = when(program, lambda it: it["sides"][0]["problem"])
+        assert report["sides"][0]["problem"].startswith("no master answers at")
+        assert not report["is_ready"]
+        eventually(lambda: "/t" in on_b.graph().topics)
+        on_b.new_pub("/t").publish("early")
+        report = when(program, lambda it: it["routes"][0]["waiting"] == 1)
+        with Master(address, learn_s=0.0):
+            report = when(program, lambda it: it["is_ready"] and it["routes"][0]["sent"] == 1)
+            assert report["sides"][0]["problem"] == ""
+            program.signal(signal.SIGTERM)
+            _out, err = program.end()
+        lines = err.splitlines()
+        assert len(lines) == 2
+        assert "side a of the bridge" in lines[0]
+        assert "is waited for: no master answers at" in lines[0]
+        assert lines[1].endswith("is there")
+
+
+class OnTerminal:
+    """The command on a terminal of its own, with all that it has written there."""
+
+    def __init__(self, *words):
+        self._keys, terminal = os.openpty()
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", COMMAND, *words],
+            stdin=subprocess.DEVNULL,
+            stdout=terminal,
+            stderr=terminal,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "140", "LINES": "40"},
+        )
+        os.close(terminal)
+        self.text = ""
+
+    def shows(self, word):
+        """Read on until it has written this."""
+        while word not in self.text:
+            self.text += self._read()
+
+    def _read(self):
+        try:
+            said = os.read(self._keys, 100_000).decode()
+        except OSError:  # its end
+            said = ""
+        assert said, f"it ended: {self.text}"
+        return said
+
+    def end(self):
+        """What it wrote after Ctrl+C, and its exit code."""
+        self.process.send_signal(signal.SIGINT)
+        before = len(self.text)
+        with pytest.raises(AssertionError, match="it ended"):
+            self.shows("what it never says")
+        return self.text[before:], self.process.wait(60)
+
+    def close(self):
+        self.process.kill()
+        self.process.wait(60)
+        os.close(self._keys)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="terminals of Unix")
+def test_on_a_terminal_a_table_stands_in_its_place_and_warnings_above_it(file, nodes):
+    on_a, _on_b = nodes
+    shown = OnTerminal("bridge", file('[[topics]]\na = "/t"\ndirection = "a->b"\nb_type = "string"\n'))
+    try:
+        shown.shows("zeromq → zenoh  /t")
+        assert "returned" not in shown.text, "columns that are all 0 need no room"
+        eventually(lambda: "/t" in on_a.graph().topics)
+        pub = on_a.new_pub("/t")
+        pub.publish({"no": "text"})
+        shown.shows("a message on '/t' cannot be sent (1 so far): cannot encode a 'dict' as 'string'")
+        shown.shows("! zeromq → zenoh  /t: cannot encode")
+        shown.shows("\x1b[1A")  # up again: the next report takes its place
+        rest, code = shown.end()
+        assert code == INTERRUPTED
+        assert "Traceback" not in shown.text
+        assert "\x1b[?25h" in rest, "the cursor is back"
+    finally:
+        shown.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "give a file, or two sides such as 'zeromq:/chatter ros:/chatter'; --example prints a file"),
+        (("zeromq:/t",), "'zeromq:/t' is one side, and no file; name the other, too, such as 'ros:/chatter'"),
+        (("zeromq:/t", "zeromk:/t"), "no back end 'zeromk'; did you mean 'zeromq'?"),
+        (("zeromq", "zenoh:/t"), "'zeromq' is no BACKEND:TOPIC; write it as 'zeromq:/topic' or"),
+        (("zeromq:", "zenoh:"), "no topic is named; write it as 'zeromq:/topic ros:/topic'"),
+        (("zeromq:/a/*", "zenoh:/b"), "'/a/*' and '/b' do not go together; use the same '*' or '**'"),
+        (("zeromq:/t", "zmq:/u"), "both sides are the network 'zeromq:"),
+        (("zeromq:/t", "zenoh:/t", "--direction", "a-b"), "'a-b' is no direction; did you mean 'a->b'?"),
+        (("zenoh@nowhere:/t", "zeromq:/t"), "'nowhere' is no place where nodes of 'zenoh' meet"),
+        (("zeromq:/a b", "zenoh:/t"), "'/a b' cannot be a topic"),
+        (("missing.toml",), "'missing.toml' cannot be read: no such file or directory; 'nep bridge --ex"),
+        (("missing.toml", "--rate", "3"), "with a file its own lines decide"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_joined_is_one_sentence(words, said):
+    with running(COMMAND, "bridge", *words) as program:
+        out, err = program.end()
+        assert (program.process.returncode, out) == (1, "")
+        assert err.startswith("nep: ")
+        assert said in err
+        assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("rate", ["0", "-1", "nan", "inf", "1e300"])
+def test_a_rate_that_is_none_is_refused(rate):
+    with running(COMMAND, "bridge", "zeromq:/t", "zenoh:/t", "--rate", rate) as program:
+        _out, err = program.end()
+        assert program.process.returncode == 2
+        assert "give messages a second" in re.sub(r"[\s│]+", " ", err)
+
+
+def test_a_file_is_checked_without_joining_anything(file):
+    path = file(
+        '[[topics]]\na = "/t"\nmax_rate_hz = 5\n[[topics]]\na = "/r/*"\nb = "/s/*"\ndirection = "b->a"\n'
+    )
+    with running(COMMAND, "bridge", "--check", path) as program:
+        out, err = program.end()
+        assert (program.process.returncode, out) == (0, "/t ↔ /t  ≤ 5 /s\n/r/* ← /s/*\n")
+        assert err.startswith("the file is right: lab joins zeromq:127.0.0.1:")
+    with running(COMMAND, "bridge", "--check", file('[[topics]]\na = "/t"\nmax_rate = 5\n')) as program:
+        _out, err = program.end()
+        assert program.process.returncode == 1
+        assert re.fullmatch(
+            r"nep: line 9 of '.*lab\.toml', topics\[1\]\.max_rate: there is no such key; did you mean "
+            r"'max_rate_hz'\?\n",
+            err,
+        )

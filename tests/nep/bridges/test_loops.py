@@ -1,0 +1,298 @@
+"""No message goes round for ever: rings of bridges, both ways, and networks that tell nothing of origins."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
+
+import pytest
+
+from nep.backends import memory
+from nep.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
+from nep.bridges.trail import ECHO_S, HOPS_MOST, TRAIL_KEY, Echoes, Trail, read_trail
+from nep.errors import WireError
+from nep.messages.message import arrived
+from tests.nep.bridges.joined import bridged, nets, route, settled, silent, taken, topic
+from tests.nep.programs import eventually
+
+
+def quiet(*bridges: Bridge) -> None:
+    """Nothing moves any more; what moved in the ring has an end."""
+    before: list[tuple[int, int]] = []
+
+    def is_still() -> bool:
+        nonlocal before
+        now = [(each.counts().received, each.counts().returned) for one in bridges for each in one.routes]
+        before, was = now, before
+        return now == was
+
+    for _time in range(5):
+        eventually(is_still)
+
+
+RINGS = [("zeromq", "memory"), ("zeromq", "nanomsg"), ("zenoh", "memory")]
+
+
+@pytest.mark.parametrize("backends", RINGS, ids="-".join)
+def test_two_bridges_between_the_same_networks_end_with_one_copy_each(backends):
+    with (
+        nets(*backends) as (a, b),
+        bridged(a, b, topic("/t"), name="one") as one,
+        bridged(a, b, topic("/t"), name="two") as two,
+    ):
+        hears_a, hears_b = a.node("hears").new_sub("/t"), b.node("hears").new_sub("/t")
+        pub = a.node("says").new_pub("/t")
+        for number in range(20):
+            pub.publish(number)
+        for bridge in (one, two):
+            counts = settled(route(bridge, "a", "/t"), 20)
+            assert (counts.received, counts.sent) == (20, 20)
+        assert sorted(taken(hears_b, 40)) == sorted([*range(20)] * 2)
+        assert taken(hears_a, 20) == list(range(20))
+        quiet(one, two)
+        assert silent(hears_a)
+        assert silent(hears_b)
+        for bridge in (one, two):
+            counts = route(bridge, "b", "/t").counts()
+            assert (counts.received, counts.returned) == (0, 20), "those that the other bridge brought"
+
+
+def test_three_bridges_in_a_ring_bring_each_message_once_by_each_way():
+    with nets("zeromq", "memory", "zenoh") as (a, b, c), ExitStack() as opened:
+        ring = [
+            opened.enter_context(bridged(x, y, topic("/t"), name=name))
+            for x, y, name in ((a, b, "ab"), (b, c, "bc"), (c, a, "ca"))
+        ]
+        hears = [net.node("hears").new_sub("/t") for net in (a, b, c)]
+        pub = a.node("says").new_pub("/t")
+        for number in range(10):
+            pub.publish(number)
+        assert taken(hears[0], 10) == list(range(10))
+        for each in hears[1:]:
+            assert sorted(taken(each, 20)) == sorted([*range(10)] * 2), "one by each way round"
+        quiet(*ring)
+        assert all(silent(each) for each in hears)
+
+
+def test_three_bridges_in_a_ring_one_way_stop_where_it_began():
+    with nets("memory", "zeromq", "memory") as (a, b, c), ExitStack() as opened:
+        ring = [
+            opened.enter_context(bridged(x, y, topic("/t", direction="a->b"), name=name))
+            for x, y, name in ((a, b, "ab"), (b, c, "bc"), (c, a, "ca"))
+        ]
+        hears = [net.node("hears").new_sub("/t") for net in (a, b, c)]
+        b.node("says").new_pub("/t").publish("once")
+        assert [taken(each, 1) for each in hears] == [["once"]] * 3
+        quiet(*ring)
+        assert all(silent(each) for each in hears)
+        assert ring[0].routes[0].counts().returned == 1
+
+
+def test_a_ring_within_one_bridge_stops():
+    with (
+        nets("memory", "zeromq") as (a, b),
+        bridged(
+            a, b, topic("/x", "/y", "a->b"), topic("/x", "/y2", "b->a"), topic("/z", "/y", "b->a")
+        ) as one,
+    ):
+        hears = a.node("hears").new_sub("/x"), a.node("hears too").new_sub("/z")
+        a.node("says").new_pub("/x").publish(1)
+        assert settled(route(one, "a", "/x"), 1).sent == 1
+        assert taken(hears[0], 1) == [1]
+        quiet(one)
+        assert all(silent(each) for each in hears)
+
+
+def test_a_chain_of_bridges_carries_on():
+    with (
+        nets("zeromq", "memory", "nanomsg") as (a, b, c),
+        bridged(a, b, topic("/t"), name="one"),
+        bridged(b, c, topic("/t"), name="two"),
+    ):
+        sub = c.node("c").new_sub("/t")
+        a.node("a").new_pub("/t").publish("far")
+        message = sub.receive(30.0)
+        assert message.payload == "far"
+        trail = read_trail(message.extension)
+        assert len(trail.bridges) == 2
+        assert [each.partition(":")[0] for each in trail.networks] == ["zeromq", "memory", "nanomsg"]
+
+
+def test_names_that_differ_for_one_network_are_still_stopped_by_the_bridge_s_id():
+    """Both bridges call each network another name, as two computers do."""
+    with nets("memory", "zeromq") as (a, b):
+
+        def named(name):
+            sides = [
+                replace(side_of(net.backend, net.master), network=f"{name}-{net.backend}") for net in (a, b)
+            ]
+            return BridgeConfiguration(name, *sides, (topic("/t"),))
+
+        with Bridge(named("one")) as one, Bridge(named("two")) as two:
+            assert one.wait_until_ready(30.0)
+            assert two.wait_until_ready(30.0)
+            hears = a.node("hears").new_sub("/t")
+            a.node("says").new_pub("/t").publish("x")
+            assert taken(hears, 1) == ["x"]
+            quiet(one, two)
+            came = 0
+            while hears.receive(0.2) is not None:
+                came += 1
+            assert 1 <= came <= 4, "each bridge once from each copy, and no more"
+
+
+# ---- networks that tell nothing
+
+
+class Nameless(memory.MemoryTransport):
+    """As ROS 1: who hears its own messages, without a publisher, and no room for an extension."""
+
+    def publisher(self, spec):
+        made = super().publisher(spec)
+        send = made.send
+
+        def bare(encoded):
+            if encoded.extension:
+                raise WireError("no room for an extension", len(encoded.data))
+            send(encoded)
+
+        made.send = bare
+        return made
+
+    def subscriber(self, spec):
+        sink = spec.sink
+        if sink is not None:
+            spec = replace(spec, sink=lambda messages: sink([nameless(each) for each in messages]))
+        return super().subscriber(spec)
+
+
+def nameless(message):
+    made = arrived(message.kind, message.raw, message.stamp_ns, 0, 0)
+    made.publisher = made.seq = None
+    return made
+
+
+@pytest.fixture(params=[False, True], ids=["says that it has no room", "does not say so"])
+def nameless_side(request, monkeypatch):
+    backend = replace(
+        memory.BACKEND, name="nameless", open=Nameless, has_extensions=request.param, is_in_process=True
+    )
+    monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: NAMED[name])
+    NAMED["nameless"] = backend
+    return SideConfiguration(backend, "somewhere", "nameless:somewhere")
+
+
+NAMED = {"memory": memory.BACKEND}
+
+
+def test_without_signs_of_origin_an_echo_is_known_by_its_bytes(nameless_side):
+    import nep
+
+    with nets("memory") as (a,):
+        told = BridgeConfiguration("test", side_of(a.backend, a.master), nameless_side, (topic("/t"),))
+        with Bridge(told) as bridge, nep.node("ros", "nameless", master="somewhere") as ros:
+            assert bridge.wait_until_ready(30.0)
+            hears_a, hears_ros = a.node("hears").new_sub("/t"), ros.new_sub("/t")
+            says = a.node("says").new_pub("/t")
+            for payload in ("same", "same", "same", "other"):
+                says.publish(payload)
+            assert taken(hears_a, 4) == taken(hears_ros, 4) == ["same", "same", "same", "other"]
+            back = route(bridge, "b", "/t")
+            eventually(lambda: back.counts().returned == 4)
+            assert back.counts().received == 0
+            assert silent(hears_a)
+            ros.new_pub("/t").publish("same")
+            assert taken(hears_a, 1) == ["same"], "somebody else may say the same"
+            assert settled(back, 1).sent == 1
+            assert route(bridge, "a", "/t").counts().failed == 0
+
+
+def test_two_bridges_over_a_network_without_signs_end_too(nameless_side):
+    import nep
+
+    with nets("memory") as (a,), ExitStack() as opened:
+        pair = []
+        for name in ("one", "two"):
+            told = BridgeConfiguration(name, side_of(a.backend, a.master), nameless_side, (topic("/t"),))
+            pair.append(opened.enter_context(Bridge(told)))
+            assert pair[-1].wait_until_ready(30.0)
+        ros = opened.enter_context(nep.node("ros", "nameless", master="somewhere"))
+        hears_a, hears_ros = a.node("hears").new_sub("/t"), ros.new_sub("/t")
+        for number in range(10):
+            a.node(f"says{number}").new_pub("/t").publish(number)
+        quiet(*pair)
+        count = 0
+        while hears_a.receive(0.2) is not None:
+            count += 1
+        assert 10 <= count <= 40
+        count = 0
+        while hears_ros.receive(0.2) is not None:
+            count += 1
+        assert 20 <= count <= 40
+
+
+# ---- trails and echoes alone
+
+
+def test_a_trail_says_where_a_message_may_go():
+    trail = Trail().carried("a", "b", "one")
+    assert trail == Trail(("a", "b"), ("one",))
+    assert not trail.may_go("a", "two")
+    assert not trail.may_go("c", "one")
+    assert trail.may_go("c", "two")
+    assert trail.carried("b", "c", "two") == Trail(("a", "b", "c"), ("one", "two"))
+    assert read_trail({TRAIL_KEY: trail.to_plain()}) == trail
+
+
+def test_a_trail_has_an_end():
+    trail = Trail()
+    for number in range(HOPS_MOST):
+        assert trail.may_go(f"n{number + 1}", f"b{number}")
+        trail = trail.carried(f"n{number}", f"n{number + 1}", f"b{number}")
+    assert not read_trail({TRAIL_KEY: trail.to_plain()}).may_go("new", "new")
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        None, 7, "text", [], {}, {"networks": 7}, {"networks": [7, None, {}], "bridges": "one"},
+        {"networks": ["x" * 10**6], "bridges": [b"x"]}, {"networks": ["n"] * 10**5, "bridges": ["b"] * 10**5},
+    ],
+)  # fmt: skip
+def test_whatever_somebody_else_writes_there_is_read_without_harm(found):
+    trail = read_trail({TRAIL_KEY: found})
+    assert len(trail.networks) <= HOPS_MOST + 2
+    assert len(trail.bridges) <= HOPS_MOST + 2
+
+
+def test_a_message_with_a_strange_trail_passes():
+    with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")):
+        sub = b.node("b").new_sub("/t")
+        a.node("a").new_pub("/t").publish_bytes(b"1", {TRAIL_KEY: ["oops"], "mine": 7})
+        message = sub.receive(30.0)
+        assert message.extension["mine"] == 7
+        assert len(read_trail(message.extension).bridges) == 1
+
+
+def test_an_echo_is_known_once_for_each_time_and_not_for_ever():
+    echoes = Echoes()
+    echoes.sent(b"x", 0.0)
+    echoes.sent(b"x", 1.0)
+    echoes.sent(memoryview(b"y"), 1.0)
+    assert [echoes.is_echo(b"x", 2.0) for _time in range(3)] == [True, True, False]
+    assert not echoes.is_echo(b"z", 2.0)
+    assert not echoes.is_echo(b"y", 1.0 + ECHO_S + 0.1)
+    echoes.sent(b"x", 10.0)
+    echoes.not_needed()
+    assert not echoes.is_echo(b"x", 10.0)
+    echoes.sent(b"x", 10.0)
+    assert not echoes.is_echo(b"x", 10.0), "nothing is remembered any more"
+
+
+def test_echoes_have_a_bound():
+    echoes = Echoes()
+    for number in range(10_000):
+        echoes.sent(str(number).encode(), 0.0)
+    assert not echoes.is_echo(b"0", 0.0)
+    assert echoes.is_echo(b"9999", 0.0)
+    assert len(echoes._sent) < 5_000

@@ -1,0 +1,112 @@
+"""A rate limit: the newest is kept, what it replaced is counted apart from what was lost."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+
+import pytest
+
+from nep.bridges.pacer import Limit, Pacer
+from tests.nep.bridges.joined import bridged, nets, route, settled, silent, taken, topic
+from tests.nep.programs import eventually
+
+THREE = [("memory", "zeromq"), ("zeromq", "zenoh"), ("nanomsg", "memory")]
+
+
+@pytest.mark.parametrize("pair", THREE, ids="-".join)
+def test_of_a_burst_the_first_and_the_newest_pass_and_the_others_are_thinned(pair):
+    with nets(*pair) as (a, b), bridged(a, b, topic("/t", max_rate_hz=0.5)) as bridge:
+        sub, pub = b.node("b").new_sub("/t"), a.node("a").new_pub("/t")
+        started = time.monotonic()
+        for number in range(100):
+            pub.publish(number)
+        counts = settled(route(bridge, "a", "/t"), 100)
+        assert (counts.received, counts.sent, counts.thinned, counts.lost) == (100, 2, 98, 0)
+        assert time.monotonic() - started >= 1.7
+        assert taken(sub, 2) == [0, 99]
+        assert silent(sub)
+
+
+def test_a_topic_that_is_slower_than_the_limit_passes_whole():
+    with nets("memory", "memory") as (a, b), bridged(a, b, topic("/t", max_rate_hz=1e6)) as bridge:
+        sub, pub, never = b.node("b").new_sub("/t"), a.node("a").new_pub("/t"), threading.Event()
+        for number in range(50):
+            pub.publish(number)
+            never.wait(0.006)  # memory hands them over 200 times a second
+        counts = settled(route(bridge, "a", "/t"), 50)
+        assert counts.sent + counts.thinned == 50
+        assert taken(sub, 1) == [0]
+
+
+def test_each_way_and_topic_has_its_own_limit():
+    with (
+        nets("memory", "memory") as (a, b),
+        bridged(a, b, topic("/slow", max_rate_hz=0.001), topic("/free")) as bridge,
+    ):
+        on_a, on_b = a.node("a"), b.node("b")
+        free = on_b.new_sub("/free")
+        for pub in (on_a.new_pub("/slow"), on_b.new_pub("/slow"), on_a.new_pub("/free")):
+            for number in range(20):
+                pub.publish(number)
+        assert taken(free, 20) == list(range(20))
+        for side in ("a", "b"):
+            found = route(bridge, side, "/slow")
+            eventually(lambda found=found: found.counts().received == 20)
+            counts = found.counts()
+            assert (counts.sent, counts.thinned, counts.waiting) == (1, 18, 1)
+
+
+def test_what_waits_for_its_turn_goes_when_the_bridge_is_closed():
+    with nets("memory", "zeromq") as (a, b):
+        sub, pub = b.node("b").new_sub("/t"), a.node("a").new_pub("/t")
+        with bridged(a, b, topic("/t", max_rate_hz=0.001)) as bridge:
+            for number in range(10):
+                pub.publish(number)
+            found = route(bridge, "a", "/t")
+            eventually(lambda: found.counts().received == 10)
+        assert taken(sub, 2) == [0, 9]
+        counts = found.counts()
+        assert (counts.sent, counts.thinned, counts.waiting) == (2, 8, 0)
+
+
+def test_what_is_latched_stays_so_when_it_is_thinned():
+    with nets("memory", "memory") as (a, b), bridged(a, b, topic("/t", max_rate_hz=2)) as bridge:
+        pub = a.node("a").new_pub("/t", latched=True)
+        for number in range(10):
+            pub.publish(number)
+        settled(route(bridge, "a", "/t"), 10)
+        assert b.node("late").new_sub("/t").receive(30.0).payload == 9
+
+
+# ---- the limit and the pacer alone
+
+
+def test_a_limit_lets_through_as_many_as_it_says():
+    limit = Limit(10.0)
+    passed = [now / 1000 for now in range(10_000) if limit.has_room(now / 1000)]
+    assert 100 <= len(passed) <= 101
+    assert min(later - earlier for earlier, later in itertools.pairwise(passed)) > 0.089
+
+
+def test_a_limit_saves_nothing_up():
+    limit = Limit(10.0)
+    assert limit.has_room(0.0)
+    assert [limit.has_room(100.0 + n / 1000) for n in range(5)] == [True, False, False, False, False]
+    assert limit.next_at == pytest.approx(100.09)
+
+
+def test_a_pacer_calls_in_the_order_of_time_and_no_more_when_closed():
+    pacer, called, done = Pacer("test-pace"), [], threading.Event()
+    now = time.monotonic()
+    pacer.call_at(now + 3600.0, lambda: called.append("never"))
+    pacer.call_at(now + 0.2, done.set)
+    pacer.call_at(now + 0.1, lambda: called.append("second"))
+    pacer.call_at(now - 1.0, lambda: called.append("first"))
+    assert done.wait(30.0)
+    assert called == ["first", "second"]
+    pacer.close()
+    pacer.call_at(now, lambda: called.append("never"))
+    pacer.close()
+    assert called == ["first", "second"]
