@@ -15,13 +15,11 @@ from nep.bridges.route import Route
 from nep.errors import ClosedError, NepError
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
-from nep.protocol.graph_view import GraphView
+from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
 
-__all__ = ["STATUS_TOPIC", "STATUS_TYPE", "BridgeSide"]
+__all__ = ["BridgeSide"]
 
-STATUS_TOPIC = "/nep/bridges"
-STATUS_TYPE = "nep/bridge"
-"""Each bridge tells here, on both sides, what it joins and how many messages it has carried (latched)."""
+_STATUS_TYPE = "nep/bridge"
 _logger = logging.getLogger("nep")
 _LOOK_S = 1.0
 _ANSWER_S = 1.0
@@ -161,8 +159,8 @@ class BridgeSide:
             return
         with suppress(NepError):  # with the next look it is tried again
             if self._status is None:
-                self._status = self.node.new_pub(STATUS_TOPIC, STATUS_TYPE, latched=True)
-            self._status.publish({**status, "stamp_ns": time.time_ns()})
+                self._status = self.node.new_pub(BRIDGES_TOPIC, _STATUS_TYPE, latched=True)
+            self._status.publish(status)
             self._told = status
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 
 __all__ = [
+    "BRIDGES_TOPIC",
     "Alert",
     "ClientInfo",
     "GraphView",
@@ -16,6 +17,9 @@ __all__ = [
     "SubscriberInfo",
     "TopicInfo",
 ]
+
+BRIDGES_TOPIC = "/nep/bridges"
+"""Bridges tell here what they join and how many messages they have carried: who publishes here is one."""
 
 
 @dataclass(frozen=True)

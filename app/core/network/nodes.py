@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from nep.protocol.graph_view import GraphView, NodeInfo
+from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView, NodeInfo
 
 GONE_SHOWN_S = 10.0
 GATEWAY = "gateway"
@@ -39,6 +39,11 @@ class NodeEntry:
     def is_original(self) -> bool:
         """Whether it is a program of the original NEP."""
         return self.generation not in NATIVE
+
+    @property
+    def is_bridge(self) -> bool:
+        """Whether it joins this network with another: see `nep.bridges`."""
+        return BRIDGES_TOPIC in self.publishes
 
 
 class Nodes:

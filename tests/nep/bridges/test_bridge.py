@@ -7,9 +7,9 @@ import pytest
 
 from nep.bridges import Bridge, side_of
 from nep.bridges.configuration import check_apart
-from nep.bridges.side import STATUS_TOPIC
 from nep.errors import NepError
 from nep.masters.master import Master
+from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import Net, bridged, configured, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
 
@@ -230,8 +230,8 @@ def test_a_pattern_both_ways_finds_topics_of_both_and_never_its_own():
         says_a.publish(1)
         says_b.publish(2)
         assert (taken(hears_b, 1), taken(hears_a, 1)) == ([1], [2])
-        looked = on_b.graph().topics[STATUS_TOPIC].publishers[0].count
-        eventually(lambda: on_b.graph().topics[STATUS_TOPIC].publishers[0].count > looked)
+        looked = on_b.graph().topics[BRIDGES_TOPIC].publishers[0].count
+        eventually(lambda: on_b.graph().topics[BRIDGES_TOPIC].publishers[0].count > looked)
         ways = {(each.origin.side, each.origin.topic) for each in bridge.routes}
         assert ways == {("a", "/a/x/y"), ("b", "/b/z")}
 
@@ -361,7 +361,7 @@ def test_the_graph_shows_the_bridge_and_its_counts_are_published_on_both_sides(p
             pub.publish(number)
         settled(route(bridge, "a", "/t"), 7)
         for node in (on_a, on_b):
-            sub = node.new_sub(STATUS_TOPIC)
+            sub = node.new_sub(BRIDGES_TOPIC)
             told = {}
             while told.get("sent") != 7:
                 status = sub.listen(timeout_s=30.0)[1]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import platform
+from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -11,7 +12,14 @@ from app.core.network.nodes import NodeEntry, Nodes
 from app.ui.panels.nodes.panel import PANEL, NodesPanel
 from app.ui.panels.nodes.rows import NodeRow, cpu_words, facts_of, generation_cell, limits_of, name_cell
 from app.ui.widgets.table.model import CELL_ROLE
-from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.protocol.graph_view import (
+    BRIDGES_TOPIC,
+    GraphView,
+    NodeInfo,
+    PublisherInfo,
+    SubscriberInfo,
+    TopicInfo,
+)
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
 
@@ -223,3 +231,21 @@ def test_order_and_columns_come_back_with_the_layout(qtbot, panel, window) -> No
     assert isinstance(again, NodesPanel)
     assert again.table.order.column is again.table.columns[3]
     assert again.save_state() == panel.save_state()
+
+
+def test_a_bridge_is_called_one_and_says_where_its_counts_are(panel, window) -> None:
+    bridge = NodeInfo("7", "bridge-lab-to-ros", "lab-pc", 9, "Python", "native", 1, 0.02)
+    view = graph(2, (*NODES, bridge))
+    told = {**view.topics, BRIDGES_TOPIC: topic(BRIDGES_TOPIC, "7"), "/chat": topic("/chat", "7", "7")}
+    window.session.nodes.update(replace(view, topics=told), 1.0)
+    panel.refresh()
+    assert [line[:2] for line in shown(panel) if line[0] == bridge.name] == [["bridge-lab-to-ros", "bridge"]]
+    assert generation_cell(NodeRow(window.session.nodes.get("7"))).icon == "arrow-left-right"
+    panel.table.choose(NodeRow(window.session.nodes.get("7")).key)
+    assert "A bridge: it joins topics of this network with those of another." in panel.foot.text()
+    assert BRIDGES_TOPIC in panel.foot.text()
+    assert [each.is_bridge for each in window.session.nodes] == [False, False, False, True]
+    panel.filter.setText("bridge")
+    panel.refresh()
+    panel.rebuild()
+    assert [line[0] for line in shown(panel)] == [bridge.name]

@@ -11,6 +11,7 @@ from app.core.network.nodes import NodeEntry
 from app.ui.text.numbers import age_words
 from app.ui.widgets.table.model import Cell, Column, Order
 from nep.i18n import _, lazy, number, pgettext, plazy
+from nep.protocol.graph_view import BRIDGES_TOPIC
 
 PUBLISHES, SUBSCRIBES = lazy("publishes"), lazy("subscribes")
 INDENT = 19
@@ -26,6 +27,10 @@ LIMITS = lazy(
     "be known."
 )
 ORIGINAL = lazy("the original NEP")
+BRIDGE = lazy(
+    "A bridge: it joins topics of this network with those of another. How many messages it has carried and "
+    "lost is on {topic}."
+)
 VERSIONS = {"A": lazy("the original NEP up to 0.5.4.5"), "B": lazy("the original NEP 0.5.4.8")}
 
 
@@ -68,7 +73,9 @@ def generation_words(node: NodeEntry) -> str:
 
 
 def limits_of(node: NodeEntry) -> str:
-    """What an original program can't do, in words; empty for a native one."""
+    """What an original program can't do, or what a bridge does, in words; empty for any other."""
+    if node.is_bridge:
+        return _(BRIDGE).format(topic=BRIDGES_TOPIC)
     if node.generation in UNSERVED:
         return _(NOT_SERVED).format(version=node.generation)
     if not node.is_original:
@@ -115,11 +122,13 @@ def name_cell(row: NodeRow) -> Cell:
 
 
 def generation_cell(row: NodeRow) -> Cell:
-    """Native or original; of a topic what the node does with it, and how often."""
+    """Native, original or a bridge; of a topic what the node does with it, and how often."""
     if row.topic:
         rate = row.rate(row.topic) if row.rate is not None and row.way == PUBLISHES else ""
         said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.way)
         return Cell(said, role=_ink(row, "textTertiary"))
+    if row.node.is_bridge:
+        return Cell(pgettext("node", "bridge"), "arrow-left-right", _ink(row, "textSecondary"))
     if row.node.generation in UNSERVED:
         return Cell(generation_words(row.node), "triangle-alert", _ink(row, "warn"))
     icon = "plug" if row.node.is_original else None
@@ -169,7 +178,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
     ),
     Column(
         "generation", lazy("Generation"), 116, generation_cell,
-        lambda r: (r.node.is_original, r.node.generation), tip=_generation_tip,
+        lambda r: (r.node.is_bridge, r.node.is_original, r.node.generation), tip=_generation_tip,
     ),
     Column(
         "language", plazy("of a program", "Language"), 78, _of_node(lambda n: n.language, "textSecondary"),
