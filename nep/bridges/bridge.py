@@ -7,6 +7,7 @@ import secrets
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -17,11 +18,13 @@ from nep.bridges.configuration import (
     SideName,
     checked_topic_names,
 )
+from nep.bridges.neighbours import Neighbours, Way
 from nep.bridges.pacer import Pacer
 from nep.bridges.route import Route, RouteEnd, type_in
 from nep.bridges.side import BridgeSide
 from nep.bridges.trail import Echoes
-from nep.errors import NepError
+from nep.errors import DecodeError, NepError
+from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 
@@ -55,6 +58,8 @@ class Bridge:
         self._routes: tuple[Route, ...] = ()
         self._known: set[tuple[SideName, str, str]] = set()
         self._is_full = False
+        self._neighbours = Neighbours(self.id)
+        self._warned: set[str] = set()
         self._closed = threading.Event()
         self.own_nodes: frozenset[str] = frozenset()
         """The ids of its two nodes."""
@@ -103,6 +108,7 @@ class Bridge:
         """What it joins and what became of the messages, as it is published on `/nep/bridges`."""
         return {
             "bridge": self.configuration.name,
+            "id": self.id,
             "is_ready": self.is_ready,
             "sides": [
                 {
@@ -118,6 +124,7 @@ class Bridge:
                     "from": {"side": each.origin.side, "topic": each.origin.topic},
                     "to": {"side": each.end.side, "topic": each.end.topic},
                     "trouble": each.trouble,
+                    "rival": each.rival,
                     **asdict(each.counts()),
                 }
                 for each in self._routes
@@ -153,6 +160,7 @@ class Bridge:
 
     def find(self, side: BridgeSide, view: GraphView) -> None:
         """Make routes for topics that others publish there and a pattern matches. In the side's thread."""
+        self._heed_neighbours()
         named = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
         for name in view.topics:
             if name in named or name.startswith(_OWN_TOPICS) or not type_in(view, name, self.own_nodes):
@@ -167,6 +175,41 @@ class Bridge:
                         "narrower",
                         name,
                         ROUTES_MOST,
+                    )
+
+    def speaks_on(self, side: BridgeSide, view: GraphView) -> bool:
+        """Not on side b where both back ends have one graph: their nodes on one topic would miss each other.
+
+        Side a is there since the first look.
+        """
+        return side.name == "a" or (side.looks > 1 and self.sides["a"].node.id not in view.nodes)
+
+    def heard(self, side: SideName, message: Message) -> None:
+        """Another bridge may have told what it joins. In a thread of the side's node."""
+        with suppress(DecodeError):
+            self._neighbours.heard(side, message.payload, time.monotonic())
+
+    def _heed_neighbours(self) -> None:
+        """Say which messages arrive twice, and let go of what would go round for ever."""
+        keeps_trails = any(
+            side.backend.has_extensions for side in (self.configuration.a, self.configuration.b)
+        )
+        neighbours = self._neighbours.between(time.monotonic())
+        for route in self._routes:
+            origin, end = route.origin, route.end
+            back: Way = (end.side, end.topic, origin.topic)
+            stronger = [each for each in neighbours if each.id < self.id and back in each.ways]
+            route.rival = stronger[0].name if stronger and not keeps_trails else ""
+            same: Way = (origin.side, origin.topic, end.topic)
+            for each in neighbours:
+                if {same, back} & each.ways and each.id not in self._warned:
+                    self._warned.add(each.id)
+                    _logger.warning(
+                        "the bridge '%s' joins '%s' and '%s', too: messages arrive twice, or go round; "
+                        "end one of the two",
+                        each.name,
+                        origin.topic,
+                        end.topic,
                     )
 
     def _matches(self, side: SideName, name: str) -> Iterator[tuple[BridgeTopic, str, str]]:

@@ -56,7 +56,7 @@ class RouteCounts:
     `thinned`: a newer one took their place, because there were more than `max_rate_hz`. `failed`: they could
     not be read, or not be written for the other side; `problem` says why the last one could not. `dropped`:
     the other side was not there, and there was no more room. `returned`: a bridge had brought them from where
-    they would go; they are not among those received.
+    they would go, or nobody could know; they are not among those received.
     """
 
     received: int = 0
@@ -126,6 +126,8 @@ class Route:
         self.end = end
         self.trouble = ""
         """Why it cannot subscribe or publish at present."""
+        self.rival = ""
+        """The bridge that carries its messages instead; then it carries none."""
         self._bridge = bridge
         self._own = own
         self._wake = wake
@@ -237,7 +239,9 @@ class Route:
                     self._offer(message, now)
 
     def _is_back(self, message: Message, now: float) -> bool:
-        """Whether a bridge brought it here from where it would go."""
+        """Whether a bridge brought it here from where it would go, or may have."""
+        if self.rival:
+            return True
         if message.publisher is not None:
             self.origin.echoes.not_needed()
         trail = read_trail(message.extension)

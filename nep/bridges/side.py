@@ -5,16 +5,19 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Protocol
 
 from nep.bridges.configuration import SideConfiguration, SideName
+from nep.bridges.neighbours import HEARTBEAT_S
 from nep.bridges.route import Route
 from nep.errors import ClosedError, NepError
+from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
+from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
 
 __all__ = ["BridgeSide"]
@@ -41,6 +44,12 @@ class BridgeOfSide(Protocol):
     def status(self) -> dict[str, object]:
         """What is published of the bridge."""
 
+    def speaks_on(self, side: BridgeSide, view: GraphView) -> bool:
+        """Whether it tells of itself on that side, and hears other bridges there."""
+
+    def heard(self, side: SideName, message: Message) -> None:
+        """A bridge told this on that side; it may be this one."""
+
 
 class BridgeSide:
     """Makes what routes need on this side, as soon as the network is there.
@@ -54,13 +63,17 @@ class BridgeSide:
         self.view: GraphView | None = None
         self.problem = ""
         """Why the network cannot be used; empty when it can, or when nobody has looked yet."""
+        self.looks = 0
+        """How often somebody has answered who is there."""
         self.node = Node(node_name, configuration.backend.name, master=configuration.master, wait_s=_ANSWER_S)
         self._wanted = threading.Event()
         self._is_closing = False
         self._thread: threading.Thread | None = None
         self._look_at = 0.0
         self._told: object = None
+        self._told_at = float("-inf")
         self._status: Publisher | None = None
+        self._others: Subscriber | None = None
 
     def start(self, owner: BridgeOfSide) -> None:
         """Begin to look after it."""
@@ -93,8 +106,9 @@ class BridgeSide:
                 self._look_at = time.monotonic() + _LOOK_S
             if self.view is not None:
                 self._look_after(owner, self.view)
-                if is_due:
-                    self._tell(owner.status())
+                if is_due and owner.speaks_on(self, self.view):
+                    self._meet(owner)
+                    self._tell({**owner.status(), "side": self.name})
             self._wanted.wait(max(0.0, self._look_at - time.monotonic()))
 
     def _look(self, owner: BridgeOfSide) -> None:
@@ -119,6 +133,7 @@ class BridgeSide:
             self.problem = ""
             _logger.warning("side %s of the bridge, %s, is there", self.name, self.configuration.network)
         self.view = view
+        self.looks += 1
         owner.find(self, view)
         for route in owner.routes:
             if route.origin.side == self.name:
@@ -153,15 +168,27 @@ class BridgeSide:
             return
         route.trouble = ""
 
+    def _meet(self, owner: BridgeOfSide) -> None:
+        """Hear what other bridges tell."""
+
+        def hear(messages: Sequence[Message]) -> None:
+            for message in messages:
+                owner.heard(self.name, message)
+
+        if self._others is None and not self._is_closing:
+            with suppress(NepError):  # with the next look it is tried again
+                self._others = self.node.new_sub(BRIDGES_TOPIC, _STATUS_TYPE, sink=hear)
+
     def _tell(self, status: dict[str, object]) -> None:
-        """Publish how the bridge stands, when that has changed since it was told last."""
-        if status == self._told or self._is_closing:
+        """Publish how the bridge stands, when that has changed, and now and then."""
+        now = time.monotonic()
+        if self._is_closing or (status == self._told and now - self._told_at < HEARTBEAT_S):
             return
-        with suppress(NepError):  # with the next look it is tried again
+        with suppress(NepError):  # see `_meet`
             if self._status is None:
                 self._status = self.node.new_pub(BRIDGES_TOPIC, _STATUS_TYPE, latched=True)
             self._status.publish(status)
-            self._told = status
+            self._told, self._told_at = status, now
 
 
 def _said(error: Exception) -> str:

@@ -105,6 +105,7 @@ def bridge(
         write(EXAMPLE)
         return
     configuration = _configuration(what or [], direction, rate_hz)
+    _check_reach(configuration)
     if check:
         bridges.check_installed(configuration)
         _say_right(configuration)
@@ -142,6 +143,17 @@ def _configuration(what: Sequence[str], direction: str, rate_hz: float | None) -
             )
         )
     return read_configuration(path)
+
+
+def _check_reach(configuration: BridgeConfiguration) -> None:
+    """Raises `NepError` for a network that this process cannot be in."""
+    for side in (configuration.a, configuration.b):
+        if side.backend.is_in_process:
+            raise NepError(
+                _(
+                    "nodes of '{name}' meet within one program only; join them there by nep.bridges.Bridge"
+                ).format(name=side.backend.name)
+            )
 
 
 def _say_right(configuration: BridgeConfiguration) -> None:
@@ -257,7 +269,13 @@ class _Report:
             counts.waiting, counts.returned,
         )  # fmt: skip
         figures = (UNKNOWN if each is None else str(each) for each in numbers)
-        return _Row(name, (rate(self.rate_hz(route, counts)), *figures), route.trouble or counts.problem)
+        return _Row(name, (rate(self.rate_hz(route, counts)), *figures), _problem(route, counts))
+
+
+def _problem(route: Route, counts: RouteCounts) -> str:
+    if route.rival:
+        return _("the bridge '{name}' carries it; end one of the two").format(name=escaped(route.rival))
+    return route.trouble or counts.problem
 
 
 class _JsonReport(_Report):

@@ -247,6 +247,7 @@ def test_on_a_terminal_a_table_stands_in_its_place_and_warnings_above_it(file, n
         (("zeromq:/t", "zmq:/u"), "both sides are the network 'zeromq:"),
         (("zeromq:/t", "zenoh:/t", "--direction", "a-b"), "'a-b' is no direction; did you mean 'a->b'?"),
         (("zenoh@nowhere:/t", "zeromq:/t"), "'nowhere' is no place where nodes of 'zenoh' meet"),
+        (("zeromq:/t", "memory:/t"), "nodes of 'memory' meet within one program only; join them there by"),
         (("zeromq:/a b", "zenoh:/t"), "'/a b' cannot be a topic"),
         (("missing.toml",), "'missing.toml' cannot be read: no such file or directory; 'nep bridge --ex"),
         (("missing.toml", "--rate", "3"), "with a file its own lines decide"),

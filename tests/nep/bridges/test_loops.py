@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import ExitStack
 from dataclasses import replace
 
@@ -9,9 +10,11 @@ import pytest
 
 from nep.backends import memory
 from nep.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
+from nep.bridges.neighbours import Neighbour, Neighbours
 from nep.bridges.trail import ECHO_S, HOPS_MOST, TRAIL_KEY, Echoes, Trail, read_trail
 from nep.errors import WireError
 from nep.messages.message import arrived
+from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import bridged, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
 
@@ -204,7 +207,9 @@ def test_without_signs_of_origin_an_echo_is_known_by_its_bytes(nameless_side):
             ros.new_pub("/t").publish("same")
             assert taken(hears_a, 1) == ["same"], "somebody else may say the same"
             assert settled(back, 1).sent == 1
-            assert route(bridge, "a", "/t").counts().failed == 0
+            there = route(bridge, "a", "/t")
+            assert there.counts().failed == 0
+            assert sum(each.refused for each in there._publishers.values()) <= 1, "it is tried only once"
 
 
 def test_two_bridges_over_a_network_without_signs_end_too(nameless_side):
@@ -229,6 +234,129 @@ def test_two_bridges_over_a_network_without_signs_end_too(nameless_side):
         while hears_ros.receive(0.2) is not None:
             count += 1
         assert 20 <= count <= 40
+
+
+# ---- other bridges between the same networks
+
+
+def test_where_nothing_keeps_trails_one_of_two_bridges_lets_go_until_the_other_has_ended(monkeypatch, caplog):
+    import nep
+
+    monkeypatch.setattr("nep.bridges.neighbours._FORGOTTEN_S", 3.0)
+    monkeypatch.setattr("nep.bridges.side.HEARTBEAT_S", 0.5)
+    backend = replace(memory.BACKEND, name="nameless", open=Nameless, has_extensions=False)
+    monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: NAMED[name])
+    NAMED["nameless"] = backend
+    sides = [SideConfiguration(backend, place, f"nameless:{place}") for place in ("here", "there")]
+
+    def joined(name, *ends):
+        return BridgeConfiguration(name, *ends, (topic("/t"),))
+
+    with ExitStack() as opened:
+        pair = [Bridge(joined("one", *sides)), Bridge(joined("two", *reversed(sides)))]
+        for each in pair:
+            opened.callback(each.close)
+        weak = max(pair, key=lambda bridge: bridge.id)
+        strong = min(pair, key=lambda bridge: bridge.id)
+        eventually(lambda: all(each.rival == strong.configuration.name for each in weak.routes))
+        assert not any(each.rival for each in strong.routes)
+        assert f"the bridge '{strong.configuration.name}' joins '/t' and '/t', too" in caplog.text
+        here, there = (opened.enter_context(nep.node(at, "nameless", master=at)) for at in ("here", "there"))
+        hears_here, hears_there, says = here.new_sub("/t"), there.new_sub("/t"), here.new_pub("/t")
+        for number in range(20):
+            says.publish(number)
+        assert taken(hears_there, 20) == taken(hears_here, 20) == list(range(20))
+        quiet(*pair)
+        assert silent(hears_here)
+        assert silent(hears_there)
+        assert sum(each.counts().returned for each in weak.routes) == 40
+        strong.close()
+        eventually(lambda: not any(each.rival for each in weak.routes))
+        says.publish("again")
+        assert taken(hears_there, 1) == ["again"]
+
+
+def test_a_second_bridge_between_the_same_networks_is_said_once(caplog):
+    with (
+        nets("zeromq", "memory") as (a, b),
+        bridged(a, b, topic("/t"), topic("/u"), name="one"),
+        bridged(b, a, topic("/u"), name="two"),
+    ):
+        eventually(lambda: caplog.text.count("the bridge 'one' joins '/u' and '/u', too") == 1)
+        eventually(lambda: caplog.text.count("the bridge 'two' joins '/u' and '/u', too") == 1)
+        assert "'/t' and" not in caplog.text
+
+
+def test_bridges_of_other_topics_or_networks_are_no_rivals(caplog):
+    with (
+        nets("zeromq", "memory", "memory") as (a, b, c),
+        bridged(a, b, topic("/t"), name="one") as one,
+        bridged(a, b, topic("/u"), name="two"),
+        bridged(a, c, topic("/t"), name="three"),
+    ):
+        told = b.node("watches").new_sub(BRIDGES_TOPIC)
+        for _time in range(6):
+            told.receive(30.0)
+        assert {each.name for each in one._neighbours.between(time.monotonic())} == {"two"}
+        assert "too: messages arrive twice" not in caplog.text
+
+
+STATUS = {
+    "id": "other",
+    "bridge": "lab",
+    "side": "a",
+    "routes": [{"from": {"side": "a", "topic": "/t"}, "to": {"side": "b", "topic": "/u"}}],
+}
+
+
+def test_a_neighbour_is_who_was_heard_on_both_sides_lately():
+    known = Neighbours("own")
+    known.heard("b", STATUS, 0.0)
+    assert known.between(0.0) == []
+    known.heard("a", STATUS, 1.0)
+    assert known.between(1.0) == [], "twice the same side of it: one network has two names"
+    known.heard("a", {**STATUS, "side": "b"}, 1.0)
+    assert known.between(2.0) == [Neighbour("other", "lab", frozenset({("b", "/t", "/u")}))]
+    assert known.between(30.0) == []
+
+
+@pytest.mark.parametrize(
+    "status",
+    [
+        None, 7, [], "text", {}, {**STATUS, "id": 7}, {**STATUS, "id": "x" * 1000}, {**STATUS, "side": "c"},
+        {**STATUS, "side": []}, {**STATUS, "id": "own"},
+    ],
+)  # fmt: skip
+def test_whatever_else_is_told_there_is_no_neighbour(status):
+    known = Neighbours("own")
+    for side in ("a", "b"):
+        known.heard(side, status, 0.0)
+        known.heard(
+            side, {**status, "side": "b"} if isinstance(status, dict) and side == "b" else status, 0.0
+        )
+    assert known.between(0.0) == []
+
+
+@pytest.mark.parametrize(
+    "routes",
+    [
+        None, 7, "text", {}, [7], [{}], [{"from": 7, "to": {}}], [{"from": {"side": []}, "to": {}}],
+        [{"from": {"side": "a", "topic": 1}, "to": {"topic": "/u"}}], [[]] * 100_000,
+    ],
+)  # fmt: skip
+def test_strange_routes_are_none(routes):
+    known = Neighbours("own")
+    known.heard("a", {**STATUS, "routes": routes}, 0.0)
+    known.heard("b", {**STATUS, "side": "b"}, 0.0)
+    assert known.between(0.0)[0].ways == frozenset()
+
+
+def test_neighbours_have_a_bound():
+    known = Neighbours("own")
+    for number in range(1000):
+        for side in ("a", "b"):
+            known.heard(side, {**STATUS, "id": str(number), "side": side}, 0.0)
+    assert len(known.between(0.0)) == 64
 
 
 # ---- trails and echoes alone

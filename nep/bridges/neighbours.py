@@ -1,0 +1,95 @@
+"""Neighbours: other bridges between the same two networks, known by what they tell on `BRIDGES_TOPIC`.
+
+A bridge that is heard on both sides joins the same networks, whatever it calls them. Where it carries a topic
+the same way, each message arrives twice. Where it carries it back and neither network keeps trails, messages
+would go round for ever: then the bridge with the greater id carries that topic no more.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from nep.bridges.configuration import SIDES, SideName
+
+__all__ = ["HEARTBEAT_S", "Neighbour", "Neighbours", "Way"]
+
+HEARTBEAT_S = 5.0
+"""A bridge tells of itself so often at least."""
+_FORGOTTEN_S = 3 * HEARTBEAT_S
+_MOST = 64
+_ID_MOST = 100
+_ROUTES_MOST = 1000
+
+Way = tuple[SideName, str, str]
+"""From that side of ours, the topic there, and the topic on the other side."""
+
+
+class Neighbour(NamedTuple):
+    """A bridge between the same networks, and which ways it carries messages, in the words of this bridge."""
+
+    id: str
+    name: str
+    ways: frozenset[Way]
+
+
+class _Told(NamedTuple):
+    """What was heard of a bridge on one side of ours. `on` is the side of its own on which it said so."""
+
+    at: float
+    name: str
+    on: str
+    ways: frozenset[tuple[str, str, str]]
+
+
+class Neighbours:
+    """Works in any thread. `own` is the id of the bridge itself."""
+
+    def __init__(self, own: str) -> None:
+        self._own = own
+        self._lock = threading.Lock()
+        self._told: dict[SideName, OrderedDict[str, _Told]] = {side: OrderedDict() for side in SIDES}
+
+    def heard(self, side: SideName, status: object, now: float) -> None:
+        """A bridge told this on that side of ours. Whatever is no bridge's status is ignored."""
+        if not isinstance(status, Mapping):
+            return
+        id_, name, on = (status.get(key) for key in ("id", "bridge", "side"))
+        if not (isinstance(id_, str) and isinstance(name, str) and on in SIDES):
+            return
+        if id_ == self._own or len(id_) > _ID_MOST:
+            return
+        with self._lock:
+            told = self._told[side]
+            told.pop(id_, None)
+            told[id_] = _Told(now, name[:_ID_MOST], str(on), frozenset(_ways(status.get("routes"))))
+            while len(told) > _MOST:
+                told.popitem(last=False)
+
+    def between(self, now: float) -> list[Neighbour]:
+        """Those that were heard on both sides lately."""
+        with self._lock:
+            on_a, on_b = ({**self._told[side]} for side in SIDES)
+        found = []
+        for id_, a in on_a.items():
+            b = on_b.get(id_)
+            if b is None or a.on == b.on or now - min(a.at, b.at) > _FORGOTTEN_S:
+                continue
+            sides: dict[str, SideName] = {a.on: "a", b.on: "b"}
+            ways = frozenset((sides[origin], topic, to) for origin, topic, to in a.ways)
+            found.append(Neighbour(id_, a.name, ways))
+        return found
+
+
+def _ways(routes: object) -> Iterator[tuple[str, str, str]]:
+    """From which of its sides and topic to which topic a bridge carries messages."""
+    for route in routes[:_ROUTES_MOST] if isinstance(routes, list) else ():
+        if not isinstance(route, Mapping):
+            continue
+        origin, end = route.get("from"), route.get("to")
+        if isinstance(origin, Mapping) and isinstance(end, Mapping):
+            side, topic, to = origin.get("side"), origin.get("topic"), end.get("topic")
+            if side in SIDES and isinstance(topic, str) and isinstance(to, str):
+                yield str(side), topic, to
