@@ -1,8 +1,8 @@
 """Bridges: topics of two back ends, or of two networks of one, joined.
 
 `configuration` has what a bridge is told and `toml_file` reads it, `bridge` joins two of `side`, a `route`
-carries one topic one way at the pace of `pacer`. `trail` keeps a message from coming back, and `neighbours`
-are other bridges between the same networks.
+carries one topic one way at the pace of `pacer`. `trail` keeps a message from coming back, `other_bridges`
+know who joins the same networks.
 """
 
 from nep.bridges.bridge import Bridge

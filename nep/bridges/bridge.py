@@ -18,7 +18,7 @@ from nep.bridges.configuration import (
     SideName,
     checked_topic_names,
 )
-from nep.bridges.neighbours import Neighbours, Way
+from nep.bridges.other_bridges import OtherBridges, Way
 from nep.bridges.pacer import Pacer
 from nep.bridges.route import Route, RouteEnd, type_in
 from nep.bridges.side import BridgeSide
@@ -58,7 +58,7 @@ class Bridge:
         self._routes: tuple[Route, ...] = ()
         self._known: set[tuple[SideName, str, str]] = set()
         self._is_full = False
-        self._neighbours = Neighbours(self.id)
+        self._others = OtherBridges(self.id)
         self._warned: set[str] = set()
         self._closed = threading.Event()
         self.own_nodes: frozenset[str] = frozenset()
@@ -160,7 +160,7 @@ class Bridge:
 
     def find(self, side: BridgeSide, view: GraphView) -> None:
         """Make routes for topics that others publish there and a pattern matches. In the side's thread."""
-        self._heed_neighbours()
+        self._heed_others()
         named = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
         for name in view.topics:
             if name in named or name.startswith(_OWN_TOPICS) or not type_in(view, name, self.own_nodes):
@@ -187,21 +187,21 @@ class Bridge:
     def heard(self, side: SideName, message: Message) -> None:
         """Another bridge may have told what it joins. In a thread of the side's node."""
         with suppress(DecodeError):
-            self._neighbours.heard(side, message.payload, time.monotonic())
+            self._others.heard(side, message.payload, time.monotonic())
 
-    def _heed_neighbours(self) -> None:
+    def _heed_others(self) -> None:
         """Say which messages arrive twice, and let go of what would go round for ever."""
         keeps_trails = any(
             side.backend.has_extensions for side in (self.configuration.a, self.configuration.b)
         )
-        neighbours = self._neighbours.between(time.monotonic())
+        others = self._others.between(time.monotonic())
         for route in self._routes:
             origin, end = route.origin, route.end
             back: Way = (end.side, end.topic, origin.topic)
-            stronger = [each for each in neighbours if each.id < self.id and back in each.ways]
+            stronger = [each for each in others if each.id < self.id and back in each.ways]
             route.rival = stronger[0].name if stronger and not keeps_trails else ""
             same: Way = (origin.side, origin.topic, end.topic)
-            for each in neighbours:
+            for each in others:
                 if {same, back} & each.ways and each.id not in self._warned:
                     self._warned.add(each.id)
                     _logger.warning(

@@ -11,7 +11,7 @@ from functools import partial
 from typing import Protocol
 
 from nep.bridges.configuration import SideConfiguration, SideName
-from nep.bridges.neighbours import HEARTBEAT_S
+from nep.bridges.other_bridges import HEARTBEAT_S
 from nep.bridges.route import Route
 from nep.errors import ClosedError, NepError
 from nep.messages.message import Message

@@ -10,7 +10,7 @@ import pytest
 
 from nep.backends import memory
 from nep.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
-from nep.bridges.neighbours import Neighbour, Neighbours
+from nep.bridges.other_bridges import OtherBridge, OtherBridges
 from nep.bridges.trail import ECHO_S, HOPS_MOST, TRAIL_KEY, Echoes, Trail, read_trail
 from nep.errors import WireError
 from nep.messages.message import arrived
@@ -242,7 +242,7 @@ def test_two_bridges_over_a_network_without_signs_end_too(nameless_side):
 def test_where_nothing_keeps_trails_one_of_two_bridges_lets_go_until_the_other_has_ended(monkeypatch, caplog):
     import nep
 
-    monkeypatch.setattr("nep.bridges.neighbours._FORGOTTEN_S", 3.0)
+    monkeypatch.setattr("nep.bridges.other_bridges._FORGOTTEN_S", 3.0)
     monkeypatch.setattr("nep.bridges.side.HEARTBEAT_S", 0.5)
     backend = replace(memory.BACKEND, name="nameless", open=Nameless, has_extensions=False)
     monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: NAMED[name])
@@ -297,7 +297,7 @@ def test_bridges_of_other_topics_or_networks_are_no_rivals(caplog):
         told = b.node("watches").new_sub(BRIDGES_TOPIC)
         for _time in range(6):
             told.receive(30.0)
-        assert {each.name for each in one._neighbours.between(time.monotonic())} == {"two"}
+        assert {each.name for each in one._others.between(time.monotonic())} == {"two"}
         assert "too: messages arrive twice" not in caplog.text
 
 
@@ -309,14 +309,14 @@ STATUS = {
 }
 
 
-def test_a_neighbour_is_who_was_heard_on_both_sides_lately():
-    known = Neighbours("own")
+def test_another_bridge_is_one_that_was_heard_on_both_sides_lately():
+    known = OtherBridges("own")
     known.heard("b", STATUS, 0.0)
     assert known.between(0.0) == []
     known.heard("a", STATUS, 1.0)
     assert known.between(1.0) == [], "twice the same side of it: one network has two names"
     known.heard("a", {**STATUS, "side": "b"}, 1.0)
-    assert known.between(2.0) == [Neighbour("other", "lab", frozenset({("b", "/t", "/u")}))]
+    assert known.between(2.0) == [OtherBridge("other", "lab", frozenset({("b", "/t", "/u")}))]
     assert known.between(30.0) == []
 
 
@@ -327,8 +327,8 @@ def test_a_neighbour_is_who_was_heard_on_both_sides_lately():
         {**STATUS, "side": []}, {**STATUS, "id": "own"},
     ],
 )  # fmt: skip
-def test_whatever_else_is_told_there_is_no_neighbour(status):
-    known = Neighbours("own")
+def test_whatever_else_is_told_there_is_no_bridge(status):
+    known = OtherBridges("own")
     for side in ("a", "b"):
         known.heard(side, status, 0.0)
         known.heard(
@@ -345,14 +345,14 @@ def test_whatever_else_is_told_there_is_no_neighbour(status):
     ],
 )  # fmt: skip
 def test_strange_routes_are_none(routes):
-    known = Neighbours("own")
+    known = OtherBridges("own")
     known.heard("a", {**STATUS, "routes": routes}, 0.0)
     known.heard("b", {**STATUS, "side": "b"}, 0.0)
     assert known.between(0.0)[0].ways == frozenset()
 
 
-def test_neighbours_have_a_bound():
-    known = Neighbours("own")
+def test_others_have_a_bound():
+    known = OtherBridges("own")
     for number in range(1000):
         for side in ("a", "b"):
             known.heard(side, {**STATUS, "id": str(number), "side": side}, 0.0)

@@ -1,4 +1,4 @@
-"""Neighbours: other bridges between the same two networks, known by what they tell on `BRIDGES_TOPIC`.
+"""Other bridges between the same two networks, known by what they tell on `BRIDGES_TOPIC`.
 
 A bridge that is heard on both sides joins the same networks, whatever it calls them. Where it carries a topic
 the same way, each message arrives twice. Where it carries it back and neither network keeps trails, messages
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from nep.bridges.configuration import SIDES, SideName
 
-__all__ = ["HEARTBEAT_S", "Neighbour", "Neighbours", "Way"]
+__all__ = ["HEARTBEAT_S", "OtherBridge", "OtherBridges", "Way"]
 
 HEARTBEAT_S = 5.0
 """A bridge tells of itself so often at least."""
@@ -27,7 +27,7 @@ Way = tuple[SideName, str, str]
 """From that side of ours, the topic there, and the topic on the other side."""
 
 
-class Neighbour(NamedTuple):
+class OtherBridge(NamedTuple):
     """A bridge between the same networks, and which ways it carries messages, in the words of this bridge."""
 
     id: str
@@ -44,7 +44,7 @@ class _Told(NamedTuple):
     ways: frozenset[tuple[str, str, str]]
 
 
-class Neighbours:
+class OtherBridges:
     """Works in any thread. `own` is the id of the bridge itself."""
 
     def __init__(self, own: str) -> None:
@@ -68,7 +68,7 @@ class Neighbours:
             while len(told) > _MOST:
                 told.popitem(last=False)
 
-    def between(self, now: float) -> list[Neighbour]:
+    def between(self, now: float) -> list[OtherBridge]:
         """Those that were heard on both sides lately."""
         with self._lock:
             on_a, on_b = ({**self._told[side]} for side in SIDES)
@@ -79,7 +79,7 @@ class Neighbours:
                 continue
             sides: dict[str, SideName] = {a.on: "a", b.on: "b"}
             ways = frozenset((sides[origin], topic, to) for origin, topic, to in a.ways)
-            found.append(Neighbour(id_, a.name, ways))
+            found.append(OtherBridge(id_, a.name, ways))
         return found
 
 
