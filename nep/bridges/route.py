@@ -22,7 +22,7 @@ from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
 
-__all__ = ["Route", "RouteCounts", "RouteEnd", "own_type"]
+__all__ = ["Route", "RouteCounts", "RouteEnd", "type_in"]
 
 HELD_MESSAGES = 10_000
 """So many wait for the other side, 64 MB at most; then the oldest are dropped and counted."""
@@ -179,6 +179,11 @@ class Route:
         """Whether messages wait for a publisher on the other side."""
         return len(self._held) > 0
 
+    @property
+    def needs_type(self) -> bool:
+        """Whether messages wait, and as what they are published is not decided."""
+        return self._form is None and not self.end.msg_type and self.needs_publisher
+
     # ---- in the thread of the origin's side
 
     def subscribe(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
@@ -311,7 +316,7 @@ class Route:
     def _form_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> _Form:
         """As what it is published: decided by the first message, and kept."""
         if self._form is None:
-            msg_type = self.end.msg_type or own_type(self.end, view, own_nodes) or message.msg_type
+            msg_type = self.end.msg_type or _type_for(message.msg_type, self.end, view, own_nodes)
             self._form = _Form(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
         return self._form
 
@@ -417,16 +422,27 @@ def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
     return known.msg_type if known.msg_type != "*" else ""
 
 
-def own_type(end: RouteEnd, view: GraphView, own_nodes: Collection[str]) -> str:
-    """The type that others have for a topic, when it is one that only this back end knows; else ""."""
+def _type_for(msg_type: str, end: RouteEnd, view: GraphView, own_nodes: Collection[str]) -> str:
+    """As what messages of a type are published at an end where no type is told.
+
+    As what others have there, when only this back end knows that type, or they publish and its codec is the
+    same: a topic shall not have two types. Else as what it is.
+    """
     known = view.topics.get(end.topic)
     if known is None or known.msg_type in {"", "*"}:
-        return ""
+        return msg_type
     members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
-    if members <= set(own_nodes):
-        return ""
+    codec = _codec_name(end, known.msg_type)
+    if members <= set(own_nodes) or not codec:
+        return msg_type
+    is_published = bool(type_in(view, end.topic, own_nodes))
+    is_same = is_published and codec == _codec_name(end, msg_type)
+    return known.msg_type if is_same or codec not in CODECS else msg_type
+
+
+def _codec_name(end: RouteEnd, msg_type: str) -> str:
+    """The name of the codec that carries a type there; "" when there is none."""
     try:
-        is_own = end.backend.codec_for(known.msg_type).name not in CODECS
+        return end.backend.codec_for(msg_type).name
     except NepError:
         return ""
-    return known.msg_type if is_own else ""

@@ -24,7 +24,7 @@ __all__ = ["BridgeSide"]
 
 _STATUS_TYPE = "nep/bridge"
 _logger = logging.getLogger("nep")
-_LOOK_S = 1.0
+_LOOK_S, _SOON_S = 1.0, 0.05
 _ANSWER_S = 1.0
 """So long may a master take to answer, and to let something be made."""
 
@@ -100,7 +100,8 @@ class BridgeSide:
     def _run(self, owner: BridgeOfSide) -> None:
         while not self._is_closing:
             self._wanted.clear()
-            is_due = time.monotonic() >= self._look_at
+            now = time.monotonic()
+            is_due = now >= self._look_at or (now >= self._look_at - _LOOK_S + _SOON_S and self._needs(owner))
             if is_due:
                 self._look(owner)
                 self._look_at = time.monotonic() + _LOOK_S
@@ -110,6 +111,10 @@ class BridgeSide:
                     self._meet(owner)
                     self._tell({**owner.status(), "side": self.name})
             self._wanted.wait(max(0.0, self._look_at - time.monotonic()))
+
+    def _needs(self, owner: BridgeOfSide) -> bool:
+        """Whether a type is to be decided: by who is there now, not a second ago."""
+        return any(each.needs_type for each in owner.routes if each.end.side == self.name)
 
     def _look(self, owner: BridgeOfSide) -> None:
         """Ask who is there; say when nobody answers, and when somebody does again."""

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from nep.bridges import Bridge, side_of
+from nep.backends import memory
+from nep.backends.base import backend_named
+from nep.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
 from nep.bridges.configuration import check_apart
-from nep.errors import NepError
+from nep.errors import EncodeError, NepError
 from nep.masters.master import Master
+from nep.messages.codecs import Codec, codec_for
+from nep.messages.encoded import Encoded
 from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import Net, bridged, configured, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
@@ -95,6 +101,68 @@ def test_a_type_of_its_own_stays_that_type():
         sub = b.node("b").new_sub("/robot/description")
         a.node("a").new_pub("/robot/description", "robot/description").publish({"v": 1})
         assert sub.receive(30.0).msg_type == "robot/description"
+
+
+def test_a_topic_that_others_publish_there_keeps_its_one_type():
+    with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")) as bridge:
+        on_b = b.node("b")
+        own, sub = on_b.new_pub("/t", "robot/state"), on_b.new_sub("/t", "robot/state")
+        a.node("a").new_pub("/t", "json").publish({"v": 1})
+        message = sub.receive(30.0)
+        assert (message.payload, message.msg_type) == ({"v": 1}, "robot/state")
+        own.publish({"v": 2})
+        assert sub.receive(30.0).msg_type == "robot/state"
+        assert not [each for each in on_b.graph().alerts if each.id == "type:/t"]
+        a.node("c").new_pub("/t", "string").publish("text")
+        assert settled(route(bridge, "a", "/t"), 2).failed == 0
+        assert sub.receive(30.0).payload == "text"
+
+
+def test_a_type_that_only_the_other_back_end_knows_is_taken_from_who_waits_there(twist_side):
+    import nep
+
+    with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
+        waits = robot.new_sub("/cmd_vel", "test_msgs/Twist")
+        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (topic("/cmd_vel"),))
+        with Bridge(told) as bridge:
+            assert bridge.wait_until_ready(30.0)
+            on_a = a.node("a")
+            pub, hears = on_a.new_pub("/cmd_vel"), on_a.new_sub("/back")
+            pub.publish({"x": 1.5})
+            pub.publish({"y": 1.5})
+            message = waits.receive(30.0)
+            assert (message.codec, message.msg_type, bytes(message.data)) == (
+                "twist",
+                "test_msgs/Twist",
+                b"x=1.5",
+            )
+            counts = settled(route(bridge, "a", "/cmd_vel"), 2)
+            assert (counts.sent, counts.failed) == (1, 1)
+            assert counts.problem == "cannot encode a 'dict' as 'twist'; it has no 'x'"
+            assert hears.received == 0
+
+
+@pytest.fixture
+def twist_side(monkeypatch):
+    """A back end with a type and codec of its own, as those of ROS have them."""
+
+    def encode(payload):
+        if not isinstance(payload, dict) or "x" not in payload:
+            raise EncodeError("twist", type(payload).__name__, "it has no 'x'")
+        return Encoded(f"x={payload['x']}".encode())
+
+    def decode(data, _extension):
+        return {"x": float(bytes(data)[2:])}
+
+    twist = Codec("twist", 0, encode, decode, dict, lambda payload: payload)
+    backend = replace(
+        memory.BACKEND,
+        name="ros-like",
+        codec_for=lambda name: twist if name == "test_msgs/Twist" else codec_for(name),
+    )
+    named = {"ros-like": backend, "zeromq": backend_named("zeromq")}
+    monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: named[name])
+    return SideConfiguration(backend, "lab", "ros-like:lab")
 
 
 def test_types_that_differ_are_converted_by_their_payload():
