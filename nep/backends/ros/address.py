@@ -1,0 +1,42 @@
+"""Where the ROS master is. Without what asking it needs: this is imported with every node of nep."""
+
+from __future__ import annotations
+
+import os
+from urllib.parse import urlsplit
+
+from nep.errors import NepError
+from nep.i18n import _
+from nep.system.addresses import checked_host, host_of
+
+__all__ = ["address_of", "is_own_computer"]
+
+_PORT = 11311
+
+
+def address_of(given: str | None) -> str:
+    """Where the ROS master is, HOST:PORT: `given`, else $ROS_MASTER_URI, else "127.0.0.1:11311".
+
+    "http://HOST:PORT" is understood; the port 11311 is added when there is none. Raises `NepError`.
+    """
+    text = given or os.environ.get("ROS_MASTER_URI") or f"127.0.0.1:{_PORT}"
+    if not isinstance(text, str):
+        raise NepError(_("an address is a 'str' such as '{example}'").format(example=f"127.0.0.1:{_PORT}"))
+    try:
+        parts = urlsplit(text if "://" in text else f"http://{text}")
+        host, port = parts.hostname, _PORT if parts.port is None else parts.port
+    except ValueError:
+        host, port = None, 0
+    if not host or not port:
+        raise NepError(
+            _("'{chosen}' is no address of a ROS master; write it as '{example}'").format(
+                chosen=text, example=f"127.0.0.1:{_PORT}"
+            )
+        )
+    return f"{checked_host(host)}:{port}"
+
+
+def is_own_computer(address: str) -> bool:
+    """Whether it is reached by a loopback address."""
+    host = host_of(address)
+    return host == "localhost" or host.startswith("127.")

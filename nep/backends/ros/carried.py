@@ -1,0 +1,304 @@
+"""What carries what: message types of nep in messages of ROS, and back.
+
+| msg_type                      | ROS message                   | its bytes are                          |
+|-------------------------------|-------------------------------|----------------------------------------|
+| json, and any name that is no ROS type | std_msgs/String      | JSON text in `data`                    |
+| string                        | std_msgs/String               | the text in `data`                     |
+| bytes, msgpack                | std_msgs/UInt8MultiArray      | in `data`                              |
+| image                         | sensor_msgs/CompressedImage   | JPEG or PNG in `data`                  |
+| sensor_msgs/Image             | itself                        | raw pixels; a picture's array          |
+| package/Type                  | itself                        | what `nep.backends.ros.definition` says |
+
+Readers take what the publisher's connection tells, not what they expect: a subscriber of `image` reads both
+messages with pictures, one of `json` reads any message as a map.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from nep.backends.ros.definition import Definition, parse
+from nep.backends.ros.library import message_text
+from nep.errors import EncodeError, NepError, WireError
+from nep.i18n import _
+from nep.messages import image_codec
+from nep.messages.codecs import CODECS, IMAGE, Codec, codec_for
+from nep.messages.encoded import Encoded
+from nep.messages.image_codec import picture_info, raw_array, raw_image, raw_layout
+
+__all__ = ["STAMP", "codec_of", "installed", "is_ros_type", "ros_type_of", "to_ros", "unpacker"]
+
+STAMP = struct.Struct("<III")
+"""With what a message that has a header begins: seq, secs, nsecs."""
+_LENGTH = struct.Struct("<I")
+_ROS_TYPE = re.compile(r"[A-Za-z]\w*/[A-Z]\w*", re.ASCII)
+_STRING = "std_msgs/String"
+_ARRAY = "std_msgs/UInt8MultiArray"
+_COMPRESSED = "sensor_msgs/CompressedImage"
+_RAW = "sensor_msgs/Image"
+_PICTURES = (_RAW, _COMPRESSED)
+_CARRIERS = {"string": _STRING, "json": _STRING, "bytes": _ARRAY, "msgpack": _ARRAY, "image": _COMPRESSED}
+_EMPTY_LAYOUT = bytes(8)
+_NUMBER = 6
+"""No number of the native wire: such messages do not travel there."""
+_definitions: dict[str, Definition] = {}
+
+Unpacked = tuple[bytes | memoryview, Mapping[str, object] | None]
+Unpack = Callable[[memoryview], Unpacked]
+
+
+def is_ros_type(msg_type: str) -> bool:
+    """Whether it names a message of ROS: "package/Type", the type with a capital."""
+    return _ROS_TYPE.fullmatch(msg_type) is not None
+
+
+def ros_type_of(msg_type: str) -> str:
+    """The ROS message that carries a message type."""
+    return msg_type if is_ros_type(msg_type) else _CARRIERS[codec_for(msg_type).name]
+
+
+def installed(name: str) -> Definition:
+    """The definition of an installed ROS message. Raises `NepError` that says what to install."""
+    if name not in _definitions:
+        found = message_text(name)
+        if found is None:
+            package = name.partition("/")[0]
+            raise NepError(
+                _(
+                    "there is no ROS message '{name}' here; look for a typing error, or install it with "
+                    "'sudo apt install python3-{package}'"
+                ).format(name=name, package=package.replace("_", "-").lower())
+            )
+        _definitions[name] = parse(name, found[0])
+    return _definitions[name]
+
+
+# ---- codecs: payloads of publishers become bytes
+
+
+def codec_of(msg_type: str) -> Codec:
+    """The codec of this back end for a message type. Raises `NepError` for a ROS type that is not there."""
+    if msg_type in _PICTURES:
+        return _picture_codec(installed(msg_type))
+    if is_ros_type(msg_type):
+        return ros_codec(installed(msg_type))
+    codec = codec_for(msg_type)
+    return replace(codec, encode=_encode_file) if codec is IMAGE else codec
+
+
+def ros_codec(definition: Definition) -> Codec:
+    """Maps ↔ the bytes of a ROS message."""
+
+    def encode(payload: object) -> Encoded:
+        return Encoded(definition.encode(_stamped(payload) if definition.has_header else payload))
+
+    def decode(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
+        return definition.decode(data)
+
+    return Codec("ros", _NUMBER, encode, decode, dict, definition.check)
+
+
+def _stamped(payload: object) -> object:
+    """A map with the time of now where its header has none."""
+    if not isinstance(payload, Mapping):
+        return payload
+    header = payload.get("header", {})
+    if not isinstance(header, Mapping) or "stamp" in header:
+        return payload
+    secs, nsecs = divmod(time.time_ns(), 1_000_000_000)
+    return {**payload, "header": {**header, "stamp": {"secs": secs, "nsecs": nsecs}}}
+
+
+def _picture_codec(definition: Definition) -> Codec:
+    maps = ros_codec(definition)
+
+    def encode(payload: object) -> Encoded:
+        if isinstance(payload, Mapping):
+            return maps.encode(payload)
+        return raw_image(payload) if definition.name == _RAW else _encode_file(payload)
+
+    def check(payload: object) -> None:
+        if not isinstance(payload, Mapping):
+            image_codec.check(payload)
+
+    return replace(IMAGE, encode=encode, check=check)
+
+
+def _encode_file(payload: object) -> Encoded:
+    made = image_codec.encode(payload)
+    _check_file(made, type(payload).__name__)
+    return made
+
+
+def _check_file(made: Encoded, kind: str) -> str:
+    encoding = (made.extension or {}).get("encoding")
+    if encoding not in {"jpeg", "png"}:
+        raise EncodeError(
+            "image", kind, _("'{name}' carries JPEG and PNG; use the type '{raw}'").format(
+                name=_COMPRESSED, raw=_RAW
+            )
+        )  # fmt: skip
+    return str(encoding)
+
+
+def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
+    """The body of a ROS message with these bytes of a codec. Raises `EncodeError`, `WireError`."""
+    data, extension = encoded.data, encoded.extension
+    if codec == "image" and extension:
+        head = bytes(4) + _now() + bytes(4)
+        if ros_type == _RAW:
+            return head + _raw_body(data, extension)
+        kind = _check_file(encoded, type(data).__name__).encode()
+        return b"".join((head, _LENGTH.pack(len(kind)), kind, _LENGTH.pack(len(data)), data))
+    if extension:
+        raise WireError(_("a '{name}' has no room for an extension").format(name=ros_type), len(data))
+    if codec == "image" and ros_type == _COMPRESSED and _magic(data):
+        return to_ros(ros_type, codec, Encoded(data, picture_info(data)))
+    if codec in {"ros", "image"}:
+        return bytes(data)
+    size = _LENGTH.pack(len(data))
+    return b"".join((size, data)) if ros_type == _STRING else b"".join((_EMPTY_LAYOUT, size, data))
+
+
+def _magic(data: bytes | memoryview) -> bool:
+    return bytes(data[:2]) == b"\xff\xd8" or bytes(data[:4]) == b"\x89PNG"
+
+
+def _now() -> bytes:
+    return struct.pack("<II", *divmod(time.time_ns(), 1_000_000_000))
+
+
+def _raw_body(data: bytes | memoryview, extension: Mapping[str, object]) -> bytes:
+    layout, shape = raw_layout(extension.get("encoding")), extension.get("shape")
+    if layout is None or not isinstance(shape, list | tuple):
+        raise WireError(
+            _("'{name}' carries raw pixels; publish an array, or use the type 'image'").format(name=_RAW)
+        )
+    frame = raw_array(memoryview(data), layout, shape)
+    encoding = str(extension["encoding"])
+    name = {"bgr16": "16UC3", "bgra16": "16UC4"}.get(encoding, encoding).encode()
+    height, width = frame.shape[:2]
+    return b"".join((
+        struct.pack("<II", height, width), _LENGTH.pack(len(name)), name,
+        struct.pack("<BII", 0, frame.strides[0], len(data)), data,
+    ))  # fmt: skip
+
+
+# ---- the bytes of ROS messages become those of a codec
+
+
+@dataclass(frozen=True)
+class Unpacker:
+    """How the messages of one publisher are read. `unpack` raises `WireError` for what is no such message."""
+
+    codec: Codec
+    msg_type: str
+    unpack: Unpack
+    has_header: bool
+
+
+def unpacker(msg_type: str, ros_type: str, text: str) -> Unpacker:
+    """For a subscriber of `msg_type` who hears messages of `ros_type`, defined by `text`.
+
+    Raises `NepError` when they do not go together.
+    """
+    wanted = codec_for(msg_type)
+    if is_ros_type(msg_type) and msg_type != ros_type:
+        raise _mismatch(msg_type, ros_type)
+    if ros_type in _PICTURES and (msg_type in _PICTURES or wanted is IMAGE):
+        return Unpacker(IMAGE, msg_type, _from_raw if ros_type == _RAW else _from_compressed, True)
+    if not is_ros_type(msg_type) and ros_type == _CARRIERS[wanted.name]:
+        read = _from_string if ros_type == _STRING else _from_array
+        return Unpacker(wanted, msg_type, read, has_header=False)
+    if not is_ros_type(msg_type) and wanted is not CODECS["json"]:
+        raise _mismatch(msg_type, ros_type)
+    definition = parse(ros_type, text) if text else installed(ros_type)
+    return Unpacker(ros_codec(definition), ros_type, lambda body: (body, None), definition.has_header)
+
+
+def _mismatch(msg_type: str, ros_type: str) -> NepError:
+    return NepError(
+        _(
+            "it carries '{ros_type}', which a subscriber of '{msg_type}' does not read; subscribe to that"
+        ).format(ros_type=ros_type, msg_type=msg_type)
+    )
+
+
+def _sized(body: memoryview, at: int) -> tuple[memoryview, int]:
+    """The bytes behind their length at `at`, and where they end."""
+    (size,) = _LENGTH.unpack_from(body, at)
+    if at + 4 + size > len(body):
+        raise WireError(_("it is cut off"), len(body))
+    return body[at + 4 : at + 4 + size], at + 4 + size
+
+
+def _all(body: memoryview, at: int) -> memoryview:
+    data, end = _sized(body, at)
+    if end != len(body):
+        raise WireError(_("{count} bytes are too many").format(count=len(body) - end), len(body))
+    return data
+
+
+def _from_string(body: memoryview) -> Unpacked:
+    return _all(body, 0), None
+
+
+def _from_array(body: memoryview) -> Unpacked:
+    (count,) = _LENGTH.unpack_from(body, 0)
+    at = 4
+    if count * 12 > len(body):
+        raise WireError(_("it is cut off"), len(body))
+    for _number in range(count):
+        _label, at = _sized(body, at)
+        at += 8
+    (offset,) = _LENGTH.unpack_from(body, at)
+    return _all(body, at + 4)[offset:], None
+
+
+def _from_compressed(body: memoryview) -> Unpacked:
+    _frame, at = _sized(body, STAMP.size)
+    _format, at = _sized(body, at)
+    data = _all(body, at)
+    return data, picture_info(data)
+
+
+def _from_raw(body: memoryview) -> Unpacked:
+    """Rows without what pads them, little-endian."""
+    _frame, at = _sized(body, STAMP.size)
+    height, width = struct.unpack_from("<II", body, at)
+    name, at = _sized(body, at + 8)
+    is_big, step = struct.unpack_from("<BI", body, at)
+    pixels = _all(body, at + 5)
+    encoding = str(name, "utf-8", "replace")
+    encoding = f"{encoding}C1" if encoding in {"8U", "16U", "32F"} else encoding
+    layout = raw_layout(encoding)
+    if layout is None:
+        raise WireError(
+            _("its encoding '{name}' is not read; send one such as 'bgr8', 'mono8' or '16UC1'").format(
+                name=encoding
+            )
+        )
+    size = int(layout.numbers[-1])
+    row = width * layout.channels * size
+    if step < row or step * height != len(pixels):
+        raise WireError(
+            _("{width} x {height} pixels of '{name}' do not fit {size} bytes").format(
+                width=width, height=height, name=encoding, size=len(pixels)
+            )
+        )
+    if step != row:
+        pixels = memoryview(b"".join(pixels[at : at + row] for at in range(0, len(pixels), step)))
+    if is_big and size > 1:
+        pixels = _swapped(pixels, size)
+    return pixels, {"shape": [height, width, layout.channels], "encoding": encoding}
+
+
+def _swapped(pixels: memoryview, size: int) -> memoryview:
+    swapped = bytearray(len(pixels))
+    for number in range(size):
+        swapped[number::size] = pixels[size - 1 - number :: size]
+    return memoryview(bytes(swapped))

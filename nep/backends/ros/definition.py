@@ -1,0 +1,494 @@
+"""Definitions of ROS messages: their text ↔ how maps become bytes and back. No ROS is needed for it.
+
+Who publishes tells every subscriber the whole definition, so that messages are read whose package is not
+installed, and no program is made from what a stranger wrote. A map has the fields by their names; what is
+left out is zero or empty. `time` and `duration` are `{"secs": 1, "nsecs": 500000000}`, when written also
+seconds as a number; arrays are lists, `uint8[]` and `char[]` are bytes.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
+from nep.i18n import _
+from nep.text import escaped, shortened
+
+__all__ = ["Definition", "parse"]
+
+_SEPARATOR = re.compile(r"^={10,}\s*$", re.MULTILINE)
+_HEAD = re.compile(r"\s*MSG:\s*([\w/]+)[^\n]*\n?")
+_CONSTANT = re.compile(r"[\w/]+\s+\w+\s*=")
+_FIELD = re.compile(r"([A-Za-z][\w/]*)(\[(\d*)\])?\s+([A-Za-z]\w*)")
+_INTEGERS = {
+    "int8": "b", "byte": "b", "uint8": "B", "char": "B", "int16": "h", "uint16": "H", "int32": "i",
+    "uint32": "I", "int64": "q", "uint64": "Q",
+}  # fmt: skip
+_FLOATS = {"float32": "f", "float64": "d"}
+_LETTERS = {**_INTEGERS, **_FLOATS, "bool": "?"}
+_TIMES = {"time": struct.Struct("<II"), "duration": struct.Struct("<ii")}
+_BYTES = ("uint8", "char")
+_LENGTH = struct.Struct("<I")
+_HEADERS = ("Header", "std_msgs/Header", "roslib/Header")
+_DEEPEST = 30
+_MOST_FIELDS = 2_000
+"""With all that is inside: a definition may come from a stranger, and needs memory for each of them."""
+_MOST_EMPTY = 10_000
+"""So many messages without bytes may be in one."""
+
+
+class _FieldError(Exception):
+    """What is wrong with the field at `path`."""
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path = path
+        self.reason = reason
+
+
+class _Reader:
+    """Takes values from bytes, one after the other. Raises `struct.error` at their end."""
+
+    def __init__(self, data: bytes | memoryview) -> None:
+        self.data = memoryview(data)
+        self.at = 0
+        self.messages_left = _MOST_EMPTY + _DEEPEST * len(self.data)
+        """So many messages may be inside: those without bytes are bounded by nothing else."""
+
+    @property
+    def left(self) -> int:
+        return len(self.data) - self.at
+
+    def take(self, count: int) -> memoryview:
+        if count > self.left:
+            raise struct.error
+        self.at += count
+        return self.data[self.at - count : self.at]
+
+    def length(self) -> int:
+        return int(_LENGTH.unpack(self.take(4))[0])
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """How a value is written and read. It has `least` bytes or more."""
+
+    name: str
+    write: Callable[[object, str, bytearray], None]
+    read: Callable[[_Reader, str], object]
+    least: int
+
+
+@dataclass(frozen=True)
+class _Field:
+    name: str
+    kind: _Kind
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A message type. `text` is its definition with those of all that it has inside; made by `parse`."""
+
+    name: str
+    text: str
+    fields: tuple[_Field, ...]
+    has_header: bool
+    """Whether its first field is a header: then the bytes begin with seq, secs and nsecs."""
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(each.name for each in self.fields)
+
+    def encode(self, payload: object) -> bytes:
+        """A map as bytes. Raises `EncodeError`, whose place is the field's path."""
+        out = bytearray()
+        try:
+            _write_fields(self.name, self.fields, payload, "", out)
+        except _FieldError as error:
+            reason = error.reason
+            if error.path:
+                reason = _("field '{path}' {reason}").format(path=error.path, reason=reason)
+            raise EncodeError(self.name, type(payload).__name__, reason, error.path) from None
+        return bytes(out)
+
+    def decode(self, data: bytes | memoryview) -> dict[str, object]:
+        """Bytes as a map. Raises `DecodeError` with the path of the field that does not fit."""
+        reader = _Reader(data)
+        try:
+            made = _read_fields(self.fields, reader, "")
+        except _FieldError as error:
+            reason = _("field '{path}' {reason}").format(path=error.path, reason=error.reason)
+            raise DecodeError(self.name, len(reader.data), reason) from None
+        if reader.left:
+            raise DecodeError(
+                self.name, len(reader.data), _("{count} bytes are too many").format(count=reader.left)
+            )
+        return made
+
+    def check(self, payload: object) -> None:
+        """Raises `EncodeError` for what is no map."""
+        if not isinstance(payload, Mapping):
+            raise EncodeError(self.name, type(payload).__name__, _not_a_map(self.fields))
+
+
+# ---- reading definitions
+
+
+def parse(name: str, text: str) -> Definition:
+    """The type `name` ("geometry_msgs/Twist") from its definition. Raises `NepError`."""
+    sections = _SEPARATOR.split(text)
+    texts = {name: sections[0]}
+    for section in sections[1:]:
+        head = _HEAD.match(section)
+        if head is not None:
+            texts[head[1]] = section[head.end() :]
+    parser = _Parser(name, texts)
+    fields = parser.fields_of(name, 0)
+    return Definition(name, text, fields, parser.has_header)
+
+
+class _Parser:
+    def __init__(self, name: str, texts: Mapping[str, str]) -> None:
+        self._name = name
+        self._texts = texts
+        self._known: dict[str, _Kind] = {}
+        self._count = 0
+        self.has_header = False
+
+    def fields_of(self, name: str, depth: int) -> tuple[_Field, ...]:
+        fields: list[_Field] = []
+        for line in self._texts[name].splitlines():
+            stripped = line.partition("#")[0].strip()
+            if not stripped or _CONSTANT.match(line.strip()):
+                continue
+            found = _FIELD.fullmatch(stripped)
+            self._count += 1
+            if found is None or self._count > _MOST_FIELDS:
+                raise self._bad(stripped)
+            if depth == 0 and not fields:
+                self.has_header = found[1] in _HEADERS and not found[2] and found[4] == "header"
+            kind = self._kind(name, found[1], depth)
+            if found[2]:
+                kind = _array(kind, int(found[3]) if found[3] else None)
+            fields.append(_Field(found[4], kind))
+        return tuple(fields)
+
+    def _kind(self, inside: str, written: str, depth: int) -> _Kind:
+        basic = _basic(written)
+        if basic is not None:
+            return basic
+        name = self._resolved(inside, written)
+        known = self._known.get(name)
+        if known is None:
+            if depth >= _DEEPEST:
+                raise self._bad(written)
+            known = self._known[name] = _nested(name, self.fields_of(name, depth + 1))
+        return known
+
+    def _resolved(self, inside: str, written: str) -> str:
+        if written in _HEADERS:
+            candidates = ["std_msgs/Header", written]
+        elif "/" in written:
+            candidates = [written]
+        else:
+            candidates = [f"{inside.partition('/')[0]}/{written}"]
+        for each in candidates:
+            if each in self._texts:
+                return each
+        raise self._bad(written)
+
+    def _bad(self, part: str) -> NepError:
+        return NepError(
+            _("the definition of '{name}' cannot be read; see '{part}' in it").format(
+                name=escaped(shortened(self._name, 100)), part=escaped(shortened(part, 60))
+            )
+        )
+
+
+# ---- kinds of values
+
+
+def _basic(name: str) -> _Kind | None:
+    if name in _INTEGERS:
+        return _integer(name)
+    if name in _FLOATS:
+        return _float(name)
+    if name in _TIMES:
+        return _time(name)
+    if name == "bool":
+        return _Kind(name, _write_bool, lambda reader, _path: reader.take(1)[0] != 0, 1)
+    if name == "string":
+        return _Kind(name, _write_string, _read_string, 4)
+    return None
+
+
+def _integer(name: str) -> _Kind:
+    packing = struct.Struct(f"<{_INTEGERS[name]}")
+    bits = 8 * packing.size
+    is_signed = _INTEGERS[name].islower()
+    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if is_signed else (0, (1 << bits) - 1)
+
+    def write(value: object, path: str, out: bytearray) -> None:
+        number = _whole(value)
+        if number is None:
+            raise _wrong(path, value, name)
+        if not low <= number <= high:
+            raise _FieldError(
+                path,
+                _("is {value}; '{name}' goes from {low} to {high}").format(
+                    value=shortened(str(number), 40), name=name, low=low, high=high
+                ),
+            )
+        out += packing.pack(number)
+
+    return _Kind(
+        name, write, lambda reader, _path: packing.unpack(reader.take(packing.size))[0], packing.size
+    )
+
+
+def _float(name: str) -> _Kind:
+    packing = struct.Struct(f"<{_FLOATS[name]}")
+
+    def write(value: object, path: str, out: bytearray) -> None:
+        as_float = getattr(type(value), "__float__", None)
+        if as_float is None or isinstance(value, bool):
+            raise _wrong(path, value, name)
+        try:
+            out += packing.pack(as_float(value))
+        except (OverflowError, TypeError, ValueError, struct.error):
+            raise _FieldError(
+                path, _("is {value}, which is no '{name}'").format(value=_shown(value), name=name)
+            ) from None
+
+    return _Kind(
+        name, write, lambda reader, _path: packing.unpack(reader.take(packing.size))[0], packing.size
+    )
+
+
+def _time(name: str) -> _Kind:
+    packing = _TIMES[name]
+
+    def write(value: object, path: str, out: bytearray) -> None:
+        try:
+            out += packing.pack(*_secs_of(value, path, name))
+        except struct.error:
+            raise _FieldError(
+                path, _("is {value}, which is no '{name}'").format(value=_shown(value), name=name)
+            ) from None
+
+    def read(reader: _Reader, _path: str) -> object:
+        secs, nsecs = packing.unpack(reader.take(8))
+        return {"secs": secs, "nsecs": nsecs}
+
+    return _Kind(name, write, read, 8)
+
+
+def _secs_of(value: object, path: str, name: str) -> tuple[int, int]:
+    if isinstance(value, Mapping):
+        for key in value:
+            if key not in {"secs", "nsecs"}:
+                raise _unknown(path, key, ("secs", "nsecs"))
+        secs, nsecs = _whole(value.get("secs", 0)), _whole(value.get("nsecs", 0))
+        if secs is not None and nsecs is not None:
+            return secs, nsecs
+    elif isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1 << 33:
+        whole = round(value * 1_000_000_000) if isinstance(value, float) else value * 1_000_000_000
+        return divmod(whole, 1_000_000_000)
+    raise _wrong(path, value, name)
+
+
+def _write_bool(value: object, path: str, out: bytearray) -> None:
+    number = int(value) if isinstance(value, bool) else _whole(value)
+    if number not in {0, 1}:
+        raise _wrong(path, value, "bool")
+    out.append(number)
+
+
+def _write_string(value: object, path: str, out: bytearray) -> None:
+    if isinstance(value, str):
+        try:
+            value = value.encode("utf-8")
+        except UnicodeEncodeError:
+            raise _FieldError(path, _("holds half of a surrogate pair")) from None
+    if not isinstance(value, bytes):
+        raise _wrong(path, value, "string")
+    out += _LENGTH.pack(len(value))
+    out += value
+
+
+def _read_string(reader: _Reader, _path: str) -> object:
+    return str(reader.take(reader.length()), "utf-8", "replace")
+
+
+def _array(kind: _Kind, length: int | None) -> _Kind:
+    name = f"{kind.name}[{'' if length is None else length}]"
+    if kind.name in _BYTES:
+        write = _writes_bytes(name, length)
+        read: Callable[[_Reader, str, int], object] = _reads_bytes
+    else:
+        write, read = _writes_list(name, kind, length), _reads_list(kind)
+    if length is None:
+
+        def read_all(reader: _Reader, path: str) -> object:
+            return read(reader, path, reader.length())
+
+        return _Kind(name, write, read_all, 4)
+
+    def read_fixed(reader: _Reader, path: str) -> object:
+        return read(reader, path, length)
+
+    return _Kind(name, write, read_fixed, length * kind.least)
+
+
+def _writes_bytes(name: str, length: int | None) -> Callable[[object, str, bytearray], None]:
+    def write(value: object, path: str, out: bytearray) -> None:
+        data = _bytes_of(value, path, name)
+        _write_length(len(data), length, path, out)
+        out += data
+
+    return write
+
+
+def _bytes_of(value: object, path: str, name: str) -> bytes | bytearray | memoryview:
+    if isinstance(value, bytes | bytearray):
+        return value
+    if isinstance(value, memoryview):
+        return value.tobytes()
+    to_list = getattr(value, "tolist", None)
+    if callable(to_list):
+        as_bytes = getattr(value, "tobytes", None)
+        if getattr(getattr(value, "dtype", None), "str", "") == "|u1" and callable(as_bytes):
+            return bytes(as_bytes())
+        value = to_list()
+    if not isinstance(value, Sequence) or isinstance(value, str):
+        raise _wrong(path, value, name)
+    try:
+        return bytes(value)
+    except (TypeError, ValueError):
+        raise _FieldError(path, _("holds what is no number from 0 to 255")) from None
+
+
+def _reads_bytes(reader: _Reader, _path: str, count: int) -> object:
+    return bytes(reader.take(count))
+
+
+def _writes_list(name: str, kind: _Kind, length: int | None) -> Callable[[object, str, bytearray], None]:
+    letter = _LETTERS.get(kind.name, "") if kind.name != "bool" else ""
+
+    def write(value: object, path: str, out: bytearray) -> None:
+        to_list = getattr(value, "tolist", None)
+        values = to_list() if callable(to_list) else value
+        if not isinstance(values, Sequence) or isinstance(values, str | bytes | bytearray):
+            raise _wrong(path, value, name)
+        _write_length(len(values), length, path, out)
+        if letter and not any(type(each) is bool for each in values):
+            try:
+                out += struct.pack(f"<{len(values)}{letter}", *values)
+                return
+            except (struct.error, OverflowError, TypeError, ValueError):
+                pass  # one by one, to say which
+        for number, each in enumerate(values):
+            kind.write(each, f"{path}[{number}]", out)
+
+    return write
+
+
+def _reads_list(kind: _Kind) -> Callable[[_Reader, str, int], object]:
+    letter = _LETTERS.get(kind.name, "")
+    size = struct.calcsize(f"<{letter}")
+
+    def read(reader: _Reader, path: str, count: int) -> object:
+        if count * kind.least > reader.left:
+            raise _FieldError(path, _("has {count} elements, more than can be there").format(count=count))
+        if letter:
+            return list(struct.unpack(f"<{count}{letter}", reader.take(count * size)))
+        return [kind.read(reader, path) for _number in range(count)]
+
+    return read
+
+
+def _write_length(count: int, length: int | None, path: str, out: bytearray) -> None:
+    if length is None:
+        if count > 0xFFFFFFFF:
+            raise _FieldError(path, _("is too long"))
+        out += _LENGTH.pack(count)
+    elif count != length:
+        raise _FieldError(path, _("has {count} elements; give {length}").format(count=count, length=length))
+
+
+def _nested(name: str, fields: tuple[_Field, ...]) -> _Kind:
+    def write(value: object, path: str, out: bytearray) -> None:
+        _write_fields(name, fields, value, path, out)
+
+    def read(reader: _Reader, path: str) -> object:
+        return _read_fields(fields, reader, path)
+
+    return _Kind(name, write, read, sum(each.kind.least for each in fields))
+
+
+def _write_fields(name: str, fields: tuple[_Field, ...], payload: object, path: str, out: bytearray) -> None:
+    if not isinstance(payload, Mapping):
+        if not path:
+            raise _FieldError("", _not_a_map(fields))
+        raise _wrong(path, payload, name)
+    for each in fields:
+        if each.name in payload:
+            each.kind.write(payload[each.name], f"{path}.{each.name}" if path else each.name, out)
+        else:
+            out += bytes(each.kind.least)  # empty and zero are zero bytes, whatever it is
+    if len(payload) > len(fields) or not payload.keys() <= {each.name for each in fields}:
+        names = tuple(each.name for each in fields)
+        raise _unknown(path, next(key for key in payload if key not in names), names)
+
+
+def _read_fields(fields: tuple[_Field, ...], reader: _Reader, path: str) -> dict[str, object]:
+    made: dict[str, object] = {}
+    reader.messages_left -= 1
+    if reader.messages_left < 0:
+        raise _FieldError(path, _("has more inside than can be there"))
+    for each in fields:
+        where = f"{path}.{each.name}" if path else each.name
+        try:
+            made[each.name] = each.kind.read(reader, where)
+        except struct.error:
+            raise _FieldError(where, _("is cut off")) from None
+    return made
+
+
+# ---- words
+
+
+def _whole(value: object) -> int | None:
+    """A whole number of any class, None for what is none."""
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, int):
+        return value
+    index = getattr(type(value), "__index__", None)
+    return None if index is None else int(index(value))
+
+
+def _not_a_map(fields: tuple[_Field, ...]) -> str:
+    names = ", ".join(f"'{each.name}'" for each in fields[:6])
+    return _("publish a 'dict' with its fields {names}").format(names=names or "{}")
+
+
+def _wrong(path: str, value: object, name: str) -> _FieldError:
+    return _FieldError(path, _("is {value}; give a '{name}'").format(value=_shown(value), name=name))
+
+
+def _unknown(path: str, key: object, names: tuple[str, ...]) -> _FieldError:
+    where = f"{path}.{key}" if path else str(key)
+    return _FieldError(
+        escaped(shortened(where, 200)),
+        _("does not exist; {did_you_mean}").format(did_you_mean=did_you_mean(str(key), names)),
+    )
+
+
+def _shown(value: object) -> str:
+    if value is None or isinstance(value, str | int | float):
+        return escaped(shortened(repr(value), 40))
+    return _("a '{kind}'").format(kind=type(value).__name__)

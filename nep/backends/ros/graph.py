@@ -1,0 +1,102 @@
+"""The graph of a ROS master as nep shows it: its nodes, and what nep knows of those in this process."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from dataclasses import dataclass, replace
+from urllib.parse import urlsplit
+
+from nep.backends.ros.master import RosNodes
+from nep.masters.graph import Graph
+from nep.protocol.graph_view import GraphView
+from nep.protocol.requests import (
+    AddPublisher,
+    AddSubscriber,
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    Renew,
+    Request,
+    SubscriberCount,
+    SubscriberRecord,
+)
+
+__all__ = ["OwnNode", "view_of"]
+
+_CODECS = {
+    "std_msgs/String": "json",
+    "std_msgs/UInt8MultiArray": "bytes",
+    "sensor_msgs/CompressedImage": "image",
+    "sensor_msgs/Image": "image",
+}
+_GENERATION = "ros"
+
+
+@dataclass(frozen=True)
+class OwnNode:
+    """A node of nep in this process: `ros_name` is that of the ROS node that it shares.
+
+    `publishers` are (topic, type, whether it is latched, counts), `subscribers` (topic, type, counts).
+    """
+
+    node: NodeRecord
+    ros_name: str
+    publishers: tuple[tuple[str, str, bool, PublisherCount], ...]
+    subscribers: tuple[tuple[str, str, SubscriberCount], ...]
+
+
+def view_of(known: RosNodes, own: list[OwnNode]) -> GraphView:
+    """What the master knows; in the place of this process's ROS node stand its nodes of nep.
+
+    Rates are not known: nobody counts for others in ROS.
+    """
+    graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
+    mine = {(each.ros_name, topic) for each in own for topic, _type, _latched, _count in each.publishers}
+    my_ears = {(each.ros_name, topic) for each in own for topic, _type, _count in each.subscribers}
+    for topic, names in known.publishers.items():
+        for name in names:
+            if (name, topic) not in mine:
+                kind = known.types.get(topic, "*")
+                codec = _CODECS.get(kind, "ros")
+                uri = known.uris.get(name, "")
+                record = PublisherRecord(_id(name, topic, "o"), topic, kind, codec, (uri,) if uri else ())
+                _tell(graph, AddPublisher(_node(name, uri), record))
+    for topic, names in known.subscribers.items():
+        for name in names:
+            if (name, topic) not in my_ears:
+                heard = SubscriberRecord(_id(name, topic, "i"), topic, known.types.get(topic, "*"))
+                _tell(graph, AddSubscriber(_node(name, known.uris.get(name, "")), heard))
+    for each in own:
+        if each.ros_name:
+            _tell_own(graph, each, known.uris.get(each.ros_name, ""))
+    return graph.view()
+
+
+def _tell_own(graph: Graph, own: OwnNode, uri: str) -> None:
+    node = replace(own.node, generation=_GENERATION)
+    for topic, kind, is_latched, count in own.publishers:
+        codec = _CODECS.get(kind, "ros")
+        record = PublisherRecord(count.id, topic, kind, codec, (uri,) if uri else (), is_latched)
+        _tell(graph, AddPublisher(node, record))
+    for topic, kind, heard in own.subscribers:
+        _tell(graph, AddSubscriber(node, SubscriberRecord(heard.id, topic, kind)))
+    counts = tuple(count for *_, count in own.publishers)
+    ears = tuple(heard for *_, heard in own.subscribers)
+    _tell(graph, Renew(node.id, graph.epoch, graph.revision, counts, ears))
+
+
+def _tell(graph: Graph, request: Request) -> None:
+    graph.apply(request, 0, time.monotonic(), "")
+
+
+def _node(name: str, uri: str) -> NodeRecord:
+    """A node of ROS: its name is its id, because a master has one of a name."""
+    host = urlsplit(uri).hostname or "" if uri else ""
+    return NodeRecord(name, name.lstrip("/"), host, None, language="", generation=_GENERATION)
+
+
+def _id(*words: str) -> int:
+    """The same number for the same words, in every process."""
+    digest = hashlib.sha256("\0".join(words).encode()).digest()
+    return int.from_bytes(digest[:8], "little") >> 1 or 1

@@ -1,0 +1,134 @@
+"""The library rospy: found when the first node asks for it, also in a venv beside Debian's Python.
+
+pip has no rospy. Debian's packages lie where a venv does not look. They are found there by a finder that
+comes last and knows the names of ROS and of what ROS imports only: so nothing else of the system, such as
+its numpy, is ever found there, and whatever the venv has is taken from the venv.
+"""
+
+from __future__ import annotations
+
+import atexit
+import importlib
+import importlib.machinery
+import logging
+import os
+import sys
+import warnings
+from collections.abc import Callable, Sequence
+from importlib.abc import MetaPathFinder
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from nep.errors import BackendUnavailableError, NepError
+from nep.i18n import _
+from nep.system.forks import in_child
+
+__all__ = ["PLACES", "RosFinder", "library", "load_rospy", "message_text"]
+
+PLACES = ("/opt/ros/noetic/lib/python3/dist-packages", "/usr/lib/python3/dist-packages")
+_NAMES = frozenset({
+    "rospy", "rosgraph", "roslib", "rospkg", "roscpp", "genpy", "genmsg", "catkin", "catkin_pkg",
+    "yaml", "_yaml", "defusedxml", "netifaces", "distro", "dateutil", "docutils", "pyparsing", "six",
+})  # fmt: skip
+_ENDINGS = ("_msgs", "_srvs")
+_OLD_WAYS = r"(rospy|rosgraph|roslib|rospkg|genpy|genmsg|catkin_pkg)(\..*)?"
+_inherited: set[str] = set()
+
+
+class RosFinder(MetaPathFinder):
+    """Finds ROS, and `extra` packages of messages by their names, in the first of these folders."""
+
+    def __init__(self, places: Sequence[str]) -> None:
+        self._places = list(places)
+        self.extra: set[str] = set()
+
+    def find_spec(
+        self,
+        name: str,
+        path: Sequence[str] | None,
+        target: ModuleType | None = None,  # noqa: ARG002 - Python's contract
+    ) -> importlib.machinery.ModuleSpec | None:
+        """A top-level package of ROS; what is inside of one is found by itself."""
+        if path is not None or not (name in _NAMES or name in self.extra or name.endswith(_ENDINGS)):
+            return None
+        return importlib.machinery.PathFinder.find_spec(name, self._places)
+
+
+_finder = RosFinder([place for place in PLACES if Path(place).is_dir()])
+
+
+def _forked() -> None:
+    """In a child: rospy's threads stayed behind, and it can be started once in a process only."""
+    core = sys.modules.get("rospy.core")
+    if core is None or not core.is_initialized():
+        return
+    _inherited.add("rospy")
+    at_exit = getattr(core, "_ros_atexit", None)
+    if at_exit is not None:
+        atexit.unregister(at_exit)  # it would unregister what is the parent's
+    topics = sys.modules["rospy.impl.registration"].get_topic_manager()
+    for each in [*topics.pubs.values(), *topics.subs.values()]:
+        for connection in each.connections:
+            if connection.socket is not None:
+                connection.socket.close()
+
+
+in_child(_forked)
+
+
+def library() -> Any:  # noqa: ANN401 - it has no types
+    """Rospy. Raises `BackendUnavailableError` where it is not installed.
+
+    Raises `NepError` in a child that was forked from a program that uses it.
+    """
+    if _inherited:
+        raise NepError(
+            _(
+                "'ros' does not work in a program that was forked from one that uses it; start it anew, "
+                "with multiprocessing by the method 'spawn'"
+            )
+        )
+    return sys.modules.get("rospy") or load_rospy()
+
+
+def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> ModuleType:
+    """Import rospy, so that it changes nothing for others. Raises `BackendUnavailableError`."""
+    if _finder not in sys.meta_path:
+        sys.meta_path.append(_finder)
+    logger_class = logging.getLoggerClass()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            made = load("rospy")
+            load("std_msgs.msg")
+    except ImportError as error:
+        raise BackendUnavailableError(
+            "ros",
+            _("install it with 'sudo apt install python3-rospy python3-std-msgs python3-sensor-msgs'"),
+        ) from error
+    finally:
+        logging.setLoggerClass(logger_class)  # rospy sets its own for all that the program will log
+    warnings.filterwarnings("ignore", category=DeprecationWarning, module=_OLD_WAYS)
+    return made
+
+
+def message_text(name: str) -> tuple[str, str] | None:
+    """Definition and MD5 sum of an installed type ("geometry_msgs/Twist"); None when there is none."""
+    package, _slash, kind = name.partition("/")
+    if not package.isidentifier() or not kind.isidentifier():
+        return None
+    library()
+    if _has_folder(package):
+        _finder.extra.add(package)
+    try:
+        found = getattr(importlib.import_module(f"{package}.msg"), kind, None)
+    except ImportError:
+        return None
+    text, checksum = getattr(found, "_full_text", None), getattr(found, "_md5sum", None)
+    return (text, checksum) if isinstance(text, str) and isinstance(checksum, str) else None
+
+
+def _has_folder(package: str) -> bool:
+    """Whether there is a package of messages of this name in a folder of ROS."""
+    return any(os.path.isfile(f"{place}/{package}/msg/__init__.py") for place in PLACES)  # noqa: PTH113

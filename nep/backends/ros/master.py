@@ -1,0 +1,146 @@
+"""RosMaster: what the ROS master is asked for, each time with a limit. No rospy is needed for it."""
+
+from __future__ import annotations
+
+import http.client
+import threading
+import time
+import xmlrpc.client
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from xml.parsers.expat import ExpatError
+
+from nep.errors import MasterUnreachable, NepError
+from nep.i18n import _
+
+__all__ = ["RosMaster", "RosMasterUnreachable", "RosNodes", "buses_of"]
+
+_CALLER = "/nep"
+_ASK_S = 1.0
+"""A master on a network answers within this time, or the attempt is over."""
+_AGAIN_S = 0.1
+_FAILURES = (
+    OSError, xmlrpc.client.Error, http.client.HTTPException, ExpatError, ValueError, TypeError, LookupError
+)  # fmt: skip
+"""What asking for something raises, also when somebody else than a master listens there."""
+
+
+class RosMasterUnreachable(MasterUnreachable):
+    """No ROS master answered at `address` within `waited_s` seconds."""
+
+    def __init__(self, address: str, waited_s: float) -> None:
+        self.address = address
+        self.waited_s = waited_s
+        self.is_known = True
+        NepError.__init__(
+            self,
+            _(
+                "no ROS master answers at '{address}' (waited {seconds:g} s); start one with 'roscore', or "
+                "with 'rosmaster --core'"
+            ).format(address=address, seconds=waited_s),
+        )
+
+
+class _Transport(xmlrpc.client.Transport):
+    """Gives up after a time."""
+
+    def __init__(self, timeout_s: float) -> None:
+        super().__init__()
+        self._timeout_s = timeout_s
+
+    def make_connection(self, host: tuple[str, dict[str, str]] | str) -> http.client.HTTPConnection:
+        connection = super().make_connection(host)
+        connection.timeout = self._timeout_s
+        return connection
+
+
+def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noqa: ANN401 - any value
+    """What a master's or a node's method gives. Raises `_FAILURES`."""
+    with xmlrpc.client.ServerProxy(uri, transport=_Transport(max(0.01, timeout_s))) as proxy:
+        code, status, value = getattr(proxy, method)(*args)
+    if code != 1:
+        raise ValueError(status)
+    return value
+
+
+def buses_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
+    """The connections of a node: who is at the other end, "i" or "o", the topic. Empty when it is dead."""
+    try:
+        said = _call(uri, timeout_s, "getBusInfo", _CALLER)
+        return [(str(each[1]), str(each[2]), str(each[4])) for each in said]
+    except _FAILURES:
+        return []
+
+
+@dataclass(frozen=True)
+class RosNodes:
+    """Who publishes and subscribes: topic → names of nodes; the types of topics; where nodes are."""
+
+    publishers: Mapping[str, Sequence[str]]
+    subscribers: Mapping[str, Sequence[str]]
+    types: Mapping[str, str]
+    uris: Mapping[str, str]
+
+
+class RosMaster:
+    """The master at an address. Every question raises `RosMasterUnreachable` when it has no answer."""
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        self.uri = f"http://{address}/"
+
+    def wait(self, timeout_s: float | None) -> None:
+        """Wait until it answers, None without a limit."""
+        started = time.monotonic()
+        pause = threading.Event()
+        while True:
+            waited = time.monotonic() - started
+            left = _ASK_S if timeout_s is None else min(_ASK_S, timeout_s - waited)
+            try:
+                _call(self.uri, left, "getPid", _CALLER)
+                return
+            except _FAILURES as error:
+                waited = time.monotonic() - started
+                if timeout_s is not None and waited + _AGAIN_S >= timeout_s:
+                    raise RosMasterUnreachable(self.address, timeout_s) from error
+            pause.wait(_AGAIN_S)
+
+    def names(self, topic: str, timeout_s: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Nodes that publish on a topic, and nodes that subscribe to it."""
+        state = self._ask("getSystemState", timeout_s)
+        found = [next((tuple(names) for each, names in part if each == topic), ()) for part in state[:2]]
+        return found[0], found[1]
+
+    def uri_of(self, name: str, timeout_s: float) -> str:
+        """Where a node is; "" when nobody knows."""
+        try:
+            return str(_call(self.uri, timeout_s, "lookupNode", _CALLER, name))
+        except _FAILURES:
+            return ""
+
+    def nodes(self, timeout_s: float) -> RosNodes:
+        """Everybody."""
+        state = self._ask("getSystemState", timeout_s)
+        publishers, subscribers = ({str(each): tuple(names) for each, names in part} for part in state[:2])
+        types = {str(topic): str(kind) for topic, kind in self._ask("getTopicTypes", timeout_s)}
+        names = {name for part in (publishers, subscribers) for each in part.values() for name in each}
+        return RosNodes(publishers, subscribers, types, self._uris(sorted(names), timeout_s))
+
+    def _uris(self, names: Sequence[str], timeout_s: float) -> dict[str, str]:
+        try:
+            with xmlrpc.client.ServerProxy(self.uri, transport=_Transport(timeout_s)) as proxy:
+                calls = xmlrpc.client.MultiCall(proxy)
+                for name in names:
+                    calls.lookupNode(_CALLER, name)
+                given: Any = calls() if names else []
+                answers: list[Any] = [given[number] for number in range(len(names))]
+        except _FAILURES:
+            return {}
+        return {name: str(each[2]) for name, each in zip(names, answers, strict=False) if each[0] == 1}
+
+    def _ask(self, method: str, timeout_s: float) -> Any:  # noqa: ANN401 - any value
+        try:
+            return _call(self.uri, timeout_s, method, _CALLER)
+        except _FAILURES as error:
+            raise RosMasterUnreachable(self.address, timeout_s) from error

@@ -1,0 +1,267 @@
+"""The one ROS node of this process. All nodes of nep in it share it: rospy has one for a process, once.
+
+It is named after the first of them and lives until the process ends. Nodes that close only unregister their
+publishers and subscribers; after its end rospy could not be started again.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from nep.backends.ros.address import address_of, is_own_computer
+from nep.backends.ros.definition import Definition
+from nep.backends.ros.library import library
+from nep.backends.ros.master import RosMaster, buses_of
+from nep.errors import BadTopicError, NepError
+from nep.i18n import _
+from nep.system.forks import give_up, in_child
+
+__all__ = ["RosProcess", "process_with", "ros_topic"]
+
+_NAME = re.compile(r"\W+", re.ASCII)
+_TOPIC = re.compile(r"[~/A-Za-z][\w/]*", re.ASCII)
+_POLL_S = 0.01
+_ASK_S = 0.5
+_UNREGISTER_S = 2.0
+
+
+def ros_topic(topic: str) -> str:
+    """`topic` itself when ROS allows it. Raises `BadTopicError`."""
+    if not _TOPIC.fullmatch(topic) or "//" in topic or topic.endswith("/"):
+        raise BadTopicError(
+            topic, _("in ROS a topic begins with a letter or '/', and has letters, digits, '_' and '/' only")
+        )
+    return topic
+
+
+class RosProcess:
+    """rospy, running. Its methods may be called from any thread."""
+
+    def __init__(self, rospy: Any, address: str) -> None:  # noqa: ANN401 - rospy has no types
+        self.rospy = rospy
+        self.master = RosMaster(address)
+        self.name: str = rospy.get_name()
+        self.uri: str = rospy.get_node_uri()
+        self.changed = threading.Condition()
+        """Notified when somebody connects to a publisher."""
+        self._lock = threading.RLock()
+        self._types: dict[str, tuple[str, int]] = {}
+        self._classes: dict[str, type] = {}
+        self._seqs: Counter[str] = Counter()
+        self.subscribed: Counter[str] = Counter()
+        """How many subscribers of nep's there are here, by topic."""
+
+    def resolved(self, topic: str) -> str:
+        """The full name of a topic."""
+        return str(self.rospy.resolve_name(ros_topic(topic)))
+
+    # ---- publishers
+
+    def advertise(self, topic: str, definition: Definition, *, is_latched: bool, queue: int) -> Any:  # noqa: ANN401 - rospy has no types
+        """Rospy's publisher on a full name. Raises `NepError` when the process has another type on it."""
+        with self._lock:
+            known, users = self._types.get(topic, (definition.name, 0))
+            if known != definition.name:
+                raise NepError(
+                    _(
+                        "this program publishes '{known}' on '{topic}', and ROS has one type for a topic of "
+                        "a program; publish '{name}' on another topic"
+                    ).format(known=known, topic=topic, name=definition.name)
+                )
+            made = self.rospy.Publisher(
+                topic, self._class_of(definition), subscriber_listener=self, tcp_nodelay=True,
+                latch=is_latched, queue_size=queue,
+            )  # fmt: skip
+            self._types[topic] = definition.name, users + 1
+        return made
+
+    def withdraw(self, topic: str, publisher: Any) -> None:  # noqa: ANN401 - rospy has no types
+        """Unregister it."""
+        with self._lock:
+            within(publisher.unregister, _UNREGISTER_S)
+            known, users = self._types[topic]
+            self._types[topic] = known, users - 1
+            if users == 1:
+                del self._types[topic]
+
+    def unsent(self, publisher: Any, deadline: float) -> int:  # noqa: ANN401 - rospy has no types
+        """Wait until rospy has sent what it queued; how many connections have some left at `deadline`."""
+        impl = publisher.impl
+        pause = threading.Event()
+        while True:
+            left = sum(_has_unsent(each) for each in ([] if impl is None else impl.connections))
+            if not left or time.monotonic() >= deadline:
+                return left
+            pause.wait(_POLL_S)
+
+    def unregister(self, subscriber: Any) -> None:  # noqa: ANN401 - rospy has no types
+        """Unregister a subscriber of rospy's."""
+        within(subscriber.unregister, _UNREGISTER_S)
+
+    def send(self, publisher: Any, definition: Definition, topic: str, body: bytes) -> None:  # noqa: ANN401
+        """Publish a body; in a header it gets the next number of its topic, as rospy gives it."""
+        with self._lock:
+            message = self._class_of(definition)()
+            if definition.has_header:
+                self._seqs[topic] += 1
+                body = (self._seqs[topic] & 0xFFFFFFFF).to_bytes(4, "little") + body[4:]
+            message.body = body
+            publisher.publish(message)
+
+    def _class_of(self, definition: Definition) -> type:
+        """A class of messages that rospy sends as they are."""
+        made = self._classes.get(definition.name)
+        if made is None:
+            genpy = self.rospy.msg.genpy
+            known = genpy.message.get_message_class(definition.name)
+
+            def serialize(message: Any, buffer: Any) -> None:  # noqa: ANN401 - rospy has no types
+                buffer.write(message.body)
+
+            made = self._classes[definition.name] = type(
+                "EncodedMessage",
+                (genpy.Message,),
+                {
+                    "__slots__": ["body"], "_slot_types": ["uint8[]"], "_has_header": False,
+                    "_type": definition.name, "_md5sum": known._md5sum, "_full_text": definition.text,  # noqa: SLF001
+                    "serialize": serialize,
+                },
+            )  # fmt: skip
+        return made
+
+    # ---- who is connected
+
+    def peer_subscribe(self, *_told: object) -> None:
+        """Called by rospy when somebody connected to a publisher."""
+        with self.changed:
+            self.changed.notify_all()
+
+    def peer_unsubscribe(self, *_told: object) -> None:
+        """Called by rospy when somebody disconnected from a publisher."""
+
+    def hearers(self, publisher: Any) -> tuple[str, ...]:  # noqa: ANN401 - rospy has no types
+        """Names of the nodes that are connected to a publisher."""
+        impl = publisher.impl
+        return () if impl is None else tuple(str(each.endpoint_id) for each in impl.connections)
+
+    def wait_for_hearers(self, publisher: Any, topic: str, timeout_s: float) -> None:  # noqa: ANN401
+        """Wait until all nodes whose subscribers are registered are connected."""
+        expected = set(self.master.names(topic, _ASK_S)[1])
+        with self.changed:
+            self.changed.wait_for(lambda: expected <= set(self.hearers(publisher)), timeout_s)
+
+    def wait_for_sources(self, topic: str, timeout_s: float) -> None:
+        """Wait until all nodes that publish on a topic say that this one is connected to them.
+
+        rospy's own side of a connection tells nothing: it is listed before it is there.
+        """
+        deadline = time.monotonic() + timeout_s
+        pause = threading.Event()
+        uris = {
+            name: self.uri if name == self.name else self.master.uri_of(name, _ASK_S)
+            for name in self.master.names(topic, _ASK_S)[0]
+        }
+        for uri in filter(None, uris.values()):
+            while (left := deadline - time.monotonic()) > 0.0 and not self._is_heard_from(uri, topic, left):
+                pause.wait(_POLL_S)
+
+    def _is_heard_from(self, uri: str, topic: str, timeout_s: float) -> bool:
+        if uri != self.uri:
+            buses = buses_of(uri, timeout_s)
+            return not buses or (self.name, "o", topic) in buses
+        own = self.rospy.topics.get_topic_manager().get_publisher_impl(topic)
+        return own is None or self.name in {each.endpoint_id for each in own.connections}
+
+
+def within(call: Callable[[], object], timeout_s: float) -> None:
+    """Call it in a thread, and wait so long: rospy asks a master without a limit."""
+    thread = threading.Thread(target=call, name="nep-ros-unregister", daemon=True)
+    thread.start()
+    thread.join(timeout_s)
+
+
+def _has_unsent(connection: Any) -> bool:  # noqa: ANN401 - rospy has no types
+    """Whether a connection's thread does anything else than wait for something to send.
+
+    rospy does not tell: what its thread took out of the queue is nowhere to be seen until it is sent.
+    """
+    data = getattr(connection, "_cond_data_available", None)
+    if data is None or connection.done:
+        return False
+    with data:
+        return bool(connection._queue) or not data._waiters  # noqa: SLF001
+
+
+_process: RosProcess | None = None
+_lock = threading.Lock()
+
+
+def _forked() -> None:
+    global _process, _lock
+    _process, _lock = None, threading.Lock()
+
+
+in_child(_forked)
+
+
+def process_with(address: str, name: str, wait_s: float | None) -> RosProcess:
+    """The process's ROS node, started for the node `name` if there is none yet.
+
+    Raises `MasterUnreachable`, and `NepError` when it is connected with another master or was shut down.
+    """
+    global _process  # noqa: PLW0603 - one for the process
+    rospy = library()
+    RosMaster(address).wait(wait_s)  # rospy itself would wait for ever, and could not be asked again
+    with _lock:
+        if rospy.is_shutdown():
+            raise NepError(
+                _("rospy was shut down in this program and cannot start in it again; start the program anew")
+            )
+        if _process is None:
+            _process = _started(rospy, address, name)
+        if not _is_same(_process.master.address, address):
+            raise NepError(
+                _(
+                    "this program is connected with the ROS master at '{known}', and ROS allows one for a "
+                    "program; use another program for '{address}'"
+                ).format(known=_process.master.address, address=address)
+            )
+        return _process
+
+
+def _is_same(one: str, other: str) -> bool:
+    is_local = is_own_computer(one) and is_own_computer(other)
+    return one == other or (is_local and one.rpartition(":")[2] == other.rpartition(":")[2])
+
+
+def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401 - rospy has no types
+    if rospy.core.is_initialized():  # the program has started it itself
+        return RosProcess(rospy, address_of(rospy.core.rosgraph.get_master_uri()))
+    os.environ["ROS_MASTER_URI"] = f"http://{address}"
+    if is_own_computer(address) and not os.environ.keys() & {"ROS_IP", "ROS_HOSTNAME"}:
+        os.environ["ROS_IP"] = "127.0.0.1"
+    word = _NAME.sub("_", name).strip("_")
+    word = word if word[:1].isalpha() else f"nep_{word}"
+    configure = rospy.core.configure_logging
+    rospy.core.configure_logging = lambda *_args, **_keywords: None  # it would take over the program's log
+    try:
+        rospy.init_node(word[:100], anonymous=True, disable_signals=True)
+    finally:
+        rospy.core.configure_logging = configure
+    made = RosProcess(rospy, address)
+    for uri in (made.uri, f"http://{address_of(made.uri).rpartition(':')[0]}:{_tcp_port(rospy)}"):
+        port = uri.rstrip("/").rpartition(":")[2]
+        give_up(f"tcp://127.0.0.1:{port}", f"tcp://0.0.0.0:{port}")
+    return made
+
+
+def _tcp_port(rospy: Any) -> int:  # noqa: ANN401 - rospy has no types
+    """The port at which its publishers are reached; it listens there from now on."""
+    rospy.impl.tcpros_base.start_tcpros_server()
+    return int(rospy.impl.tcpros_base.get_tcpros_server_address()[1])

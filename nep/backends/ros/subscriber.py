@@ -1,0 +1,207 @@
+"""RosSubscriber: what rospy hears, in an inbox of nep's. Bodies are decoded by whoever reads them."""
+
+from __future__ import annotations
+
+import logging
+import struct
+import threading
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from nep.backends.base import SubscriberSpec
+from nep.backends.ros.carried import STAMP, Unpacker, installed, is_ros_type, unpacker
+from nep.backends.ros.process import RosProcess
+from nep.backends.zeromq.sockets import Refusals
+from nep.errors import DecodeError, NepError, WireError
+from nep.i18n import _
+from nep.messages.message import NOTHING, Message, MessageKind, arrived
+from nep.messages.queue import Inbox
+from nep.text import escaped, shortened
+
+__all__ = ["RosSubscriber"]
+
+_logger = logging.getLogger("nep")
+_BUFFER_BYTES = 2**18
+"""rospy reads so much at once; its own 64 KiB make pictures slow."""
+_SOURCES = 1_000
+
+
+class SubscriberOwner(Protocol):
+    """What a subscriber needs of its transport."""
+
+    changed: threading.Condition
+
+    def wait(self, subscribers: Any, timeout_s: float) -> None:  # noqa: ANN401 - see `Transport.wait`
+        """Wait for a message."""
+
+    def wake(self) -> None:
+        """End all waits."""
+
+    def forget(self, closed: Any) -> None:  # noqa: ANN401 - publishers, too
+        """It was closed."""
+
+
+@dataclass
+class _Source:
+    """One publisher, as its connection tells. `seq` is that of its newest header."""
+
+    unpacker: Unpacker | None
+    kind: MessageKind | None
+    problem: str = ""
+    seq: int = 0
+    last: object = None
+
+
+class RosSubscriber:
+    """Takes messages of any type, so that one of a wrong type becomes a problem instead of silence."""
+
+    def __init__(
+        self, owner: SubscriberOwner, process: RosProcess, spec: SubscriberSpec, max_bytes: int
+    ) -> None:
+        if is_ros_type(spec.msg_type):
+            installed(spec.msg_type)
+        self.spec = spec
+        self.process = process
+        self.topic = process.resolved(spec.topic)
+        self.inbox = Inbox(spec.keep, spec.max_messages, max_bytes)
+        self.ready: deque[Message] = deque()
+        self.received = 0
+        self.lost: int | None = None
+        self.refusals = Refusals()
+        self.is_closed = False
+        self._owner = owner
+        self._told = ""
+        self._sources: dict[tuple[str, ...], _Source] = {}
+        self._subscriber: Any = None
+
+    def begin(self) -> None:
+        """Subscribe. What comes goes into the inbox."""
+        with self._owner.changed:
+            self.process.subscribed[self.topic] += 1
+        self._subscriber = self.process.rospy.Subscriber(
+            self.topic, self.process.rospy.AnyMsg, self._came, buff_size=_BUFFER_BYTES, tcp_nodelay=True
+        )
+
+    @property
+    def refused(self) -> int:
+        """What came and could not be read as a message of its publisher's type, or is of a wrong one."""
+        return self.refusals.count
+
+    @property
+    def problem(self) -> str:
+        """Why a message could not be read; empty when all is well."""
+        return self._told or self.refusals.told()
+
+    # ---- what rospy calls, in a thread of each connection
+
+    def _came(self, raw: Any) -> None:  # noqa: ANN401 - rospy has no types
+        header: Mapping[str, str] = raw._connection_header  # noqa: SLF001 - rospy documents it
+        body = memoryview(raw._buff)  # noqa: SLF001 - so are the bytes of AnyMsg found
+        with self._owner.changed:
+            if self.is_closed:
+                return
+            source = self._source_of(header)
+            if source.last is raw:
+                return  # latched: rospy hands out what a connection had last, and may just have handed it out
+            source.last = raw if header.get("latching") == "1" else None
+            try:
+                message = self._read(source, body)
+            except (WireError, struct.error) as error:
+                self._refuse(error.reason if isinstance(error, WireError) else _("it is cut off"))
+                return
+            dropped = self.inbox.put(message)
+            self.received += 1 - dropped
+            if dropped:
+                self.lost = (self.lost or 0) + dropped
+            self._owner.changed.notify_all()
+
+    def _source_of(self, header: Mapping[str, str]) -> _Source:
+        key = tuple(header.get(each, "") for each in ("callerid", "type", "md5sum", "latching"))
+        source = self._sources.get(key)
+        if source is None:
+            if len(self._sources) >= _SOURCES:
+                self._sources.clear()
+            source = self._sources[key] = self._met(header)
+        return source
+
+    def _met(self, header: Mapping[str, str]) -> _Source:
+        ros_type = header.get("type", "")
+        try:
+            found = unpacker(self.spec.msg_type, ros_type, header.get("message_definition", ""))
+        except NepError as error:
+            who = escaped(shortened(header.get("callerid", "").lstrip("/"), 100))
+            problem = _("'{name}' is not read: {why}").format(name=who, why=str(error))
+            return _Source(None, None, problem)
+        is_latched = header.get("latching") == "1"
+        codec = found.codec
+        return _Source(
+            found, MessageKind(self.spec.topic, codec.name, found.msg_type, is_latched, codec.decode)
+        )
+
+    def _read(self, source: _Source, body: memoryview) -> Message:
+        if source.unpacker is None or source.kind is None:
+            raise WireError(source.problem, len(body))
+        try:
+            data, extension = source.unpacker.unpack(body)
+        except DecodeError as error:
+            raise WireError(error.reason, len(body)) from error
+        message = arrived(source.kind, data, None, 0, 0, extension or NOTHING)
+        message.seq = message.publisher = None
+        if source.unpacker.has_header:
+            seq, secs, nsecs = STAMP.unpack_from(body, 0)
+            message.stamp_ns = secs * 1_000_000_000 + nsecs
+            message.seq = seq
+            self._number(source, seq)
+        return message
+
+    def _number(self, source: _Source, seq: int) -> None:
+        """Numbers that rise by more than one tell of messages that were lost; others tell of a new start."""
+        gap = seq - source.seq - 1
+        if source.seq and gap >= 0:
+            self.lost = (self.lost or 0) + gap
+        elif seq and self.lost is None:
+            self.lost = 0
+        source.seq = seq
+
+    def _refuse(self, reason: str) -> None:
+        if self.refusals.add(reason):
+            _logger.warning("on '%s' came what is no message: %s", self.spec.topic, reason)
+
+    # ---- reading
+
+    def poll(self) -> Message | None:
+        """The next message if one is there."""
+        with self._owner.changed:
+            return self.inbox.take()
+
+    def receive(self, timeout_s: float) -> Message | None:
+        """The next message, waited for."""
+        self._owner.wait((self,), timeout_s)
+        return self.poll()
+
+    def take_batch(self, most_bytes: int) -> list[Message]:
+        """What a sink gets at once."""
+        with self._owner.changed:
+            return self.inbox.take_all(most_bytes)
+
+    def report(self, problem: str) -> None:
+        """Shown as an alert in the graph of this process."""
+        self._told = problem
+
+    def forked(self) -> None:
+        """In a child. See `SubscriberTransport.forked`."""
+        self.is_closed = True
+
+    def close(self) -> None:
+        """Unregister and forget what was not read."""
+        with self._owner.changed:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            self.process.subscribed[self.topic] -= 1
+        self._owner.forget(self)
+        if self._subscriber is not None:
+            self.process.unregister(self._subscriber)
+        self._owner.wake()

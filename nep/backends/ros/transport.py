@@ -1,0 +1,279 @@
+"""The back end `ros`: publishers and subscribers of nep on topics of ROS."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.connection import Configuration, Hybrid
+from nep.backends.ros.carried import installed, ros_type_of, to_ros
+from nep.backends.ros.graph import OwnNode, view_of
+from nep.backends.ros.library import library
+from nep.backends.ros.master import RosMaster, RosMasterUnreachable
+from nep.backends.ros.process import RosProcess, process_with
+from nep.backends.ros.subscriber import RosSubscriber
+from nep.errors import ClosedError, NepError
+from nep.i18n import _
+from nep.messages.encoded import Encoded
+from nep.protocol.graph_view import GraphView
+from nep.protocol.requests import NodeRecord, PublisherCount, SubscriberCount
+
+__all__ = ["RosPublisher", "RosTransport"]
+
+_logger = logging.getLogger("nep")
+_QUEUES = {"image": 64, "bytes": 1000, "ros": 1000}
+_MOST = 10_000
+"""How many messages rospy queues for each connection, before it drops the oldest and tells nobody."""
+_BATCH_BYTES = 64 * 2**20
+"""A sink works on so many bytes at once; with those that wait for it there are no more than the bound."""
+_BATCH_S = 0.005  # sinks are called 200 times a second at most
+
+
+def _address(configuration: Configuration) -> str:
+    if not isinstance(configuration, Hybrid):
+        raise NepError(_("the back end 'ros' has no direct connections; use 'zeromq' for them"))
+    return configuration.master
+
+
+class RosPublisher:
+    """Publishes through rospy. Its number of messages is nep's; a header's seq counts for the whole topic."""
+
+    def __init__(self, transport: RosTransport, process: RosProcess, spec: PublisherSpec) -> None:
+        self.spec = spec
+        self.count = 0
+        self.bytes = 0
+        self.last_stamp_ns: int | None = None
+        self.problem = ""
+        self.process = process
+        self._transport = transport
+        self._definition = installed(ros_type_of(spec.msg_type))
+        self.topic = process.resolved(spec.topic)
+        self._lock = threading.RLock()
+        self._is_closed = False
+        queue = _QUEUES.get(spec.codec.name, _MOST)
+        self._publisher: Any = process.advertise(
+            self.topic, self._definition, is_latched=spec.is_latched, queue=queue
+        )
+
+    @property
+    def ros_type(self) -> str:
+        """The ROS message that carries what is published."""
+        return self._definition.name
+
+    @property
+    def subscribers(self) -> int:
+        """Nodes of ROS that are connected; for this process its subscribers."""
+        hearers = () if self._is_closed else self.process.hearers(self._publisher)
+        own = max(1, self.process.subscribed[self.topic]) if self.process.name in hearers else 0
+        return sum(each != self.process.name for each in hearers) + own
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody is connected."""
+        impl = self._publisher.impl
+        return impl is not None and bool(impl.connections)
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Nodes of ROS that are registered as subscribers and have not connected."""
+        try:
+            registered = self.process.master.names(self.topic, HANDSHAKE_S)[1]
+        except RosMasterUnreachable:
+            return ()
+        hearers = self.process.hearers(self._publisher)
+        return tuple(each.lstrip("/") for each in registered if each not in hearers)
+
+    def lend(self, _size_bytes: int) -> memoryview | None:
+        """See `PublisherTransport.lend`: none here."""
+        return None
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self._lock:
+            self.count += 1
+            self.last_stamp_ns = time.time_ns()
+
+    def report(self, problem: str) -> None:
+        """Shown as an alert in the graph of this process."""
+        self.problem = problem
+
+    def send(self, encoded: Encoded) -> None:
+        """Hand it to rospy, which queues it for each connection. Raises as `to_ros`, and `ClosedError`."""
+        body = to_ros(self._definition.name, self.spec.codec.name, encoded)
+        with self._lock:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'")
+            self.count += 1
+            self.bytes += len(body)
+            self.last_stamp_ns = time.time_ns()
+            self.process.send(self._publisher, self._definition, self.topic, body)
+
+    def counts(self) -> PublisherCount:
+        """The statistics for the graph."""
+        return PublisherCount(
+            self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, self.problem
+        )
+
+    def close(self, timeout_s: float) -> None:
+        """Let rospy send what it has queued, and unregister."""
+        deadline = time.monotonic() + timeout_s
+        with self._lock:
+            if self._is_closed:
+                return
+            self._is_closed = True
+        self._transport.forget(self)
+        left = self.process.unsent(self._publisher, deadline)
+        if left:
+            _logger.warning("'%s' is closed before %d subscriber(s) took everything", self.spec.topic, left)
+        self.process.withdraw(self.topic, self._publisher)
+
+
+class RosTransport:
+    """One node's way to the others. Raises `BackendUnavailableError` where rospy is not installed."""
+
+    def __init__(self, node: NodeRecord) -> None:
+        library()
+        self.node = node
+        self.changed = threading.Condition()
+        self._wakes = 0
+        self._publishers: tuple[RosPublisher, ...] = ()
+        self._subscribers: tuple[RosSubscriber, ...] = ()
+        self._lock = threading.RLock()
+        self._is_closed = False
+        self._thread: threading.Thread | None = None
+        self._closing = threading.Event()
+        _transports.add(self)
+
+    def publisher(self, spec: PublisherSpec) -> RosPublisher:
+        """A publisher, when all nodes with registered subscribers have connected, or half a second later."""
+        process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
+        publisher = RosPublisher(self, process, spec)
+        with self._lock:
+            self._publishers = (*self._publishers, publisher)
+        try:
+            self._check_open()
+            process.wait_for_hearers(publisher._publisher, publisher.topic, HANDSHAKE_S)  # noqa: SLF001
+        except BaseException:
+            publisher.close(0.0)
+            raise
+        return publisher
+
+    def subscriber(self, spec: SubscriberSpec) -> RosSubscriber:
+        """A subscriber, when all publishers that are registered have connected, or half a second later."""
+        process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
+        batch = 0 if spec.sink is None else _BATCH_BYTES
+        subscriber = RosSubscriber(self, process, spec, spec.max_bytes - batch)
+        with self._lock:
+            self._subscribers = (*self._subscribers, subscriber)
+        try:
+            subscriber.begin()
+            self._check_open()
+            process.wait_for_sources(subscriber.topic, HANDSHAKE_S)
+            if spec.sink is not None:
+                self._pour()
+        except BaseException:
+            subscriber.close()
+            raise
+        return subscriber
+
+    def _check_open(self) -> None:
+        if self._is_closed:
+            raise ClosedError(f"node '{self.node.name}'")
+
+    def forget(self, closed: RosPublisher | RosSubscriber) -> None:
+        """It was closed."""
+        with self._lock:
+            self._publishers = tuple(each for each in self._publishers if each is not closed)
+            self._subscribers = tuple(each for each in self._subscribers if each is not closed)
+
+    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
+        """Wait for a message in one of `subscribers`, or for `wake`."""
+        mine = [each for each in subscribers if isinstance(each, RosSubscriber)]
+        with self.changed:
+            before = self._wakes
+            self.changed.wait_for(
+                lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
+            )
+
+    def wake(self) -> None:
+        """End all waits."""
+        with self.changed:
+            self._wakes += 1
+            self.changed.notify_all()
+
+    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
+        """Who is there, as the ROS master knows it. Raises `MasterUnreachable`."""
+        address = _address(configuration)
+        known = RosMaster(address).nodes(timeout_s)
+        own = [each.own(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001 - of its kind
+        return view_of(known, own)
+
+    def own(self, address: str) -> OwnNode:
+        """What the graph tells of this node beyond what the master knows."""
+        outs: list[RosPublisher] = [
+            each for each in self._publishers if each.process.master.address == address
+        ]
+        ins: list[RosSubscriber] = [
+            each for each in self._subscribers if each.process.master.address == address
+        ]
+        names = [each.process.name for each in outs] + [each.process.name for each in ins]
+        return OwnNode(
+            self.node,
+            names[0] if names else "",
+            tuple((o.topic, o.ros_type, o.spec.is_latched, o.counts()) for o in outs),
+            tuple(
+                (
+                    i.topic,
+                    ros_type_of(i.spec.msg_type),
+                    SubscriberCount(i.spec.id, i.received, i.lost, i.problem),
+                )
+                for i in ins
+            ),
+        )
+
+    def begin_close(self) -> None:
+        """What is queued goes on by itself."""
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister all and end the thread. The process's ROS node stays."""
+        deadline = time.monotonic() + timeout_s
+        with self._lock:
+            self._is_closed = True
+        self._closing.set()
+        for subscriber in self._subscribers:
+            subscriber.close()
+        for publisher in self._publishers:
+            publisher.close(max(0.0, deadline - time.monotonic()))
+        _transports.discard(self)
+        self.wake()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(timeout_s)
+
+    # ---- sinks
+
+    def _pour(self) -> None:
+        with self._lock:
+            if self._thread is None:
+                name = f"nep-sinks-{self.node.name}"
+                self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+                self._thread.start()
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            sinks = [each for each in self._subscribers if each.spec.sink is not None]
+            self.wait(sinks, 0.1)
+            for subscriber in sinks:
+                messages = subscriber.take_batch(_BATCH_BYTES)
+                if messages and subscriber.spec.sink is not None:
+                    try:
+                        subscriber.spec.sink(messages)
+                    except BaseException:  # also SystemExit, which would end all sinks' thread
+                        _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
+            self._closing.wait(_BATCH_S)
+
+
+_transports: set[RosTransport] = set()

@@ -1,0 +1,235 @@
+"""The contract of back ends over ROS, in a process of its own: see `test_ros.py`, which runs this file.
+
+rospy lives as long as its process, with threads and sockets, and there is one ROS node for all tests. What
+ROS has no room for is left out: the publisher's id and number of a message without a header, how many were
+lost of those, letters such as "ü" in topics, and bytes that are wrong for their type.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from tests.nep.backends import test_contract as contract
+from tests.nep.backends.ros_programs import ros_master
+from tests.nep.backends.test_contract import Make
+
+pytestmark = [  # rospy's own ways
+    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+]
+
+for _name in (
+    "test_the_paper_s_listing_polls",
+    "test_every_type_arrives_as_it_was",
+    "test_many_to_many",
+    "test_the_next_message_reaches_a_new_subscriber",
+    "test_what_is_latched_and_cannot_be_sent_leaves_what_was_latched_before",
+    "test_whoever_begins_to_listen_ends_no_publisher",
+    "test_a_payload_of_a_wrong_type_is_an_error_heard_or_unheard",
+    "test_whatever_is_inside_ends_no_program",
+    "test_callbacks_run_in_the_thread_that_spins",
+    "test_timers_run_in_the_thread_that_spins_and_beside_callbacks",
+    "test_a_timer_that_is_made_while_a_node_spins_runs",
+    "test_a_timer_may_close_its_node",
+    "test_what_a_callback_raises_comes_out_of_spin",
+    "test_spin_ends_after_its_time_and_when_told",
+    "test_a_sink_gets_batches_in_a_thread_of_the_node",
+    "test_a_sink_that_fails_gets_the_next_batch",
+    "test_bad_bytes_are_skipped_by_listen_and_become_an_alert",
+    "test_a_full_inbox_drops_the_oldest_and_counts",
+    "test_a_callback_s_full_inbox_drops_the_oldest_and_counts",
+    "test_what_can_still_be_changed_is_copied",
+):
+    globals()[_name] = getattr(contract, _name)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left() -> None:
+    """rospy's threads and sockets stay until the process ends."""
+
+
+@pytest.fixture(scope="module")
+def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with ros_master(tmp_path_factory.mktemp("ros")) as address:
+        yield address
+
+
+@pytest.fixture
+def make(ros: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
+    made: list[nep.Node] = []
+
+    def new(name: str) -> nep.Node:
+        node = nep.node(name, "ROS", master=ros)
+        made.append(node)
+        return node
+
+    yield new
+    for node in made:
+        node.close()
+
+
+def test_order_is_kept_and_nothing_is_lost(make: Make) -> None:
+    sub = make("b").new_sub("topic")
+    pub = make("a").new_pub("topic")
+    for n in range(5000):
+        pub.publish(n)
+    assert [sub.listen(timeout_s=30.0)[1] for _ in range(5000)] == list(range(5000))
+    assert (sub.received, sub.lost) == (5000, None)
+
+
+def test_a_late_subscriber_gets_what_is_latched_once(make: Make) -> None:
+    pub = make("a").new_pub("/robot/description", "robot/description", latched=True)
+    early = make("early").new_sub("/robot/description", "robot/description")
+    pub.publish({"v": 1})
+    pub.publish({"v": 2})
+    assert [early.listen(timeout_s=30.0)[1] for _ in range(2)] == [{"v": 1}, {"v": 2}]
+    late = make("late").new_sub("/robot/description", "robot/description")
+    message = late.receive(30.0)
+    assert message is not None
+    assert (message.payload, message.is_latched) == ({"v": 2}, True)
+    assert late.listen(timeout_s=0.05) == (False, {})
+    assert early.listen(timeout_s=0.05) == (False, {})
+
+
+def test_keep_latest(make: Make) -> None:
+    sub = make("b").new_sub("topic", keep="latest")
+    other = make("c").new_sub("topic")
+    pub = make("a").new_pub("topic")
+    for n in range(100):
+        pub.publish(n)
+    while other.listen(timeout_s=30.0)[1] != 99:
+        pass
+    last: object = None
+    while last != 99:
+        ok, last = sub.listen(timeout_s=30.0)
+        assert ok
+    assert sub.listen() == (False, {})
+
+
+def test_a_header_numbers_messages_and_has_the_time(make: Make) -> None:
+    sub = make("b").new_sub("stamped", "geometry_msgs/TwistStamped")
+    pub = make("a").new_pub("stamped", "geometry_msgs/TwistStamped")
+    before = time.time_ns()
+    for n in range(3):
+        pub.publish({"twist": {"linear": {"x": n}}})
+    messages = [sub.receive(30.0) for _ in range(3)]
+    assert all(message is not None for message in messages)
+    seqs = [message.seq for message in messages if message is not None]
+    assert seqs == [1, 2, 3]
+    assert (sub.lost, messages[0].stamp_ns >= before) == (0, True)  # type: ignore[union-attr,operator]
+    pub._transport.process._seqs["/stamped"] += 4  # as if four had not come
+    pub.publish({})
+    assert sub.receive(30.0) is not None
+    assert sub.lost == 4
+
+
+def test_the_graph_has_this_program_s_nodes_with_counts(make: Make) -> None:
+    node, other = make("a"), make("b")
+    pub = node.new_pub("topic", "geometry_msgs/Twist", latched=True)
+    sub = other.new_sub("topic", "geometry_msgs/Twist")
+    pub.publish({})
+    assert sub.receive(30.0) is not None
+    view = node.graph()
+    assert {each.name for each in view.nodes.values()} >= {"a", "b"}
+    topic = view.topics["/topic"]
+    assert (topic.msg_type, topic.codec, topic.rate_hz) == ("geometry_msgs/Twist", "ros", None)
+    assert [(each.id, each.node_id, each.count) for each in topic.publishers] == [(pub.id, node.id, 1)]
+    assert [(each.id, each.node_id, each.received) for each in topic.subscribers] == [(sub.id, other.id, 1)]
+    other.close()
+    assert "b" not in {each.name for each in node.graph().nodes.values()}
+    assert node.graph().topics["/topic"].subscribers == ()
+
+
+def test_two_types_of_one_program_on_a_topic_are_refused_until_the_first_is_gone(make: Make) -> None:
+    first = make("a").new_pub("topic", "json")
+    with pytest.raises(nep.NepError, match=r"this program publishes 'std_msgs/String' on '/topic'"):
+        make("b").new_pub("topic", "bytes")
+    first.close()
+    make("c").new_pub("topic", "bytes").close()
+
+
+def test_a_subscriber_of_another_type_says_so(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+    sub, node = make("b").new_sub("topic", "bytes"), make("a")
+    pub = node.new_pub("topic", "json")
+    pub.publish(1)
+    assert sub.listen(timeout_s=0.05) == (False, b"")
+    while not sub.refused:
+        assert sub.listen(timeout_s=0.05) == (False, b"")
+    assert "it carries 'std_msgs/String', which a subscriber of 'bytes' does not read" in caplog.text
+    assert any("std_msgs/String" in alert.sentence for alert in node.graph().alerts)
+
+
+def test_what_rospy_has_queued_is_sent_before_a_publisher_closes(make: Make) -> None:
+    sub, pub = make("b").new_sub("big", "bytes"), make("a").new_pub("big", "bytes")
+    for n in range(20):
+        pub.publish(bytes([n]) * 8_000_000)
+    pub.close(30.0)
+    for n in range(20):
+        ok, data = sub.listen(timeout_s=30.0)
+        assert ok, n
+        assert data == bytes([n]) * 8_000_000
+
+
+def test_closing_ends_waits_and_is_said(make: Make) -> None:
+    node = make("a")
+    sub, pub = node.new_sub("topic"), node.new_pub("topic")
+    ended: list[str] = []
+
+    def wait() -> None:
+        try:
+            sub.receive()
+        except nep.ClosedError:
+            ended.append("raised")
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    node.close()
+    thread.join(30.0)
+    assert ended == ["raised"]
+    with pytest.raises(nep.ClosedError):
+        pub.publish(1)
+    with pytest.raises(nep.ClosedError):
+        node.new_sub("topic")
+
+
+def test_another_master_is_refused_in_a_sentence(make: Make, tmp_path: Path) -> None:
+    make("a").new_pub("topic")
+    with (
+        ros_master(tmp_path) as other,
+        nep.node("n", "ros", master=other) as node,
+        pytest.raises(nep.NepError, match="ROS allows one for a program"),
+    ):
+        node.new_pub("topic")
+
+
+@pytest.mark.parametrize("topic", ["ü", "/a//b", "a/", "1a", "a-b", "a\u0301"])
+def test_topics_that_ros_does_not_have(make: Make, topic: str) -> None:
+    with pytest.raises(nep.BadTopicError, match="in ROS a topic begins with"):
+        make("a").new_sub(topic)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks")
+def test_a_forked_child_says_that_it_cannot_and_leaves_the_parent_alone(make: Make) -> None:
+    sub, pub = make("b").new_sub("topic"), make("a").new_pub("topic")
+    ros = pub._transport.process.master.address
+    read, write = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            nep.node("c", "ros", master=ros).new_pub("topic")
+        except nep.NepError as error:
+            os.write(write, str(error).encode())
+        os._exit(0)
+    os.close(write)
+    with os.fdopen(read) as said:
+        assert "'ros' does not work in a program that was forked" in said.read()
+    os.waitpid(child, 0)
+    pub.publish(1)
+    assert sub.listen(timeout_s=30.0) == (True, 1)

@@ -1,0 +1,66 @@
+"""Debian's ROS for tests: a master in a process of its own, and whether there is one at all."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import shutil
+import socket
+import subprocess
+import xmlrpc.client
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from nep.backends.ros.library import PLACES
+from tests.nep.programs import eventually
+
+NEEDED = ("rospy", "rosmaster", "std_msgs", "sensor_msgs", "geometry_msgs")
+NO_ROS = (
+    "ROS 1 is missing (Debian: python3-rospy python3-rosmaster python3-sensor-msgs python3-geometry-msgs)"
+)
+HAS_ROS = shutil.which("rosmaster") is not None and any(
+    all((Path(place) / each).is_dir() for each in NEEDED) for place in PLACES
+)
+FIND_ROS = "from nep.backends.ros.library import library; library()\nimport rospy\n"
+"""With what a program begins that is one of ROS and none of nep."""
+
+
+def skip_without_ros() -> None:
+    """All skips come from this line, so that pytest tells of them in one."""
+    if not HAS_ROS:
+        pytest.skip(NO_ROS)
+
+
+def free_port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+def answers(uri: str) -> bool:
+    try:
+        with xmlrpc.client.ServerProxy(uri) as proxy:
+            return proxy.getPid("/test")[0] == 1  # type: ignore[index]
+    except (OSError, http.client.HTTPException):
+        return False
+
+
+@contextmanager
+def ros_master(folder: Path) -> Iterator[str]:
+    """The address of a running ROS master."""
+    address = f"127.0.0.1:{free_port()}"
+    environment = {
+        **os.environ, "ROS_MASTER_URI": f"http://{address}", "ROS_IP": "127.0.0.1", "ROS_LOG_DIR": str(folder)
+    }  # fmt: skip
+    told = ["rosmaster", "--core", "-p", address.rpartition(":")[2]]
+    with subprocess.Popen(
+        told, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        try:
+            eventually(lambda: answers(f"http://{address}"))
+            yield address
+        finally:
+            process.kill()

@@ -1,0 +1,322 @@
+"""The back end `ros` with real programs of ROS; the contract runs in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep.backends.ros.library import RosFinder, load_rospy
+from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros
+from tests.nep.programs import ROOT, running
+
+
+@pytest.fixture
+def debian() -> None:
+    """There is ROS."""
+    skip_without_ros()
+
+
+@pytest.fixture
+def ros(debian: None, tmp_path: Path) -> Iterator[str]:
+    with ros_master(tmp_path) as address:
+        yield address
+
+
+def told(address: str) -> dict[str, str]:
+    """The environment of a program of ROS."""
+    return {
+        "ROS_MASTER_URI": f"http://{address}",
+        "ROS_IP": "127.0.0.1",
+        "ROS_LOG_DIR": tempfile.gettempdir(),
+    }
+
+
+def test_the_contract_holds(debian: None) -> None:
+    command = [sys.executable, "-m", "pytest", "-q", "-n0", "tests/nep/backends/ros_contract.py"]
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "ROS_"))}
+    ended = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=140
+    )
+    assert ended.returncode == 0, ended.stdout[-8000:] + ended.stderr[-2000:]
+    assert " passed" in ended.stdout
+    assert "skipped" not in ended.stdout
+
+
+NEP_HEARS = """
+import sys, nep
+with nep.node("hearer", "ROS") as node:
+    subs = [node.new_sub(topic, kind) for topic, kind in (each.split(":") for each in sys.argv[1:])]
+    print("ready")
+    for sub in subs:
+        message = sub.receive(60.0)
+        print(repr((message.codec, message.msg_type, message.is_latched, message.payload)))
+"""
+ROS_SPEAKS = (
+    FIND_ROS
+    + """
+import sys
+from std_msgs.msg import String, UInt8MultiArray
+from geometry_msgs.msg import PoseStamped
+rospy.init_node("speaker", disable_signals=True)
+pubs = [rospy.Publisher(topic, kind, queue_size=10, latch=True) for topic, kind in (
+    ("/text", String), ("/json", String), ("/bytes", UInt8MultiArray), ("/pose", PoseStamped))]
+pose = PoseStamped()
+pose.header.frame_id, pose.header.stamp, pose.pose.position.x = "map", rospy.Time(5, 7), 1.5
+said = String("grüß"), String('{"a": [1, null]}'), UInt8MultiArray(data=b"\\0\\xff"), pose
+for pub, message in zip(pubs, said):
+    pub.publish(message)
+print("ready")
+sys.stdin.readline()
+"""
+)
+
+
+def test_nep_hears_a_program_of_ros(ros: str) -> None:
+    words = ["/text:string", "json:json", "/bytes:bytes", "/pose:geometry_msgs/PoseStamped", "/pose:json"]
+    with running(ROS_SPEAKS, **told(ros)) as speaker:
+        assert speaker.line() == "ready"
+        with running(NEP_HEARS, *words, **told(ros)) as hearer:
+            assert hearer.line() == "ready"
+            assert eval(hearer.line()) == ("string", "string", True, "grüß")
+            assert eval(hearer.line()) == ("json", "json", True, {"a": [1, None]})
+            assert eval(hearer.line()) == ("bytes", "bytes", True, b"\0\xff")
+            for _both in range(2):
+                codec, kind, _latched, pose = eval(hearer.line())
+                assert (codec, kind) == ("ros", "geometry_msgs/PoseStamped")
+                assert pose["header"] == {"seq": 1, "stamp": {"secs": 5, "nsecs": 7}, "frame_id": "map"}
+                assert pose["pose"]["position"] == {"x": 1.5, "y": 0.0, "z": 0.0}
+            hearer.end()
+
+
+ROS_HEARS = (
+    FIND_ROS
+    + """
+import queue
+from std_msgs.msg import String, UInt8MultiArray
+from geometry_msgs.msg import TwistStamped
+came = queue.Queue()
+rospy.init_node("hearer", disable_signals=True)
+subs = [rospy.Subscriber(topic, kind, came.put) for topic, kind in (
+    ("/json", String), ("/bytes", UInt8MultiArray), ("/twist", TwistStamped))]
+print("ready")
+print(came.get().data)
+print(bytes(came.get().data))
+twist = came.get()
+print(twist.header.seq, twist.header.frame_id, twist.header.stamp.secs > 10**9, twist.twist.angular.z)
+"""
+)
+NEP_SPEAKS = """
+import nep
+with nep.node("speaker", "ros1") as node:
+    kinds = {"json": "json", "/bytes": "bytes", "/twist": "geometry_msgs/TwistStamped"}
+    pubs = [node.new_pub(topic, kind) for topic, kind in kinds.items()]
+    print([pub.subscribers for pub in pubs])
+    twist = {"header": {"frame_id": "base"}, "twist": {"angular": {"z": 2}}}
+    for pub, payload in zip(pubs, ({"a": 1}, b"xyz", twist)):
+        pub.publish(payload)
+        input()
+"""
+
+
+def test_a_program_of_ros_that_was_there_hears_the_first_message(ros: str) -> None:
+    with running(ROS_HEARS, **told(ros)) as hearer:
+        assert hearer.line() == "ready"
+        with running(NEP_SPEAKS, **told(ros)) as speaker:
+            assert speaker.line() == "[1, 1, 1]"
+            for expected in ('{"a":1}', "b'xyz'", "1 base True 2.0"):
+                assert hearer.line() == expected
+                speaker.say("")
+            speaker.end()
+
+
+LISTING_4 = """
+import nep, sys
+def callback(message):
+    print(message)
+    if message["n"] == 2: node.stop_spin()
+node = nep.node("callback_node", "ROS")
+node.new_callback("example", "json", callback)
+print("ready")
+node.spin()
+print(sorted(each.name for each in node.graph().nodes.values())[:1])
+"""
+LISTING_2 = """
+import nep
+node = nep.node("publisher_node", "ROS")
+pub = node.new_pub("example", "json")
+for n in range(3):
+    pub.publish({"n": n})
+"""
+
+
+def test_the_paper_s_listing_4_between_two_programs_that_end_by_themselves(ros: str) -> None:
+    with running(LISTING_4, **told(ros)) as hearer:
+        assert hearer.line() == "ready"
+        with running(LISTING_2, **told(ros)) as speaker:
+            assert [hearer.line() for _ in range(3)] == ["{'n': 0}", "{'n': 1}", "{'n': 2}"]
+            speaker.end()
+            assert speaker.process.returncode == 0
+        assert hearer.line() == "['callback_node']"
+        hearer.end()
+        assert hearer.process.returncode == 0
+
+
+PICTURES = (
+    FIND_ROS
+    + """
+import nep, numpy as np, sys
+from sensor_msgs.msg import Image
+from rospy.msg import AnyMsg
+node = nep.node("camera", "ros")
+sub, exact = node.new_sub("/camera", "image"), node.new_sub("/camera", "sensor_msgs/Image")
+pub = rospy.Publisher("/camera", Image, queue_size=10)
+while pub.get_num_connections() < 1:
+    rospy.sleep(0.01)
+def send(encoding, height, width, step, data, big=0):
+    pub.publish(Image(encoding=encoding, height=height, width=width, step=step, data=data, is_bigendian=big))
+    for each in (sub, exact):
+        picture = each.listen(timeout_s=30.0)[1]
+        print(picture.dtype, picture.shape, picture.ravel().tolist())
+send("rgb8", 1, 2, 8, bytes([1, 2, 3, 4, 5, 6, 9, 9]))
+send("bgr8", 1, 2, 6, bytes([1, 2, 3, 4, 5, 6]))
+send("mono8", 2, 1, 1, b"ab")
+send("16UC1", 1, 2, 4, b"\\1\\0\\2\\0")
+send("16UC1", 1, 2, 4, b"\\0\\1\\0\\2", 1)
+pub.publish(Image(encoding="bayer_rggb8", height=1, width=1, step=1, data=b"x"))
+pub.publish(Image(encoding="rgb8", height=100, width=2, step=6, data=b"x"))
+send("32FC1", 1, 1, 4, np.float32(1.5).tobytes())
+print(sub.refused)
+node.close()
+"""
+)
+
+
+def test_raw_pictures_of_ros_are_read_in_every_layout(ros: str) -> None:
+    pytest.importorskip("cv2")
+    with running(PICTURES, **told(ros)) as program:
+        for expected in (
+            "uint8 (1, 2, 3) [3, 2, 1, 6, 5, 4]",
+            "uint8 (1, 2, 3) [1, 2, 3, 4, 5, 6]",
+            "uint8 (2, 1) [97, 98]",
+            "uint16 (1, 2) [1, 2]",
+            "uint16 (1, 2) [1, 2]",
+            "float32 (1, 1) [1.5]",
+        ):
+            assert [program.line(), program.line()] == [expected, expected]
+        assert program.line() == "2"
+        program.end()
+
+
+FRAMES = (
+    FIND_ROS
+    + """
+import nep, numpy as np, queue
+from sensor_msgs.msg import CompressedImage, Image
+came = queue.Queue()
+node = nep.node("camera", "ros")
+pubs = [node.new_pub("/jpeg", "image"), node.new_pub("/raw", "sensor_msgs/Image")]
+subs = [rospy.Subscriber("/jpeg", CompressedImage, came.put), rospy.Subscriber("/raw", Image, came.put)]
+while not all(pub.subscribers for pub in pubs):
+    rospy.sleep(0.01)
+frame = np.full((4, 6, 3), 200, np.uint8)
+pubs[0].publish(frame)
+made = came.get()
+print(made.format, made.data[:2] == b"\\xff\\xd8", made.header.stamp.secs > 10**9)
+pubs[1].publish(frame)
+made = came.get()
+print(made.encoding, made.height, made.width, made.step, bytes(made.data) == frame.tobytes())
+pubs[0].publish(np.zeros((2, 2), np.float32))
+print(pubs[0].count, pubs[0].refused)
+node.close()
+"""
+)
+
+
+def test_programs_of_ros_get_pictures(ros: str) -> None:
+    pytest.importorskip("cv2")
+    with running(FRAMES, **told(ros)) as program:
+        assert program.line() == "jpeg True True"
+        assert program.line() == "bgr8 4 6 18 True"
+        assert program.line() == "1 1"
+        program.end()
+
+
+LISTENS = """
+import nep, os, psutil
+node = nep.node("n", "ros", master=os.environ["ADDRESS"])
+node.new_pub("topic")
+print(sorted({each.laddr.ip for each in psutil.Process().net_connections("inet") if each.status == "LISTEN"}))
+import logging
+print(logging.getLoggerClass().__name__, logging.getLogger().handlers, logging.getLogger().level)
+"""
+
+
+def test_without_a_word_of_the_user_it_listens_on_loopback_and_leaves_the_log_alone(ros: str) -> None:
+    with running(LISTENS, ADDRESS=ros) as program:
+        assert program.line() == "['127.0.0.1']"
+        assert program.line() == "Logger [] 30"
+        program.end()
+        assert program.process.returncode == 0
+
+
+def test_without_a_master_a_sentence_says_what_to_start(debian: None) -> None:
+    address = f"127.0.0.1:{free_port()}"
+    with (
+        nep.node("n", "ros", master=f"http://{address}/", wait_s=0.2) as node,
+        pytest.raises(nep.MasterUnreachable, match=f"no ROS master answers at '{address}'.*'roscore'"),
+    ):
+        node.new_pub("topic")
+    with (
+        nep.node("n", "ros", master=address) as node,
+        pytest.raises(nep.MasterUnreachable, match="'rosmaster --core'"),
+    ):
+        node.graph(0.2)
+
+
+def test_what_cannot_be(ros: str) -> None:
+    with nep.node("n", "ros", master=ros) as node:
+        with pytest.raises(nep.NepError, match="no direct connections"):
+            node.new_pub("topic", "json", node.direct())
+        with pytest.raises(nep.NepError, match="there is no ROS message 'nav_nothing/Odometry' here"):
+            node.new_pub("topic", "nav_nothing/Odometry")
+        with pytest.raises(nep.NepError, match="sudo apt install python3-geometry-msgs"):
+            node.new_pub("topic", "geometry_msgs/Twisst")
+
+
+def test_without_rospy_one_sentence_says_what_to_install() -> None:
+    def missing(_name: str) -> object:
+        raise ImportError
+
+    with pytest.raises(
+        nep.NepError, match="'ros' is not installed; install it with 'sudo apt install python3-rospy"
+    ):
+        load_rospy(missing)  # type: ignore[arg-type]
+
+
+def test_who_does_not_ask_for_it_does_not_import_it() -> None:
+    code = (
+        "import sys, nep; nep.node('a').close(); names = 'rospy', 'xmlrpc', 'nep.backends.ros.transport'; "
+        "sys.exit(any(each in sys.modules for each in names))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_only_what_belongs_to_ros_is_found_beside_the_environment(tmp_path: Path) -> None:
+    for name in ("rospy", "numpy_of_debian", "my_msgs", "turtle"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").touch()
+    finder = RosFinder([str(tmp_path)])
+    found = [
+        name for name in ("rospy", "numpy_of_debian", "my_msgs", "turtle") if finder.find_spec(name, None)
+    ]
+    assert found == ["rospy", "my_msgs"]
+    finder.extra.add("turtle")
+    assert finder.find_spec("turtle", None) is not None
+    assert finder.find_spec("rospy", [str(tmp_path)]) is None
