@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
 
+import nep.system.exits  # noqa: F401 - so must this one's
 from nep.backends.base import (
     PublisherSpec,
     Sink,

@@ -6,6 +6,7 @@ publishers and subscribers; after its end rospy could not be started again.
 
 from __future__ import annotations
 
+import atexit
 import os
 import re
 import threading
@@ -17,18 +18,20 @@ from typing import Any
 from nep.backends.ros.address import address_of, is_own_computer
 from nep.backends.ros.definition import Definition
 from nep.backends.ros.library import library
-from nep.backends.ros.master import RosMaster, buses_of
+from nep.backends.ros.master import RosMaster, RosMasterUnreachable, buses_of
 from nep.errors import BadTopicError, NepError
 from nep.i18n import _
+from nep.system.exits import after_nodes
 from nep.system.forks import give_up, in_child
 
-__all__ = ["RosProcess", "process_with", "ros_topic"]
+__all__ = ["RosProcess", "process_with", "ros_topic", "within"]
 
 _NAME = re.compile(r"\W+", re.ASCII)
 _TOPIC = re.compile(r"[~/A-Za-z][\w/]*", re.ASCII)
 _POLL_S = 0.01
 _ASK_S = 0.5
-_UNREGISTER_S = 2.0
+_LEAST_S = 0.2
+"""A master that is well answers within this time, however little is left."""
 
 
 def ros_topic(topic: str) -> str:
@@ -51,6 +54,7 @@ class RosProcess:
         self.changed = threading.Condition()
         """Notified when somebody connects to a publisher."""
         self._lock = threading.RLock()
+        self._seq_lock = threading.Lock()
         self._types: dict[str, tuple[str, int]] = {}
         self._classes: dict[str, type] = {}
         self._seqs: Counter[str] = Counter()
@@ -81,10 +85,11 @@ class RosProcess:
             self._types[topic] = definition.name, users + 1
         return made
 
-    def withdraw(self, topic: str, publisher: Any) -> None:  # noqa: ANN401 - rospy has no types
+    def withdraw(self, topic: str, publisher: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy has no types
         """Unregister it."""
+        if not within(publisher.unregister, timeout_s):
+            return  # rospy still has the topic
         with self._lock:
-            within(publisher.unregister, _UNREGISTER_S)
             known, users = self._types[topic]
             self._types[topic] = known, users - 1
             if users == 1:
@@ -100,14 +105,10 @@ class RosProcess:
                 return left
             pause.wait(_POLL_S)
 
-    def unregister(self, subscriber: Any) -> None:  # noqa: ANN401 - rospy has no types
-        """Unregister a subscriber of rospy's."""
-        within(subscriber.unregister, _UNREGISTER_S)
-
     def send(self, publisher: Any, definition: Definition, topic: str, body: bytes) -> None:  # noqa: ANN401
         """Publish a body; in a header it gets the next number of its topic, as rospy gives it."""
-        with self._lock:
-            message = self._class_of(definition)()
+        message = self._class_of(definition)()
+        with self._seq_lock:
             if definition.has_header:
                 self._seqs[topic] += 1
                 body = (self._seqs[topic] & 0xFFFFFFFF).to_bytes(4, "little") + body[4:]
@@ -179,11 +180,12 @@ class RosProcess:
         return own is None or self.name in {each.endpoint_id for each in own.connections}
 
 
-def within(call: Callable[[], object], timeout_s: float) -> None:
-    """Call it in a thread, and wait so long: rospy asks a master without a limit."""
+def within(call: Callable[[], object], timeout_s: float) -> bool:
+    """Call it in a thread, and wait so long, whether it ended: rospy asks a master without a limit."""
     thread = threading.Thread(target=call, name="nep-ros-unregister", daemon=True)
     thread.start()
-    thread.join(timeout_s)
+    thread.join(max(_LEAST_S, timeout_s))
+    return not thread.is_alive()
 
 
 def _has_unsent(connection: Any) -> bool:  # noqa: ANN401 - rospy has no types
@@ -242,7 +244,9 @@ def _is_same(one: str, other: str) -> bool:
 
 def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401 - rospy has no types
     if rospy.core.is_initialized():  # the program has started it itself
-        return RosProcess(rospy, address_of(rospy.core.rosgraph.get_master_uri()))
+        found = RosProcess(rospy, address_of(rospy.core.rosgraph.get_master_uri()))
+        _end_after_nodes(found)
+        return found
     os.environ["ROS_MASTER_URI"] = f"http://{address}"
     if is_own_computer(address) and not os.environ.keys() & {"ROS_IP", "ROS_HOSTNAME"}:
         os.environ["ROS_IP"] = "127.0.0.1"
@@ -255,10 +259,28 @@ def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401
     finally:
         rospy.core.configure_logging = configure
     made = RosProcess(rospy, address)
+    _end_after_nodes(made)
     for uri in (made.uri, f"http://{address_of(made.uri).rpartition(':')[0]}:{_tcp_port(rospy)}"):
         port = uri.rstrip("/").rpartition(":")[2]
         give_up(f"tcp://127.0.0.1:{port}", f"tcp://0.0.0.0:{port}")
     return made
+
+
+def _end_after_nodes(process: RosProcess) -> None:
+    """By itself rospy would end before nodes have delivered, and would wait for a hung master."""
+    at_exit = getattr(process.rospy.core, "_ros_atexit", None)
+    if at_exit is not None:
+        atexit.unregister(at_exit)
+
+    def end() -> None:
+        try:
+            process.master.wait(_ASK_S)
+        except RosMasterUnreachable:
+            return
+        process.rospy.signal_shutdown("the program ends")
+
+    pid = os.getpid()
+    after_nodes(lambda: end() if os.getpid() == pid else None)
 
 
 def _tcp_port(rospy: Any) -> int:  # noqa: ANN401 - rospy has no types

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from nep.backends.base import SubscriberSpec
 from nep.backends.ros.carried import STAMP, Unpacker, installed, is_ros_type, unpacker
-from nep.backends.ros.process import RosProcess
+from nep.backends.ros.process import RosProcess, within
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import DecodeError, NepError, WireError
 from nep.i18n import _
@@ -194,7 +194,7 @@ class RosSubscriber:
         """In a child. See `SubscriberTransport.forked`."""
         self.is_closed = True
 
-    def close(self) -> None:
+    def close(self, timeout_s: float = 2.0) -> None:
         """Unregister and forget what was not read."""
         with self._owner.changed:
             if self.is_closed:
@@ -203,5 +203,5 @@ class RosSubscriber:
             self.process.subscribed[self.topic] -= 1
         self._owner.forget(self)
         if self._subscriber is not None:
-            self.process.unregister(self._subscriber)
+            within(self._subscriber.unregister, timeout_s)
         self._owner.wake()

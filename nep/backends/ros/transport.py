@@ -129,7 +129,7 @@ class RosPublisher:
         left = self.process.unsent(self._publisher, deadline)
         if left:
             _logger.warning("'%s' is closed before %d subscriber(s) took everything", self.spec.topic, left)
-        self.process.withdraw(self.topic, self._publisher)
+        self.process.withdraw(self.topic, self._publisher, deadline - time.monotonic())
 
 
 class RosTransport:
@@ -245,7 +245,7 @@ class RosTransport:
             self._is_closed = True
         self._closing.set()
         for subscriber in self._subscribers:
-            subscriber.close()
+            subscriber.close(deadline - time.monotonic())
         for publisher in self._publishers:
             publisher.close(max(0.0, deadline - time.monotonic()))
         _transports.discard(self)

@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 
 import nep
@@ -320,3 +321,54 @@ def test_only_what_belongs_to_ros_is_found_beside_the_environment(tmp_path: Path
     finder.extra.add("turtle")
     assert finder.find_spec("turtle", None) is not None
     assert finder.find_spec("rospy", [str(tmp_path)]) is None
+
+
+MUCH = """
+import nep
+pub = nep.node("speaker", "ros").new_pub("much", "bytes")
+print(pub.subscribers)
+for n in range(20):
+    pub.publish(bytes([n]) * 8_000_000)
+"""
+HEARS_MUCH = """
+import nep
+with nep.node("hearer", "ros") as node:
+    sub = node.new_sub("much", "bytes")
+    print("ready")
+    print([sub.listen(timeout_s=30.0)[1][:1].hex() for _ in range(20)])
+"""
+
+
+def test_what_was_published_is_delivered_when_the_program_just_ends(ros: str) -> None:
+    with running(HEARS_MUCH, **told(ros)) as hearer:
+        assert hearer.line() == "ready"
+        with running(MUCH, **told(ros)) as speaker:
+            assert speaker.line() == "1"
+            assert hearer.line() == str([f"{n:02x}" for n in range(20)])
+            speaker.end()
+            assert speaker.process.returncode == 0
+
+
+HUNG = """
+import nep, sys, time
+node = nep.node("n", "ros")
+things = [node.new_pub("a"), node.new_sub("a"), node.new_sub("b")]
+print("ready")
+sys.stdin.readline()
+started = time.monotonic()
+node.close()
+print(time.monotonic() - started < 20)
+"""
+
+
+def test_a_master_that_hangs_keeps_no_program_from_ending(debian: None, tmp_path: Path) -> None:
+    with ros_master(tmp_path) as address, running(HUNG, **told(address)) as program:
+        assert program.line() == "ready"
+        (master,) = [
+            each for each in psutil.Process().children() if address.rpartition(":")[2] in each.cmdline()
+        ]
+        master.suspend()
+        program.say("")
+        assert program.line() == "True"
+        program.end()
+        assert program.process.returncode == 0
