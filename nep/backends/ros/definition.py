@@ -301,7 +301,8 @@ def _secs_of(value: object, path: str, name: str) -> tuple[int, int]:
 
 
 def _write_bool(value: object, path: str, out: bytearray) -> None:
-    number = int(value) if isinstance(value, bool) else _whole(value)
+    is_bool = isinstance(value, bool) or type(value).__name__ in {"bool", "bool_"}  # numpy's, too
+    number = int(bool(value)) if is_bool else _whole(value)
     if number not in {0, 1}:
         raise _wrong(path, value, "bool")
     out.append(number)

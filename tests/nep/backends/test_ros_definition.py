@@ -1,0 +1,232 @@
+"""Bytes of ROS messages, without ROS; and the same bytes as genpy makes, where it is installed."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import nep
+from nep.backends.ros.carried import codec_of, is_ros_type, ros_type_of, to_ros, unpacker
+from nep.backends.ros.definition import parse
+from nep.errors import WireError
+from nep.messages.encoded import Encoded
+from tests.nep.backends.ros_programs import skip_without_ros
+
+EVERYTHING = """
+# a comment = no constant
+uint8 RED=1
+string NAME=a # b
+float32 PI = 3.14
+bool flag
+int8 i8
+uint16 u16   # with a comment
+int64 i64
+uint64 u64
+float32 f32
+string text
+time at
+duration span
+uint8[] data
+char[3] letters
+int16[] numbers
+bool[] flags
+string[2] words
+Point[] points
+other/Thing thing
+================================================================================
+MSG: own/Point
+float64 x
+float64 y
+================================================================================
+MSG: other/Thing
+byte b
+Header header
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+"""
+ALL = parse("own/All", EVERYTHING)
+PAYLOAD: dict[str, object] = {
+    "flag": True, "i8": -128, "u16": 65535, "i64": -(2**63), "u64": 2**64 - 1, "f32": 0.5, "text": "grüß",
+    "at": {"secs": 2**32 - 1, "nsecs": 1}, "span": {"secs": -1, "nsecs": 5}, "data": b"\0\xff",
+    "letters": b"abc", "numbers": [-1, 32767], "flags": [True, False], "words": ["", "é"],
+    "points": [{"x": 1.0, "y": -2.0}],
+    "thing": {"b": -1, "header": {"seq": 3, "stamp": {"secs": 1, "nsecs": 2}, "frame_id": "map"}},
+}  # fmt: skip
+
+
+def test_a_map_becomes_bytes_and_the_same_map() -> None:
+    assert ALL.decode(ALL.encode(PAYLOAD)) == PAYLOAD
+    assert not ALL.has_header
+
+
+def test_what_is_left_out_is_zero_or_empty() -> None:
+    made = ALL.decode(ALL.encode({}))
+    assert made["letters"] == b"\0\0\0"
+    assert (made["words"], made["points"], made["text"], made["at"]) == (
+        ["", ""], [], "", {"secs": 0, "nsecs": 0}
+    )  # fmt: skip
+    assert made["thing"]["header"]["frame_id"] == ""  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("payload", "sentence"),
+    [
+        ({"i8": 128}, "field 'i8' is 128; 'int8' goes from -128 to 127"),
+        ({"u64": -1}, "field 'u64' is -1; 'uint64' goes from 0 to 18446744073709551615"),
+        ({"u64": 2**64}, "field 'u64' is 18446744073709551616; 'uint64' goes"),
+        ({"i8": True}, "field 'i8' is True; give a 'int8'"),
+        ({"i8": 1.0}, "field 'i8' is 1.0; give a 'int8'"),
+        ({"flag": 2}, "field 'flag' is 2; give a 'bool'"),
+        ({"f32": "1"}, "field 'f32' is '1'; give a 'float32'"),
+        ({"f32": 1e300}, "field 'f32' is 1e+300, which is no 'float32'"),
+        ({"text": 5}, "field 'text' is 5; give a 'string'"),
+        ({"text": "\ud800"}, "field 'text' holds half of a surrogate pair"),
+        ({"text": None}, "field 'text' is None; give a 'string'"),
+        ({"at": {"secs": -1}}, "field 'at' is a 'dict', which is no 'time'"),
+        ({"at": -0.5}, "field 'at' is -0.5, which is no 'time'"),
+        ({"at": math.nan}, "field 'at' is nan; give a 'time'"),
+        ({"at": {"sec": 1}}, "field 'at.sec' does not exist; did you mean 'secs'?"),
+        ({"letters": b"ab"}, "field 'letters' has 2 elements; give 3"),
+        ({"words": ["a"] * 3}, "field 'words' has 3 elements; give 2"),
+        ({"words": "ab"}, "field 'words' is 'ab'; give a 'string[2]'"),
+        ({"data": [256]}, "field 'data' holds what is no number from 0 to 255"),
+        ({"data": "ab"}, "field 'data' is 'ab'; give a 'uint8[]'"),
+        ({"numbers": [1, 40000]}, "field 'numbers[1]' is 40000; 'int16' goes from -32768 to 32767"),
+        ({"numbers": [1, True]}, "field 'numbers[1]' is True"),
+        ({"points": [{}, {"z": 1}]}, "field 'points[1].z' does not exist; known are 'x', 'y'"),
+        ({"points": [5]}, "field 'points[0]' is 5; give a 'own/Point'"),
+        ({"thing": {"header": {"frame": 1}}}, "field 'thing.header.frame' does not exist; did you mean"),
+        ({"txt": ""}, "field 'txt' does not exist; did you mean 'text'?"),
+        ({5: 1}, "field '5' does not exist"),
+        ([], "publish a 'dict' with its fields 'flag', 'i8'"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_named_by_its_path(payload: object, sentence: str) -> None:
+    with pytest.raises(nep.EncodeError) as raised:
+        ALL.encode(payload)
+    assert f"as 'own/All'; {sentence}" in str(raised.value)
+
+
+def test_numpy_and_seconds_are_taken() -> None:
+    made = ALL.decode(
+        ALL.encode({
+            "i8": np.int8(-3), "f32": np.float64(0.25), "flag": np.bool_(True), "at": 1.5, "span": -1.5,
+            "data": np.arange(3, dtype=np.uint8), "numbers": np.array([5, -6]), "letters": memoryview(b"xyz"),
+        })
+    )  # fmt: skip
+    assert (made["i8"], made["f32"], made["flag"]) == (-3, 0.25, True)
+    assert made["at"] == {"secs": 1, "nsecs": 500_000_000}
+    assert made["span"] == {"secs": -2, "nsecs": 500_000_000}
+    assert (made["data"], made["numbers"], made["letters"]) == (b"\0\1\2", [5, -6], b"xyz")
+
+
+def test_every_cut_is_told_and_nothing_else_is_raised() -> None:
+    whole = ALL.encode(PAYLOAD)
+    for size in range(len(whole)):
+        with pytest.raises(nep.DecodeError, match="cannot decode"):
+            ALL.decode(whole[:size])
+    with pytest.raises(nep.DecodeError, match="1 bytes are too many"):
+        ALL.decode(whole + b"x")
+
+
+@given(st.binary(max_size=300))
+@settings(max_examples=300, deadline=None)
+def test_any_bytes_become_a_map_or_a_decode_error(data: bytes) -> None:
+    with contextlib.suppress(nep.DecodeError):
+        ALL.decode(data)
+
+
+def test_lengths_that_nobody_can_have_take_no_memory() -> None:
+    empty = parse("a/A", "B[] all\n" + "=" * 80 + "\nMSG: a/B\n")
+    assert empty.decode(struct.pack("<I", 3)) == {"all": [{}, {}, {}]}
+    with pytest.raises(nep.DecodeError, match="more inside than can be there"):
+        empty.decode(b"\xff\xff\xff\xff")
+    numbers = parse("a/A", "float64[] all")
+    with pytest.raises(nep.DecodeError, match="'all' has 4294967295 elements"):
+        numbers.decode(b"\xff\xff\xff\xff" + bytes(100))
+    fixed = parse("a/A", "uint8[4000000000] all")
+    with pytest.raises(nep.DecodeError, match="'all' is cut off"):
+        fixed.decode(bytes(100))
+
+
+def test_messages_that_hold_each_other_a_million_times_end() -> None:
+    line = "=" * 80
+    levels = "".join(f"{line}\nMSG: a/L{n}\nL{n + 1} a\nL{n + 1} b\nL{n + 1} c\n" for n in range(25))
+    bomb = parse("a/L", f"L0 a\n{levels}{'=' * 80}\nMSG: a/L25\n")
+    with pytest.raises(nep.DecodeError, match="more inside than can be there"):
+        bomb.decode(b"")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["A again", "nothing/Known x", "float64", "float64 x y", "int8[x] y", "float64[1", "B b", "\0"],
+)  # fmt: skip
+def test_definitions_that_cannot_be(text: str) -> None:
+    with pytest.raises(nep.NepError, match="the definition of 'a/A' cannot be read; see"):
+        parse("a/A", text)
+
+
+@pytest.mark.parametrize(
+    ("msg_type", "ros_type"),
+    [
+        ("json", "std_msgs/String"), ("robot/description", "std_msgs/String"), ("string", "std_msgs/String"),
+        ("bytes", "std_msgs/UInt8MultiArray"), ("msgpack", "std_msgs/UInt8MultiArray"),
+        ("image", "sensor_msgs/CompressedImage"), ("geometry_msgs/Twist", "geometry_msgs/Twist"),
+    ],
+)  # fmt: skip
+def test_what_carries_what(msg_type: str, ros_type: str) -> None:
+    assert ros_type_of(msg_type) == ros_type
+    assert is_ros_type(msg_type) == (msg_type == ros_type)
+
+
+def test_bodies_that_are_no_such_message_are_refused() -> None:
+    read = unpacker("json", "std_msgs/String", "").unpack
+    assert read(memoryview(to_ros("std_msgs/String", "json", Encoded(b"{}"))))[0] == b"{}"
+    for wrong in (b"", b"\1\0\0", b"\5\0\0\0ab", b"\1\0\0\0ab"):
+        with pytest.raises((WireError, struct.error)):
+            read(memoryview(wrong))
+    read = unpacker("bytes", "std_msgs/UInt8MultiArray", "").unpack
+    for wrong in (b"\xff\xff\xff\xff", bytes(7), b"\1\0\0\0" + bytes(11)):
+        with pytest.raises((WireError, struct.error)):
+            read(memoryview(wrong))
+    labelled = b"\1\0\0\0" + b"\2\0\0\0ab" + bytes(8) + b"\1\0\0\0" + b"\3\0\0\0xyz"
+    assert bytes(read(memoryview(labelled))[0]) == b"yz", "the data begins where data_offset says"
+
+
+def test_an_extension_has_no_room() -> None:
+    with pytest.raises(WireError, match="a 'std_msgs/String' has no room for an extension"):
+        to_ros("std_msgs/String", "json", Encoded(b"{}", {"a": 1}))
+
+
+def test_the_bytes_are_those_of_genpy() -> None:
+    skip_without_ros()
+    from nep.backends.ros.library import library
+
+    library()
+    from geometry_msgs.msg import PoseWithCovarianceStamped
+    from sensor_msgs.msg import JointState
+
+    pose = PoseWithCovarianceStamped()
+    pose.header.frame_id = "map"
+    pose.pose.pose.orientation.w = 1.0
+    pose.pose.covariance = [float(n) for n in range(36)]
+    out = io.BytesIO()
+    pose.serialize(out)
+    codec = codec_of("geometry_msgs/PoseWithCovarianceStamped")
+    payload = codec.decode(out.getvalue(), {})
+    assert payload["pose"]["covariance"] == [float(n) for n in range(36)]  # type: ignore[index]
+    assert codec.encode(payload).data == out.getvalue()
+    state = {"name": ["a", "b"], "position": [1.0, 2.0], "header": {"stamp": 0}}
+    read = JointState()
+    read.deserialize(codec_of("sensor_msgs/JointState").encode(state).data)
+    assert (read.name, list(read.position), list(read.effort)) == (["a", "b"], [1.0, 2.0], [])
