@@ -41,8 +41,17 @@ _ARRAY = "std_msgs/UInt8MultiArray"
 _COMPRESSED = "sensor_msgs/CompressedImage"
 _RAW = "sensor_msgs/Image"
 _PICTURES = (_RAW, _COMPRESSED)
+_MD5SUMS = {
+    _STRING: "992ce8a1687cec8c8bd883ec73ca41d1",
+    _ARRAY: "82373f1612381bb6ee473b5cd6f5d89c",
+    _COMPRESSED: "8f7a12909da2c9d3332d540a0977563f",
+    _RAW: "060021388200f6f0f447d0fcd9c64743",
+}
+"""Of the definitions that are built in here."""
 _CARRIERS = {"string": _STRING, "json": _STRING, "bytes": _ARRAY, "msgpack": _ARRAY, "image": _COMPRESSED}
 _EMPTY_LAYOUT = bytes(8)
+_DEPTH_HEADER = 12
+"""Parameters of compressed_depth_image_transport, which 16-bit pictures do not need; a PNG follows."""
 _NUMBER = 6
 """No number of the native wire: such messages do not travel there."""
 _definitions: dict[str, Definition] = {}
@@ -201,12 +210,14 @@ class Unpacker:
     has_header: bool
 
 
-def unpacker(msg_type: str, ros_type: str, text: str) -> Unpacker:
+def unpacker(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpacker:
     """For a subscriber of `msg_type` who hears messages of `ros_type`, defined by `text`.
 
     Raises `NepError` when they do not go together.
     """
     wanted = codec_for(msg_type)
+    if md5sum not in {"*", _MD5SUMS.get(ros_type, md5sum)}:
+        raise _another(ros_type)
     if is_ros_type(msg_type) and msg_type != ros_type:
         raise _mismatch(msg_type, ros_type)
     if ros_type in _PICTURES and (msg_type in _PICTURES or wanted is IMAGE):
@@ -216,8 +227,24 @@ def unpacker(msg_type: str, ros_type: str, text: str) -> Unpacker:
         return Unpacker(wanted, msg_type, read, has_header=False)
     if not is_ros_type(msg_type) and wanted is not CODECS["json"]:
         raise _mismatch(msg_type, ros_type)
-    definition = parse(ros_type, text) if text else installed(ros_type)
+    definition = parse(ros_type, text) if text else _installed_like(ros_type, md5sum)
     return Unpacker(ros_codec(definition), ros_type, lambda body: (body, None), definition.has_header)
+
+
+def _installed_like(ros_type: str, md5sum: str) -> Definition:
+    """For a publisher who does not tell its definition."""
+    definition, found = installed(ros_type), message_text(ros_type)
+    if found is None or md5sum not in {"*", found[1]}:
+        raise _another(ros_type)
+    return definition
+
+
+def _another(ros_type: str) -> NepError:
+    return NepError(
+        _(
+            "its '{ros_type}' has other fields than the one known here; use the same version on both sides"
+        ).format(ros_type=ros_type)
+    )
 
 
 def _mismatch(msg_type: str, ros_type: str) -> NepError:
@@ -261,8 +288,10 @@ def _from_array(body: memoryview) -> Unpacked:
 
 def _from_compressed(body: memoryview) -> Unpacked:
     _frame, at = _sized(body, STAMP.size)
-    _format, at = _sized(body, at)
+    kind, at = _sized(body, at)
     data = _all(body, at)
+    if b"compressedDepth" in bytes(kind) and bytes(kind[:4]) == b"16UC":
+        data = data[_DEPTH_HEADER:]
     return data, picture_info(data)
 
 

@@ -14,7 +14,7 @@ from xml.parsers.expat import ExpatError
 from nep.errors import MasterUnreachable, NepError
 from nep.i18n import _
 
-__all__ = ["RosMaster", "RosMasterUnreachable", "RosNodes", "buses_of"]
+__all__ = ["Registered", "RosMaster", "RosMasterUnreachable", "RosNodes", "buses_of"]
 
 _CALLER = "/nep"
 _ASK_S = 1.0
@@ -55,12 +55,16 @@ class _Transport(xmlrpc.client.Transport):
         return connection
 
 
+class _RefusedError(ValueError):
+    """It answered, and said no."""
+
+
 def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noqa: ANN401 - any value
     """What a master's or a node's method gives. Raises `_FAILURES`."""
     with xmlrpc.client.ServerProxy(uri, transport=_Transport(max(0.01, timeout_s))) as proxy:
         code, status, value = getattr(proxy, method)(*args)
     if code != 1:
-        raise ValueError(status)
+        raise _RefusedError(status)
     return value
 
 
@@ -81,6 +85,15 @@ class RosNodes:
     subscribers: Mapping[str, Sequence[str]]
     types: Mapping[str, str]
     uris: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Registered:
+    """What a node has registered: topics with their types, services with their addresses."""
+
+    publications: Sequence[Sequence[str]]
+    subscriptions: Sequence[Sequence[str]]
+    services: Sequence[Sequence[str]]
 
 
 class RosMaster:
@@ -111,6 +124,30 @@ class RosMaster:
         state = self._ask("getSystemState", timeout_s)
         found = [next((tuple(names) for each, names in part if each == topic), ()) for part in state[:2]]
         return found[0], found[1]
+
+    def has_forgotten(self, name: str, timeout_s: float) -> bool:
+        """Whether it answers and knows no node of this name."""
+        try:
+            _call(self.uri, timeout_s, "lookupNode", _CALLER, name)
+        except _RefusedError:
+            return True
+        except _FAILURES:
+            pass
+        return False
+
+    def register(self, name: str, uri: str, node: Registered, timeout_s: float) -> bool:
+        """Register all of a node that it has forgotten; whether it took it."""
+        try:
+            for topic, kind in node.publications:
+                _call(self.uri, timeout_s, "registerPublisher", name, topic, kind, uri)
+            for service, address in node.services:
+                _call(self.uri, timeout_s, "registerService", name, service, address, uri)
+            for topic, kind in node.subscriptions:
+                found = _call(self.uri, timeout_s, "registerSubscriber", name, topic, kind, uri)
+                _call(uri, timeout_s, "publisherUpdate", "/master", topic, found)
+        except _FAILURES:
+            return False
+        return True
 
     def uri_of(self, name: str, timeout_s: float) -> str:
         """Where a node is; "" when nobody knows."""

@@ -7,6 +7,7 @@ publishers and subscribers; after its end rospy could not be started again.
 from __future__ import annotations
 
 import atexit
+import logging
 import os
 import re
 import threading
@@ -18,18 +19,23 @@ from typing import Any
 from nep.backends.ros.address import address_of, is_own_computer
 from nep.backends.ros.definition import Definition
 from nep.backends.ros.library import library
-from nep.backends.ros.master import RosMaster, RosMasterUnreachable, buses_of
-from nep.errors import BadTopicError, NepError
+from nep.backends.ros.master import Registered, RosMaster, RosMasterUnreachable, buses_of
+from nep.backends.ros.queue_room import QueueRoom
+from nep.errors import BadTopicError, ClosedError, NepError
 from nep.i18n import _
 from nep.system.exits import after_nodes
 from nep.system.forks import give_up, in_child
 
-__all__ = ["RosProcess", "process_with", "ros_topic", "within"]
+__all__ = ["RosProcess", "RosShutdownError", "process_with", "ros_topic", "within"]
+
+_logger = logging.getLogger("nep")
 
 _NAME = re.compile(r"\W+", re.ASCII)
 _TOPIC = re.compile(r"[~/A-Za-z][\w/]*", re.ASCII)
 _POLL_S = 0.01
 _ASK_S = 0.5
+_WATCH_S = 1.0
+"""So often it is seen whether the master was started anew."""
 _LEAST_S = 0.2
 """A master that is well answers within this time, however little is left."""
 
@@ -41,6 +47,18 @@ def ros_topic(topic: str) -> str:
             topic, _("in ROS a topic begins with a letter or '/', and has letters, digits, '_' and '/' only")
         )
     return topic
+
+
+class RosShutdownError(ClosedError):
+    """The ROS node of this program was shut down: by the program, by 'rosnode kill', by its name's next."""
+
+    def __init__(self) -> None:
+        self.what = "rospy"
+        self.is_forked = False
+        NepError.__init__(
+            self,
+            _("rospy was shut down in this program and cannot start in it again; start the program anew"),
+        )
 
 
 class RosProcess:
@@ -60,6 +78,45 @@ class RosProcess:
         self._seqs: Counter[str] = Counter()
         self.subscribed: Counter[str] = Counter()
         """How many subscribers of nep's there are here, by topic."""
+        self._ended = threading.Event()
+        rospy.on_shutdown(self._shut_down)
+        threading.Thread(target=self._watch, name="nep-ros-master", daemon=True).start()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether rospy was shut down: nothing comes or goes any more."""
+        return bool(self.rospy.core.is_shutdown_requested())
+
+    def end(self) -> None:
+        """Unregister all and shut rospy down. For the end of the program."""
+        self._ended.set()
+        try:
+            self.master.wait(_ASK_S)
+        except RosMasterUnreachable:
+            return
+        self.rospy.signal_shutdown("the program ends")
+
+    def _shut_down(self) -> None:
+        """Called by rospy, whoever asked for it."""
+        if not self._ended.is_set():
+            self._ended.set()
+            _logger.warning("%s", RosShutdownError())
+
+    def _watch(self) -> None:
+        """Until rospy ends, see whether the master was started anew; in a thread."""
+        while not self._ended.wait(_WATCH_S):
+            if self.master.has_forgotten(self.name, _ASK_S) and self._register_anew():
+                _logger.warning("the ROS master at '%s' was started anew", self.master.address)
+
+    def _register_anew(self) -> bool:
+        """Tell the master all that rospy told it, which rospy does not do again; whether it took it."""
+        registration = self.rospy.impl.registration
+        topics, services = registration.get_topic_manager(), registration.get_service_manager().get_services()
+        with topics.lock:  # what is unregistered meanwhile must not be registered after that
+            known = Registered(topics.get_publications(), topics.get_subscriptions(), services)
+            return bool(known.publications or known.subscriptions or services) and self.master.register(
+                self.name, self.uri, known, _ASK_S
+            )
 
     def resolved(self, topic: str) -> str:
         """The full name of a topic."""
@@ -87,13 +144,18 @@ class RosProcess:
 
     def withdraw(self, topic: str, publisher: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy has no types
         """Unregister it."""
-        if not within(publisher.unregister, timeout_s):
+        if self.is_over or not within(publisher.unregister, timeout_s):
             return  # rospy still has the topic
         with self._lock:
             known, users = self._types[topic]
             self._types[topic] = known, users - 1
             if users == 1:
                 del self._types[topic]
+
+    def unsubscribe(self, subscriber: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy has no types
+        """Unregister it."""
+        if not self.is_over:
+            within(subscriber.unregister, timeout_s)
 
     def unsent(self, publisher: Any, deadline: float) -> int:  # noqa: ANN401 - rospy has no types
         """Wait until rospy has sent what it queued; how many connections have some left at `deadline`."""
@@ -105,15 +167,21 @@ class RosProcess:
                 return left
             pause.wait(_POLL_S)
 
-    def send(self, publisher: Any, definition: Definition, topic: str, body: bytes) -> None:  # noqa: ANN401
-        """Publish a body; in a header it gets the next number of its topic, as rospy gives it."""
+    def send(self, publisher: Any, definition: Definition, topic: str, body: bytes, room: QueueRoom) -> int:  # noqa: ANN401
+        """Publish a body; how many older ones were dropped, for a subscriber that takes none.
+
+        In a header it gets the next number of its topic, as rospy gives it.
+        """
         message = self._class_of(definition)()
+        impl = publisher.impl
         with self._seq_lock:
+            dropped = room.make([] if impl is None else impl.connections, len(body))
             if definition.has_header:
                 self._seqs[topic] += 1
                 body = (self._seqs[topic] & 0xFFFFFFFF).to_bytes(4, "little") + body[4:]
             message.body = body
             publisher.publish(message)
+        return dropped
 
     def _class_of(self, definition: Definition) -> type:
         """A class of messages that rospy sends as they are."""
@@ -221,10 +289,8 @@ def process_with(address: str, name: str, wait_s: float | None) -> RosProcess:
     rospy = library()
     RosMaster(address).wait(wait_s)  # rospy itself would wait for ever, and could not be asked again
     with _lock:
-        if rospy.is_shutdown():
-            raise NepError(
-                _("rospy was shut down in this program and cannot start in it again; start the program anew")
-            )
+        if rospy.core.is_shutdown_requested():
+            raise RosShutdownError
         if _process is None:
             _process = _started(rospy, address, name)
         if not _is_same(_process.master.address, address):
@@ -272,15 +338,8 @@ def _end_after_nodes(process: RosProcess) -> None:
     if at_exit is not None:
         atexit.unregister(at_exit)
 
-    def end() -> None:
-        try:
-            process.master.wait(_ASK_S)
-        except RosMasterUnreachable:
-            return
-        process.rospy.signal_shutdown("the program ends")
-
     pid = os.getpid()
-    after_nodes(lambda: end() if os.getpid() == pid else None)
+    after_nodes(lambda: process.end() if os.getpid() == pid else None)
 
 
 def _tcp_port(rospy: Any) -> int:  # noqa: ANN401 - rospy has no types

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import struct
 import threading
@@ -12,7 +13,7 @@ from typing import Any, Protocol
 
 from nep.backends.base import SubscriberSpec
 from nep.backends.ros.carried import STAMP, Unpacker, installed, is_ros_type, unpacker
-from nep.backends.ros.process import RosProcess, within
+from nep.backends.ros.process import RosProcess, RosShutdownError
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import DecodeError, NepError, WireError
 from nep.i18n import _
@@ -52,6 +53,16 @@ class _Source:
     problem: str = ""
     seq: int = 0
     last: object = None
+
+
+def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy has no types
+    """Of an AnyMsg; of a message of a type when the program itself subscribed to the topic before."""
+    found = getattr(message, "_buff", None)
+    if isinstance(found, bytes):
+        return found
+    stream = io.BytesIO()
+    message.serialize(stream)
+    return stream.getvalue()
 
 
 class RosSubscriber:
@@ -98,7 +109,7 @@ class RosSubscriber:
 
     def _came(self, raw: Any) -> None:  # noqa: ANN401 - rospy has no types
         header: Mapping[str, str] = raw._connection_header  # noqa: SLF001 - rospy documents it
-        body = memoryview(raw._buff)  # noqa: SLF001 - so are the bytes of AnyMsg found
+        body = memoryview(_bytes_of(raw))
         with self._owner.changed:
             if self.is_closed:
                 return
@@ -128,8 +139,9 @@ class RosSubscriber:
 
     def _met(self, header: Mapping[str, str]) -> _Source:
         ros_type = header.get("type", "")
+        text, md5sum = header.get("message_definition", ""), header.get("md5sum", "*")
         try:
-            found = unpacker(self.spec.msg_type, ros_type, header.get("message_definition", ""))
+            found = unpacker(self.spec.msg_type, ros_type, text, md5sum)
         except NepError as error:
             who = escaped(shortened(header.get("callerid", "").lstrip("/"), 100))
             problem = _("'{name}' is not read: {why}").format(name=who, why=str(error))
@@ -172,9 +184,12 @@ class RosSubscriber:
     # ---- reading
 
     def poll(self) -> Message | None:
-        """The next message if one is there."""
+        """The next message if one is there. Raises `RosShutdownError` when none can come any more."""
         with self._owner.changed:
-            return self.inbox.take()
+            message = self.inbox.take()
+        if message is None and self.process.is_over and not self.is_closed:
+            raise RosShutdownError
+        return message
 
     def receive(self, timeout_s: float) -> Message | None:
         """The next message, waited for."""
@@ -203,5 +218,5 @@ class RosSubscriber:
             self.process.subscribed[self.topic] -= 1
         self._owner.forget(self)
         if self._subscriber is not None:
-            within(self._subscriber.unregister, timeout_s)
+            self.process.unsubscribe(self._subscriber, timeout_s)
         self._owner.wake()

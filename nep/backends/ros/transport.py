@@ -14,8 +14,10 @@ from nep.backends.ros.carried import installed, ros_type_of, to_ros
 from nep.backends.ros.graph import OwnNode, view_of
 from nep.backends.ros.library import library
 from nep.backends.ros.master import RosMaster, RosMasterUnreachable
-from nep.backends.ros.process import RosProcess, process_with
+from nep.backends.ros.process import RosProcess, RosShutdownError, process_with
+from nep.backends.ros.queue_room import QueueRoom
 from nep.backends.ros.subscriber import RosSubscriber
+from nep.backends.zeromq.sockets import Refusals
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.encoded import Encoded
@@ -54,6 +56,8 @@ class RosPublisher:
         self.topic = process.resolved(spec.topic)
         self._lock = threading.RLock()
         self._is_closed = False
+        self._room = QueueRoom()
+        self._drops = Refusals()
         queue = _QUEUES.get(spec.codec.name, _MOST)
         self._publisher: Any = process.advertise(
             self.topic, self._definition, is_latched=spec.is_latched, queue=queue
@@ -73,9 +77,9 @@ class RosPublisher:
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody is connected."""
+        """Whether anybody is connected, or rospy was shut down: then `send` says so."""
         impl = self._publisher.impl
-        return impl is not None and bool(impl.connections)
+        return (impl is not None and bool(impl.connections)) or self.process.is_over
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -102,21 +106,34 @@ class RosPublisher:
         self.problem = problem
 
     def send(self, encoded: Encoded) -> None:
-        """Hand it to rospy, which queues it for each connection. Raises as `to_ros`, and `ClosedError`."""
+        """Hand it to rospy, which queues it for each connection. Raises as `to_ros`, and `ClosedError`.
+
+        What a subscriber cannot take is dropped, the oldest first, and counted.
+        """
         body = to_ros(self._definition.name, self.spec.codec.name, encoded)
         with self._lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
+            if self.process.is_over:
+                raise RosShutdownError
             self.count += 1
             self.bytes += len(body)
             self.last_stamp_ns = time.time_ns()
-            self.process.send(self._publisher, self._definition, self.topic, body)
+            dropped = self.process.send(self._publisher, self._definition, self.topic, body, self._room)
+            if dropped:
+                self._tell(dropped)
+
+    def _tell(self, dropped: int) -> None:
+        reason = _("subscribers are too slow for it, and the oldest messages for them are dropped")
+        for _each in range(dropped):
+            if self._drops.add(reason):
+                _logger.warning("'%s' has dropped %d message(s) so far: %s",
+                    self.spec.topic, self._drops.count, reason)  # fmt: skip
 
     def counts(self) -> PublisherCount:
         """The statistics for the graph."""
-        return PublisherCount(
-            self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, self.problem
-        )
+        problem = self.problem or self._drops.told()
+        return PublisherCount(self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, problem)
 
     def close(self, timeout_s: float) -> None:
         """Let rospy send what it has queued, and unregister."""

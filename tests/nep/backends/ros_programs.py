@@ -7,6 +7,7 @@ import os
 import shutil
 import socket
 import subprocess
+import tempfile
 import xmlrpc.client
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -48,10 +49,19 @@ def answers(uri: str) -> bool:
         return False
 
 
+def told(address: str) -> dict[str, str]:
+    """The environment of a program of ROS."""
+    return {
+        "ROS_MASTER_URI": f"http://{address}",
+        "ROS_IP": "127.0.0.1",
+        "ROS_LOG_DIR": tempfile.gettempdir(),
+    }
+
+
 @contextmanager
-def ros_master(folder: Path) -> Iterator[str]:
-    """The address of a running ROS master."""
-    address = f"127.0.0.1:{free_port()}"
+def ros_master(folder: Path, address: str = "") -> Iterator[str]:
+    """The address of a running ROS master; it is killed at the end."""
+    address = address or f"127.0.0.1:{free_port()}"
     environment = {
         **os.environ, "ROS_MASTER_URI": f"http://{address}", "ROS_IP": "127.0.0.1", "ROS_LOG_DIR": str(folder)
     }  # fmt: skip

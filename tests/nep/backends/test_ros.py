@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import pytest
 
 import nep
 from nep.backends.ros.library import RosFinder, load_rospy
-from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros
+from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros, told
 from tests.nep.programs import ROOT, running
 
 
@@ -28,15 +27,6 @@ def debian() -> None:
 def ros(debian: None, tmp_path: Path) -> Iterator[str]:
     with ros_master(tmp_path) as address:
         yield address
-
-
-def told(address: str) -> dict[str, str]:
-    """The environment of a program of ROS."""
-    return {
-        "ROS_MASTER_URI": f"http://{address}",
-        "ROS_IP": "127.0.0.1",
-        "ROS_LOG_DIR": tempfile.gettempdir(),
-    }
 
 
 def test_the_contract_holds(debian: None) -> None:

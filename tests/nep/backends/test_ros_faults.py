@@ -1,0 +1,322 @@
+"""The back end `ros` when things go wrong: masters, nodes and subscribers that die, hang or lie."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep.backends.ros.address import address_of
+from nep.backends.ros.carried import unpacker
+from nep.backends.ros.queue_room import QueueRoom
+from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros, told
+from tests.nep.programs import running
+
+HEARS = """
+import nep
+with nep.node("hearer", "ros") as node:
+    sub = node.new_sub("topic", "json")
+    print("ready")
+    for message in sub:
+        print(message.payload)
+"""
+SPEAKS = """
+import nep, sys
+node = nep.node("speaker", "ros")
+pub = node.new_pub("topic", "json", latched=True)
+pub.publish(0)
+print("ready")
+for line in sys.stdin:
+    pub.publish(int(line))
+    print(pub.subscribers)
+"""
+
+
+@pytest.fixture
+def ros(tmp_path: Path) -> Iterator[str]:
+    skip_without_ros()
+    with ros_master(tmp_path) as address:
+        yield address
+
+
+def test_a_master_that_was_started_anew_gets_to_know_everybody_again(tmp_path: Path) -> None:
+    skip_without_ros()
+    address = f"127.0.0.1:{free_port()}"
+    with running(SPEAKS, **told(address)) as speaker, running(HEARS, **told(address)) as early:
+        with ros_master(tmp_path, address):
+            assert (speaker.line(), early.line()) == ("ready", "ready")
+            assert early.line() == "0"
+        speaker.say("1")
+        assert (speaker.line(), early.line()) == ("1", "1"), "who is connected needs no master"
+        with ros_master(tmp_path, address), running(HEARS, **told(address)) as late:
+            assert late.line() == "ready"
+            assert late.line() == "1"
+            speaker.say("2")
+            assert (speaker.line(), early.line(), late.line()) == ("2", "2", "2")
+            with running(SPEAKS, **told(address)) as other:
+                assert other.line() == "ready"
+                assert early.line() == "0", "a subscriber of before hears of new publishers"
+
+
+SHUT_DOWN = """
+import nep, sys
+node = nep.node("first", "ros")
+pub, sub = node.new_pub("topic"), node.new_sub("topic")
+node.new_callback("topic", "json", print)
+print("ready")
+for call in (node.spin, sub.listen, sub.receive, lambda: pub.publish(1), lambda: node.new_pub("b")):
+    try:
+        call()
+    except nep.ClosedError as error:
+        print(error)
+print(list(sub))
+node.close()
+"""
+SAME_NAME = "import nep; nep.node('second', 'ros').new_pub('topic'); print('ready'); input()"
+
+
+def test_a_node_whose_name_another_takes_says_so_instead_of_waiting(ros: str) -> None:
+    with running(SHUT_DOWN, "__name:=same", **told(ros)) as first:
+        assert first.line() == "ready"
+        with running(SAME_NAME, "__name:=same", **told(ros)) as second:
+            assert second.line() == "ready"
+            assert first.line().startswith("shutdown request: "), "rospy prints it"
+            for _each in range(5):
+                assert first.line() == (
+                    "rospy was shut down in this program and cannot start in it again; start the program anew"
+                )
+            assert first.line() == "[]"
+            said, errors = first.end()
+            assert (first.process.returncode, said, "Traceback" in errors) == (0, "", False)
+            assert "rospy was shut down in this program" in errors, "a warning, also for who only publishes"
+
+
+INTERRUPTED = """
+import nep
+node = nep.node("n", "ros")
+node.new_callback("topic", "json", print)
+print("ready")
+node.spin()
+"""
+
+
+def test_ctrl_c_ends_a_program_that_spins_and_unregisters_it(ros: str) -> None:
+    with running(INTERRUPTED, **told(ros)) as program, nep.node("n", "ros", master=ros) as node:
+        assert program.line() == "ready"
+        assert len(node.graph().topics["/topic"].subscribers) == 1
+        program.signal(signal.SIGINT)
+        said, errors = program.end()
+        assert said == ""
+        assert errors.strip().endswith("KeyboardInterrupt")
+        assert "/topic" not in node.graph().topics
+
+
+TOO_MUCH = """
+import nep, resource, sys
+node = nep.node("speaker", "ros")
+pub = node.new_pub("much", "bytes")
+print(pub.subscribers)
+sys.stdin.readline()
+for n in range(400):
+    pub.publish(n.to_bytes(2, "little") + bytes(2_000_000))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)
+print([each.sentence for each in node.graph().alerts])
+sys.stdin.readline()
+print(pub._transport._drops.count)
+pub.close(60.0)
+"""
+SLOW = """
+import nep, sys
+with nep.node("hearer", "ros") as node:
+    sub = node.new_sub("much", "bytes")
+    print("ready")
+    sys.stdin.readline()
+    last, count = 0, 0
+    while last != 399:
+        last, count = int.from_bytes(sub.listen(timeout_s=60.0)[1][:2], "little"), count + 1
+    print(count + sub.lost if sub.lost else count)
+"""
+
+
+def test_a_subscriber_that_hangs_costs_bounded_memory_and_drops_are_counted(ros: str) -> None:
+    with running(SLOW, **told(ros)) as hearer:
+        assert hearer.line() == "ready"
+        with running(TOO_MUCH, **told(ros)) as speaker:
+            assert speaker.line() == "1"
+            hearer.stop()
+            speaker.say("")
+            assert int(speaker.line()) < 650, "MB; there are 800 to send"
+            assert "subscribers are too slow for it" in speaker.line()
+            hearer.signal(signal.SIGCONT)
+            hearer.say("")
+            speaker.say("")
+            dropped = int(speaker.line())
+            assert dropped > 100
+            assert int(hearer.line()) + dropped == 400
+            speaker.end()
+
+
+def test_a_subscriber_that_is_killed_costs_the_others_nothing(ros: str) -> None:
+    with running(SPEAKS, **told(ros)) as speaker:
+        assert speaker.line() == "ready"
+        with running(HEARS, **told(ros)) as other:
+            with running(HEARS, **told(ros)) as killed:
+                assert [killed.line() for _ in range(2)] == ["ready", "0"]
+                assert [other.line() for _ in range(2)] == ["ready", "0"]
+            for n in range(1, 100):
+                speaker.say(str(n))
+                heard_by = speaker.line()
+                assert other.line() == str(n)
+            assert heard_by == "1"
+
+
+LIES = (
+    FIND_ROS
+    + """
+import nep, sys
+from std_msgs.msg import String, Int32
+class Other(String):
+    _md5sum = "0" * 32
+class Mute(Int32):
+    _full_text = ""
+class Wrong(Mute):
+    _md5sum = "0" * 32
+rospy.init_node("liar", disable_signals=True)
+pubs = [rospy.Publisher(topic, kind, queue_size=10, latch=True) for topic, kind in (
+    ("/other", Other), ("/mute", Mute), ("/wrong", Wrong))]
+pubs[0].publish(Other("a"))
+pubs[1].publish(Mute(5))
+pubs[2].publish(Wrong(6))
+sub = rospy.Subscriber("/ours", Other, print)
+print("ready")
+sys.stdin.readline()
+"""
+)
+HEARS_LIES = """
+import nep
+node = nep.node("hearer", "ros")
+subs = [node.new_sub(topic, "json") for topic in ("/other", "/mute", "/wrong")]
+print(subs[1].receive(60.0).payload)
+for sub in (subs[0], subs[2]):
+    while not sub.refused:
+        assert not sub.listen(timeout_s=0.01)[0]
+print(sorted({each.sentence[-50:] for each in node.graph().alerts}))
+pub = node.new_pub("/ours", "json")
+print(pub.subscribers, [each[:4] for each in pub.missing])
+"""
+
+
+def test_other_versions_of_a_message_are_refused_on_both_sides(ros: str) -> None:
+    with running(LIES, **told(ros)) as liar:
+        assert liar.line() == "ready"
+        with running(HEARS_LIES, **told(ros)) as hearer:
+            assert hearer.line() == "{'data': 5}"
+            assert "use the same version on both sides" in hearer.line()
+            assert hearer.line() == "0 ['liar']"
+
+
+BOTH = (
+    FIND_ROS
+    + """
+import nep, threading
+from std_msgs.msg import String
+came = threading.Event()
+rospy.init_node("own", disable_signals=True)
+own = rospy.Subscriber("/topic", String, lambda message: came.set())
+node = nep.node("n", "ros")
+sub, pub = node.new_sub("/topic", "string"), node.new_pub("/topic", "string")
+pub.publish("both")
+print(sub.listen(timeout_s=60.0), came.wait(60.0), rospy.get_name())
+"""
+)
+
+
+def test_a_program_may_start_rospy_itself_and_hear_the_same_topic(ros: str) -> None:
+    with running(BOTH, **told(ros)) as program:
+        assert program.line() == "(True, 'both') True /own"
+        program.end()
+        assert program.process.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("given", "address"),
+    [
+        ("http://robot:11312/", "robot:11312"), ("192.168.1.5", "192.168.1.5:11311"), ("h:1", "h:1"),
+        ("https://h", "h:11311"), ("http://127.0.0.1:11311", "127.0.0.1:11311"),
+    ],
+)  # fmt: skip
+def test_where_the_master_is(given: str, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert address_of(given) == address
+    monkeypatch.setenv("ROS_MASTER_URI", given)
+    assert address_of(None) == address
+
+
+@pytest.mark.parametrize(
+    "given", ["http://", "http://h:99999", "h:x", "http://[::1", ":11311", "http://h:0/", " ", "a b"]
+)
+def test_what_is_no_address_of_a_master(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", given)
+    with pytest.raises(nep.NepError, match=r"address"):
+        nep.node("n", "ros")
+
+
+def test_without_a_word_it_is_on_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ROS_MASTER_URI", raising=False)
+    assert address_of(None) == "127.0.0.1:11311"
+    monkeypatch.setenv("ROS_MASTER_URI", "")
+    assert address_of("") == "127.0.0.1:11311"
+
+
+class Connection:
+    """As rospy's QueuedConnection, with nobody who takes anything."""
+
+    def __init__(self, queue_size: int, queue: list[bytes]) -> None:
+        import threading
+
+        self._lock = threading.Lock()
+        self._queue_size = queue_size
+        self._queue = queue
+
+
+def test_room_is_made_by_number_and_by_bytes_for_each_connection() -> None:
+    few, many = Connection(3, [b"a", b"b", b"c"]), Connection(100, [bytes(10)] * 5)
+    assert QueueRoom().make([few, many], 1) == 1
+    assert (few._queue, len(many._queue)) == ([b"b", b"c"], 5)
+    assert QueueRoom(40).make([many], 39) == 0, "measured after 40 bytes only"
+    room = QueueRoom(40)
+    assert room.make([many], 40) == 5
+    many._queue = [bytes(10)] * 5
+    assert [room.make([many], 10) for _ in range(4)] == [0, 0, 0, 2]
+    assert room.make([], 50) == 0
+    assert room.make([object()], 50) == 0
+    assert room.make([Connection(100, [])], 2**40) == 0
+
+
+def test_a_definition_with_another_checksum_is_not_taken() -> None:
+    assert unpacker("json", "std_msgs/String", "", "992ce8a1687cec8c8bd883ec73ca41d1").msg_type == "json"
+    with pytest.raises(nep.NepError, match="its 'sensor_msgs/Image' has other fields"):
+        unpacker("image", "sensor_msgs/Image", "uint8 data", "0" * 32)
+
+
+def test_depth_that_ros_compressed_is_read() -> None:
+    np, cv2 = pytest.importorskip("numpy"), pytest.importorskip("cv2")
+    depth = np.arange(12, dtype=np.uint16).reshape(3, 4) * 5000
+    png = cv2.imencode(".png", depth)[1].tobytes()
+    kind = b"16UC1; compressedDepth png"
+    body = (
+        bytes(16)
+        + len(kind).to_bytes(4, "little")
+        + kind
+        + (len(png) + 12).to_bytes(4, "little")
+        + bytes(12)
+        + png
+    )
+    found = unpacker("image", "sensor_msgs/CompressedImage", "")
+    data, extension = found.unpack(memoryview(body))
+    assert (found.codec.decode(data, extension or {}) == depth).all()  # type: ignore[attr-defined]
+    data, extension = found.unpack(memoryview(body.replace(b"16UC1", b"32FC1")))
+    with pytest.raises(nep.DecodeError):
+        found.codec.decode(data, extension or {})
