@@ -7,6 +7,7 @@ publishers and subscribers; after its end rospy could not be started again.
 from __future__ import annotations
 
 import atexit
+import ipaddress
 import logging
 import os
 import re
@@ -25,6 +26,7 @@ from nep.errors import BadTopicError, ClosedError, NepError
 from nep.i18n import _
 from nep.system.exits import after_nodes
 from nep.system.forks import give_up, in_child
+from nep.text import escaped, shortened
 
 __all__ = ["RosProcess", "RosShutdownError", "process_with", "ros_topic", "within"]
 
@@ -42,7 +44,7 @@ _LEAST_S = 0.2
 
 def ros_topic(topic: str) -> str:
     """`topic` itself when ROS allows it. Raises `BadTopicError`."""
-    if not _TOPIC.fullmatch(topic) or "//" in topic or topic.endswith("/"):
+    if not _TOPIC.fullmatch(topic) or "//" in topic or topic.endswith(("/", "~")):
         raise BadTopicError(
             topic, _("in ROS a topic begins with a letter or '/', and has letters, digits, '_' and '/' only")
         )
@@ -127,7 +129,9 @@ class RosProcess:
     def advertise(self, topic: str, definition: Definition, *, is_latched: bool, queue: int) -> Any:  # noqa: ANN401 - rospy has no types
         """Rospy's publisher on a full name. Raises `NepError` when the process has another type on it."""
         with self._lock:
-            known, users = self._types.get(topic, (definition.name, 0))
+            impl = self.rospy.impl.registration.get_topic_manager().get_publisher_impl(topic)
+            own = definition.name if impl is None else impl.type  # the program's, such as that of /rosout
+            known, users = self._types.get(topic, (own, 0))
             if known != definition.name:
                 raise NepError(
                     _(
@@ -308,14 +312,32 @@ def _is_same(one: str, other: str) -> bool:
     return one == other or (is_local and one.rpartition(":")[2] == other.rpartition(":")[2])
 
 
+def _set_own_address(master: str) -> None:
+    """See that rospy gets along with what the user said where this computer is. Raises `NepError`."""
+    for name in ("ROS_IP", "ROS_HOSTNAME"):
+        if os.environ.get(name) == "":
+            del os.environ[name]  # rospy would print a line for each connection
+    own = os.environ.get("ROS_IP")
+    if own is not None:
+        try:
+            ipaddress.ip_address(own)
+        except ValueError:
+            raise NepError(
+                _("the variable ROS_IP is '{value}'; set it to the IP address of this computer").format(
+                    value=escaped(shortened(own, 100))
+                )
+            ) from None
+    elif is_own_computer(master) and "ROS_HOSTNAME" not in os.environ:
+        os.environ["ROS_IP"] = "127.0.0.1"
+
+
 def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401 - rospy has no types
     if rospy.core.is_initialized():  # the program has started it itself
         found = RosProcess(rospy, address_of(rospy.core.rosgraph.get_master_uri()))
         _end_after_nodes(found)
         return found
     os.environ["ROS_MASTER_URI"] = f"http://{address}"
-    if is_own_computer(address) and not os.environ.keys() & {"ROS_IP", "ROS_HOSTNAME"}:
-        os.environ["ROS_IP"] = "127.0.0.1"
+    _set_own_address(address)
     word = _NAME.sub("_", name).strip("_")
     word = word if word[:1].isalpha() else f"nep_{word}"
     configure = rospy.core.configure_logging

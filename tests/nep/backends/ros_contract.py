@@ -153,6 +153,8 @@ def test_two_types_of_one_program_on_a_topic_are_refused_until_the_first_is_gone
         make("b").new_pub("topic", "bytes")
     first.close()
     make("c").new_pub("topic", "bytes").close()
+    with pytest.raises(nep.NepError, match=r"this program publishes 'rosgraph_msgs/Log' on '/rosout'"):
+        make("d").new_pub("/rosout", "json")
 
 
 def test_a_subscriber_of_another_type_says_so(make: Make, caplog: pytest.LogCaptureFixture) -> None:
@@ -209,7 +211,7 @@ def test_another_master_is_refused_in_a_sentence(make: Make, tmp_path: Path) -> 
         node.new_pub("topic")
 
 
-@pytest.mark.parametrize("topic", ["ü", "/a//b", "a/", "1a", "a-b", "a\u0301"])
+@pytest.mark.parametrize("topic", ["ü", "/a//b", "a/", "1a", "a-b", "a\u0301", "~", "~/", "/", "a~"])
 def test_topics_that_ros_does_not_have(make: Make, topic: str) -> None:
     with pytest.raises(nep.BadTopicError, match="in ROS a topic begins with"):
         make("a").new_sub(topic)

@@ -178,6 +178,7 @@ def send(encoding, height, width, step, data, big=0):
 send("rgb8", 1, 2, 8, bytes([1, 2, 3, 4, 5, 6, 9, 9]))
 send("bgr8", 1, 2, 6, bytes([1, 2, 3, 4, 5, 6]))
 send("mono8", 2, 1, 1, b"ab")
+send("mono16", 2, 1, 3, b"\\1\\0x\\2\\0x")
 send("16UC1", 1, 2, 4, b"\\1\\0\\2\\0")
 send("16UC1", 1, 2, 4, b"\\0\\1\\0\\2", 1)
 pub.publish(Image(encoding="bayer_rggb8", height=1, width=1, step=1, data=b"x"))
@@ -196,6 +197,7 @@ def test_raw_pictures_of_ros_are_read_in_every_layout(ros: str) -> None:
             "uint8 (1, 2, 3) [3, 2, 1, 6, 5, 4]",
             "uint8 (1, 2, 3) [1, 2, 3, 4, 5, 6]",
             "uint8 (2, 1) [97, 98]",
+            "uint16 (2, 1) [1, 2]",
             "uint16 (1, 2) [1, 2]",
             "uint16 (1, 2) [1, 2]",
             "float32 (1, 1) [1.5]",
@@ -225,6 +227,21 @@ made = came.get()
 print(made.encoding, made.height, made.width, made.step, bytes(made.data) == frame.tobytes())
 pubs[0].publish(np.zeros((2, 2), np.float32))
 print(pubs[0].count, pubs[0].refused)
+def raw(payload):
+    pubs[1].publish(payload)
+    made = came.get()
+    print(made.encoding, made.height, made.width, made.step, made.is_bigendian, bytes(made.data)[:4])
+raw(np.full((2, 3), 7, np.uint8))
+raw(np.full((2, 3), 258, np.uint16))
+raw(np.full((2, 3, 4), 7, np.uint8))
+raw(np.full((2, 3), 1, np.float32))
+raw(nep.Encoded(bytes(range(18)), {"encoding": "rgb8", "shape": [2, 3, 3]}))
+raw(nep.Encoded(bytes(range(12)), {"encoding": "16UC1", "shape": [2, 3, 1]}))
+raw({"encoding": "bayer_rggb8", "height": 1, "width": 2, "step": 2, "data": b"ab"})
+big = np.arange(1400 * 2000 * 3, dtype=np.uint32).astype(np.uint8).reshape(1400, 2000, 3)
+pubs[1].publish(big)
+made = came.get()
+print(len(made.data), bytes(made.data) == big.tobytes())
 node.close()
 """
 )
@@ -236,6 +253,13 @@ def test_programs_of_ros_get_pictures(ros: str) -> None:
         assert program.line() == "jpeg True True"
         assert program.line() == "bgr8 4 6 18 True"
         assert program.line() == "1 1"
+        for expected in (
+            r"mono8 2 3 3 0 b'\x07\x07\x07\x07'", r"mono16 2 3 6 0 b'\x02\x01\x02\x01'",
+            r"bgra8 2 3 12 0 b'\x07\x07\x07\x07'", r"32FC1 2 3 12 0 b'\x00\x00\x80?'",
+            r"rgb8 2 3 9 0 b'\x00\x01\x02\x03'", r"16UC1 2 3 6 0 b'\x00\x01\x02\x03'",
+            "bayer_rggb8 1 2 2 0 b'ab'", "8400000 True",
+        ):  # fmt: skip
+            assert program.line() == expected
         program.end()
 
 

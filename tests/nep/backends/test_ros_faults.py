@@ -241,6 +241,30 @@ def test_a_program_may_start_rospy_itself_and_hear_the_same_topic(ros: str) -> N
         assert program.process.returncode == 0
 
 
+OWN_ADDRESS = """
+import nep
+for _each in range(2):
+    try:
+        nep.node("n", "ros").new_pub("topic")
+        print("made")
+    except nep.NepError as error:
+        print(error)
+"""
+
+
+@pytest.mark.parametrize(
+    ("own", "said"),
+    [
+        ("", "made"),
+        ("999.1.2.3", "the variable ROS_IP is '999.1.2.3'; set it to the IP address of this computer"),
+    ],
+)
+def test_where_this_computer_is(ros: str, own: str, said: str) -> None:
+    with running(OWN_ADDRESS, **{**told(ros), "ROS_IP": own}) as program:
+        assert program.line() == program.line() == said
+        assert program.end() == ("", "")
+
+
 @pytest.mark.parametrize(
     ("given", "address"),
     [
