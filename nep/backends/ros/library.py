@@ -10,8 +10,8 @@ from __future__ import annotations
 import atexit
 import importlib
 import importlib.machinery
+import importlib.util
 import logging
-import os
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -119,8 +119,8 @@ def message_text(name: str) -> tuple[str, str] | None:
     if not package.isidentifier() or not kind.isidentifier():
         return None
     library()
-    if _has_folder(package):
-        _finder.extra.add(package)
+    if not _has_messages(package):
+        return None  # to import it would run whatever it is: the name may come from a stranger
     try:
         found = getattr(importlib.import_module(f"{package}.msg"), kind, None)
     except ImportError:
@@ -129,6 +129,14 @@ def message_text(name: str) -> tuple[str, str] | None:
     return (text, checksum) if isinstance(text, str) and isinstance(checksum, str) else None
 
 
-def _has_folder(package: str) -> bool:
-    """Whether there is a package of messages of this name in a folder of ROS."""
-    return any(os.path.isfile(f"{place}/{package}/msg/__init__.py") for place in PLACES)  # noqa: PTH113
+def _has_messages(package: str) -> bool:
+    """Whether a package has messages, seen by its files; in a folder of ROS it can be imported then."""
+    if any(Path(place, package, "msg", "__init__.py").is_file() for place in PLACES):
+        _finder.extra.add(package)
+        return True
+    try:
+        found = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        return False
+    places = () if found is None else found.submodule_search_locations or ()
+    return any(Path(place, "msg", "__init__.py").is_file() for place in places)

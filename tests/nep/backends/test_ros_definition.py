@@ -6,6 +6,8 @@ import contextlib
 import io
 import math
 import struct
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from hypothesis import strategies as st
 import nep
 from nep.backends.ros.carried import codec_of, is_ros_type, ros_type_of, to_ros, unpacker
 from nep.backends.ros.definition import parse
+from nep.backends.ros.library import message_text
 from nep.errors import WireError
 from nep.messages.encoded import Encoded
 from tests.nep.backends.ros_programs import skip_without_ros
@@ -206,6 +209,24 @@ def test_bodies_that_are_no_such_message_are_refused() -> None:
 def test_an_extension_has_no_room() -> None:
     with pytest.raises(WireError, match="a 'std_msgs/String' has no room for an extension"):
         to_ros("std_msgs/String", "json", Encoded(b"{}", {"a": 1}))
+
+
+def test_only_packages_of_messages_are_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    skip_without_ros()
+    for name, folder in (("of_no_ros", ""), ("of_no_ros_either", "messages"), ("of_my_own", "msg")):
+        (tmp_path / name / folder).mkdir(parents=True)
+        (tmp_path / name / "__init__.py").touch()
+        (tmp_path / name / folder / "__init__.py").touch()
+    (tmp_path / "of_my_own" / "msg" / "__init__.py").write_text(
+        "class Thing:\n    _full_text, _md5sum = 'int8 a', 'x'\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert message_text("of_no_ros/Thing") is None
+    assert message_text("of_no_ros_either/Thing") is None
+    assert message_text("of_my_own/Thing") == ("int8 a", "x")
+    assert message_text("of_my_own/Other") is None
+    assert message_text("not there/Thing") is None
+    assert {each for each in sys.modules if each.startswith("of_")} == {"of_my_own", "of_my_own.msg"}
 
 
 def test_the_bytes_are_those_of_genpy() -> None:
