@@ -42,13 +42,17 @@ CALLS_MAX_BYTES = 256 * 2**20
 
 @dataclass(frozen=True)
 class ServerSpec:
-    """What a server shall be. `number` proves the id, as that of a publisher."""
+    """What a server shall be. `number` proves the id, as that of a publisher.
+
+    `msg_type` is the type of its service, for back ends whose services have types.
+    """
 
     id: int
     service: str
     configuration: Configuration
     wait_s: float | None
     number: int = 0
+    msg_type: str = "json"
 
 
 @dataclass(frozen=True)

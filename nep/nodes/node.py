@@ -286,13 +286,15 @@ class Node:
         configuration: Configuration | None = None,
         *,
         threads: int = 0,
+        msg_type: str = "json",
     ) -> Server:
         """A server of a service: `callback(request)` gives the answer, in the thread that calls `spin`.
 
         With `threads` it runs in so many threads of the server's own instead, and nobody needs to spin. What
         it raises is raised at the client, as `ServiceError`. Without a callback, `Server.listen_info` and
         `send_info` answer. With `node.direct(ip, port)` it serves the original NEP's `client` at that port.
-        Raises as `new_pub` does.
+        `msg_type` is for back ends whose services have types ("ros": "std_srvs/SetBool"); others answer each
+        client in its own. Raises as `new_pub` does.
         """
         self._open_transport()
         check_service(service)
@@ -303,7 +305,8 @@ class Node:
             raise ValueError(_("threads need a callback to run; give one"))
         number = next(self._numbers)
         id_ = id_from(self._key, number)
-        spec = ServerSpec(id_, service, self._configured(configuration), self._wait_s, number)
+        configured = self._configured(configuration)
+        spec = ServerSpec(id_, service, configured, self._wait_s, number, text("msg_type", msg_type))
         return self._services.server(spec, callback, threads)
 
     def new_client(

@@ -29,8 +29,19 @@ from nep.messages import image_codec
 from nep.messages.codecs import CODECS, IMAGE, Codec, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.image_codec import picture_info, raw_array, raw_image, raw_layout
+from nep.text import escaped, shortened
 
-__all__ = ["STAMP", "codec_of", "installed", "is_ros_type", "ros_type_of", "to_ros", "unpacker"]
+__all__ = [
+    "STAMP",
+    "another_version",
+    "codec_of",
+    "installed",
+    "is_ros_type",
+    "not_installed",
+    "ros_type_of",
+    "to_ros",
+    "unpacker",
+]
 
 STAMP = struct.Struct("<III")
 """With what a message that has a header begins: seq, secs, nsecs."""
@@ -75,15 +86,20 @@ def installed(name: str) -> Definition:
     if name not in _definitions:
         found = message_text(name)
         if found is None:
-            package = name.partition("/")[0]
-            raise NepError(
-                _(
-                    "there is no ROS message '{name}' here; look for a typing error, or install it with "
-                    "'sudo apt install python3-{package}'"
-                ).format(name=name, package=package.replace("_", "-").lower())
-            )
+            raise not_installed(name, _("ROS message"))
         _definitions[name] = parse(name, found[0])
     return _definitions[name]
+
+
+def not_installed(name: str, what: str) -> NepError:
+    """That a type is not there; `what` it would be."""
+    known = escaped(shortened(name, 100))
+    return NepError(
+        _(
+            "there is no {what} '{name}' here; look for a typing error, or install it with "
+            "'sudo apt install python3-{package}'"
+        ).format(what=what, name=known, package=known.partition("/")[0].replace("_", "-").lower())
+    )
 
 
 # ---- codecs: payloads of publishers become bytes
@@ -217,7 +233,7 @@ def unpacker(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpa
     """
     wanted = codec_for(msg_type)
     if md5sum not in {"*", _MD5SUMS.get(ros_type, md5sum)}:
-        raise _another(ros_type)
+        raise another_version(ros_type)
     if is_ros_type(msg_type) and msg_type != ros_type:
         raise _mismatch(msg_type, ros_type)
     if ros_type in _PICTURES and (msg_type in _PICTURES or wanted is IMAGE):
@@ -235,15 +251,16 @@ def _installed_like(ros_type: str, md5sum: str) -> Definition:
     """For a publisher who does not tell its definition."""
     definition, found = installed(ros_type), message_text(ros_type)
     if found is None or md5sum not in {"*", found[1]}:
-        raise _another(ros_type)
+        raise another_version(ros_type)
     return definition
 
 
-def _another(ros_type: str) -> NepError:
+def another_version(ros_type: str) -> NepError:
+    """That the other side has another definition of it."""
     return NepError(
         _(
             "its '{ros_type}' has other fields than the one known here; use the same version on both sides"
-        ).format(ros_type=ros_type)
+        ).format(ros_type=escaped(shortened(ros_type, 100)))
     )
 
 

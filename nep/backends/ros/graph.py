@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from urllib.parse import urlsplit
 
@@ -21,6 +22,7 @@ from nep.protocol.requests import (
     SubscriberCount,
     SubscriberRecord,
 )
+from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
 __all__ = ["OwnNode", "view_of"]
 
@@ -37,13 +39,16 @@ _GENERATION = "ros"
 class OwnNode:
     """A node of nep in this process: `ros_name` is that of the ROS node that it shares.
 
-    `publishers` are (topic, type, whether it is latched, counts), `subscribers` (topic, type, counts).
+    `publishers` are (topic, type, whether it is latched, counts), `subscribers` (topic, type, counts),
+    `servers` and `clients` (service, counts).
     """
 
     node: NodeRecord
     ros_name: str
     publishers: tuple[tuple[str, str, bool, PublisherCount], ...]
     subscribers: tuple[tuple[str, str, SubscriberCount], ...]
+    servers: tuple[tuple[str, PublisherCount], ...] = ()
+    clients: tuple[tuple[str, SubscriberCount], ...] = ()
 
 
 def view_of(known: RosNodes, own: list[OwnNode]) -> GraphView:
@@ -52,25 +57,39 @@ def view_of(known: RosNodes, own: list[OwnNode]) -> GraphView:
     Rates are not known: nobody counts for others in ROS.
     """
     graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
-    mine = {(each.ros_name, topic) for each in own for topic, _type, _latched, _count in each.publishers}
-    my_ears = {(each.ros_name, topic) for each in own for topic, _type, _count in each.subscribers}
-    for topic, names in known.publishers.items():
-        for name in names:
-            if (name, topic) not in mine:
-                kind = known.types.get(topic, "*")
-                codec = _CODECS.get(kind, "ros")
-                uri = known.uris.get(name, "")
-                record = PublisherRecord(_id(name, topic, "o"), topic, kind, codec, (uri,) if uri else ())
-                _tell(graph, AddPublisher(_node(name, uri), record))
-    for topic, names in known.subscribers.items():
-        for name in names:
-            if (name, topic) not in my_ears:
-                heard = SubscriberRecord(_id(name, topic, "i"), topic, known.types.get(topic, "*"))
-                _tell(graph, AddSubscriber(_node(name, known.uris.get(name, "")), heard))
+    for topic, name in _others(known.publishers, own, lambda each: each.publishers):
+        kind = known.types.get(topic, "*")
+        uri = known.uris.get(name, "")
+        codec = _CODECS.get(kind, "ros")
+        record = PublisherRecord(_id(name, topic, "o"), topic, kind, codec, (uri,) if uri else ())
+        _tell(graph, AddPublisher(_node(name, uri), record))
+    for topic, name in _others(known.subscribers, own, lambda each: each.subscribers):
+        heard = SubscriberRecord(_id(name, topic, "i"), topic, known.types.get(topic, "*"))
+        _tell(graph, AddSubscriber(_node(name, known.uris.get(name, "")), heard))
+    for service, name in _others(known.services, own, lambda each: each.servers):
+        node = _node(name, known.uris.get(name, ""))
+        _tell(graph, _serves(node, _id(name, service, "s"), service))
     for each in own:
         if each.ros_name:
             _tell_own(graph, each, known.uris.get(each.ros_name, ""))
     return graph.view()
+
+
+def _others(
+    known: Mapping[str, Sequence[str]],
+    own: list[OwnNode],
+    rows_of: Callable[[OwnNode], Sequence[tuple[object, ...]]],
+) -> Iterator[tuple[str, str]]:
+    """What nodes have that are none of nep's in this process: (topic or service, name of the node)."""
+    mine = {(row[0], each.ros_name) for each in own for row in rows_of(each)}
+    return ((each, node) for each, nodes in known.items() for node in nodes if (each, node) not in mine)
+
+
+def _serves(node: NodeRecord, server_id: int, service: str, uri: str = "") -> AddPublisher:
+    endpoints = (uri,) if uri else ()
+    return AddPublisher(
+        node, PublisherRecord(server_id, topic_of(service), SERVICE_TYPE, SERVICE_TYPE, endpoints)
+    )
 
 
 def _tell_own(graph: Graph, own: OwnNode, uri: str) -> None:
@@ -81,8 +100,12 @@ def _tell_own(graph: Graph, own: OwnNode, uri: str) -> None:
         _tell(graph, AddPublisher(node, record))
     for topic, kind, heard in own.subscribers:
         _tell(graph, AddSubscriber(node, SubscriberRecord(heard.id, topic, kind)))
-    counts = tuple(count for *_, count in own.publishers)
-    ears = tuple(heard for *_, heard in own.subscribers)
+    for service, count in own.servers:
+        _tell(graph, _serves(node, count.id, service, uri))
+    for service, heard in own.clients:
+        _tell(graph, AddSubscriber(node, SubscriberRecord(heard.id, topic_of(service), SERVICE_TYPE)))
+    counts = (*(each[-1] for each in own.publishers), *(count for _, count in own.servers))
+    ears = (*(each[-1] for each in own.subscribers), *(heard for _, heard in own.clients))
     _tell(graph, Renew(node.id, graph.epoch, graph.revision, counts, ears))
 
 

@@ -18,13 +18,13 @@ from collections.abc import Callable, Sequence
 from importlib.abc import MetaPathFinder
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from nep.errors import BackendUnavailableError, NepError
 from nep.i18n import _
 from nep.system.forks import in_child
 
-__all__ = ["PLACES", "RosFinder", "library", "load_rospy", "message_text"]
+__all__ = ["PLACES", "RosFinder", "library", "load_rospy", "message_text", "service_texts"]
 
 PLACES = ("/opt/ros/noetic/lib/python3/dist-packages", "/usr/lib/python3/dist-packages")
 _NAMES = frozenset({
@@ -113,25 +113,51 @@ def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> M
     return made
 
 
+class ServiceTexts(NamedTuple):
+    """The definition of a service: of its request and its answer, and their MD5 sum."""
+
+    request: str
+    answer: str
+    md5sum: str
+
+
 def message_text(name: str) -> tuple[str, str] | None:
     """Definition and MD5 sum of an installed type ("geometry_msgs/Twist"); None when there is none."""
-    package, _slash, kind = name.partition("/")
-    if not package.isidentifier() or not kind.isidentifier():
-        return None
-    library()
-    if not _has_messages(package):
-        return None  # to import it would run whatever it is: the name may come from a stranger
-    try:
-        found = getattr(importlib.import_module(f"{package}.msg"), kind, None)
-    except ImportError:
-        return None
+    found = _found(name, "msg")
     text, checksum = getattr(found, "_full_text", None), getattr(found, "_md5sum", None)
     return (text, checksum) if isinstance(text, str) and isinstance(checksum, str) else None
 
 
-def _has_messages(package: str) -> bool:
-    """Whether a package has messages, seen by its files; in a folder of ROS it can be imported then."""
-    if any(Path(place, package, "msg", "__init__.py").is_file() for place in PLACES):
+def service_texts(name: str) -> ServiceTexts | None:
+    """The definition of an installed type of services ("std_srvs/SetBool"); None when there is none."""
+    found = _found(name, "srv")
+    request, answer = (
+        getattr(getattr(found, each, None), "_full_text", None)
+        for each in ("_request_class", "_response_class")
+    )
+    md5sum = getattr(found, "_md5sum", None)
+    if isinstance(request, str) and isinstance(answer, str) and isinstance(md5sum, str):
+        return ServiceTexts(request, answer, md5sum)
+    return None
+
+
+def _found(name: str, folder: str) -> object:
+    """The class of an installed type; None when there is none."""
+    package, _slash, kind = name.partition("/")
+    if not package.isidentifier() or not kind.isidentifier():
+        return None
+    library()
+    if not _has_folder(package, folder):
+        return None  # to import it would run whatever it is: the name may come from a stranger
+    try:
+        return getattr(importlib.import_module(f"{package}.{folder}"), kind, None)
+    except ImportError:
+        return None
+
+
+def _has_folder(package: str, folder: str) -> bool:
+    """Whether a package has messages or services, seen by its files; then it can be imported."""
+    if any(Path(place, package, folder, "__init__.py").is_file() for place in PLACES):
         _finder.extra.add(package)
         return True
     try:
@@ -139,4 +165,4 @@ def _has_messages(package: str) -> bool:
     except (ImportError, ValueError):
         return False
     places = () if found is None else found.submodule_search_locations or ()
-    return any(Path(place, "msg", "__init__.py").is_file() for place in places)
+    return any(Path(place, folder, "__init__.py").is_file() for place in places)

@@ -20,6 +20,8 @@ _CALLER = "/nep"
 _ASK_S = 1.0
 """A master on a network answers within this time, or the attempt is over."""
 _AGAIN_S = 0.1
+_OF_ROSPY = ("/get_loggers", "/set_logger_level")
+"""Services that every node of ROS has."""
 _FAILURES = (
     OSError, xmlrpc.client.Error, http.client.HTTPException, ExpatError, ValueError, TypeError, LookupError
 )  # fmt: skip
@@ -79,10 +81,11 @@ def buses_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
 
 @dataclass(frozen=True)
 class RosNodes:
-    """Who publishes and subscribes: topic → names of nodes; the types of topics; where nodes are."""
+    """Who publishes, subscribes and serves: name → nodes; the types of topics; where nodes are."""
 
     publishers: Mapping[str, Sequence[str]]
     subscribers: Mapping[str, Sequence[str]]
+    services: Mapping[str, Sequence[str]]
     types: Mapping[str, str]
     uris: Mapping[str, str]
 
@@ -159,10 +162,27 @@ class RosMaster:
     def nodes(self, timeout_s: float) -> RosNodes:
         """Everybody."""
         state = self._ask("getSystemState", timeout_s)
-        publishers, subscribers = ({str(each): tuple(names) for each, names in part} for part in state[:2])
+        publishers, subscribers, services = (
+            {str(each): tuple(names) for each, names in part} for part in state[:3]
+        )
+        served = {name: nodes for name, nodes in services.items() if not name.endswith(_OF_ROSPY)}
         types = {str(topic): str(kind) for topic, kind in self._ask("getTopicTypes", timeout_s)}
-        names = {name for part in (publishers, subscribers) for each in part.values() for name in each}
-        return RosNodes(publishers, subscribers, types, self._uris(sorted(names), timeout_s))
+        names = {
+            name for part in (publishers, subscribers, served) for each in part.values() for name in each
+        }
+        return RosNodes(publishers, subscribers, served, types, self._uris(sorted(names), timeout_s))
+
+    def services(self, timeout_s: float) -> tuple[str, ...]:
+        """The services that have a server."""
+        services = self._ask("getSystemState", timeout_s)[2]
+        return tuple(str(name) for name, _nodes in services if not str(name).endswith(_OF_ROSPY))
+
+    def service_uri(self, name: str, timeout_s: float) -> str:
+        """Where a service is; "" when nobody knows."""
+        try:
+            return str(_call(self.uri, timeout_s, "lookupService", _CALLER, name))
+        except _FAILURES:
+            return ""
 
     def _uris(self, names: Sequence[str], timeout_s: float) -> dict[str, str]:
         try:

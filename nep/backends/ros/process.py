@@ -22,6 +22,7 @@ from nep.backends.ros.definition import Definition
 from nep.backends.ros.library import library
 from nep.backends.ros.master import Registered, RosMaster, RosMasterUnreachable, buses_of
 from nep.backends.ros.queue_room import QueueRoom
+from nep.backends.ros.service_connection import Handshakes
 from nep.errors import BadTopicError, ClosedError, NepError
 from nep.i18n import _
 from nep.system.exits import after_nodes
@@ -80,6 +81,7 @@ class RosProcess:
         self._seqs: Counter[str] = Counter()
         self.subscribed: Counter[str] = Counter()
         """How many subscribers of nep's there are here, by topic."""
+        self.handshakes = Handshakes()
         self._ended = threading.Event()
         rospy.on_shutdown(self._shut_down)
         threading.Thread(target=self._watch, name="nep-ros-master", daemon=True).start()
@@ -207,6 +209,20 @@ class RosProcess:
                 },
             )  # fmt: skip
         return made
+
+    # ---- services
+
+    def serve(self, service: str, kind: type, handler: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - rospy has no types
+        """Rospy's server on a full name. Raises `NepError` when the process has one of this name."""
+        with self._lock:
+            if self.rospy.impl.registration.get_service_manager().get_service(service) is not None:
+                raise NepError(
+                    _(
+                        "this program serves '{service}' already, and ROS has one server of a name; close "
+                        "it first"
+                    ).format(service=service)
+                )
+            return self.rospy.Service(service, kind, handler)
 
     # ---- who is connected
 

@@ -16,7 +16,10 @@ from nep.backends.ros.library import library
 from nep.backends.ros.master import RosMaster, RosMasterUnreachable
 from nep.backends.ros.process import RosProcess, RosShutdownError, process_with
 from nep.backends.ros.queue_room import QueueRoom
+from nep.backends.ros.service_client import RosClient
+from nep.backends.ros.service_server import RosServer
 from nep.backends.ros.subscriber import RosSubscriber
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
@@ -159,6 +162,8 @@ class RosTransport:
         self._wakes = 0
         self._publishers: tuple[RosPublisher, ...] = ()
         self._subscribers: tuple[RosSubscriber, ...] = ()
+        self._servers: tuple[RosServer, ...] = ()
+        self._clients: tuple[RosClient, ...] = ()
         self._lock = threading.RLock()
         self._is_closed = False
         self._thread: threading.Thread | None = None
@@ -201,20 +206,61 @@ class RosTransport:
         if self._is_closed:
             raise ClosedError(f"node '{self.node.name}'")
 
-    def forget(self, closed: RosPublisher | RosSubscriber) -> None:
+    def forget(self, closed: RosPublisher | RosSubscriber | RosServer | RosClient) -> None:
         """It was closed."""
         with self._lock:
+            self._servers = tuple(each for each in self._servers if each is not closed)
+            self._clients = tuple(each for each in self._clients if each is not closed)
             self._publishers = tuple(each for each in self._publishers if each is not closed)
             self._subscribers = tuple(each for each in self._subscribers if each is not closed)
 
-    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait for a message in one of `subscribers`, or for `wake`."""
+    # ---- services
+
+    def server(self, spec: ServerSpec) -> RosServer:
+        """A server. Raises as `publisher`, and `NepError` for a type of services that is not there."""
+        process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
+        server = RosServer(process, spec, self.forget)
+        with self._lock:
+            self._servers = (*self._servers, server)
+        self._close_if_closed(server)
+        return server
+
+    def client(self, spec: ClientSpec) -> RosClient:
+        """A client."""
+        process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
+        client = RosClient(process, spec, self.forget)
+        with self._lock:
+            self._clients = (*self._clients, client)
+        self._close_if_closed(client)
+        return client
+
+    def _close_if_closed(self, made: RosServer | RosClient) -> None:
+        if self._is_closed:
+            made.close(0.0)
+            self._check_open()
+
+    def wait(
+        self,
+        subscribers: Sequence[SubscriberTransport],
+        timeout_s: float,
+        calls: Sequence[CallQueue] = (),
+    ) -> None:
+        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
         mine = [each for each in subscribers if isinstance(each, RosSubscriber)]
-        with self.changed:
-            before = self._wakes
-            self.changed.wait_for(
-                lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
-            )
+        before = self._wakes
+        entered: list[CallQueue] = []
+        try:
+            for queue in calls:
+                if not queue.enter_wait(self.wake):
+                    return
+                entered.append(queue)
+            with self.changed:
+                self.changed.wait_for(
+                    lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
+                )
+        finally:
+            for queue in entered:
+                queue.leave_wait(self.wake)
 
     def wake(self) -> None:
         """End all waits."""
@@ -237,7 +283,9 @@ class RosTransport:
         ins: list[RosSubscriber] = [
             each for each in self._subscribers if each.process.master.address == address
         ]
-        names = [each.process.name for each in outs] + [each.process.name for each in ins]
+        servers = [each for each in self._servers if each.process.master.address == address]
+        clients = [each for each in self._clients if each.process.master.address == address]
+        names = [each.process.name for part in (outs, ins, servers, clients) for each in part]
         return OwnNode(
             self.node,
             names[0] if names else "",
@@ -250,10 +298,14 @@ class RosTransport:
                 )
                 for i in ins
             ),
+            tuple((each.service, each.counts()) for each in servers),
+            tuple((each.service, each.counts()) for each in clients),
         )
 
     def begin_close(self) -> None:
-        """What is queued goes on by itself."""
+        """What is queued goes on by itself; calls that wait are refused."""
+        for server in self._servers:
+            server.begin_close()
 
     def close(self, timeout_s: float) -> None:
         """Unregister all and end the thread. The process's ROS node stays."""
@@ -261,6 +313,10 @@ class RosTransport:
         with self._lock:
             self._is_closed = True
         self._closing.set()
+        for client in self._clients:
+            client.close(max(0.0, deadline - time.monotonic()))
+        for server in self._servers:
+            server.close(max(0.0, deadline - time.monotonic()))
         for subscriber in self._subscribers:
             subscriber.close(deadline - time.monotonic())
         for publisher in self._publishers:

@@ -1,0 +1,254 @@
+"""RosClient: calls a service of ROS, each call over a connection and in a thread of its own."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from nep.backends.ros.carried import another_version
+from nep.backends.ros.master import RosMasterUnreachable
+from nep.backends.ros.process import RosProcess
+from nep.backends.ros.service_connection import ServiceConnection
+from nep.backends.ros.service_types import NEP_CALL, ServiceType, installed_service
+from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
+from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError
+from nep.i18n import _
+from nep.protocol.requests import SubscriberCount
+from nep.protocol.service_wire import CallKind, failure
+
+__all__ = ["RosClient"]
+
+_logger = logging.getLogger("nep")
+_ASK_S = 0.5
+_AGAIN_S = 0.1
+_LOOK_S = 0.2
+
+Then = Callable[[Outcome], None]
+
+
+@dataclass(eq=False)
+class _Call:
+    """A call that is under way."""
+
+    number: int
+    data: bytes
+    timeout_s: float | None
+    deadline: float
+    then: Then
+    connection: ServiceConnection | None = None
+
+
+class RosClient:
+    """A client: its calls that are under way."""
+
+    def __init__(self, process: RosProcess, spec: ClientSpec, forget: Callable[[RosClient], None]) -> None:
+        self.spec = spec
+        self.process = process
+        self.service = process.resolved(spec.service)
+        self.late = 0
+        """None is ever late: its connection is closed when nobody waits for it."""
+        self.is_closed = False
+        self._forget_me = forget
+        self._lock = threading.Lock()
+        self._calls: dict[int, _Call] = {}
+        self._bytes = 0
+        self._numbers = itertools.count(1)
+        self._waiting: list[_Call] = []
+        self._is_looking = False
+        self._is_over = threading.Event()
+        self._threads: set[threading.Thread] = set()
+        self._answered = self._failed = 0
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether there is a server; the master is asked."""
+        return not self.is_closed and bool(self.process.master.service_uri(self.service, _LOOK_S))
+
+    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+        """See `ClientTransport.begin`."""
+        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        with self._lock:
+            if self.is_closed:
+                raise self._closed_error()
+            check_calls(self.spec.service, len(self._calls), self._bytes, len(data))
+            call = _Call(next(self._numbers), bytes(data), timeout_s, deadline, then)
+            self._calls[call.number] = call
+            self._bytes += len(call.data)
+            self._seek(call)
+        return call
+
+    # ---- looking for a server: in one thread for all calls that wait for one
+
+    def _seek(self, call: _Call) -> None:
+        """With the lock held."""
+        self._waiting.append(call)
+        if not self._is_looking:
+            self._is_looking = True
+            self._start(self._look)
+
+    def _start(self, target: Callable[..., None], *arguments: object) -> None:
+        """A thread of the client's own. With the lock held."""
+        name = f"nep-call-{self.spec.service}"
+        thread = threading.Thread(target=target, args=arguments, name=name, daemon=True)
+        self._threads = {each for each in self._threads if each.is_alive()} | {thread}
+        thread.start()
+
+    def _look(self) -> None:
+        """Until all calls that wait for a server have one, or waited too long."""
+        while True:
+            uri = self.process.master.service_uri(self.service, _ASK_S)
+            now = time.monotonic()
+            with self._lock:
+                waiting = [each for each in self._waiting if each.number in self._calls]
+                late = [] if uri else [each for each in waiting if each.deadline <= now]
+                ready = waiting if uri else []
+                self._waiting = [] if uri else [each for each in waiting if each.deadline > now]
+                for call in ready[1:]:
+                    self._start(self._run, call, uri)
+                is_done = not self._waiting or self.is_closed
+                if is_done:
+                    self._is_looking = False
+                due = min((each.deadline for each in self._waiting), default=math.inf)
+            for call in late:
+                self._end_with(call, NoServerError(self.spec.service, call.timeout_s or 0.0))
+            if ready:
+                self._run(ready[0], uri)
+            if is_done:
+                return
+            self._is_over.wait(max(0.0, min(_AGAIN_S, due - time.monotonic())))
+
+    # ---- calling: each in a thread
+
+    def _run(self, call: _Call, uri: str) -> None:
+        try:
+            with self.process.handshakes.turn(uri, lambda: call.number not in self._calls, call.deadline):
+                connection = ServiceConnection(uri, self.service, self.process.name, call.deadline)
+        except OSError:  # it is registered no longer, or just ended
+            self._look_again(call)
+            return
+        try:
+            outcome = self._outcome(call, connection)
+        except NepError as error:
+            outcome = error
+        except Exception as error:
+            _logger.exception("a call of '%s' could not be carried out", self.spec.service)
+            outcome = NepError(_("the call failed: {reason}").format(reason=type(error).__name__))
+        finally:
+            connection.close()
+        self._end_with(call, outcome)
+
+    def _look_again(self, call: _Call) -> None:
+        """After a while, so that one who is registered and cannot be reached is not tried all the time."""
+        left = call.deadline - time.monotonic()
+        self._is_over.wait(max(0.0, min(_AGAIN_S, left)))
+        if left <= 0.0:
+            self._end_with(call, NoServerError(self.spec.service, call.timeout_s or 0.0))
+            return
+        with self._lock:
+            if call.number in self._calls:
+                self._seek(call)
+
+    def _end_with(self, call: _Call, outcome: Outcome) -> None:
+        is_answered = not isinstance(outcome, NepError)
+        with self._lock:
+            is_waited_for = self._take(call)
+            self._answered += is_waited_for and is_answered
+            self._failed += is_waited_for and not is_answered
+        if is_waited_for:
+            self._tell(call, outcome)
+
+    def _tell(self, call: _Call, outcome: Outcome) -> None:
+        try:
+            call.then(outcome)
+        except Exception:
+            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
+
+    def _outcome(self, call: _Call, connection: ServiceConnection) -> Outcome:
+        kind = self._type_of(connection)
+        with self._lock:
+            if call.number not in self._calls:
+                return self._closed_error()  # to nobody
+            call.connection = connection
+        try:
+            is_carried_out, answer = connection.ask(
+                kind.body_of_call(self.spec.codec, call.data, call.timeout_s)
+            )
+        except TimeoutError:
+            return ServiceTimeoutError(self.spec.service, call.timeout_s or 0.0)
+        except OSError:
+            return ServerGoneError(self.spec.service)
+        if is_carried_out:
+            return kind.reply_in(answer, self.spec.codec)
+        if kind is NEP_CALL:  # its servers tell of errors otherwise
+            return ServerGoneError(self.spec.service)
+        return failure(CallKind.ERROR, "ServiceException", answer.decode("utf-8", "replace"))
+
+    def _type_of(self, connection: ServiceConnection) -> ServiceType:
+        kind = installed_service(connection.header["type"])
+        if connection.header.get("md5sum", "*") not in {"*", kind.md5sum}:
+            raise another_version(kind.name)
+        return kind
+
+    def _take(self, call: _Call) -> bool:
+        """It is not under way any more; whether it was. With the lock held."""
+        if self._calls.pop(call.number, None) is None:
+            return False
+        self._bytes -= len(call.data)
+        return True
+
+    def forget(self, call: OpenCall) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            known = self._calls.get(call.number)
+            if known is not None:
+                self._take(known)
+                self._end(known)
+
+    def _end(self, call: _Call) -> None:
+        """End its thread. With the lock held."""
+        if call.connection is not None:
+            call.connection.end()
+
+    def known(self, timeout_s: float) -> tuple[str, ...]:
+        """The services that have a server now."""
+        try:
+            return tuple(sorted(self.process.master.services(timeout_s)))
+        except RosMasterUnreachable:
+            return ()
+
+    def counts(self) -> SubscriberCount:
+        """The statistics for the graph."""
+        return SubscriberCount(self.spec.id, self._answered, self._failed)
+
+    def close(self, timeout_s: float = _ASK_S) -> None:
+        """Calls that are under way end."""
+        with self._lock:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            left, self._calls = list(self._calls.values()), {}
+            for call in left:
+                self._end(call)
+            threads = tuple(self._threads)
+        self._is_over.set()
+        self._forget_me(self)
+        for call in left:
+            self._tell(call, self._closed_error())
+        deadline = time.monotonic() + timeout_s
+        for thread in threads:
+            if thread is not threading.current_thread():
+                thread.join(max(0.0, deadline - time.monotonic()))
+
+    def forked(self) -> None:
+        """In a child. See `ClientTransport.forked`."""
+        self.is_closed = True
+        self._lock = threading.Lock()
+        self._calls = {}
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(_("client of '{service}'").format(service=self.spec.service))

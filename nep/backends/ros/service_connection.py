@@ -1,0 +1,146 @@
+"""ServiceConnection: one call of a ROS service over TCP. rospy's own waits without a limit."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import socket
+import struct
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from urllib.parse import urlsplit
+
+from nep.i18n import _
+from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
+
+__all__ = ["Handshakes", "ServiceConnection", "ServiceConnectionError"]
+
+_LENGTH = struct.Struct("<I")
+_HEADER_MAX_BYTES = 2**20
+_HANDSHAKE_S = 5.0
+_HANDSHAKES_MAX = 3
+"""So many at once with one server of this program's: rospy lets five wait, and loses more for seconds."""
+_SLICE_S = 0.1
+
+
+class ServiceConnectionError(OSError):
+    """The other end is gone, or is no server of this service."""
+
+
+class Handshakes:
+    """Bounds how many connections are being made with each server. May be used from any thread."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition(threading.Lock())
+        self._counts: Counter[str] = Counter()
+
+    @contextlib.contextmanager
+    def turn(self, uri: str, is_over: Callable[[], bool], deadline: float) -> Iterator[None]:
+        """Wait for one's turn. Raises `TimeoutError`, and `ServiceConnectionError` when `is_over`."""
+        with self._changed:
+            while self._counts[uri] >= _HANDSHAKES_MAX:
+                left = deadline - time.monotonic()
+                if left <= 0.0:
+                    raise TimeoutError
+                if is_over():
+                    raise ServiceConnectionError(_("nobody waits any more"))
+                self._changed.wait(min(_SLICE_S, left))
+            self._counts[uri] += 1
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._counts[uri] -= 1
+                if not self._counts[uri]:
+                    del self._counts[uri]
+                self._changed.notify_all()
+
+
+class ServiceConnection:
+    """Connected to the server at `uri`. Each step ends at `deadline` with `TimeoutError`, or `OSError`.
+
+    To be made takes 5 seconds at most.
+    """
+
+    def __init__(self, uri: str, service: str, caller: str, deadline: float) -> None:
+        parts = urlsplit(uri)
+        try:
+            host, port = parts.hostname, parts.port
+        except ValueError:
+            host = port = None
+        if parts.scheme != "rosrpc" or not host or not port:
+            raise ServiceConnectionError(_("it has no address"))
+        self._deadline = min(deadline, time.monotonic() + _HANDSHAKE_S)
+        self._socket = socket.create_connection((host, port), max(0.001, self._left()))
+        try:
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self.header = self._shake_hands({"callerid": caller, "service": service, "md5sum": "*"})
+            self._deadline = deadline
+        except BaseException:
+            self._socket.close()
+            raise
+
+    def _left(self) -> float:
+        return self._deadline - time.monotonic()
+
+    def _shake_hands(self, fields: dict[str, str]) -> dict[str, str]:
+        packed = [f"{key}={value}".encode() for key, value in fields.items()]
+        self._send(b"".join(_LENGTH.pack(len(each)) + each for each in packed))
+        data = self._sized(_HEADER_MAX_BYTES)
+        header: dict[str, str] = {}
+        at = 0
+        while at + 4 <= len(data):
+            (size,) = _LENGTH.unpack_from(data, at)
+            key, _equals, value = data[at + 4 : at + 4 + size].decode("utf-8", "replace").partition("=")
+            header[key] = value
+            at += 4 + size
+        if "error" in header or "type" not in header:
+            raise ServiceConnectionError(header.get("error", ""))
+        return header
+
+    def ask(self, body: bytes) -> tuple[bool, bytes]:
+        """Whether it was carried out, and the body of the answer, or else why not."""
+        self._send(body)
+        is_carried_out = self._exactly(1) != b"\0"
+        return is_carried_out, self._sized(PAYLOAD_MAX_BYTES + 2**20)
+
+    def _send(self, data: bytes) -> None:
+        self._limit()
+        self._socket.sendall(_LENGTH.pack(len(data)) + data)
+
+    def _sized(self, most: int) -> bytes:
+        (size,) = _LENGTH.unpack(self._exactly(4))
+        if size > most:
+            raise ServiceConnectionError(_("it sends too much"))
+        return self._exactly(size)
+
+    def _exactly(self, size: int) -> bytes:
+        data = bytearray(size)
+        view = memoryview(data)
+        while view:
+            self._limit()
+            count = self._socket.recv_into(view)
+            if not count:
+                raise ServiceConnectionError(_("it is gone"))
+            view = view[count:]
+        return bytes(data)
+
+    def _limit(self) -> None:
+        if self._deadline == math.inf:
+            self._socket.settimeout(None)
+            return
+        left = self._left()
+        if left <= 0.0:
+            raise TimeoutError
+        self._socket.settimeout(left)
+
+    def end(self) -> None:
+        """Whatever waits here ends at once; from any thread."""
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Close it; in the thread that uses it."""
+        self._socket.close()

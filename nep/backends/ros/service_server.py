@@ -1,0 +1,188 @@
+"""RosServer: serves a service of ROS. rospy has a thread for each connection; it waits for the answer."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from nep.backends.ros.process import RosProcess
+from nep.backends.ros.service_types import NEP_CALL, ServiceType, served_type
+from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
+from nep.errors import NepError
+from nep.i18n import _
+from nep.protocol.requests import PublisherCount
+from nep.protocol.service_wire import CallKind, Reply, failure, read_failure
+
+__all__ = ["RosServer"]
+
+
+class _Waiting:
+    """A thread of rospy's that waits for the answer to its call."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
+        self._body: bytes | None = None
+        self._reason = ""
+
+    def end(self, body: bytes | None, reason: str = "") -> bool:
+        """With the body of an answer, or else with why there is none; whether it was the first to come."""
+        with self._lock:
+            if self._ended.is_set():
+                return False
+            self._body, self._reason = body, reason
+            self._ended.set()
+            return True
+
+    def wait(self) -> tuple[bytes | None, str]:
+        """What it ended with."""
+        self._ended.wait()
+        return self._body, self._reason
+
+
+class RosServer:
+    """A server: its queue."""
+
+    def __init__(self, process: RosProcess, spec: ServerSpec, forget: Callable[[RosServer], None]) -> None:
+        self.spec = spec
+        self.process = process
+        self.service = process.resolved(spec.service)
+        self.calls = CallQueue()
+        self.tally = Tally()
+        self.is_closed = False
+        self._forget = forget
+        self._type = served_type(spec.msg_type)
+        self._changed = threading.Condition(threading.Lock())
+        self._waiting: set[_Waiting] = set()
+        self._unregistering: threading.Thread | None = None
+        self._response = _message_class(process.rospy, f"{self._type.name}Response", self._type)
+        self._rospy_service: Any = process.serve(self.service, _service_class(process.rospy, self._type,
+            self._response), self._handle)  # fmt: skip
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it is reached."""
+        return (str(self._rospy_service.uri),)
+
+    # ---- what rospy calls, in a thread of each connection
+
+    def _handle(self, request: Any) -> Any:  # noqa: ANN401 - rospy has no types
+        waiting = _Waiting()
+        with self._changed:
+            self._waiting.add(waiting)
+        try:
+            self._ask(request.body, waiting)
+            body, reason = waiting.wait()
+            if body is None:
+                raise self.process.rospy.ServiceException(reason)  # rospy tells it the other side
+            made = self._response()
+            made.body = body
+            return made
+        finally:
+            with self._changed:
+                self._waiting.discard(waiting)
+                self._changed.notify_all()
+
+    def _ask(self, body: bytes, waiting: _Waiting) -> None:
+        """Let it be carried out, or answer at once."""
+        try:
+            asked = self._type.call_in(body)
+        except NepError as error:
+            self._answer(waiting, failure(CallKind.REFUSED, "", str(error)))
+            return
+        deadline = None if asked.timeout_s is None else time.monotonic() + asked.timeout_s
+        incoming = IncomingCall(
+            asked.data, asked.codec, deadline, lambda reply: self._answer(waiting, fitting(reply))
+        )
+        if self.is_closed or not self.calls.put(incoming):
+            self._answer(waiting, refusal(self.spec.service, is_closed=self.calls.is_closed))
+
+    def _answer(self, waiting: _Waiting, reply: Reply) -> bool:
+        body: bytes | None = None
+        if self._type is NEP_CALL or reply.kind == CallKind.ANSWER:
+            try:
+                body = self._type.body_of_reply(reply)
+            except NepError as error:  # what the callback gave is no answer of this type
+                reply = failure(CallKind.ERROR, type(error).__name__, str(error))
+        self.tally.add(reply)
+        if body is not None:
+            return waiting.end(body)
+        return waiting.end(None, ": ".join(filter(None, read_failure(reply.data))))
+
+    # ---- the end
+
+    def counts(self) -> PublisherCount:
+        """The statistics for the graph."""
+        tally = self.tally
+        return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
+
+    def begin_close(self) -> None:
+        """Unregister, and refuse the calls that wait."""
+        with self._changed:
+            if self._unregistering is not None:
+                return
+            self._unregistering = threading.Thread(
+                target=self._unregister, name="nep-ros-unregister", daemon=True
+            )
+        self._unregistering.start()
+        for call in self.calls.close():
+            call.answer(refusal(self.spec.service, is_closed=True))
+
+    def _unregister(self) -> None:
+        if not self.process.is_over:
+            with contextlib.suppress(Exception):  # rospy has logged it
+                self._rospy_service.shutdown()
+
+    def close(self, timeout_s: float) -> None:
+        """The same, and end: what is answered within `timeout_s` is sent."""
+        deadline = time.monotonic() + timeout_s
+        self.begin_close()
+        if self._unregistering is not None:
+            self._unregistering.join(max(0.0, timeout_s))
+        with self._changed:
+            self._changed.wait_for(lambda: not self._waiting, max(0.0, deadline - time.monotonic()))
+            self.is_closed = True
+            for waiting in self._waiting:
+                waiting.end(None, _("the server ends"))
+        self._forget(self)
+
+    def forked(self) -> None:
+        """In a child. See `ServerTransport.forked`."""
+        self.is_closed = True
+        self.calls.forked()
+
+
+def _message_class(rospy: Any, name: str, kind: ServiceType) -> type:  # noqa: ANN401 - rospy has no types
+    """A class of messages that rospy sends and receives as they are."""
+
+    def serialize(message: Any, buffer: Any) -> None:  # noqa: ANN401 - rospy has no types
+        buffer.write(message.body)
+
+    def deserialize(message: Any, body: bytes) -> Any:  # noqa: ANN401 - rospy has no types
+        message.body = bytes(body)
+        return message
+
+    return type(
+        "EncodedBody",
+        (rospy.msg.genpy.Message,),
+        {
+            "__slots__": ["body"], "_slot_types": ["uint8[]"], "_has_header": False, "_type": name,
+            "_md5sum": kind.md5sum, "_full_text": "", "serialize": serialize, "deserialize": deserialize,
+        },
+    )  # fmt: skip
+
+
+def _service_class(rospy: Any, kind: ServiceType, response: type) -> type:  # noqa: ANN401 - rospy has no types
+    return type(
+        "EncodedService",
+        (),
+        {
+            "_type": kind.name,
+            "_md5sum": kind.md5sum,
+            "_request_class": _message_class(rospy, f"{kind.name}Request", kind),
+            "_response_class": response,
+        },
+    )

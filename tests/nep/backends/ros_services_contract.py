@@ -1,0 +1,87 @@
+"""The contract of services over ROS, in a process of its own: see `test_ros_services.py`, which runs it.
+
+What ROS has no room for is left out: answers that come late, for a client closes its connection when it waits
+no longer, and two servers of one name in one program.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+import nep
+from tests.nep.backends.ros_contract import Make, _nothing_is_left, make, ros
+from tests.nep.programs import eventually
+from tests.nep.services import test_calls as contract
+from tests.nep.services.test_calls import spin
+
+__all__ = ["_nothing_is_left", "make", "ros", "spin"]
+
+pytestmark = [  # rospy's own ways
+    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+]
+LEFT_OUT = {
+    "test_an_awaited_call_that_is_cancelled_is_forgotten",
+    "test_a_server_that_takes_too_long_is_another_error_and_its_answer_is_dropped",
+    "test_a_server_that_closes_answers_what_it_carries_out",
+    "test_a_second_server_is_an_alert_and_takes_over",
+    "test_the_graph_tells_of_services_and_not_of_topics",
+}
+globals().update({
+    name: test
+    for name, test in vars(contract).items()
+    if name.startswith("test_") and name not in LEFT_OUT
+})  # fmt: skip
+
+
+@pytest.fixture
+def registered(make: Make) -> Make:
+    """The master knows all of them."""
+    return make
+
+
+def test_a_server_that_takes_too_long_is_another_error(make: Make) -> None:
+    server = make("server").new_server("/slow")
+    client = make("client").new_client("/slow")
+    with pytest.raises(nep.ServiceTimeoutError, match=r"an answer of '/slow' did not come within 0\.2 s"):
+        client.call({"n": 1}, timeout_s=0.2)
+    assert server.listen_info(30.0) == {"n": 1}
+    server.send_info({})
+    assert client.late == 0
+
+
+def test_the_graph_tells_of_services_and_not_of_those_of_rospy(make: Make) -> None:
+    a, b = make("a"), make("b")
+    server = a.new_server("x", lambda request: 1 / 0 if request == "bad" else request, threads=1)
+    client = b.new_client("/x", timeout_s=30.0)
+    assert client.call(1) == 1
+    with pytest.raises(nep.ServiceError):
+        client.call("bad")
+    eventually(lambda: b.graph().services["/x"].calls == 2)
+    graph = b.graph()
+    assert graph.services.keys() == {"/x"}
+    assert not any("/x" in topic for topic in graph.topics)
+    info = graph.services["/x"]
+    assert (info.errors, info.clients[0].answered) == (1, 2)
+    assert [each.node_id for each in info.servers] == [a.id]
+    assert [each.node_id for each in info.clients] == [b.id]
+    assert server.endpoints[0].startswith("rosrpc://127.0.0.1:")
+    server.close()
+    client.close()
+    assert not b.graph().services
+
+
+def test_a_second_server_of_a_program_is_refused_until_the_first_is_closed(make: Make) -> None:
+    first = make("a").new_server("/x")
+    with pytest.raises(nep.NepError, match="this program serves '/x' already"):
+        make("b").new_server("/x")
+    first.close()
+    make("c").new_server("/x", lambda request: request, threads=1)
+    assert make("d").new_client("/x").call(5, timeout_s=30.0) == 5
+
+
+def test_types_that_are_not_there_are_refused(make: Make) -> None:
+    with pytest.raises(nep.NepError, match=r"there is no ROS service 'std_srvs/SetBoot' here.*-srvs'"):
+        make("a").new_server("/x", msg_type="std_srvs/SetBoot")
+    with pytest.raises(nep.NepError, match="a service of ROS cannot have the type 'image'"):
+        make("b").new_server("/x", msg_type="image")

@@ -1,0 +1,252 @@
+"""Services of the back end `ros` with real programs of ROS; the contract runs in a process of its own."""
+
+from __future__ import annotations
+
+import math
+import os
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep.backends.ros.definition import parse
+from nep.backends.ros.service_types import NEP_CALL, ServiceType
+from nep.errors import WireError
+from nep.messages.codecs import CODECS
+from nep.protocol.service_wire import CallKind, Reply, failure
+from tests.nep.backends.ros_programs import FIND_ROS, ros_master, skip_without_ros, told
+from tests.nep.programs import ROOT, running
+
+
+@pytest.fixture
+def ros(tmp_path: Path) -> Iterator[str]:
+    skip_without_ros()
+    with ros_master(tmp_path) as address:
+        yield address
+
+
+def test_the_contract_holds() -> None:
+    skip_without_ros()
+    command = [sys.executable, "-m", "pytest", "-q", "-n0", "tests/nep/backends/ros_services_contract.py"]
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "ROS_"))}
+    ended = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=140
+    )
+    assert ended.returncode == 0, ended.stdout[-8000:] + ended.stderr[-2000:]
+    assert " passed" in ended.stdout
+    assert "skipped" not in ended.stdout
+
+
+SERVES = (
+    FIND_ROS
+    + """
+import sys
+from std_srvs.srv import SetBool, SetBoolResponse, Trigger
+from sensor_msgs.srv import SetCameraInfo, SetCameraInfoResponse
+rospy.init_node("server", disable_signals=True)
+def switch(request):
+    return SetBoolResponse(not request.data, "switched")
+def fails(request):
+    raise RuntimeError("no power")
+def camera(request):
+    info = request.camera_info
+    said = info.height, len(info.D), info.K[8], info.header.frame_id
+    return SetCameraInfoResponse(True, "%d %d %s %s" % said)
+class Other(Trigger):
+    _md5sum = "0" * 32
+class Unknown(Trigger):
+    _type = "nothing_msgs/Known"
+servers = [rospy.Service(*each) for each in (
+    ("/switch", SetBool, switch), ("/fails", Trigger, fails), ("/camera", SetCameraInfo, camera),
+    ("/other", Other, fails), ("/unknown", Unknown, fails))]
+print("ready")
+sys.stdin.readline()
+"""
+)
+CALLS = """
+import nep
+node = nep.node("client", "ros")
+def call(service, request, **more):
+    try:
+        print(node.new_client(service, **more).call(request, timeout_s=30.0))
+    except nep.NepError as error:
+        print(type(error).__name__, error)
+call("/switch", {"data": True})
+call("switch", {})
+call("/switch", {"data": 5})
+call("/switch", {"dat": True})
+call("/switch", {"data": False}, msg_type="msgpack")
+call("/switch", [])
+call("/fails", {})
+info = {"header": {"frame_id": "eye"}, "height": 480, "D": [0.5] * 5, "K": list(range(9))}
+call("/camera", {"camera_info": info})
+call("/other", {})
+call("/unknown", {})
+print(sorted(node.graph().services))
+"""
+
+
+def test_nep_calls_a_program_of_ros(ros: str) -> None:
+    with running(SERVES, **told(ros)) as server:
+        assert server.line() == "ready"
+        with running(CALLS, **told(ros)) as client:
+            assert client.line() == "{'success': False, 'message': 'switched'}"
+            assert client.line() == "{'success': True, 'message': 'switched'}"
+            assert "EncodeError" in (said := client.line())
+            assert "field 'data' is 5; give a 'bool'" in said
+            assert "field 'dat' does not exist; did you mean 'data'?" in client.line()
+            assert client.line() == "{'success': True, 'message': 'switched'}"
+            assert "publish a 'dict' with its fields 'data'" in client.line()
+            assert client.line() == (
+                "ServiceError the server of '/fails' failed: ServiceException: error processing request: "
+                "no power"
+            )
+            assert client.line() == "{'success': True, 'status_message': '480 5 8.0 eye'}"
+            assert "use the same version on both sides" in client.line()
+            assert "there is no ROS service 'nothing_msgs/Known' here" in client.line()
+            assert client.line() == "['/camera', '/fails', '/other', '/switch', '/unknown']"
+            client.end()
+
+
+NEP_SERVES = """
+import nep, threading
+node = nep.node("server", "ros")
+def switch(request):
+    print(request)
+    if request["data"]:
+        raise ValueError("no")
+    return {"success": True, "message": "done"}
+first = node.new_server("/switch", switch, msg_type="std_srvs/SetBool")
+second = node.new_server("/wrong", lambda request: {"succes": True}, threads=1, msg_type="std_srvs/Trigger")
+third = node.new_server("/empty", lambda request: None, threads=1, msg_type="std_srvs/Empty")
+node.new_timer(0.01, lambda: second.errors and first.calls == 3 and third.calls and node.stop_spin())
+print("ready")
+node.spin()
+print(first.calls, first.errors, second.errors)
+"""
+ROS_CALLS = (
+    FIND_ROS
+    + """
+from std_srvs.srv import Empty, SetBool, Trigger
+rospy.init_node("client", disable_signals=True)
+def call(service, kind, *args, **more):
+    rospy.wait_for_service(service, 30)
+    try:
+        print(repr(rospy.ServiceProxy(service, kind, **more)(*args)).replace(chr(10), " "))
+    except rospy.ServiceException as error:
+        print(error)
+call("/switch", SetBool, False)
+call("/switch", SetBool, True)
+call("/switch", SetBool, False, persistent=True)
+call("/empty", Empty)
+call("/switch", Trigger)
+call("/wrong", Trigger)
+"""
+)
+
+
+def test_a_program_of_ros_calls_nep(ros: str) -> None:
+    with running(NEP_SERVES, **told(ros)) as server:
+        assert server.line() == "ready"
+        with running(ROS_CALLS, **told(ros)) as client:
+            assert client.line() == 'success: True message: "done"'
+            assert client.line() == (
+                "service [/switch] responded with an error: b'service cannot process request: ValueError: no'"
+            )
+            assert client.line() == 'success: True message: "done"'
+            assert client.line() == ""
+            assert "md5sums do not match" in client.line()
+            assert "field 'succes' does not exist; did you mean 'success'?" in client.line()
+            client.end()
+        assert [server.line() for _ in range(3)] == ["{'data': False}", "{'data': True}", "{'data': False}"]
+        assert server.line() == "3 1 1"
+        server.end()
+        assert server.process.returncode == 0
+
+
+DIES = """
+import nep, sys
+node = nep.node("server", "ros")
+server = node.new_server("/x")
+print("ready")
+while True:
+    if server.listen_info() == "end":
+        print("asked")
+        sys.stdin.readline()
+    server.send_info("answer")
+"""
+ASKS = """
+import nep, sys
+node = nep.node("client", "ros")
+client = node.new_client("/x", timeout_s=60.0)
+print(client.call(1))
+future = client.call_async("end", timeout_s=None)
+print("waits", flush=True)
+for limit in (60.0, None):
+    try:
+        future.result(limit)
+    except nep.NepError as error:
+        print(type(error).__name__)
+    sys.stdin.readline()
+    future = client.call_async(2)
+print(future.result(60.0))
+"""
+
+
+def test_a_server_that_dies_is_told_and_the_next_one_is_found(ros: str) -> None:
+    with running(DIES, **told(ros)) as server, running(ASKS, **told(ros)) as client:
+        assert server.line() == "ready"
+        assert (client.line(), client.line(), server.line()) == ("answer", "waits", "asked")
+        server.kill()
+        assert client.line() == "ServerGoneError"
+        client.say("")
+        with running(DIES, **told(ros)) as other:
+            assert other.line() == "ready"
+            client.say("")
+            assert client.line() == "answer"
+            client.end()
+
+
+def test_nep_call_is_what_the_file_of_that_name_says() -> None:
+    json, msgpack = CODECS["json"], CODECS["msgpack"]
+    body = NEP_CALL.body_of_call(json, b'{"a":1}', 1.5)
+    assert body == struct.pack("<HII", 1, 1500, 7) + b'{"a":1}'
+    assert NEP_CALL.call_in(body) == (b'{"a":1}', 1, 1.5)
+    assert NEP_CALL.call_in(NEP_CALL.body_of_call(msgpack, b"\xc0", None)) == (b"\xc0", 4, None)
+    assert NEP_CALL.call_in(NEP_CALL.body_of_call(json, b"", 1e-9)).timeout_s == 0.001
+    assert NEP_CALL.call_in(NEP_CALL.body_of_call(json, b"", 1e300)).timeout_s == (2**32 - 1) / 1000
+    for reply in (Reply(CallKind.ANSWER, b"1"), failure(CallKind.ERROR, "ValueError", "no")):
+        assert NEP_CALL.reply_in(NEP_CALL.body_of_reply(reply), json) == reply
+    for wrong in (b"", b"\1\1\0\0\0\0\0", b"\2\1\0\0\0\0", b"\2\1\0\5\0\0\0ab", b"\2\1\0\0\0\0\0x"):
+        with pytest.raises(nep.DecodeError):
+            NEP_CALL.reply_in(wrong, json)
+    with pytest.raises(nep.DecodeError):
+        NEP_CALL.call_in(b"\1")
+
+
+def test_a_type_of_ros_has_bytes_and_nan_with_msgpack() -> None:
+    kind = ServiceType(
+        "a/B", "", parse("a/BRequest", "uint8[] data\nfloat64 x"), parse("a/BResponse", "uint8[] data")
+    )
+    json, msgpack = CODECS["json"], CODECS["msgpack"]
+    asked = msgpack.encode({"data": b"\0\xff", "x": math.nan}).data
+    data, codec, timeout_s = kind.call_in(kind.body_of_call(msgpack, asked, 5.0))
+    assert (codec, timeout_s) == (4, None)
+    found = msgpack.decode(data, {})
+    assert found["data"] == b"\0\xff"  # type: ignore[index]
+    assert math.isnan(found["x"])  # type: ignore[index]
+    body = kind.body_of_reply(Reply(CallKind.ANSWER, b'{"data":[1,2]}', 1))
+    assert kind.reply_in(body, msgpack).data == msgpack.encode({"data": b"\1\2"}).data
+    with pytest.raises(nep.EncodeError):
+        kind.reply_in(body, json)
+    for wrong in (
+        Reply(CallKind.ERROR, b"{}"),
+        Reply(CallKind.ANSWER, b"{}", 99),
+        Reply(CallKind.ANSWER, b"{oops"),
+    ):
+        with pytest.raises((nep.DecodeError, WireError)):
+            kind.body_of_reply(wrong)
