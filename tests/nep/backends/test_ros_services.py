@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 import struct
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from nep.backends.ros.service_types import NEP_CALL, ServiceType
 from nep.errors import WireError
 from nep.messages.codecs import CODECS
 from nep.protocol.service_wire import CallKind, Reply, failure
-from tests.nep.backends.ros_programs import FIND_ROS, ros_master, skip_without_ros, told
+from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros, told
 from tests.nep.programs import ROOT, running
 
 
@@ -250,3 +251,45 @@ def test_a_type_of_ros_has_bytes_and_nan_with_msgpack() -> None:
     ):
         with pytest.raises((nep.DecodeError, WireError)):
             kind.body_of_reply(wrong)
+
+
+OBEYS = """
+import nep, sys
+node = nep.node("client", "ros")
+client = node.new_client("/x")
+for line in sys.stdin:
+    limit, request = line.split()
+    try:
+        print(client.call(request, float(limit)))
+    except nep.NepError as error:
+        print(type(error).__name__)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
+def test_a_server_that_hangs_holds_nobody_up(ros: str) -> None:
+    with running(DIES, **told(ros)) as server, running(OBEYS, **told(ros)) as client:
+        assert server.line() == "ready"
+        client.say("60 1")
+        assert client.line() == "answer"
+        server.stop()
+        client.say("0.3 1")
+        assert client.line() == "NoServerError", "it did not say that it is one: nothing was sent"
+        server.signal(signal.SIGCONT)
+        client.say("60 1")
+        assert client.line() == "answer"
+
+
+def test_a_master_that_was_started_anew_gets_to_know_the_services(tmp_path: Path) -> None:
+    skip_without_ros()
+    address = f"127.0.0.1:{free_port()}"
+    with running(DIES, **told(address)) as server, running(OBEYS, **told(address)) as client:
+        with ros_master(tmp_path, address):
+            assert server.line() == "ready"
+            client.say("60 1")
+            assert client.line() == "answer"
+        client.say("0.1 2")
+        assert client.line() == "NoServerError", "a call needs the master"
+        with ros_master(tmp_path, address):
+            client.say("60 3")
+            assert client.line() == "answer"
