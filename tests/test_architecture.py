@@ -40,7 +40,6 @@ SMALL_LINES = 60
 EARNED = {
     "app.core.robots.awaited": "pure, and tested alone",
     "nep.public": "a seam: imported at the first use of a name of `nep`, all of them at once",
-    "nep.backends.zenoh.early": "pure, and tested alone",
     "nep.cli.doctor": "one of a list: the commands of nep",
     "nep.cli.interrupts": "imported before all else of a command, under the guard of its caller",
     "app.core.run.edits_since_run": "pure, and tested alone",

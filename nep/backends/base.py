@@ -71,7 +71,8 @@ class PublisherSpec:
 class SubscriberSpec:
     """What a subscriber shall be. With a `sink` nothing is kept for `SubscriberTransport.poll`.
 
-    `number` proves the id. `qos`: one of the back end's words, or "".
+    `number` proves the id. `qos`: one of the back end's words, or "". With `is_pattern` it hears all topics
+    that match its own, as `nep.protocol.topic_pattern` has it.
     """
 
     id: int
@@ -85,6 +86,7 @@ class SubscriberSpec:
     sink: Sink | None = None
     number: int = 0
     qos: str = ""
+    is_pattern: bool = False
 
 
 class Wakes(Protocol):
@@ -222,6 +224,7 @@ class Backend:
     `NepError` for what is no place where nodes of this back end meet. `codec_for` gives the codec of a
     publisher's message type, for a back end that has types of its own. `qos`: its words for qualities of
     service. `has_history`: its publishers keep more than the last message for subscribers that come late.
+    `has_patterns`: its subscribers take topics with wildcards.
     `has_extensions`: what travels beside a payload arrives. `is_in_process`: only nodes of one process meet.
     """
 
@@ -233,6 +236,7 @@ class Backend:
     codec_for: Callable[[str], Codec] = codec_for
     qos: tuple[str, ...] = ()
     has_history: bool = False
+    has_patterns: bool = False
     has_extensions: bool = True
     is_in_process: bool = False
 

@@ -141,7 +141,9 @@ class NativeNetwork:
 
     def subscribe(self, topic: str, codec: str) -> bool:
         """See `NativeSide`."""
-        subscriber = self._try(topic, lambda node: node.new_sub(topic, codec, sink=self._arrived))
+        subscriber = self._try(
+            topic, lambda node: node.new_sub(topic, codec, sink=self._arrived, wildcards=False)
+        )
         if subscriber is None:
             return False
         self._subscribers[topic, codec] = subscriber

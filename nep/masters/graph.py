@@ -19,6 +19,7 @@ from typing import NamedTuple
 from nep.errors import WireError
 from nep.i18n import _
 from nep.masters.leases import LEASE_S, Leases, RawRenewal
+from nep.masters.pattern_index import ALL_PATTERNS_MAX, PATTERNS_MAX
 from nep.masters.registry import (
     ALL_RECORDS_MAX,
     ALWAYS_ROOM,
@@ -282,12 +283,31 @@ class Graph:
                     RECORDS_MAX=RECORDS_MAX
                 )
             )
+        self._admit_patterns(request)
         all_ = len(registry.publisher_owners) + len(registry.subscriber_owners)
         if mine > max(own, ALWAYS_ROOM) and all_ + mine - own > ALL_RECORDS_MAX:
             raise WireError(
                 _("the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most").format(
                     ALL_RECORDS_MAX=ALL_RECORDS_MAX
                 )
+            )
+
+    def _admit_patterns(self, request: Join | AddPublisher | AddSubscriber) -> None:
+        new = {each.id for each in records_of(request) if isinstance(each, SubscriberRecord) and each.pattern}
+        if not new:
+            return
+        member = self._registry.members.get(request.node.id)
+        known = () if member is None else member.subscribers.values()
+        own = {each.record.id for each in known if each.record.pattern}
+        mine = new if isinstance(request, Join) else own | new
+        all_ = len(self._registry.patterns) - len(own) + len(mine)
+        most = max(len(self._registry.patterns), ALL_PATTERNS_MAX)
+        if len(mine) > max(len(own), PATTERNS_MAX) or all_ > most:
+            raise WireError(
+                _(
+                    "a node has {PATTERNS_MAX} subscribers with wildcards at most, and all nodes together "
+                    "{ALL_PATTERNS_MAX}"
+                ).format(PATTERNS_MAX=PATTERNS_MAX, ALL_PATTERNS_MAX=ALL_PATTERNS_MAX)
             )
 
     # ---- requests
@@ -338,7 +358,7 @@ class Graph:
         self._place(member, request.publisher, out)
         expected: list[Expected] = []
         hung: list[Expected] = []
-        for other, subscriber in self._registry.subscribers_of(request.publisher.topic):
+        for other, subscriber in self._registry.hearing(request.publisher.topic):
             if not other.is_managed:
                 entry = Expected(subscriber.record.id, other.node.id, other.node.name)
                 # Who did not answer this node is not waited for by it; by others when it is late as well.
@@ -350,7 +370,11 @@ class Graph:
         check_record(request.subscriber)
         member = self._meet(request.node, now, sender)
         self._registry.add_subscriber(member, request.subscriber)
-        found = self._registry.publishers_of(request.subscriber.topic)
+        found = tuple(
+            remote
+            for topic in sorted(self._registry.topics_of(request.subscriber))
+            for remote in self._registry.publishers_of(topic)
+        )
         # A probe that cannot be sent takes a dead publisher out of the reply: nobody waits for its echo.
         out.extend(self.probes(sorted({remote.node_id for remote in found} - {member.node.id})))
         return Found(self.epoch, self.revision, found)
@@ -370,7 +394,7 @@ class Graph:
             self._registry.add_subscriber(member, subscriber)
         for publisher in request.publishers:
             self._place(member, publisher, out)
-        topics = {record.topic for record in request.subscribers}
+        topics = self._registry.topics_heard_by(member)
         found = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
         return Found(self.epoch, self.revision, tuple(found))
 
@@ -405,7 +429,7 @@ class Graph:
             return Renewed(self.epoch, self.revision, again=True)
         topics: Iterable[str] = ()
         if self._registry.publishers_revision > request.revision:
-            topics = sorted({subscriber.record.topic for subscriber in member.subscribers.values()})
+            topics = sorted(self._registry.topics_heard_by(member))
         changed = tuple(
             TopicPublishers(topic, self._registry.publishers_of(topic))
             for topic in topics
@@ -453,7 +477,7 @@ class Graph:
 
     def _tell(self, record: PublisherRecord, push: Push, out: list[Outgoing]) -> None:
         told: set[str] = set()
-        for member, _subscriber in self._registry.subscribers_of(record.topic):
+        for member, _subscriber in self._registry.hearing(record.topic):
             if not member.is_managed and member.node.id not in told:
                 told.add(member.node.id)
                 out.append(Outgoing(member.node.id, push))

@@ -12,6 +12,7 @@ from typing import Any
 
 from nep.errors import NepError, WireError
 from nep.i18n import _
+from nep.masters.pattern_index import PatternIndex
 from nep.masters.rates import Meter
 from nep.protocol.graph_view import Alert
 from nep.protocol.requests import (
@@ -140,6 +141,7 @@ class Registry:
         self._publishing: dict[str, dict[int, RegisteredNode]] = {}
         self._subscribing: dict[str, dict[int, RegisteredNode]] = {}
         self._reported: dict[str, tuple[Alert, ...]] = {}
+        self.patterns: PatternIndex[RegisteredNode] = PatternIndex()
 
     # ---- reading
 
@@ -167,6 +169,23 @@ class Registry:
         found = self._subscribing.get(topic)
         return [(member, member.subscribers[known]) for known, member in found.items()] if found else []
 
+    def hearing(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
+        """The subscribers that hear a topic: those of it, and those whose wildcards match."""
+        found = [each for each in self.subscribers_of(topic) if not each[1].record.pattern]
+        return found + [
+            (member, member.subscribers[known]) for member, known in self.patterns.subscribers_of(topic)
+        ]
+
+    def topics_of(self, record: SubscriberRecord) -> set[str]:
+        """The topics that a subscriber hears: with wildcards, those that are published."""
+        return self.patterns.topics_of(record.topic) if record.pattern else {record.topic}
+
+    def topics_heard_by(self, member: RegisteredNode) -> set[str]:
+        """The topics that the subscribers of a node hear."""
+        return {
+            topic for subscriber in member.subscribers.values() for topic in self.topics_of(subscriber.record)
+        }
+
     def remote(self, member: RegisteredNode, record: PublisherRecord) -> RemotePublisher:
         """A publisher as subscribers have to know it."""
         return RemotePublisher(record, member.node.id, member.node.name)
@@ -179,7 +198,7 @@ class Registry:
         """Everybody who can be connected to on the topics that this node subscribes to."""
         if member.heard_at != self.revision:
             member.heard_at = self.revision
-            topics = {subscriber.record.topic for subscriber in member.subscribers.values()}
+            topics = self.topics_heard_by(member)
             member.heard = {
                 known: other.publishers[known]
                 for topic in topics
@@ -230,6 +249,7 @@ class Registry:
         member.publishers[record.id] = RegisteredPublisher(record)
         self.publisher_owners[record.id] = member
         self._publishing.setdefault(record.topic, {})[record.id] = member
+        self.patterns.topic_came(record.topic)
         self._changed(record.topic)
         return True
 
@@ -239,6 +259,8 @@ class Registry:
             member.subscribers[record.id] = RegisteredSubscriber(record)
             self.subscriber_owners[record.id] = member
             self._subscribing.setdefault(record.topic, {})[record.id] = member
+            if record.pattern:
+                self.patterns.add(record.topic, record.id, member, self._publishing)
             self.touched.add(record.topic)
             self.revision += 1
 
@@ -250,6 +272,8 @@ class Registry:
             return None
         self.publisher_owners.pop(publisher, None)
         _take_out(self._publishing, gone.record.topic, publisher)
+        if gone.record.topic not in self._publishing:
+            self.patterns.topic_went(gone.record.topic)
         self._changed(gone.record.topic)
         self._forget_unused(gone.record.topic)
         return gone.record
@@ -261,6 +285,8 @@ class Registry:
         if gone is not None:
             self.subscriber_owners.pop(subscriber, None)
             _take_out(self._subscribing, gone.record.topic, subscriber)
+            if gone.record.pattern:
+                self.patterns.remove(gone.record.topic, subscriber)
             self.touched.add(gone.record.topic)
             self.revision += 1
             self._forget_unused(gone.record.topic)

@@ -42,6 +42,7 @@ from nep.nodes.work import Callback, Work
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
 from nep.protocol.service_wire import PREFIX, check_service
+from nep.protocol.topic_pattern import is_pattern
 from nep.protocol.wire import check_node_name, check_topic
 from nep.services.client import Client
 from nep.services.owned import OwnedServices, codec_checked
@@ -214,9 +215,13 @@ class Node:
         max_messages: int = MAX_MESSAGES,
         sink: Sink | None = None,
         qos: str = "",
+        wildcards: bool = True,
     ) -> Subscriber:
         """A subscriber. What is published after this returned arrives, from every registered publisher.
 
+        A level of `topic` that is `*` is any level, `**` any number of them: "/robot/*/camera". Publishers
+        of all topics that match are heard, also those that come later, and a message has its own topic;
+        without `wildcards`, and in direct connections, the topic of just this name.
         `keep="latest"`: only the newest message is kept for `listen`; "all": up to `max_messages` (and
         256 MB), then the oldest are dropped and counted. `sink`: takes the messages in batches, 200 times a
         second at most, in a thread of the node's own, instead of `listen`. `qos` as for `new_pub`. Raises as
@@ -234,6 +239,7 @@ class Node:
             sink=None if sink is None else function("sink", sink),
             number=number,
             qos=self._quality(qos),
+            is_pattern=flag("wildcards", wildcards) and self._is_pattern(topic, configuration),
         )
         return self._subscribed(self._open_transport().subscriber(spec), spec)
 
@@ -254,8 +260,8 @@ class Node:
         `keep` and `max_messages` as for `new_sub`: with `keep="latest"` a callback that is slower than the
         topic gets the newest message each time and never falls behind. `with_message`: it is given the
         `Message`, which has the payload, topic, stamp_ns, seq and publisher. A message that cannot be decoded
-        is skipped, logged, and an alert in the graph, either way. `qos` as for `new_pub`. Raises as `new_pub`
-        does.
+        is skipped, logged, and an alert in the graph, either way. Wildcards in `topic` as for `new_sub`.
+        `qos` as for `new_pub`. Raises as `new_pub` does.
         """
         transport = self._open_transport()
         function("callback", callback)
@@ -271,6 +277,7 @@ class Node:
             at_least("max_messages", max_messages, 1),
             number=number,
             qos=self._quality(qos),
+            is_pattern=self._is_pattern(topic, configuration),
         )
         incoming = transport.subscriber(spec)
         subscriber = self._subscribed(incoming, spec)
@@ -343,6 +350,17 @@ class Node:
                 )
             )
         return configuration
+
+    def _is_pattern(self, topic: str, configuration: Configuration | None) -> bool:
+        if isinstance(configuration, Direct) or not is_pattern(topic):
+            return False
+        if not self._backend.has_patterns:
+            raise ValueError(
+                _("the back end '{name}' takes no wildcards; subscribe to each topic by its name").format(
+                    name=self._backend.name
+                )
+            )
+        return True
 
     def _history(self, history: int, configuration: Configuration) -> int:
         within("history", history, 0, MAX_HISTORY)

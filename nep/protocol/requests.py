@@ -67,12 +67,16 @@ class PublisherRecord:
 
 @dataclass(frozen=True)
 class SubscriberRecord:
-    """A subscriber as its node presents it. `number` proves its id: see `is_proven`."""
+    """A subscriber as its node presents it. `number` proves its id: see `is_proven`.
+
+    With `pattern` it hears all topics that match its own: see `nep.protocol.topic_pattern`.
+    """
 
     id: int
     topic: str
     msg_type: str
     number: int = 0
+    pattern: bool = False
 
 
 def node_id_from(key: str) -> str:

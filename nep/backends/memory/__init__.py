@@ -31,6 +31,7 @@ from nep.protocol.requests import (
     SubscriberCount,
     SubscriberRecord,
 )
+from nep.protocol.topic_pattern import matches
 from nep.protocol.wire import extension_part
 from nep.system import forks
 from nep.system.cpu import CpuLoad
@@ -52,6 +53,15 @@ class _Hub(ServiceHub):
         self.transports: dict[str, MemoryTransport] = {}
         self.publishers: dict[str, list[MemoryPublisher]] = {}
         self.subscribers: dict[str, tuple[MemorySubscriber, ...]] = {}
+        self.patterns: tuple[MemorySubscriber, ...] = ()
+        """Those whose topic has wildcards."""
+
+    def hearing(self, topic: str) -> tuple[MemorySubscriber, ...]:
+        """The subscribers that hear a topic."""
+        found = self.subscribers.get(topic, ())
+        if not self.patterns:
+            return found
+        return (*found, *(each for each in self.patterns if matches(each.spec.topic, topic)))
 
     def forget(self, node_id: str) -> None:
         """A node leaves."""
@@ -107,7 +117,7 @@ class MemoryPublisher:
     @property
     def subscribers(self) -> int:
         """How many subscribers there are on the topic."""
-        return len(self.hub.subscribers.get(self.spec.topic, ()))
+        return len(self.hub.hearing(self.spec.topic))
 
     @property
     def is_heard(self) -> bool:
@@ -149,7 +159,7 @@ class MemoryPublisher:
                 self._kind, data, self.last_stamp_ns, self.count, self.spec.id, encoded.extension or {}
             )
             self.history.add(message, len(data))
-            for subscriber in self.hub.subscribers.get(self.spec.topic, ()):
+            for subscriber in self.hub.hearing(self.spec.topic):
                 subscriber.put(message)
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - nothing is ever on its way here
@@ -233,10 +243,11 @@ class MemorySubscriber:
             if self.is_closed:
                 return
             self.is_closed = True
-            others = tuple(each for each in self.hub.subscribers[self.spec.topic] if each is not self)
-            self.hub.subscribers[self.spec.topic] = others
-            if not others:
-                del self.hub.subscribers[self.spec.topic]
+            self.hub.patterns = tuple(each for each in self.hub.patterns if each is not self)
+            there = self.hub.subscribers.pop(self.spec.topic, ())
+            others = tuple(each for each in there if each is not self)
+            if others:
+                self.hub.subscribers[self.spec.topic] = others
             self._transport.forget(self)
             self.hub.ask(requests.RemoveSubscriber(self._transport.node.id, self.spec.id))
         self._transport.wake()
@@ -283,12 +294,17 @@ class MemoryTransport:
         """Register a subscriber, and hand it what is latched."""
         hub = self._join(spec.configuration)
         with hub.lock:
-            hub.ask(requests.AddSubscriber(self.node, SubscriberRecord(spec.id, spec.topic, spec.msg_type)))
+            record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, pattern=spec.is_pattern)
+            hub.ask(requests.AddSubscriber(self.node, record))
             subscriber = MemorySubscriber(self, hub, spec)
-            for publisher in hub.publishers.get(spec.topic, ()):
-                for message in publisher.history:
-                    subscriber.put(message)
-            hub.subscribers[spec.topic] = (*hub.subscribers.get(spec.topic, ()), subscriber)
+            for topic, publishers in hub.publishers.items():
+                if topic == spec.topic or (spec.is_pattern and matches(spec.topic, topic)):
+                    for message in (each for publisher in publishers for each in publisher.history):
+                        subscriber.put(message)
+            if spec.is_pattern:
+                hub.patterns = (*hub.patterns, subscriber)
+            else:
+                hub.subscribers[spec.topic] = (*hub.subscribers.get(spec.topic, ()), subscriber)
             self._subscribers = (*self._subscribers, subscriber)
         if spec.sink is not None:
             self._pour(subscriber)
@@ -410,4 +426,6 @@ def _name(master: str | None) -> str:
     return master or "memory"
 
 
-BACKEND = Backend("memory", MemoryTransport, master=_name, has_history=True, is_in_process=True)
+BACKEND = Backend(
+    "memory", MemoryTransport, master=_name, has_history=True, has_patterns=True, is_in_process=True
+)

@@ -9,4 +9,6 @@ from nep.backends.nanomsg.transport import NanomsgTransport
 
 __all__ = ["BACKEND"]
 
-BACKEND = Backend("nanomsg", NanomsgTransport, needs="pynng", aliases=("nn",), has_history=True)
+BACKEND = Backend(
+    "nanomsg", NanomsgTransport, needs="pynng", aliases=("nn",), has_history=True, has_patterns=True
+)

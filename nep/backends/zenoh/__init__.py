@@ -10,4 +10,6 @@ from nep.backends.zenoh.transport import ZenohTransport
 
 __all__ = ["BACKEND"]
 
-BACKEND = Backend("zenoh", ZenohTransport, needs="eclipse-zenoh", master=place_name, has_history=True)
+BACKEND = Backend(
+    "zenoh", ZenohTransport, needs="eclipse-zenoh", master=place_name, has_history=True, has_patterns=True
+)

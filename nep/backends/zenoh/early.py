@@ -7,7 +7,9 @@ waits until the history is there with all that it has, and goes on behind it.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from operator import itemgetter
+from typing import Generic, TypeVar
 
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.messages.history import HISTORY_BYTES
@@ -15,12 +17,12 @@ from nep.protocol.wire import Header
 
 __all__ = ["EarlyMessages"]
 
-Parts = Sequence[bytes]
+T = TypeVar("T")
 _LONGEST_S = 15.0
 """Nothing waits for longer; greetings take ten seconds at most."""
 
 
-class EarlyMessages:
+class EarlyMessages(Generic[T]):
     """Those of one subscriber, which lives under its own lock. `sources`: whom it hears."""
 
     def __init__(
@@ -29,31 +31,31 @@ class EarlyMessages:
         self._sources = sources
         self._max_messages = max_messages
         self._clock = clock
-        self._kept: dict[int, list[tuple[int, Parts]]] = {}
+        self._kept: dict[int, list[tuple[int, T, int]]] = {}
         self._until: dict[int, float] = {}
         self._bytes = 0
 
-    def keep(self, header: Header, parts: Parts) -> bool:
-        """Whether this live message comes too early, and waits now. What waits is taken by `take`."""
+    def keep(self, header: Header, message: T, size_bytes: int) -> bool:
+        """Whether a live message comes too early, and waits now. What waits is taken by `take`."""
         source = self._sources.find(header.publisher)
         if source is None or source.remote is None or source.has_echoed:
             return False
         now = self._clock()
         if now >= self._until.setdefault(header.publisher, now + _LONGEST_S) or not self._has_room(header):
             return False
-        self._kept.setdefault(header.publisher, []).append((header.seq, parts))
-        self._bytes += sum(map(len, parts))
+        self._kept.setdefault(header.publisher, []).append((header.seq, message, size_bytes))
+        self._bytes += size_bytes
         return True
 
     def _has_room(self, header: Header) -> bool:
         count = len(self._kept.get(header.publisher, ()))
         return count < self._max_messages and self._bytes < HISTORY_BYTES
 
-    def take(self, publisher: int) -> list[Parts]:
+    def take(self, publisher: int) -> list[T]:
         """Those of a publisher that were not heard since, in order."""
         self._until.pop(publisher, None)
         kept = self._kept.pop(publisher, [])
-        self._bytes -= sum(len(part) for _seq, parts in kept for part in parts)
+        self._bytes -= sum(size_bytes for _seq, _message, size_bytes in kept)
         source = self._sources.find(publisher)
         last = 0 if source is None or source.last is None else source.last
-        return [parts for seq, parts in sorted(kept) if seq > last]
+        return [message for seq, message, _size in sorted(kept, key=itemgetter(0)) if seq > last]

@@ -23,18 +23,23 @@ __all__ = [
     "Alive",
     "call_key",
     "data_key",
+    "data_keys",
     "hello_key",
     "hellos_key",
+    "hellos_keys",
     "node_key",
     "parse_live",
     "publisher_key",
     "subscriber_key",
+    "topic_of",
 ]
 
 _ROOT = "nep/v1"
 _LIVE = f"{_ROOT}/live/"
 ALL_CALLS = f"{_ROOT}/call/*"
 ALL_LIVE = f"{_LIVE}**"
+_WILD = frozenset({"*", "**"})
+_TOPIC_AT = 3
 _ID_MOST = 2**64 - 1
 _NODE_WORDS, _PUBLISHER_WORDS, _SUBSCRIBER_WORDS = 7, 6, 4
 
@@ -59,6 +64,11 @@ def data_key(topic: str) -> str:
     return f"{_ROOT}/data/{_word(topic)}"
 
 
+def data_keys(pattern: str) -> str:
+    """Where messages of all topics are published that match a pattern, and of some that do not."""
+    return f"{_ROOT}/data/{_words(pattern)}"
+
+
 def hello_key(topic: str, publisher: int) -> str:
     """Where a publisher answers new subscribers."""
     return f"{_ROOT}/hello/{_word(topic)}/{publisher:016x}"
@@ -67,6 +77,26 @@ def hello_key(topic: str, publisher: int) -> str:
 def hellos_key(topic: str) -> str:
     """Where all publishers of a topic answer."""
     return f"{_ROOT}/hello/{_word(topic)}/*"
+
+
+def hellos_keys(pattern: str) -> str:
+    """Where all publishers of the topics of `data_keys` answer."""
+    return f"{_ROOT}/hello/{_words(pattern)}/*"
+
+
+def _words(pattern: str) -> str:
+    """What a topic that matches begins and ends with; zenoh has wildcards for chunks, and a topic is one."""
+    levels = pattern.split("/")
+    wild = [each for each, level in enumerate(levels) if level in _WILD]
+    first, last = wild[0], wild[-1]
+    begin = "/".join(levels[:first]) + ("/" if first and levels[first] == "*" else "")
+    end = ("/" if levels[last] == "*" and levels[last + 1 :] else "") + "/".join(levels[last + 1 :])
+    return f"{quote(begin, safe='')}$*{quote(end, safe='')}" if begin or end else "*"
+
+
+def topic_of(key: str) -> str:
+    """The topic of a message, or of an answer to a hello."""
+    return _text(key.split("/")[_TOPIC_AT]) if key.count("/") >= _TOPIC_AT else ""
 
 
 def call_key(node_id: str) -> str:

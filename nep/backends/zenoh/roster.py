@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from nep.backends.zenoh.keys import Alive
 from nep.protocol.requests import Expected, NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
+from nep.protocol.topic_pattern import is_pattern, matches
 
 __all__ = ["Roster"]
 
@@ -23,6 +24,7 @@ class Roster:
         self._nodes: dict[str, NodeRecord] = {}
         self._publishers: dict[str, dict[int, tuple[str, PublisherRecord]]] = {}
         self._subscribers: dict[str, dict[int, tuple[str, SubscriberRecord]]] = {}
+        self._patterns: set[str] = set()
         self._count = 0
 
     def note(self, alive: Alive, *, is_there: bool) -> None:
@@ -41,15 +43,37 @@ class Roster:
                 self._count += _note(self._publishers, (node_id, record), is_there)
             else:
                 self._count += _note(self._subscribers, (node_id, record), is_there)
+                if is_pattern(record.topic):
+                    self._patterns.discard(record.topic)
+                    if record.topic in self._subscribers:
+                        self._patterns.add(record.topic)
 
     def count_subscribers(self, topic: str) -> int:
-        """How many there are on a topic."""
-        return len(self._subscribers.get(topic, ()))
+        """How many hear a topic."""
+        found = len(self._subscribers.get(topic, ()))
+        if not self._patterns:
+            return found
+        with self._lock:
+            return found + sum(len(self._subscribers[each]) for each in self._matching(topic))
+
+    def _matching(self, topic: str) -> list[str]:
+        """The other topics of subscribers that match this one. With the lock held."""
+        return [each for each in self._patterns if each != topic and matches(each, topic)]
+
+    @property
+    def published(self) -> tuple[str, ...]:
+        """The topics that have publishers."""
+        with self._lock:
+            return tuple(self._publishers)
 
     def subscribers_of(self, topic: str) -> tuple[Expected, ...]:
-        """Those on a topic."""
+        """Those that hear a topic."""
         with self._lock:
-            there = self._subscribers.get(topic, {}).values()
+            there = [
+                found
+                for each in (topic, *self._matching(topic))
+                for found in self._subscribers.get(each, {}).values()
+            ]
             return tuple(Expected(each.id, node_id, self._name(node_id)) for node_id, each in there)
 
     def publishers_of(self, topic: str) -> tuple[RemotePublisher, ...]:

@@ -14,8 +14,10 @@ from nep.backends.zenoh.keys import (
     ALL_LIVE,
     call_key,
     data_key,
+    data_keys,
     hello_key,
     hellos_key,
+    hellos_keys,
     node_key,
     parse_live,
     publisher_key,
@@ -34,7 +36,13 @@ from nep.messages.packing import pack_saturated, unpack_bounded
 from nep.protocol import requests
 from nep.protocol.encoding import decode_request, encode_request
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import NodeRecord, PublisherRecord, Request, SubscriberRecord
+from nep.protocol.requests import (
+    NodeRecord,
+    PublisherRecord,
+    RemotePublisher,
+    Request,
+    SubscriberRecord,
+)
 from nep.system.cpu import CpuLoad
 
 __all__ = ["Inquiry", "ZenohSession"]
@@ -180,7 +188,10 @@ class ZenohSession:
             0,
             tuple(each.record for each in publishers),
             tuple(
-                SubscriberRecord(each.spec.id, each.spec.topic, each.spec.msg_type) for each in subscribers
+                SubscriberRecord(
+                    each.spec.id, each.spec.topic, each.spec.msg_type, pattern=each.spec.is_pattern
+                )
+                for each in subscribers
             ),
         )
         renewal = requests.Renew(
@@ -218,7 +229,7 @@ class ZenohSession:
         if not isinstance(record, PublisherRecord):
             return
         for subscriber in self._subscribers:
-            if subscriber.spec.topic == record.topic:
+            if subscriber.hears(record.topic):
                 if is_there:
                     subscriber.met(self.roster.remote(alive.node_id, record))
                     self._greet(record, subscriber)
@@ -280,22 +291,32 @@ class ZenohSession:
         """It takes messages from now on, and others may see it."""
         spec = subscriber.spec
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type)
-        for remote in self.roster.publishers_of(spec.topic):  # what comes before they are greeted waits
+        for remote in self._publishers_for(subscriber):  # what comes before they are greeted waits
             subscriber.met(remote)
+        key = data_keys(spec.topic) if spec.is_pattern else data_key(spec.topic)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
-            self._outputs[spec.id] = self._zenoh.declare_subscriber(
-                data_key(spec.topic), callback(subscriber.came)
-            )
+            self._outputs[spec.id] = self._zenoh.declare_subscriber(key, callback(subscriber.came))
             self._tokens[subscriber] = self._declare(subscriber_key(self.node.id, record))
 
     def greet_all(self, subscriber: ZenohSubscriber, timeout_s: float) -> None:
         """Ask all publishers of its topic what they have latched, and where its counting begins."""
-        there = self.roster.publishers_of(subscriber.spec.topic)
+        there = self._publishers_for(subscriber)
         for remote in there:
             subscriber.met(remote)
-        self.ask(hellos_key(subscriber.spec.topic), None, timeout_s, take=subscriber.told).wait()
+        spec = subscriber.spec
+        key = hellos_keys(spec.topic) if spec.is_pattern else hellos_key(spec.topic)
+        self.ask(key, None, timeout_s, take=subscriber.told).wait()
         subscriber.greeted(each.publisher.id for each in there)
+
+    def _publishers_for(self, subscriber: ZenohSubscriber) -> tuple[RemotePublisher, ...]:
+        topics = self.roster.published if subscriber.spec.is_pattern else (subscriber.spec.topic,)
+        return tuple(
+            remote
+            for topic in topics
+            if subscriber.hears(topic)
+            for remote in self.roster.publishers_of(topic)
+        )
 
     def publisher(self, make: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
         """One that is made with zenoh's session."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Callable, Iterable
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from nep.backends.base import Sink, SubscriberSpec, Wakes
 from nep.backends.zenoh.early import EarlyMessages
 from nep.backends.zenoh.inboxes import Inboxes
+from nep.backends.zenoh.keys import topic_of
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import Refusals
 from nep.backends.zeromq.sub_socket import CarefulParser
@@ -18,13 +20,23 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+from nep.protocol.topic_pattern import matches
 from nep.protocol.wire import HEADER_BYTES, hello_part, read_header, topic_part
 
 __all__ = ["ZenohSubscriber"]
 
 _logger = logging.getLogger("nep")
+_EARS_MAX = 10_000
 _BATCH_BYTES = 64 * 2**20
 """A sink works on so many bytes at once; with those that wait for it there are no more than the bound."""
+
+
+class _Ear(NamedTuple):
+    """What hears one topic: the first part of its messages, and of those for this subscriber alone."""
+
+    topic: bytes
+    own: bytes
+    parser: CarefulParser
 
 
 class ZenohSubscriber:
@@ -44,13 +56,35 @@ class ZenohSubscriber:
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
         self._sources = HeardPublishers()
         self._refusals = Refusals()
-        self._early = EarlyMessages(self._sources, spec.max_messages)
+        self._early = EarlyMessages[tuple[_Ear, list[bytes]]](self._sources, spec.max_messages)
         self._problem = ""
-        self._topic = topic_part(spec.topic)
-        self._own = hello_part(spec.id, spec.topic)
-        self._parser = CarefulParser(
-            spec, self._own, self._sources, self._leave, lambda _publisher, _seq: None
-        )
+        self._ear = self._new_ear(spec.topic)
+        self._ears: OrderedDict[str, _Ear] = OrderedDict()
+        """With wildcards: those of topics that were heard, the one that was heard last at the end."""
+
+    def _new_ear(self, topic: str) -> _Ear:
+        spec = self.spec if topic == self.spec.topic else replace(self.spec, topic=topic)
+        own = hello_part(spec.id, topic)
+        parser = CarefulParser(spec, own, self._sources, self._leave, lambda _publisher, _seq: None)
+        return _Ear(topic_part(topic), own, parser)
+
+    def hears(self, topic: str) -> bool:
+        """Whether messages of this topic are for it."""
+        return topic == self.spec.topic or (self.spec.is_pattern and matches(self.spec.topic, topic))
+
+    def _ear_of(self, sample: Any) -> _Ear | None:  # noqa: ANN401 - zenoh's
+        """What hears the topic of a sample; None when that does not match, which zenoh cannot see."""
+        if not self.spec.is_pattern:
+            return self._ear
+        topic = topic_of(str(sample.key_expr))
+        with self._inboxes.changed:
+            ear = self._ears.pop(topic, None)
+            if ear is None and not self.hears(topic):
+                return None
+            ear = self._ears[topic] = ear or self._new_ear(topic)
+            if len(self._ears) > _EARS_MAX:
+                self._ears.popitem(last=False)
+            return ear
 
     # ---- what the reader sees
 
@@ -126,41 +160,45 @@ class ZenohSubscriber:
 
     def came(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
         """A message on the topic."""
-        self._take(sample, self._topic)
+        ear = self._ear_of(sample)
+        if ear is not None:
+            self._take(sample, ear, ear.topic)
 
     def told(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
         """What a publisher answers to a hello: what is latched, or the number of its last message."""
-        self._take(sample, self._own)
+        ear = self._ear_of(sample)
+        if ear is not None:
+            self._take(sample, ear, ear.own)
 
-    def _take(self, sample: Any, first: bytes) -> None:  # noqa: ANN401 - zenoh's
+    def _take(self, sample: Any, ear: _Ear, first: bytes) -> None:  # noqa: ANN401 - zenoh's
         payload: bytes = sample.payload.to_bytes()
         beside: bytes = b"" if sample.attachment is None else sample.attachment.to_bytes()
         rest = [beside[:HEADER_BYTES]]
-        if payload or first == self._topic or len(beside) > HEADER_BYTES or _is_latched(beside):
+        if payload or first == ear.topic or len(beside) > HEADER_BYTES or _is_latched(beside):
             rest.append(payload)
         if len(beside) > HEADER_BYTES:
             rest.append(beside[HEADER_BYTES:])
         with self._inboxes.changed:
             if not self.is_closed:
-                self._take_parts(first, rest)
+                self._take_parts(ear, first, rest)
 
-    def _take_parts(self, first: bytes, rest: list[bytes]) -> None:
+    def _take_parts(self, ear: _Ear, first: bytes, rest: list[bytes]) -> None:
         """With the lock of the inboxes held."""
         try:
             if not rest[0]:
                 raise WireError(_("it has no header; a program of another kind published it"), len(rest[-1]))
-            if first == self._topic and _is_latched(rest[0]) and self._is_early(rest):
+            if first == ear.topic and _is_latched(rest[0]) and self._is_early(ear, rest):
                 return
-            self._hear(self._parser.parse(first, rest))
-            if first == self._own and len(rest) == 1:  # the end of an answer
+            self._hear(ear.parser.parse(first, rest))
+            if first == ear.own and len(rest) == 1:  # the end of an answer
                 self._take_early(read_header(rest[0]).publisher)
         except WireError as error:
             if self._refusals.add(error.reason):
                 _logger.warning("on '%s' came what is no message: %s", self.spec.topic, error)
 
-    def _is_early(self, rest: list[bytes]) -> bool:
+    def _is_early(self, ear: _Ear, rest: list[bytes]) -> bool:
         header = read_header(rest[0])
-        is_early = self._early.keep(header, rest)
+        is_early = self._early.keep(header, (ear, rest), sum(map(len, rest)))
         if not is_early:  # nor does any before it wait any longer
             self._take_early(header.publisher)
         return is_early
@@ -171,8 +209,8 @@ class ZenohSubscriber:
             self._tell_waiting()
 
     def _take_early(self, publisher: int) -> None:
-        for parts in self._early.take(publisher):
-            self._hear(self._parser.parse(self._topic, parts))
+        for ear, rest in self._early.take(publisher):
+            self._hear(ear.parser.parse(ear.topic, rest))
 
     def greeted(self, publishers: Iterable[int]) -> None:
         """Who of these has not answered a hello by now is not waited for."""

@@ -15,6 +15,7 @@ from typing import Protocol
 
 from nep.backends.zeromq.bindings import in_reach, may_stay
 from nep.backends.zeromq.io_thread import IoThread, Rest
+from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.rpc import PendingCall, RpcClient
 from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards
 from nep.errors import (
@@ -52,6 +53,7 @@ from nep.protocol.requests import (
     SubscriberCount,
     SubscriberRecord,
 )
+from nep.protocol.topic_pattern import matches
 from nep.system.addresses import MasterName, is_loopback, look_up
 from nep.system.cpu import CpuLoad
 
@@ -143,7 +145,7 @@ class MasterSession:
         self._calls = RpcClient(socket, address, after_use=lambda: io.serve_soon(self))
         self._lock = threading.Lock()
         self._publishers: dict[int, tuple[PublisherRecord, SessionPublisher]] = {}
-        self._subscribers: dict[int, tuple[SubscriberRecord, SessionSubscriber]] = {}
+        self._subscribers: dict[int, tuple[SubscriberRecord, SessionSubscriber | PatternSubscriber]] = {}
         self._confirmed: set[int] = set()
         self._epoch, self._revision = 0, 0
         self._join_again_at = 0.0
@@ -219,7 +221,10 @@ class MasterSession:
         return self.add_publisher(moved, publisher, wait_s)
 
     def add_subscriber(
-        self, record: SubscriberRecord, subscriber: SessionSubscriber, wait_s: float | None
+        self,
+        record: SubscriberRecord,
+        subscriber: SessionSubscriber | PatternSubscriber,
+        wait_s: float | None,
     ) -> Found:
         """Register; the publishers to connect to. Raises as `RpcClient.ask` does."""
         with self._lock:
@@ -354,14 +359,21 @@ class MasterSession:
             for subscriber in self._subscribers_of(answer.publisher.publisher.topic):
                 subscriber.connect(self._in_reach((answer.publisher,)))
         elif isinstance(answer, PublisherGone):
-            for subscriber in self._subscribers_of(answer.topic):
-                subscriber.gone(answer.id, answer.last_seq, is_closed=answer.is_closed)
+            self._publisher_gone(answer)
         elif isinstance(answer, Renewed):
             self._renewed(answer, now)
         elif isinstance(answer, Added | Found) and self._epoch == 0:
             self._epoch = answer.epoch
         if self._epoch not in {0, answer.epoch}:
             self._join(now)
+
+    def _publisher_gone(self, gone: PublisherGone) -> None:
+        if gone.is_closed:
+            for _record, each in self._all_subscribers():
+                if isinstance(each, PatternSubscriber):
+                    each.closed_early(gone.id)
+        for subscriber in self._subscribers_of(gone.topic, is_wanted=False):
+            subscriber.gone(gone.id, gone.last_seq, is_closed=gone.is_closed)
 
     def _renew(self) -> None:
         if self._epoch == 0:
@@ -392,8 +404,8 @@ class MasterSession:
         for topic in answer.topics:
             for subscriber in self._subscribers_of(topic.topic):
                 subscriber.reconcile(self._in_reach(topic.publishers))
-        for _record, subscriber in self._all_subscribers():
-            subscriber.tick(now, answer.last_seqs.items())
+        for _record, each in self._all_subscribers():
+            each.tick(now, answer.last_seqs.items())
 
     def _join(self, now: float) -> None:
         """Register everything again, once at a time."""
@@ -419,11 +431,29 @@ class MasterSession:
         for remote in self._in_reach(reply.publishers):
             by_topic.setdefault(remote.publisher.topic, []).append(remote)
         for record, subscriber in self._all_subscribers():
-            subscriber.reconcile(by_topic.get(record.topic, ()))
+            if isinstance(subscriber, PatternSubscriber):
+                for topic in {*subscriber.topics, *(each for each in by_topic if _hears(record, each))}:
+                    member = subscriber.of_topic(topic)
+                    if member is not None:
+                        member.reconcile(by_topic.get(topic, ()))
+            else:
+                subscriber.reconcile(by_topic.get(record.topic, ()))
 
-    def _subscribers_of(self, topic: str) -> list[SessionSubscriber]:
-        return [subscriber for record, subscriber in self._all_subscribers() if record.topic == topic]
+    def _subscribers_of(self, topic: str, *, is_wanted: bool = True) -> list[SessionSubscriber]:
+        """Who hears this topic; with wildcards those that do so already, unless it `is_wanted` for them."""
+        found: list[SessionSubscriber] = []
+        for record, subscriber in self._all_subscribers():
+            if isinstance(subscriber, PatternSubscriber):
+                member = subscriber.of_topic(topic, is_wanted=is_wanted) if _hears(record, topic) else None
+                found += () if member is None else (member,)
+            elif record.topic == topic:
+                found.append(subscriber)
+        return found
 
-    def _all_subscribers(self) -> list[tuple[SubscriberRecord, SessionSubscriber]]:
+    def _all_subscribers(self) -> list[tuple[SubscriberRecord, SessionSubscriber | PatternSubscriber]]:
         with self._lock:
             return list(self._subscribers.values())
+
+
+def _hears(record: SubscriberRecord, topic: str) -> bool:
+    return record.pattern and matches(record.topic, topic)

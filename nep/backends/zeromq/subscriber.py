@@ -454,6 +454,12 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         self._closed_early: set[int] | None = set()
         """Publishers that closed before `begin`; None since."""
 
+    @property
+    def has_publishers(self) -> bool:
+        """Whether it hears any, or remembers one that may only be silent."""
+        with self._turn():
+            return bool(self._readable.sources.by_id)
+
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
         """Wait until these publishers have echoed.
 

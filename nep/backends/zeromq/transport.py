@@ -24,6 +24,7 @@ from nep.backends.services import CallQueue, ClientSpec, ClientTransport, Server
 from nep.backends.zeromq.io_thread import IoThread, Served, SharedContext, shared_context
 from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
 from nep.backends.zeromq.master_session import MasterSession, SessionPublisher
+from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.publisher import NativePublisher
 from nep.backends.zeromq.services.node_services import ZeromqServices
 from nep.backends.zeromq.sockets import Socket
@@ -46,7 +47,7 @@ _LEAVE_S = 0.3
 _THREAD_FILES = 4
 _MOST_SESSIONS = 8
 """So many masters' connections are kept though nothing is registered with them."""
-_Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber
+_Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber | PatternSubscriber
 
 
 class OwnedPublisher(PublisherTransport, Served, Protocol):
@@ -94,7 +95,8 @@ class ThreadWait:
 
 
 def _poll_of(fds: tuple[int, ...]) -> Callable[[int], Sequence[tuple[int, int]]]:
-    """Polls these for reading, for so many milliseconds at most."""
+    """Polls these for reading, for so many milliseconds at most. One below 0 is none."""
+    fds = tuple(fd for fd in fds if fd >= 0)
     if not hasattr(select, "poll"):  # Windows
         polled = [(fd, zmq.POLLIN) for fd in fds]
         return lambda timeout_ms: zmq.zmq_poll(polled, timeout_ms)
@@ -229,16 +231,21 @@ class ZeromqTransport:
             session.remove_subscriber(subscriber)
 
         io = self._io_for(spec)
-        readable = self._mastered_readable(spec)
-        subscriber = NativeSubscriber(readable, io, spec, forget)
-        with closed_on_error(readable.close):
+        subscriber: NativeSubscriber | PatternSubscriber
+        if spec.is_pattern:
+            subscriber = PatternSubscriber(self._mastered_readable, io, spec, forget)
             self._keep(subscriber)
+        else:
+            readable = self._mastered_readable(spec)
+            subscriber = NativeSubscriber(readable, io, spec, forget)
+            with closed_on_error(readable.close):
+                self._keep(subscriber)
+        record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number, spec.is_pattern)
         try:
-            reply = session.add_subscriber(
-                SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number), subscriber, spec.wait_s
-            )
+            reply = session.add_subscriber(record, subscriber, spec.wait_s)
             subscriber.begin(reply.publishers)
-            io.add(subscriber)
+            if isinstance(subscriber, NativeSubscriber):
+                io.add(subscriber)
             with self._waker() as waker:
                 subscriber.wait_for((each.publisher.id for each in reply.publishers), HANDSHAKE_S, waker)
         except BaseException:
@@ -335,7 +342,7 @@ class ZeromqTransport:
                     return
                 entered_calls.append(queue)
             for subscriber in subscribers:
-                if isinstance(subscriber, SocketSubscriber):
+                if isinstance(subscriber, SocketSubscriber | PatternSubscriber):
                     if not subscriber.enter_wait(waits.waker):
                         return
                     entered.append(subscriber)
@@ -459,7 +466,7 @@ class ZeromqTransport:
         for session in self._sessions.values():
             give_up(session.endpoint)
         for each in (*self._publishers.values(), *self._subscribers.values()):
-            if isinstance(each, NativePublisher | NativeSubscriber):
+            if isinstance(each, NativePublisher | NativeSubscriber | PatternSubscriber):
                 give_up(*each.endpoints)
 
     def _session(self, address: str) -> MasterSession:

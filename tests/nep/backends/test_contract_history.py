@@ -273,18 +273,18 @@ def test_what_comes_before_the_echo_is_left_out_only_where_it_comes_again(
 def test_early_messages_wait_for_the_history_and_are_bounded() -> None:
     now = [0.0]
     sources = HeardPublishers()
-    early = EarlyMessages(sources, 3, lambda: now[0])
-    assert not early.keep(Header(1, 1, 7, 0, 5), [b"7"]), "nobody has met it"
+    early: EarlyMessages[bytes] = EarlyMessages(sources, 3, lambda: now[0])
+    assert not early.keep(Header(1, 1, 7, 0, 5), b"7", 2), "nobody has met it"
     sources.listed(_remote(2))
     for seq in (9, 7, 8):
-        assert early.keep(Header(1, 1, seq, 0, 5), [b"%d" % seq])
-    assert not early.keep(Header(1, 1, 10, 0, 5), [b"10"]), "there is room for three"
+        assert early.keep(Header(1, 1, seq, 0, 5), b"%d" % seq, 2)
+    assert not early.keep(Header(1, 1, 10, 0, 5), b"10", 2), "there is room for three"
     assert sources.arrived(5, 7, is_alone=True)
-    assert early.take(5) == [[b"8"], [b"9"]], "those that the history had are left out"
+    assert early.take(5) == [b"8", b"9"], "those that the history had are left out"
     assert early.take(5) == []
     sources.get(5).has_echoed = True
-    assert not early.keep(Header(1, 1, 11, 0, 5), [b"11"]), "it has answered"
+    assert not early.keep(Header(1, 1, 11, 0, 5), b"11", 2), "it has answered"
     sources.get(5).has_echoed = False
-    assert early.keep(Header(1, 1, 12, 0, 5), [b"12"])
+    assert early.keep(Header(1, 1, 12, 0, 5), b"12", 2)
     now[0] = 20.0
-    assert not early.keep(Header(1, 1, 13, 0, 5), [b"13"])
+    assert not early.keep(Header(1, 1, 13, 0, 5), b"13", 2)

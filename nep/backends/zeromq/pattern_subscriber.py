@@ -1,0 +1,248 @@
+"""PatternSubscriber: one subscriber for all topics that its wildcards match.
+
+It has a member for each topic that is published, a subscriber with a socket of its own that says hello with
+the same id. The master knows one subscriber, and tells its node of every publisher that matches; so a
+publisher waits for it as for any other, and its first message is not lost.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+from nep.backends.base import SubscriberSpec, Wakes
+from nep.backends.zeromq.io_thread import IoThread
+from nep.backends.zeromq.subscriber import NativeReadable, NativeSubscriber
+from nep.errors import NepError
+from nep.messages.message import Message
+from nep.messages.queue import MAX_MESSAGES, Inbox
+from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+from nep.system.log_rarely import is_logged
+from nep.system.wakeup import Waker
+
+__all__ = ["PatternSubscriber"]
+
+_logger = logging.getLogger("nep")
+_MEMBERS_MAX = 2_000
+"""So many topics one subscriber hears: whoever reaches the master can publish any number."""
+
+
+class PatternSubscriber:
+    """See the module. `new_readable` makes a member's socket, `io` serves it, `on_close` unregisters.
+
+    The methods for publishers are called by the link to the master.
+    """
+
+    def __init__(
+        self,
+        new_readable: Callable[[SubscriberSpec], NativeReadable],
+        io: IoThread,
+        spec: SubscriberSpec,
+        on_close: Callable[[int], None],
+    ) -> None:
+        self.spec = spec
+        self.is_closed = False
+        self.ready: deque[Message] = deque()
+        self.fd = -1
+        self._new_readable = new_readable
+        self._io = io
+        self._on_close = on_close
+        self._members: dict[str, NativeSubscriber] = {}
+        self._closed_early: set[int] | None = set()
+        """Publishers that closed before `begin`; None since."""
+        self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
+        self._gone = _Totals()
+        self._dropped = 0
+        self._problem = self._lack = ""
+        self._failures = 0
+        self._waiting: tuple[Wakes, ...] = ()
+        self._making = threading.RLock()
+        self._changed = threading.Condition()
+
+    # ---- what the reader sees
+
+    def poll(self) -> Message | None:
+        """The next message if one is there."""
+        with self._changed:
+            return None if self.is_closed else self._inbox.take()
+
+    def receive(self, timeout_s: float) -> Message | None:
+        """The next message; waits at most `timeout_s` seconds."""
+        with self._changed:
+            self._changed.wait_for(lambda: self.is_closed or len(self._inbox), timeout_s)
+            return None if self.is_closed else self._inbox.take()
+
+    def enter_wait(self, waker: Wakes) -> bool:
+        """Before waiting. See `SubscriberTransport.enter_wait`."""
+        with self._changed:
+            if self.is_closed or len(self._inbox):
+                return False
+            self._waiting = (*self._waiting, waker)
+            return True
+
+    def leave_wait(self, waker: Wakes) -> None:
+        """After waiting."""
+        with self._changed:
+            self._waiting = tuple(each for each in self._waiting if each is not waker)
+
+    def _came(self, messages: Sequence[Message]) -> None:
+        """In the thread that serves members."""
+        if self.spec.sink is not None:
+            self.spec.sink(messages)
+            return
+        with self._changed:
+            if not self.is_closed:
+                self._dropped += sum(map(self._inbox.put, messages))
+                self._tell_waiting()
+
+    def _tell_waiting(self) -> None:
+        self._changed.notify_all()
+        for each in self._waiting:
+            each.wake()
+
+    # ---- what it tells
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived, on all topics."""
+        with self._making:
+            return self._gone.received + sum(each.received for each in self._members.values()) - self._dropped
+
+    @property
+    def lost(self) -> int:
+        """Messages that did not arrive, or were dropped here for lack of room."""
+        with self._making:
+            return self._gone.lost + sum(each.lost or 0 for each in self._members.values()) + self._dropped
+
+    @property
+    def refused(self) -> int:
+        """What came and was no message at all."""
+        with self._making:
+            return self._gone.refused + sum(each.refused for each in self._members.values())
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it is connected."""
+        return tuple(endpoint for each in list(self._members.values()) for endpoint in each.endpoints)
+
+    def report(self, problem: str) -> None:
+        """The reader's trouble with a message, for the next renewal."""
+        self._problem = problem
+
+    def counts(self) -> SubscriberCount:
+        """The statistics for a renewal."""
+        with self._making:
+            problems = (each.counts().problem for each in self._members.values())
+            problem = self._problem or self._lack or next(filter(None, problems), "")
+            return SubscriberCount(self.spec.id, as_count(self.received), as_count(self.lost), problem)
+
+    # ---- publishers
+
+    def of_topic(self, topic: str, *, is_wanted: bool = True) -> NativeSubscriber | None:
+        """The member for a topic, made when it `is_wanted`; None when there is none, or no room for one."""
+        with self._making:
+            member = self._members.get(topic)
+            if member is not None or not is_wanted or self.is_closed:
+                return member
+            try:
+                member = self._members[topic] = self._new_member(topic)
+            except NepError as error:
+                self._lack = str(error)
+                self._failures += 1
+                if is_logged(self._failures):
+                    _logger.warning("'%s' does not hear '%s': %s", self.spec.topic, topic, error)
+                return None
+            self._lack = ""
+        member.begin(())
+        self._io.add(member)
+        return member
+
+    def _new_member(self, topic: str) -> NativeSubscriber:
+        if len(self._members) >= _MEMBERS_MAX:
+            raise NepError(f"it hears {_MEMBERS_MAX} topics already")
+        spec = replace(
+            self.spec,
+            topic=topic,
+            keep="all",
+            max_messages=MAX_MESSAGES,
+            sink=self._came,
+            is_pattern=False,
+        )
+        return NativeSubscriber(self._new_readable(spec), self._io, spec, lambda _id: None)
+
+    def begin(self, remotes: Iterable[RemotePublisher]) -> None:
+        """Connect to the publishers that there were when it was registered, and have not closed since."""
+        with self._making:
+            closed, self._closed_early = self._closed_early or set(), None
+        for remote in remotes:
+            if remote.publisher.id not in closed:
+                member = self.of_topic(remote.publisher.topic)
+                if member is not None:
+                    member.connect((remote,))
+
+    def closed_early(self, publisher: int) -> None:
+        """A publisher has closed; it may be one of those that `begin` is about to be told of."""
+        with self._making:
+            if self._closed_early is not None:
+                self._closed_early.add(publisher)
+
+    def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
+        """Wait until these publishers have echoed; see `NativeSubscriber.wait_for`."""
+        wanted = tuple(publishers)
+        deadline = time.monotonic() + timeout_s
+        members = list(self._members.values())
+        return all(each.wait_for(wanted, max(0.0, deadline - time.monotonic()), waker) for each in members)
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Those that it has a member for."""
+        return tuple(self._members)
+
+    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+        """Once a second: see `NativeSubscriber.tick`. A topic that nobody publishes any more is left."""
+        seqs = tuple(last_seqs)
+        for topic, member in list(self._members.items()):
+            member.tick(now, seqs)
+            if self.spec.sink is None and not member.has_publishers:
+                with self._making:
+                    del self._members[topic]
+                    self._gone.add(member)
+                member.close()
+
+    # ---- closing
+
+    def close(self) -> None:
+        """Unregister and forget what was not read."""
+        with self._making, self._changed:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            self._inbox.take_all()
+            self._tell_waiting()
+            members = list(self._members.values())
+        self._on_close(self.spec.id)
+        for member in members:
+            member.close()
+
+    def forked(self) -> None:
+        """In a child. See `SubscriberTransport.forked`."""
+        self.is_closed = True
+        for member in list(self._members.values()):
+            member.forked()
+
+
+class _Totals:
+    """What members counted that are not there any more."""
+
+    def __init__(self) -> None:
+        self.received = self.lost = self.refused = 0
+
+    def add(self, member: NativeSubscriber) -> None:
+        """This one goes."""
+        self.received += member.received
+        self.lost += member.lost or 0
+        self.refused += member.refused

@@ -1,0 +1,93 @@
+"""PatternIndex: subscribers whose topic has wildcards, and which published topics each of them matches.
+
+A topic is compared with every pattern when its first publisher comes, a pattern with every topic when its
+first subscriber does; both are bounded, and nobody compares again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Generic, TypeVar
+
+from nep.protocol.topic_pattern import matches
+
+__all__ = ["ALL_PATTERNS_MAX", "PATTERNS_MAX", "PatternIndex"]
+
+PATTERNS_MAX = 100
+"""So many subscribers with wildcards one node may have,"""
+ALL_PATTERNS_MAX = 1_000
+"""and all nodes together."""
+
+T = TypeVar("T")
+
+
+class PatternIndex(Generic[T]):
+    """By pattern, and by topic. `T` is whom a subscriber belongs to."""
+
+    def __init__(self) -> None:
+        self._subscribers: dict[str, dict[int, T]] = {}
+        self._topics: dict[str, set[str]] = {}
+        self._patterns: dict[str, set[str]] = {}
+        """By topic."""
+
+    def __len__(self) -> int:
+        return sum(map(len, self._subscribers.values()))
+
+    def add(self, pattern: str, subscriber: int, owner: T, published: Iterable[str]) -> None:
+        """A subscriber comes; these topics are published."""
+        if pattern not in self._subscribers:
+            self._subscribers[pattern] = {}
+            self._topics[pattern] = {topic for topic in published if matches(pattern, topic)}
+            for topic in self._topics[pattern]:
+                self._patterns.setdefault(topic, set()).add(pattern)
+        self._subscribers[pattern][subscriber] = owner
+
+    def remove(self, pattern: str, subscriber: int) -> None:
+        """A subscriber goes, if it is there."""
+        there = self._subscribers.get(pattern)
+        if there is None:
+            return
+        there.pop(subscriber, None)
+        if not there:
+            del self._subscribers[pattern]
+            for topic in self._topics.pop(pattern):
+                self._take_out(topic, pattern)
+
+    def topic_came(self, topic: str) -> None:
+        """A topic is published for the first time."""
+        if topic in self._patterns:
+            return
+        found = {pattern for pattern in self._subscribers if matches(pattern, topic)}
+        if found:
+            self._patterns[topic] = found
+            for pattern in found:
+                self._topics[pattern].add(topic)
+
+    def topic_went(self, topic: str) -> None:
+        """Nobody publishes a topic any more."""
+        for pattern in self._patterns.pop(topic, ()):
+            self._topics[pattern].discard(topic)
+
+    def topics_of(self, pattern: str) -> set[str]:
+        """The published topics that match."""
+        return self._topics.get(pattern, set())
+
+    def subscribers_of(self, topic: str) -> list[tuple[T, int]]:
+        """Those that hear a topic, also one that was published until now: their owners and ids."""
+        if not self._subscribers:
+            return []
+        found = self._patterns.get(topic)
+        if found is None:
+            found = {pattern for pattern in self._subscribers if matches(pattern, topic)}
+        return [
+            (owner, subscriber)
+            for pattern in sorted(found)
+            for subscriber, owner in self._subscribers[pattern].items()
+        ]
+
+    def _take_out(self, topic: str, pattern: str) -> None:
+        found = self._patterns.get(topic)
+        if found is not None:
+            found.discard(pattern)
+            if not found:
+                del self._patterns[topic]

@@ -1,0 +1,432 @@
+"""The contract of back ends: subscribers whose topic has wildcards hear all topics that match."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from itertools import count
+
+import pytest
+
+import nep
+from nep.backends.zenoh.keys import data_key, data_keys, hello_key, hellos_keys, topic_of
+from nep.errors import WireError
+from nep.masters.graph import Graph
+from nep.masters.master import Master
+from nep.masters.pattern_index import ALL_PATTERNS_MAX, PATTERNS_MAX, PatternIndex
+from nep.protocol.requests import (
+    AddPublisher,
+    AddSubscriber,
+    NodeRecord,
+    PublisherRecord,
+    Refused,
+    SubscriberRecord,
+    id_from,
+    node_id_from,
+)
+from nep.protocol.topic_pattern import is_pattern, matches
+from tests.nep.programs import eventually, running
+
+_names = count()
+Make = Callable[[str], nep.Node]
+
+
+@pytest.fixture(params=["memory", "zeromq", "nanomsg", "zenoh"])
+def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
+    """Makes nodes that can meet; closes them."""
+    made: list[nep.Node] = []
+    where = master.address
+    if request.param == "memory":
+        where = f"wildcards-{next(_names)}"
+    elif request.param == "zenoh":
+        where = f"local/wildcards-{os.getpid()}-{next(_names)}"
+
+    def new(name: str) -> nep.Node:
+        node = nep.node(name, request.param, master=where)
+        made.append(node)
+        return node
+
+    yield new
+    for node in made:
+        node.close()
+
+
+def read(sub: nep.Subscriber, most: int) -> list[tuple[str, object]]:
+    """Topics and payloads of what comes."""
+    got = []
+    while len(got) < most:
+        message = sub.receive(30.0)
+        assert message is not None, got
+        got.append((message.topic, message.payload))
+    return got
+
+
+def test_topics_that_match_are_heard_also_those_that_come_later(make: Make) -> None:
+    node, other = make("a"), make("b")
+    before = [node.new_pub(f"/robot/{name}/camera") for name in ("ann", "bob")]
+    others = [node.new_pub(topic) for topic in ("/robot/camera", "/robot/ann/camera/raw", "/room/ann/camera")]
+    sub = other.new_sub("/robot/*/camera")
+    after = node.new_pub("/robot/cid/camera")
+    third = make("c").new_pub("/robot/ann/camera")
+    assert [pub.subscribers for pub in (*before, after, third, *others)] == [1, 1, 1, 1, 0, 0, 0]
+    for pub in others:
+        pub.publish("not for it")
+    for n, pub in enumerate((*before, after, third)):
+        pub.publish(n)
+    assert sorted(read(sub, 4)) == [
+        ("/robot/ann/camera", 0),
+        ("/robot/ann/camera", 3),
+        ("/robot/bob/camera", 1),
+        ("/robot/cid/camera", 2),
+    ]
+    assert sub.listen(timeout_s=0.05) == (False, {})
+    assert (sub.topic, sub.received, sub.lost, sub.refused) == ("/robot/*/camera", 4, 0, 0)
+
+
+def test_the_first_message_of_a_publisher_that_comes_later_is_not_lost(make: Make) -> None:
+    sub, node = make("b").new_sub("/robot/**"), make("a")
+    for n in range(20):
+        with node.new_pub(f"/robot/{n}/x") as pub:
+            assert pub.subscribers == 1
+            pub.publish(n)
+    assert read(sub, 20) == [(f"/robot/{n}/x", n) for n in range(20)]
+    assert sub.lost == 0
+
+
+def test_order_is_kept_on_each_topic_and_counters_are_sums(make: Make) -> None:
+    sub, node = make("b").new_sub("t/*"), make("a")
+    pubs = [node.new_pub(f"t/{n}") for n in range(3)]
+    for number in range(300):
+        for pub in pubs:
+            pub.publish(number)
+    got = read(sub, 900)
+    for pub in pubs:
+        assert [payload for topic, payload in got if topic == pub.topic] == list(range(300))
+    assert (sub.received, sub.lost) == (900, 0)
+
+
+def test_a_callback_is_given_the_message_with_its_own_topic(make: Make) -> None:
+    node, other = make("b"), make("a")
+    got: list[tuple[str, str, object]] = []
+
+    def callback(message: nep.Message) -> None:
+        got.append((message.topic, message.msg_type, message.payload))
+        if len(got) == 2:
+            node.stop_spin()
+
+    node.new_callback("**/words", "string", callback, with_message=True)
+    pubs = [other.new_pub("words", "string"), other.new_pub("/a/b/words", "my/words")]
+    pubs[0].publish("short")
+    pubs[1].publish(["long"])
+    node.spin(30.0)
+    assert sorted(got) == [("/a/b/words", "my/words", ["long"]), ("words", "string", "short")]
+
+
+def test_spin_of_several_nodes_a_loop_and_a_sink(make: Make) -> None:
+    node, other, out = make("b"), make("c"), make("a")
+    got: list[object] = []
+    sunk: list[tuple[str, object]] = []
+    came = threading.Event()
+
+    def sink(messages: object) -> None:
+        sunk.extend((each.topic, each.payload) for each in messages)  # type: ignore[attr-defined]
+        if len(sunk) == 2:
+            came.set()
+
+    def callback(payload: object) -> None:
+        got.append(payload)
+        node.stop_spin()
+        other.stop_spin()
+
+    node.new_callback("x/*", "json", callback)
+    other.new_sub("x/*", sink=sink)
+    waiting = other.new_sub("x/*")
+
+    async def read_async() -> list[str]:
+        topics = []
+        async for message in waiting:
+            topics.append(message.topic)
+            if len(topics) == 2:
+                break
+        return topics
+
+    out.new_pub("x/1").publish(1)
+    nep.spin(node, other, timeout_s=30.0)
+    out.new_pub("x/2").publish(2)
+    assert asyncio.run(read_async()) == ["x/1", "x/2"]
+    assert came.wait(30.0)
+    assert (got, sunk) == ([1], [("x/1", 1), ("x/2", 2)])
+
+
+def test_what_is_latched_comes_and_a_full_inbox_drops_the_oldest(make: Make) -> None:
+    node = make("a")
+    for name in ("a", "b"):
+        pub = node.new_pub(f"state/{name}", latched=True)
+        pub.publish("old")
+        pub.publish(name)
+    live = node.new_pub("live/a")
+    other = make("b")
+    assert sorted(read(other.new_sub("state/*"), 2)) == [("state/a", "a"), ("state/b", "b")]
+    few = other.new_sub("live/*", max_messages=10)
+    latest = other.new_sub("live/**", keep="latest")
+    for n in range(100):
+        live.publish(n)
+    eventually(lambda: few.received + (few.lost or 0) == 100)
+    assert [payload for _topic, payload in read(few, 10)] == list(range(90, 100))
+    assert (few.received, few.lost) == (10, 90)
+    eventually(lambda: latest.received >= 100 or latest.listen()[1] == 99)
+    assert latest.lost == 0
+
+
+def test_two_patterns_and_a_plain_name_hear_the_same_topic_each_for_itself(make: Make) -> None:
+    other, node = make("b"), make("a")
+    subs = [other.new_sub(topic) for topic in ("a/*/c", "**", "a/b/c", "a/b/*", "*")]
+    pub = node.new_pub("a/b/c")
+    assert pub.subscribers == 4
+    pub.publish(1)
+    assert [read(sub, 1) for sub in subs[:4]] == [[("a/b/c", 1)]] * 4
+    subs[0].close()
+    eventually(lambda: pub.subscribers == 3)
+    pub.publish(2)
+    assert [read(sub, 1) for sub in subs[1:4]] == [[("a/b/c", 2)]] * 3
+    assert subs[4].listen() == (False, {})
+    with pytest.raises(nep.ClosedError, match=r"subscriber 'a/\*/c' is closed"):
+        subs[0].listen()
+
+
+def test_a_star_inside_a_level_is_a_letter_and_so_is_one_without_wildcards(make: Make) -> None:
+    other, node = make("b"), make("a")
+    inside, plain = other.new_sub("a*b"), other.new_sub("x/*", wildcards=False)
+    star, letter, named = node.new_pub("a*b"), node.new_pub("aXb"), node.new_pub("x/*")
+    assert (star.subscribers, letter.subscribers, named.subscribers) == (1, 0, 1)
+    star.publish(1)
+    named.publish(2)
+    node.new_pub("x/y").publish(3)
+    assert read(inside, 1) == [("a*b", 1)]
+    assert read(plain, 1) == [("x/*", 2)]
+    assert plain.listen() == (False, {})
+
+
+def test_closing_ends_who_waits_and_is_forgotten(make: Make) -> None:
+    node, other = make("b"), make("a")
+    pub = other.new_pub("a/b")
+    sub = node.new_sub("a/*")
+    ended: list[str] = []
+
+    def wait() -> None:
+        with pytest.raises(nep.ClosedError):
+            sub.listen(True)
+        ended.append("ended")
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    node.close()
+    thread.join(30.0)
+    assert ended == ["ended"]
+    eventually(lambda: pub.subscribers == 0)
+    eventually(lambda: "a/*" not in other.graph().topics)
+
+
+def test_bad_bytes_and_the_graph(make: Make) -> None:
+    node, other = make("b"), make("a")
+    sub = node.new_sub("a/*")
+    pub = other.new_pub("a/b")
+    pub.publish_bytes(b"{no json")
+    pub.publish(1)
+    assert sub.listen(timeout_s=30.0) == (True, 1)
+    view = other.graph()
+    assert [each.id for each in view.topics["a/*"].subscribers] == [sub.id]
+    assert view.topics["a/*"].publishers == ()
+
+
+def test_a_back_end_without_says_so(make: Make) -> None:
+    node = make("a")
+    object.__setattr__(node._backend, "has_patterns", False)
+    try:
+        with pytest.raises(ValueError, match=f"the back end '{node._backend.name}' takes no wildcards"):
+            node.new_sub("a/*")
+        node.new_sub("a*", wildcards=True)
+    finally:
+        object.__setattr__(node._backend, "has_patterns", True)
+
+
+def test_a_direct_connection_takes_the_name_as_it_is() -> None:
+    with nep.node("a") as node:
+        assert not node._is_pattern("a/*", node.direct(port=9999))
+
+
+@pytest.mark.parametrize("backend", ["zeromq", "zenoh"])
+def test_publishers_that_are_killed_come_back(master: Master, backend: str) -> None:
+    place = master.address if backend == "zeromq" else f"local/wildcards-{os.getpid()}-{next(_names)}"
+    code = """
+    import sys, nep
+    pub = nep.node("a", sys.argv[1], master=sys.argv[2]).new_pub("r/" + sys.argv[3])
+    pub.publish(sys.argv[3])
+    print("there")
+    input()
+    """
+    with nep.node("b", backend, master=place) as node:
+        sub = node.new_sub("r/*")
+        for name in ("1", "2", "1"):
+            with running(code, backend, place, name) as program:
+                assert program.line() == "there"
+                assert read(sub, 1) == [(f"r/{name}", name)]
+                program.process.kill()
+
+
+def test_a_master_that_is_started_again_knows_it(master: Master) -> None:
+    port = master.address
+    with nep.node("b", master=port) as node, nep.node("a", master=port) as other:
+        sub = node.new_sub("r/*")
+        old = other.new_pub("r/old")
+        master.close()
+        old.publish(1)
+        assert read(sub, 1) == [("r/old", 1)]
+        with Master(port, learn_s=1.0):
+            eventually(lambda: "r/*" in node.graph().topics)
+            new = other.new_pub("r/new")
+            assert new.subscribers == 1
+            new.publish(2)
+            old.publish(3)
+            assert sorted(read(sub, 2)) == [("r/new", 2), ("r/old", 3)]
+
+
+def test_topics_that_end_are_left(master: Master) -> None:
+    with nep.node("b") as node, nep.node("a") as other:
+        sub = node.new_sub("r/*")
+        members = sub._transport._members  # type: ignore[attr-defined]
+        for n in range(5):
+            with other.new_pub(f"r/{n}") as pub:
+                pub.publish(n)
+        assert len(read(sub, 5)) == 5
+        eventually(lambda: not members)
+        assert (sub.received, sub.lost) == (5, 0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows does not fork")
+@pytest.mark.parametrize("backend", ["memory", "zeromq"])
+def test_in_a_child_it_is_closed(master: Master, backend: str) -> None:
+    code = """
+    import os, sys, nep
+    node = nep.node("a", sys.argv[1])
+    sub, pub = node.new_sub("t/*"), node.new_pub("t/1")
+    pid = os.fork()
+    if not pid:
+        try:
+            sub.listen(True)
+        except nep.ClosedError as error:
+            os._exit(3 if error.is_forked else 4)
+    print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
+    pub.publish(1)
+    print(sub.listen(timeout_s=30.0))
+    """
+    with running(code, backend) as program:
+        assert [program.line(), program.line()] == ["3", "(True, 1)"]
+        assert program.end()[1] == ""
+
+
+# ---- its parts
+
+
+@pytest.mark.parametrize(
+    ("pattern", "topic", "is_match"),
+    [
+        ("/robot/*/camera", "/robot/ann/camera", True),
+        ("/robot/*/camera", "/robot//camera", False),
+        ("/robot/*/camera", "/robot/a/b/camera", False),
+        ("/robot/**/camera", "/robot/camera", True),
+        ("/robot/**/camera", "/robot/a/b/camera", True),
+        ("/robot/**", "/robot", True),
+        ("/robot/**", "/robots", False),
+        ("**", "/any/thing", True),
+        ("*", "one", True),
+        ("*", "/one", False),
+        ("/*", "/one", True),
+        ("**/camera", "camera", True),
+        ("**/camera", "/a/camera", True),
+        ("**/camera", "/a/cameras", False),
+        ("a/**/b/**/c", "a/x/b/y/z/c", True),
+        ("a/**/b/**/c", "a/x/y/c", False),
+        ("a/*", "a/*", True),
+        ("ü/*", "ü/ß", True),
+        ("/".join(["**", "a"] * 40), "/".join(["a"] * 100), True),
+        ("/".join(["**", "a"] * 40), "/".join(["a"] * 99 + ["b"]), False),
+    ],
+)
+def test_what_matches(pattern: str, topic: str, is_match: bool) -> None:
+    assert matches(pattern, topic) is is_match
+    assert is_pattern(pattern)
+
+
+@pytest.mark.parametrize("topic", ["a*b", "/robot/*x", "***", "/a/b", "", "a/**b"])
+def test_what_is_no_pattern(topic: str) -> None:
+    assert not is_pattern(topic)
+
+
+@pytest.mark.parametrize(
+    "pattern", ["/robot/*/camera", "/robot/**", "**", "*", "**/camera", "a/**/b/*/c", "/*"]
+)
+@pytest.mark.parametrize("topic", ["/robot/a/camera", "/robot", "/a", "camera", "a/b/x/c", "a/x y/b/ü/c"])
+def test_zenoh_hears_all_that_matches(pattern: str, topic: str) -> None:
+    zenoh = pytest.importorskip("zenoh")
+    heard = zenoh.KeyExpr(data_keys(pattern)).intersects(zenoh.KeyExpr(data_key(topic)))
+    assert heard or not matches(pattern, topic)
+    answered = zenoh.KeyExpr(hellos_keys(pattern)).intersects(zenoh.KeyExpr(hello_key(topic, 7)))
+    assert answered is heard
+    assert topic_of(data_key(topic)) == topic_of(hello_key(topic, 7)) == topic
+
+
+def test_an_index_forgets_what_nobody_needs() -> None:
+    index: PatternIndex[str] = PatternIndex()
+    index.topic_came("a/1")
+    index.add("a/*", 1, "n", ["a/1", "b/1"])
+    index.add("a/*", 2, "m", [])
+    index.topic_came("a/2")
+    assert index.topics_of("a/*") == {"a/1", "a/2"}
+    assert index.subscribers_of("a/2") == [("n", 1), ("m", 2)]
+    index.topic_went("a/1")
+    assert index.topics_of("a/*") == {"a/2"}
+    assert index.subscribers_of("a/1") == [("n", 1), ("m", 2)], "they are told that it went"
+    index.remove("a/*", 1)
+    index.remove("a/*", 1)
+    index.remove("b/*", 1)
+    assert (len(index), index.subscribers_of("a/2")) == (1, [("m", 2)])
+    index.remove("a/*", 2)
+    assert (len(index), index._topics, index._patterns, index.subscribers_of("a/2")) == (0, {}, {}, [])
+
+
+def _node(number: int) -> NodeRecord:
+    key = f"key {number}"
+    return NodeRecord(node_id_from(key), f"n{number}", "host", 1, key=key)
+
+
+def _pattern(number: int, each: int) -> AddSubscriber:
+    node = _node(number)
+    return AddSubscriber(node, SubscriberRecord(id_from(node.key, each), f"t{each}/*", "json", each, True))
+
+
+def test_whoever_registers_too_many_is_refused() -> None:
+    graph = Graph(1, 0.0, learn_s=0.0)
+
+    def ask(request: AddSubscriber | AddPublisher, number: int) -> object:
+        return graph.apply(request, 1, 0.0, f"route {number}", is_foreign=True)[-1].answer
+
+    for each in range(1, PATTERNS_MAX + 1):
+        assert not isinstance(ask(_pattern(0, each), 0), Refused)
+    refused = ask(_pattern(0, PATTERNS_MAX + 1), 0)
+    assert isinstance(refused, Refused)
+    assert "100 subscribers with wildcards at most" in refused.reason
+    for number in range(1, ALL_PATTERNS_MAX // PATTERNS_MAX):
+        for each in range(1, PATTERNS_MAX + 1):
+            assert not isinstance(ask(_pattern(number, each), number), Refused)
+    assert isinstance(ask(_pattern(99, 1), 99), Refused)
+    node = _node(98)
+    record = PublisherRecord(
+        id_from(node.key, 1), "t5/x", "json", "json", ("tcp://127.0.0.1:5000",), number=1
+    )
+    answer = ask(AddPublisher(node, record), 98)
+    assert len(answer.expected) == ALL_PATTERNS_MAX // PATTERNS_MAX  # type: ignore[attr-defined]
+    assert not isinstance(answer, WireError)
