@@ -314,7 +314,9 @@ class Node:
         id_ = id_from(self._key, number)
         configured = self._configured(configuration)
         spec = ServerSpec(id_, service, configured, self._wait_s, number, text("msg_type", msg_type))
-        return self._services.server(spec, callback, threads)
+        server = self._services.server(spec, callback, threads)
+        self._work.wake()  # who spins several nodes, or in a loop, answers its calls now
+        return server
 
     def new_client(
         self,

@@ -320,6 +320,23 @@ def test_what_others_order_reaches_a_spin_that_waits(make: Make) -> None:
     assert got == [1]
 
 
+@pytest.mark.parametrize("backend", ["memory", "zeromq"])
+def test_a_spin_in_a_loop_answers_calls(master: Master, backend: str) -> None:
+    with nep.node("server", backend) as node, nep.node("client", backend) as other:
+        client = other.new_client("double", timeout_s=30.0)
+
+        async def main() -> None:
+            spin = asyncio.create_task(node.spin_async())
+            await give_way()
+            await asyncio.to_thread(node.new_server, "double", lambda n: 2 * n)  # type: ignore[operator]
+            for n in range(20):
+                assert await client.acall(n) == 2 * n
+            node.stop_spin()
+            await spin
+
+        run(main())
+
+
 @pytest.mark.parametrize("is_coroutine", [False, True])
 def test_what_a_callback_raises_comes_out_of_the_spin(make: Make, is_coroutine: bool) -> None:
     node, pub = make("b"), make("a").new_pub("example")

@@ -138,6 +138,23 @@ def test_a_node_that_is_stopped_leaves_and_the_others_go_on(make: Nodes, backend
     assert ran == ["first"]
 
 
+def test_servers_answer_calls_too(make: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wait without a wake takes an hour."""
+    monkeypatch.setattr("nep.nodes.executor.SLICE_S", 3600.0)
+    nodes = [make("a", "zeromq"), make("b", "memory")]
+    thread = threading.Thread(target=nep.spin, args=nodes)
+    thread.start()
+    for node, backend in zip(nodes, ("zeromq", "memory"), strict=True):
+        node.new_server("double", lambda n: 2 * n)  # type: ignore[operator]
+        client = make("client", backend).new_client("double", timeout_s=30.0)
+        for n in range(20):
+            assert client.call(n) == 2 * n
+    for node in nodes:
+        node.stop_spin()
+    thread.join(30.0)
+    assert not thread.is_alive()
+
+
 @pytest.mark.parametrize("how", ["stop_spin", "close"])
 def test_it_ends_when_all_are_stopped_or_closed_by_others(make: Nodes, how: str) -> None:
     nodes = [make(f"n{n}", backend) for n, backend in enumerate(BACKENDS)]
