@@ -186,7 +186,10 @@ class RosProcess:
                 self._seqs[topic] += 1
                 body = (self._seqs[topic] & 0xFFFFFFFF).to_bytes(4, "little") + body[4:]
             message.body = body
-            publisher.publish(message)
+            try:
+                publisher.publish(message)
+            except self.rospy.ROSException:  # it was shut down this moment
+                raise RosShutdownError from None
         return dropped
 
     def _class_of(self, definition: Definition) -> type:

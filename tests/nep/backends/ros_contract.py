@@ -7,12 +7,16 @@ lost of those, letters such as "ü" in topics, and bytes that are wrong for thei
 
 from __future__ import annotations
 
+import importlib.util
+import math
 import os
+import queue
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import nep
@@ -73,6 +77,91 @@ def make(ros: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
     yield new
     for node in made:
         node.close()
+
+
+COMPRESSED = "sensor_msgs/CompressedImage"
+FRAME = np.full((4, 6, 3), 200, np.uint8)
+DEPTH = np.arange(24, dtype=np.uint16).reshape(4, 6) * 2000
+TWIST = {"linear": {"x": 0.5, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": math.inf}}
+PAYLOADS: dict[str, tuple[str, object]] = {
+    "json": ("json", {"n": 2**64 - 1, "text": "grüß"}),
+    "a name of the user's": ("robot/state", {"state": [1, None]}),
+    "string": ("string", "grüß\0"),
+    "bytes": ("bytes", bytes(range(256))),
+    "bytes of 8 MB": ("bytes", bytes(8_000_000)),
+    "msgpack": ("msgpack", {"data": b"\0\xff", "n": -(2**63)}),
+    "image, JPEG": ("image", FRAME),
+    "image, PNG": ("image", DEPTH),
+    COMPRESSED: (COMPRESSED, FRAME),
+    "sensor_msgs/Image": ("sensor_msgs/Image", DEPTH),
+    "sensor_msgs/Image of 8 MB": ("sensor_msgs/Image", np.zeros((1400, 2000, 3), np.uint8)),
+    "geometry_msgs/Twist": ("geometry_msgs/Twist", TWIST),
+    "std_msgs/Empty": ("std_msgs/Empty", {}),
+}
+if importlib.util.find_spec("cv2") is None:  # which makes and reads the files
+    PAYLOADS = {key: each for key, each in PAYLOADS.items() if each[0] not in {"image", COMPRESSED}}
+
+
+def is_same(one: object, other: object) -> bool:
+    if isinstance(other, np.ndarray):
+        return isinstance(one, np.ndarray) and one.dtype == other.dtype and bool((one == other).all())
+    return one == other
+
+
+def listened(make: Make, kind: str, payload: object) -> object:
+    sub = make("b").new_sub("/typed", kind)
+    make("a").new_pub("/typed", kind).publish(payload)
+    return sub.listen(timeout_s=30.0)[1]
+
+
+def latched(make: Make, kind: str, payload: object) -> object:
+    make("a").new_pub("/typed", kind, latched=True).publish(payload)
+    return make("late").new_sub("/typed", kind).listen(timeout_s=30.0)[1]
+
+
+def called_back(make: Make, kind: str, payload: object) -> object:
+    node, came = make("b"), []
+
+    def callback(message: object) -> None:
+        came.append(message)
+        node.stop_spin()
+
+    node.new_callback("/typed", kind, callback)
+    make("a").new_pub("/typed", kind).publish(payload)
+    node.spin(30.0)
+    return came[0]
+
+
+def newest(make: Make, kind: str, payload: object) -> object:
+    sub = make("b").new_sub("/typed", kind, keep="latest")
+    pub = make("a").new_pub("/typed", kind)
+    pub.publish(payload)
+    return sub.listen(timeout_s=30.0)[1]
+
+
+def poured(make: Make, kind: str, payload: object) -> object:
+    came: queue.SimpleQueue[object] = queue.SimpleQueue()
+    make("b").new_sub("/typed", kind, sink=lambda messages: [came.put(each.payload) for each in messages])
+    make("a").new_pub("/typed", kind).publish(payload)
+    return came.get(timeout=30.0)
+
+
+def from_two_to_two(make: Make, kind: str, payload: object) -> object:
+    subs = [make(name).new_sub("/typed", kind) for name in ("c", "d")]
+    for name in ("a", "b"):
+        make(name).new_pub("/typed", kind).publish(payload)
+    came = [sub.listen(timeout_s=30.0)[1] for sub in subs for _both in range(2)]
+    assert all(is_same(each, payload) for each in came)
+    return came[0]
+
+
+@pytest.mark.parametrize("kind", PAYLOADS)
+@pytest.mark.parametrize("pattern", [listened, latched, called_back, newest, poured, from_two_to_two])
+def test_every_type_with_every_pattern(
+    make: Make, pattern: Callable[[Make, str, object], object], kind: str
+) -> None:
+    msg_type, payload = PAYLOADS[kind]
+    assert is_same(pattern(make, msg_type, payload), payload)
 
 
 def test_order_is_kept_and_nothing_is_lost(make: Make) -> None:
