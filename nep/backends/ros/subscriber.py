@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from nep.backends.base import SubscriberSpec
+from nep.backends.base import SubscriberSpec, Wakes
 from nep.backends.ros.carried import STAMP, Unpacker, installed, is_ros_type, unpacker
 from nep.backends.ros.process import RosProcess, RosShutdownError
 from nep.backends.zeromq.sockets import Refusals
@@ -82,6 +82,8 @@ class RosSubscriber:
         self.lost: int | None = None
         self.refusals = Refusals()
         self.is_closed = False
+        self.fd = -1
+        self._waiting: tuple[Wakes, ...] = ()
         self._owner = owner
         self._told = ""
         self._sources: dict[tuple[str, ...], _Source] = {}
@@ -126,7 +128,13 @@ class RosSubscriber:
             self.received += 1 - dropped
             if dropped:
                 self.lost = (self.lost or 0) + dropped
-            self._owner.changed.notify_all()
+            self._tell_waiting()
+
+    def _tell_waiting(self) -> None:
+        """Something is there, or will not be any more. With the owner's lock held."""
+        self._owner.changed.notify_all()
+        for each in self._waiting:
+            each.wake()
 
     def _source_of(self, header: Mapping[str, str]) -> _Source:
         key = tuple(header.get(each, "") for each in ("callerid", "type", "md5sum", "latching"))
@@ -183,6 +191,19 @@ class RosSubscriber:
 
     # ---- reading
 
+    def enter_wait(self, waker: Wakes) -> bool:
+        """Before waiting. See `SubscriberTransport.enter_wait`."""
+        with self._owner.changed:
+            if self.is_closed or self.process.is_over or self.inbox.messages:
+                return False
+            self._waiting = (*self._waiting, waker)
+            return True
+
+    def leave_wait(self, waker: Wakes) -> None:
+        """After waiting."""
+        with self._owner.changed:
+            self._waiting = tuple(each for each in self._waiting if each is not waker)
+
     def poll(self) -> Message | None:
         """The next message if one is there. Raises `RosShutdownError` when none can come any more."""
         with self._owner.changed:
@@ -215,6 +236,7 @@ class RosSubscriber:
             if self.is_closed:
                 return
             self.is_closed = True
+            self._tell_waiting()
             self.process.subscribed[self.topic] -= 1
         self._owner.forget(self)
         if self._subscriber is not None:
