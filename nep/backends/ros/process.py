@@ -82,6 +82,8 @@ class RosProcess:
         self.subscribed: Counter[str] = Counter()
         """How many subscribers of nep's there are here, by topic."""
         self.handshakes = Handshakes()
+        self.at_shutdown: set[Callable[[], None]] = set()
+        """Called when rospy is shut down before the program ends."""
         self._ended = threading.Event()
         rospy.on_shutdown(self._shut_down)
         threading.Thread(target=self._watch, name="nep-ros-master", daemon=True).start()
@@ -105,6 +107,8 @@ class RosProcess:
         if not self._ended.is_set():
             self._ended.set()
             _logger.warning("%s", RosShutdownError())
+            for tell in list(self.at_shutdown):
+                tell()
 
     def _watch(self) -> None:
         """Until rospy ends, see whether the master was started anew; in a thread."""

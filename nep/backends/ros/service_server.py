@@ -58,6 +58,7 @@ class RosServer:
         self._changed = threading.Condition(threading.Lock())
         self._waiting: set[_Waiting] = set()
         self._unregistering: threading.Thread | None = None
+        process.at_shutdown.add(self._rospy_ends)
         self._response = _message_class(process.rospy, f"{self._type.name}Response", self._type)
         self._rospy_service: Any = process.serve(self.service, _service_class(process.rospy, self._type,
             self._response), self._handle)  # fmt: skip
@@ -131,6 +132,12 @@ class RosServer:
         for call in self.calls.close():
             call.answer(refusal(self.spec.service, is_closed=True))
 
+    def _rospy_ends(self) -> None:
+        """No call will come any more."""
+        self.is_closed = True
+        for call in self.calls.close():
+            call.answer(refusal(self.spec.service, is_closed=True))
+
     def _unregister(self) -> None:
         if not self.process.is_over:
             with contextlib.suppress(Exception):  # rospy has logged it
@@ -147,6 +154,7 @@ class RosServer:
             self.is_closed = True
             for waiting in self._waiting:
                 waiting.end(None, _("the server ends"))
+        self.process.at_shutdown.discard(self._rospy_ends)
         self._forget(self)
 
     def forked(self) -> None:

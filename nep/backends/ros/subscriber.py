@@ -93,6 +93,7 @@ class RosSubscriber:
         """Subscribe. What comes goes into the inbox."""
         with self._owner.changed:
             self.process.subscribed[self.topic] += 1
+        self.process.at_shutdown.add(self._rospy_ends)
         self._subscriber = self.process.rospy.Subscriber(
             self.topic, self.process.rospy.AnyMsg, self._came, buff_size=_BUFFER_BYTES, tcp_nodelay=True
         )
@@ -135,6 +136,12 @@ class RosSubscriber:
         self._owner.changed.notify_all()
         for each in self._waiting:
             each.wake()
+
+    def _rospy_ends(self) -> None:
+        """Nothing will come any more: `poll` says so."""
+        with self._owner.changed:
+            self._tell_waiting()
+        self._owner.wake()
 
     def _source_of(self, header: Mapping[str, str]) -> _Source:
         key = tuple(header.get(each, "") for each in ("callerid", "type", "md5sum", "latching"))
@@ -238,6 +245,7 @@ class RosSubscriber:
             self.is_closed = True
             self._tell_waiting()
             self.process.subscribed[self.topic] -= 1
+        self.process.at_shutdown.discard(self._rospy_ends)
         self._owner.forget(self)
         if self._subscriber is not None:
             self.process.unsubscribe(self._subscriber, timeout_s)

@@ -245,7 +245,10 @@ class RosTransport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
+        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`.
+
+        Raises `RosShutdownError` when no call can come any more.
+        """
         mine = [each for each in subscribers if isinstance(each, RosSubscriber)]
         before = self._wakes
         entered: list[CallQueue] = []
@@ -261,6 +264,8 @@ class RosTransport:
         finally:
             for queue in entered:
                 queue.leave_wait(self.wake)
+        if any(each.process.is_over for each in self._servers):
+            raise RosShutdownError
 
     def wake(self) -> None:
         """End all waits."""

@@ -21,6 +21,7 @@ import pytest
 
 import nep
 from tests.nep.backends import test_contract as contract
+from tests.nep.backends import test_contract_async as contract_async
 from tests.nep.backends.ros_programs import ros_master
 from tests.nep.backends.test_contract import Make
 
@@ -52,6 +53,22 @@ for _name in (
     "test_what_can_still_be_changed_is_copied",
 ):
     globals()[_name] = getattr(contract, _name)
+
+
+for _name in (
+    "test_a_time_limit_and_none",
+    "test_whoever_is_cancelled_has_taken_no_message",
+    "test_two_coroutines_share_a_subscriber",
+    "test_closing_ends_who_waits",
+    "test_closing_in_the_loop_while_another_coroutine_waits",
+    "test_spin_runs_functions_and_coroutine_functions_one_at_a_time",
+    "test_timers_and_other_coroutines_run_beside_a_spin",
+    "test_what_others_order_reaches_a_spin_that_waits",
+    "test_what_a_callback_raises_comes_out_of_the_spin",
+    "test_a_spin_that_is_cancelled_leaves_nothing",
+    "test_two_loops_in_two_threads",
+):
+    globals()[_name] = getattr(contract_async, _name)
 
 
 @pytest.fixture(autouse=True)

@@ -62,12 +62,15 @@ def test_a_master_that_was_started_anew_gets_to_know_everybody_again(tmp_path: P
 
 
 SHUT_DOWN = """
-import nep, sys
+import asyncio, nep, sys
+async def awaited():
+    print("ready")
+    await sub.receive_async()
 node = nep.node("first", "ros")
 pub, sub = node.new_pub("topic"), node.new_sub("topic")
 node.new_callback("topic", "json", print)
-print("ready")
-for call in (node.spin, sub.listen, sub.receive, lambda: pub.publish(1), lambda: node.new_pub("b")):
+calls = node.spin, sub.listen, sub.receive, lambda: pub.publish(1), lambda: node.new_pub("b")
+for call in (lambda: asyncio.run(awaited()), *calls):
     try:
         call()
     except nep.ClosedError as error:
@@ -84,7 +87,7 @@ def test_a_node_whose_name_another_takes_says_so_instead_of_waiting(ros: str) ->
         with running(SAME_NAME, "__name:=same", **told(ros)) as second:
             assert second.line() == "ready"
             assert first.line().startswith("shutdown request: "), "rospy prints it"
-            for _each in range(5):
+            for _each in range(6):
                 assert first.line() == (
                     "rospy was shut down in this program and cannot start in it again; start the program anew"
                 )

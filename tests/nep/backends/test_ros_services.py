@@ -253,6 +253,36 @@ def test_a_type_of_ros_has_bytes_and_nan_with_msgpack() -> None:
             kind.body_of_reply(wrong)
 
 
+SHUT_DOWN = """
+import nep
+node = nep.node("first", "ros")
+server, other = node.new_server("/x"), node.new_server("/y", print)
+print("ready")
+for call in (server.listen_info, node.spin, lambda: node.new_server("/z")):
+    try:
+        call()
+    except nep.ClosedError as error:
+        print(error)
+print(server.is_closed)
+node.close()
+"""
+SAME_NAME = "import nep; nep.node('second', 'ros').new_pub('topic'); print('ready'); input()"
+
+
+def test_a_server_whose_node_s_name_another_takes_says_so_instead_of_waiting(ros: str) -> None:
+    with running(SHUT_DOWN, "__name:=same", **told(ros)) as first:
+        assert first.line() == "ready"
+        with running(SAME_NAME, "__name:=same", **told(ros)) as second:
+            assert second.line() == "ready"
+            assert first.line().startswith("shutdown request: ")
+            assert first.line().startswith("server of '/x' is closed")
+            for _each in range(2):
+                assert first.line().startswith("rospy was shut down in this program")
+            assert first.line() == "True"
+            _said, errors = first.end()
+            assert (first.process.returncode, "Traceback" in errors) == (0, False)
+
+
 OBEYS = """
 import nep, sys
 node = nep.node("client", "ros")
