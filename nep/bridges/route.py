@@ -278,12 +278,25 @@ class Route:
                 self._carry(message)
 
     def _carry(self, message: Message) -> None:
+        if len(self._held):
+            self._send_held()
         publisher = self._publishers.get(self._key(message))
         if publisher is None or len(self._held):
             self._dropped += self._held.put(message)
             self._wake()
         else:
             self._send(publisher, message)
+
+    def _send_held(self) -> Message | None:
+        """Send what waited, as far as there are publishers; the first message that has none yet."""
+        while self._held.messages:
+            message = self._held.messages[0]
+            publisher = self._publishers.get(self._key(message))
+            if publisher is None:
+                return message
+            self._held.take()
+            self._send(publisher, message)
+        return None
 
     def _key(self, message: Message) -> tuple[bool, int | None]:
         """Which publisher: what is latched is so for each of its publishers alone."""
@@ -298,15 +311,10 @@ class Route:
         """Make the publishers that messages wait for, and send these. Raises `NepError`."""
         while True:
             with self._lock:
-                if not self._held.messages:
+                message = self._send_held()
+                if message is None:
                     return
-                message = self._held.messages[0]
                 key = self._key(message)
-                publisher = self._publishers.get(key)
-                if publisher is not None:
-                    self._held.take()
-                    self._send(publisher, message)
-                    continue
             form = self._form_for(message, view, own_nodes)
             publisher = node.new_pub(self.end.topic, form.msg_type, latched=key[0], qos=self.end.qos)
             with self._lock:

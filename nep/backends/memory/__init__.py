@@ -401,10 +401,12 @@ class MemoryTransport:
         return hub
 
     def _pour(self, subscriber: MemorySubscriber) -> None:
-        self._sinks = [*self._sinks, subscriber]
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name=f"nep-sinks-{self.node.name}", daemon=True)
-            self._thread.start()
+        with self.changed:  # who closes the node meanwhile finds no thread, or one that has begun
+            self._sinks = [*self._sinks, subscriber]
+            if self._thread is None and not self._closing.is_set():
+                name = f"nep-sinks-{self.node.name}"
+                self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+                self._thread.start()
 
     def _run(self) -> None:
         while not self._closing.is_set():

@@ -53,7 +53,7 @@ def test_each_way_and_topic_has_its_own_limit():
         assert taken(free, 20) == list(range(20))
         for side in ("a", "b"):
             found = route(bridge, side, "/slow")
-            eventually(lambda found=found: found.counts().received == 20)
+            eventually(lambda found=found: found.counts().received == 20 and found.counts().sent)
             counts = found.counts()
             assert (counts.sent, counts.thinned, counts.waiting) == (1, 18, 1)
 
@@ -65,7 +65,7 @@ def test_what_waits_for_its_turn_goes_when_the_bridge_is_closed():
             for number in range(10):
                 pub.publish(number)
             found = route(bridge, "a", "/t")
-            eventually(lambda: found.counts().received == 10)
+            eventually(lambda: found.counts().received == 10 and found.counts().sent)
         assert taken(sub, 2) == [0, 9]
         counts = found.counts()
         assert (counts.sent, counts.thinned, counts.waiting) == (2, 8, 0)
