@@ -37,7 +37,7 @@ ROUTES_MOST = 500
 """Patterns find no more topics than these, both ways together."""
 _OWN_TOPICS = "/nep/"
 _SLICE_S = 0.05
-_FLUSH_S = 2.0
+_FLUSH_S, _LEAVE_S = 2.0, 0.2
 _logger = logging.getLogger("nep")
 
 
@@ -238,6 +238,8 @@ class Bridge:
         self._closed.set()
         for side in self.sides.values():
             side.begin_close()
+        for side in self.sides.values():
+            side.join(_LEAVE_S)  # who waits for a master that is not there ends later, with its node
         for route in self._routes:
             route.end_taking()
         self._pacer.close(max(0.1, timeout_s))

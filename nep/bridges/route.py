@@ -124,8 +124,8 @@ class Route:
     ) -> None:
         self.origin = origin
         self.end = end
-        self.trouble = ""
-        """Why it cannot subscribe or publish at present."""
+        self.troubles: dict[SideName, str] = {}
+        """Why it cannot subscribe or publish at present, by the side on which that is."""
         self.rival = ""
         """The bridge that carries its messages instead; then it carries none."""
         self._bridge = bridge
@@ -168,6 +168,11 @@ class Route:
     def _lost(self) -> int | None:
         now = 0 if self._subscriber is None else self._subscriber.lost
         return None if now is None or self._lost_before is None else now + self._lost_before
+
+    @property
+    def trouble(self) -> str:
+        """Why it cannot subscribe or publish at present; empty when it can."""
+        return next(iter(self.troubles.copy().values()), "")
 
     @property
     def is_subscribed(self) -> bool:

@@ -106,7 +106,7 @@ class BridgeSide:
                 self._look(owner)
                 self._look_at = time.monotonic() + _LOOK_S
             if self.view is not None:
-                self._look_after(owner, self.view)
+                self._look_after(owner, self.view, is_due=is_due)
                 if is_due and owner.speaks_on(self, self.view):
                     self._meet(owner)
                     self._tell({**owner.status(), "side": self.name})
@@ -114,7 +114,8 @@ class BridgeSide:
 
     def _needs(self, owner: BridgeOfSide) -> bool:
         """Whether a type is to be decided: by who is there now, not a second ago."""
-        return any(each.needs_type for each in owner.routes if each.end.side == self.name)
+        routes = (each for each in owner.routes if each.end.side == self.name)
+        return any(each.needs_type and self.name not in each.troubles for each in routes)
 
     def _look(self, owner: BridgeOfSide) -> None:
         """Ask who is there; say when nobody answers, and when somebody does again."""
@@ -144,10 +145,13 @@ class BridgeSide:
             if route.origin.side == self.name:
                 route.close_gone(view, time.monotonic())
 
-    def _look_after(self, owner: BridgeOfSide, view: GraphView) -> None:
+    def _look_after(self, owner: BridgeOfSide, view: GraphView, *, is_due: bool) -> None:
+        """Make what routes need here. What could not be made is tried again with the next look."""
         for route in owner.routes:
             if self._is_closing:
                 return
+            if self.name in route.troubles and not is_due:
+                continue
             if route.origin.side == self.name:
                 self._try(route, partial(route.subscribe, self.node, view, owner.own_nodes))
             elif route.needs_publisher:
@@ -161,8 +165,8 @@ class BridgeSide:
             return
         except Exception as error:  # noqa: BLE001 - see `_look`
             said = _said(error)
-            if said != route.trouble:
-                route.trouble = said
+            if said != route.troubles.get(self.name):
+                route.troubles[self.name] = said
                 _logger.warning(
                     "'%s' on side %s is not carried to '%s' yet: %s",
                     route.origin.topic,
@@ -171,7 +175,7 @@ class BridgeSide:
                     said,
                 )
             return
-        route.trouble = ""
+        route.troubles.pop(self.name, None)
 
     def _meet(self, owner: BridgeOfSide) -> None:
         """Hear what other bridges tell."""

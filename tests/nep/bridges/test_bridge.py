@@ -142,6 +142,24 @@ def test_a_type_that_only_the_other_back_end_knows_is_taken_from_who_waits_there
             assert hears.received == 0
 
 
+def test_a_type_that_nobody_has_there_is_said_once_and_its_messages_wait(twist_side, caplog):
+    with nets("zeromq") as (a,):
+        wanted = topic("/t", direction="a->b")
+        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (wanted, topic("/good")))
+        with Bridge(told) as bridge:
+            assert bridge.wait_until_ready(30.0)
+            pub = a.node("a").new_pub("/t", "no_msgs/Type")
+            found = route(bridge, "a", "/t")
+            for number in range(5):
+                pub.publish(number)
+                eventually(lambda number=number: found.counts().waiting == number + 1)
+                eventually(lambda: found.trouble == "there is no type 'no_msgs/Type'; install it")
+            looks = bridge.sides["b"].looks
+            eventually(lambda: bridge.sides["b"].looks >= looks + 2)
+            assert caplog.text.count("install it") == 1
+            assert bridge.status()["routes"][0]["trouble"] == found.trouble
+
+
 @pytest.fixture
 def twist_side(monkeypatch):
     """A back end with a type and codec of its own, as those of ROS have them."""
@@ -154,11 +172,16 @@ def twist_side(monkeypatch):
     def decode(data, _extension):
         return {"x": float(bytes(data)[2:])}
 
+    def chosen(name):
+        if name.startswith("no_msgs"):
+            raise NepError(f"there is no type '{name}'; install it")
+        return twist if name == "test_msgs/Twist" else codec_for(name)
+
     twist = Codec("twist", 0, encode, decode, dict, lambda payload: payload)
     backend = replace(
         memory.BACKEND,
         name="ros-like",
-        codec_for=lambda name: twist if name == "test_msgs/Twist" else codec_for(name),
+        codec_for=chosen,
     )
     named = {"ros-like": backend, "zeromq": backend_named("zeromq")}
     monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: named[name])
