@@ -90,8 +90,8 @@ class Bridge:
 
     @property
     def is_ready(self) -> bool:
-        """Whether all topics that are named are subscribed, and both networks were seen for patterns."""
-        return all(each.is_subscribed for each in self._routes) and all(
+        """Whether the topics that are named are subscribed, where types are known, and both networks seen."""
+        return all(each.is_ready for each in self._routes) and all(
             side.view is not None for side in self.sides.values()
         )
 

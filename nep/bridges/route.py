@@ -12,7 +12,7 @@ from nep.bridges.configuration import SideName
 from nep.bridges.pacer import Limit, Pacer
 from nep.bridges.trail import TRAIL_KEY, Echoes, Trail, read_trail
 from nep.errors import ClosedError, EncodeError, NepError
-from nep.messages.codecs import CODECS, Codec, JsonEncoder
+from nep.messages.codecs import CODECS, Codec, JsonEncoder, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
@@ -33,6 +33,8 @@ _GONE_S = 10.0
 """Who is not in the graph for so long is gone; a master that was started again knows it sooner."""
 _PROBLEM_MOST = 300
 _DEFAULT_TYPE = "json"
+_NO_MAPS = frozenset({"string", "bytes", "image"})
+"""Codecs whose payloads have no fields, and so are none of a back end's own types."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,11 @@ class RouteEnd:
     msg_type: str = ""
     qos: str = ""
     echoes: Echoes = field(default_factory=Echoes)
+
+    @property
+    def default_type(self) -> str:
+        """As what a topic is subscribed that nobody publishes; "" when the type would decide what is read."""
+        return _DEFAULT_TYPE if self.backend.codec_for is codec_for else ""
 
 
 @dataclass(frozen=True)
@@ -139,6 +146,7 @@ class Route:
         self._held = Inbox("all", HELD_MESSAGES, _HELD_BYTES)
         self._subscriber: Subscriber | None = None
         self._ear: _Ear | None = None
+        self._waits_for_type = False
         self._lost_before: int | None = 0
         self._publishers: dict[tuple[bool, int | None], Publisher] = {}
         self._gone_since: dict[tuple[bool, int | None], float] = {}
@@ -180,6 +188,11 @@ class Route:
         return self._subscriber is not None
 
     @property
+    def is_ready(self) -> bool:
+        """Whether its messages come, or will when somebody publishes the topic, whose type is not told."""
+        return self._subscriber is not None or self._waits_for_type
+
+    @property
     def needs_publisher(self) -> bool:
         """Whether messages wait for a publisher on the other side."""
         return len(self._held) > 0
@@ -192,11 +205,18 @@ class Route:
     # ---- in the thread of the origin's side
 
     def subscribe(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
-        """Be subscribed; again when it is found out that the topic has another type. Raises `NepError`."""
+        """Be subscribed; again when it is found out that the topic has another type.
+
+        Where the back end has types of its own, as soon as somebody publishes it. Raises `NepError`.
+        """
         known = type_in(view, self.origin.topic, own_nodes)
         if self._subscriber is None:
+            msg_type = self.origin.msg_type or known or self.origin.default_type
+            self._waits_for_type = not msg_type
+            if not msg_type:
+                return
             ear = _Ear(self._take, is_open=True)
-            subscriber = self._new_sub(node, self.origin.msg_type or known or _DEFAULT_TYPE, ear)
+            subscriber = self._new_sub(node, msg_type, ear)
             with self._lock:
                 self._subscriber, self._ear = subscriber, ear
         elif not self.origin.msg_type and known not in {"", self._subscriber.msg_type}:
@@ -329,7 +349,7 @@ class Route:
     def _form_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> _Form:
         """As what it is published: decided by the first message, and kept."""
         if self._form is None:
-            msg_type = self.end.msg_type or _type_for(message.msg_type, self.end, view, own_nodes)
+            msg_type = self.end.msg_type or _type_for(message, self.end, view, own_nodes)
             self._form = _Form(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
         return self._form
 
@@ -435,22 +455,24 @@ def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
     return known.msg_type if known.msg_type != "*" else ""
 
 
-def _type_for(msg_type: str, end: RouteEnd, view: GraphView, own_nodes: Collection[str]) -> str:
-    """As what messages of a type are published at an end where no type is told.
+def _type_for(message: Message, end: RouteEnd, view: GraphView, own_nodes: Collection[str]) -> str:
+    """As what messages such as this one are published at an end where no type is told.
 
-    As what others have there, when only this back end knows that type, or they publish and its codec is the
-    same: a topic shall not have two types. Else as what it is.
+    As what others have there, when only this back end knows that type and the message may be a map, or they
+    publish and its codec is the same: a topic shall not have two types. Else as what it is.
     """
     known = view.topics.get(end.topic)
     if known is None or known.msg_type in {"", "*"}:
-        return msg_type
+        return message.msg_type
     members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
     codec = _codec_name(end, known.msg_type)
     if members <= set(own_nodes) or not codec:
-        return msg_type
+        return message.msg_type
+    if codec not in CODECS:
+        return message.msg_type if message.codec in _NO_MAPS else known.msg_type
     is_published = bool(type_in(view, end.topic, own_nodes))
-    is_same = is_published and codec == _codec_name(end, msg_type)
-    return known.msg_type if is_same or codec not in CODECS else msg_type
+    is_same = is_published and codec == _codec_name(end, message.msg_type)
+    return known.msg_type if is_same else message.msg_type
 
 
 def _codec_name(end: RouteEnd, msg_type: str) -> str:

@@ -15,6 +15,7 @@ from nep.errors import EncodeError, NepError
 from nep.masters.master import Master
 from nep.messages.codecs import Codec, codec_for
 from nep.messages.encoded import Encoded
+from nep.messages.message import MessageKind
 from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import Net, bridged, configured, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
@@ -142,6 +143,39 @@ def test_a_type_that_only_the_other_back_end_knows_is_taken_from_who_waits_there
             assert hears.received == 0
 
 
+def test_a_back_end_with_types_of_its_own_is_subscribed_by_the_type_that_somebody_publishes(twist_side):
+    import nep
+
+    with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
+        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (topic("/speed"),))
+        with Bridge(told) as bridge:
+            assert bridge.wait_until_ready(30.0)
+            found = route(bridge, "b", "/speed")
+            assert not found.is_subscribed, "as json its bytes would be something else"
+            pub, hears = robot.new_pub("/speed", "test_msgs/Twist"), a.node("a").new_sub("/speed")
+            eventually(lambda: found.is_subscribed)
+            pub.publish({"x": 2.0})
+            message = hears.receive(30.0)
+            assert (message.payload, message.codec, message.msg_type) == (
+                {"x": 2.0},
+                "json",
+                "test_msgs/Twist",
+            )
+
+
+def test_a_text_is_no_map_and_stays_a_text(twist_side):
+    import nep
+
+    with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
+        waits = robot.new_sub("/said", "test_msgs/Twist")
+        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (topic("/said"),))
+        with Bridge(told) as bridge:
+            assert bridge.wait_until_ready(30.0)
+            a.node("a").new_pub("/said", "string").publish("hello")
+            message = waits.receive(30.0)
+            assert (message.payload, message.msg_type) == ("hello", "string")
+
+
 def test_a_type_that_nobody_has_there_is_said_once_and_its_messages_wait(twist_side, caplog):
     with nets("zeromq") as (a,):
         wanted = topic("/t", direction="a->b")
@@ -158,6 +192,17 @@ def test_a_type_that_nobody_has_there_is_said_once_and_its_messages_wait(twist_s
             eventually(lambda: bridge.sides["b"].looks >= looks + 2)
             assert caplog.text.count("install it") == 1
             assert bridge.status()["routes"][0]["trouble"] == found.trouble
+
+
+class Typed(memory.MemoryTransport):
+    """Its messages are read by their publisher's codec, whoever else knows it."""
+
+    def publisher(self, spec):
+        made = super().publisher(spec)
+        made._kind = MessageKind(
+            spec.topic, spec.codec.name, spec.msg_type, spec.is_latched, spec.codec.decode
+        )
+        return made
 
 
 @pytest.fixture
@@ -181,6 +226,7 @@ def twist_side(monkeypatch):
     backend = replace(
         memory.BACKEND,
         name="ros-like",
+        open=Typed,
         codec_for=chosen,
     )
     named = {"ros-like": backend, "zeromq": backend_named("zeromq")}
