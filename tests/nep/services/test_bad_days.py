@@ -316,6 +316,7 @@ def test_who_spins_already_is_woken_by_a_new_server_and_by_each_call(
     with nep.node("server") as a, nep.node("client") as b:
         spinner = threading.Thread(target=a.spin, name="spin")
         spinner.start()  # before there is a server
+        eventually(lambda: a._transport._waiting)  # from its first wait on no wake is lost
         a.new_server("/x", lambda request: request)
         client = b.new_client("/x", timeout_s=LONG_S)
         assert [client.call(n) for n in range(300)] == list(range(300))
