@@ -43,6 +43,8 @@ from nep.protocol.graph_view import SubscriberInfo as SubscriberInfo
 from nep.protocol.graph_view import TopicInfo as TopicInfo
 from nep.services.client import Client as Client
 from nep.services.server import Server as Server
+from nep.services.survey import Respondent as Respondent
+from nep.services.survey import Surveyor as Surveyor
 
 node = Node
 """A node; see `Node`. The paper's spelling."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -27,6 +27,7 @@ __all__ = [
     "ServerSpec",
     "ServerTransport",
     "ServiceTransport",
+    "SurveyTransport",
     "Tally",
     "check_calls",
     "fitting",
@@ -253,6 +254,36 @@ class ClientTransport(Protocol):
         """In a child that was forked: be closed, without taking a lock or touching a socket."""
 
 
+class SurveyTransport(Protocol):
+    """What a surveyor asks through."""
+
+    @property
+    def respondents(self) -> int:
+        """How many there are now."""
+
+    @property
+    def late(self) -> int:
+        """Answers that came when nobody waited for them any more."""
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it was closed, or its transport was."""
+
+    def begin_all(
+        self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
+    ) -> Sequence[OpenCall]:
+        """Ask all respondents that are there. `then` gets the outcome of each; otherwise as `begin`."""
+
+    def forget_all(self, calls: Sequence[OpenCall]) -> None:
+        """Nobody waits for these any more; `then` is not called."""
+
+    def close(self) -> None:
+        """Unregister; calls that are under way end with `ClosedError`."""
+
+    def forked(self) -> None:
+        """In a child that was forked: be closed, without taking a lock or touching a socket."""
+
+
 class ServiceTransport(Protocol):
     """A node's transport that has services."""
 
@@ -261,6 +292,9 @@ class ServiceTransport(Protocol):
 
     def client(self, spec: ClientSpec) -> ClientTransport:
         """A new client. Raises as `Transport.subscriber` does."""
+
+    def survey(self, spec: ClientSpec) -> SurveyTransport:
+        """A new surveyor of the respondents that are servers of `spec.service`. Raises as `client` does."""
 
 
 def check_calls(service: str, count: int, used: int, size: int) -> None:

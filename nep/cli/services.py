@@ -141,8 +141,9 @@ def _request(text: str) -> object:
 
 def _found(service: str, graph: GraphView) -> ServiceInfo:
     """What is known of it. Raises `BadTopicError`, and `NepError` when nobody has it."""
-    found = graph.services.get(check_service(service))
+    found = graph.services.get(service)
     if found is None:
+        check_service(service)
         said = _("nobody serves or calls '{service}'; {meant}'nep service list' shows all services")
         raise NepError(said.format(service=service, meant=meant(service, list(graph.services))))
     return found

@@ -19,7 +19,7 @@ from nep.protocol.graph_view import (
     TopicInfo,
 )
 from nep.protocol.requests import as_count
-from nep.protocol.service_wire import service_of
+from nep.protocol.service_wire import SURVEY, service_of
 
 __all__ = ["GraphViewer"]
 
@@ -194,7 +194,7 @@ def _service(topic: str, registry: Registry) -> ServiceInfo:
 def _service_alerts(services: Mapping[str, ServiceInfo], registry: Registry) -> Iterator[Alert]:
     for name in sorted(services):
         servers = services[name].servers
-        if len(servers) > 1:
+        if len(servers) > 1 and not name.startswith(SURVEY):
             yield Alert(
                 f"service:{name}",
                 _("The service “{service}” has {count} servers: {nodes}").format(

@@ -26,7 +26,6 @@ from nep.backends.base import (
     backend_named,
 )
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port, for_messages
-from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import BadTopicError, ClosedError, WrongTypeError
 from nep.i18n import _
 from nep.messages.history import MAX_HISTORY
@@ -41,13 +40,11 @@ from nep.nodes.timer import Timer
 from nep.nodes.work import Callback, Work
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
-from nep.protocol.service_wire import PREFIX, check_service
+from nep.protocol.service_wire import PREFIX
 from nep.protocol.topic_pattern import is_pattern
 from nep.protocol.wire import check_node_name, check_topic
-from nep.services.client import Client
-from nep.services.owned import OwnedServices, codec_checked
-from nep.services.server import Callback as ServerCallback
-from nep.services.server import Server
+from nep.services.owned import OwnedServices
+from nep.services.service_node import ServiceNode
 from nep.system import forks
 from nep.system.addresses import checked_host
 
@@ -70,7 +67,7 @@ _closed_in = 0
 """The process in which `multiprocessing` knows that nodes are to be closed."""
 
 
-class Node:
+class Node(ServiceNode):
     """A node of this name. It needs no master until something is made on it; works in any thread.
 
     `transport` names a back end: "zeromq" (also "ZMQ"), "memory" (nodes of this process only). `master` is
@@ -113,7 +110,7 @@ class Node:
             key=key,
         )
         self._transport: Transport = self._backend.open(record)
-        self._services = OwnedServices(self._transport, self._backend.name)
+        self._services = OwnedServices(self._transport, self._backend, self._wait_s, self._new_id, self._wake)
         self._work = Work(name, self._transport, time.monotonic, self._services)
         _alive.add(self)
         _close_with_worker()
@@ -284,62 +281,13 @@ class Node:
         self._work.add_callback(Callback(subscriber, incoming, callback, with_message))
         return subscriber
 
-    # ---- services
-
-    def new_server(
-        self,
-        service: str,
-        callback: ServerCallback | None = None,
-        configuration: Configuration | None = None,
-        *,
-        threads: int = 0,
-        msg_type: str = "json",
-    ) -> Server:
-        """A server of a service: `callback(request)` gives the answer, in the thread that calls `spin`.
-
-        With `threads` it runs in so many threads of the server's own instead, and nobody needs to spin. What
-        it raises is raised at the client, as `ServiceError`. Without a callback, `Server.listen_info` and
-        `send_info` answer. With `node.direct(ip, port)` it serves the original NEP's `client` at that port.
-        `msg_type` is for back ends whose services have types ("ros": "std_srvs/SetBool"); others answer each
-        client in its own. Raises as `new_pub` does.
-        """
-        self._open_transport()
-        check_service(service)
-        if callback is not None:
-            function("callback", callback)
-        at_least("threads", threads, 0)
-        if threads and callback is None:
-            raise ValueError(_("threads need a callback to run; give one"))
+    def _new_id(self) -> tuple[int, int]:
         number = next(self._numbers)
-        id_ = id_from(self._key, number)
-        configured = self._configured(configuration)
-        spec = ServerSpec(id_, service, configured, self._wait_s, number, text("msg_type", msg_type))
-        server = self._services.server(spec, callback, threads)
-        self._work.wake()  # who spins several nodes, or in a loop, answers its calls now
-        return server
+        return id_from(self._key, number), number
 
-    def new_client(
-        self,
-        service: str,
-        configuration: Configuration | None = None,
-        *,
-        msg_type: str = "json",
-        timeout_s: float | None = 5.0,
-    ) -> Client:
-        """A client of a service; a server need not be there yet.
-
-        `timeout_s` is how long its calls wait for a server and their answer, unless they say otherwise.
-        `msg_type="msgpack"` carries bytes, too. With `node.direct(ip, port)` it calls the original NEP's
-        `server` at that port. Raises as `new_pub` does.
-        """
-        self._open_transport()
-        check_service(service)
-        codec = codec_checked(self._backend.codec_for(text("msg_type", msg_type)))
-        seconds("timeout_s", timeout_s)
-        number = next(self._numbers)
-        id_ = id_from(self._key, number)
-        spec = ClientSpec(id_, service, codec, self._configured(configuration), self._wait_s, number)
-        return self._services.client(spec, timeout_s)
+    def _wake(self) -> None:
+        """Who spins looks again at what there is to do."""
+        self._work.wake()
 
     def _configured(self, configuration: object) -> Configuration:
         if configuration is None:

@@ -29,12 +29,14 @@ __all__ = [
     "PAYLOAD_MAX_BYTES",
     "PREFIX",
     "SERVICE_TYPE",
+    "SURVEY",
     "CallHeader",
     "CallKind",
     "Framing",
     "ReadAnswer",
     "Reply",
     "check_service",
+    "check_survey",
     "failure",
     "read_failure",
     "service_of",
@@ -42,6 +44,8 @@ __all__ = [
 ]
 
 PREFIX = "nep.service:"
+SURVEY = "survey:"
+"""Before a survey's name: its respondents are listed as the servers of a service that is called so."""
 SERVICE_TYPE = "service"
 """Type and codec under which the master lists servers and clients."""
 PAYLOAD_MAX_BYTES = 64 * 2**20
@@ -214,8 +218,17 @@ def check_service(name: str) -> str:
     check_topic(name)
     if name.startswith(PREFIX):
         raise BadTopicError(name, _("'{prefix}' is put before it by nep itself").format(prefix=PREFIX))
+    if name.startswith(SURVEY):
+        raise BadTopicError(name, _("names that begin with '{prefix}' are surveys'").format(prefix=SURVEY))
     check_topic(topic_of(name))
     return name
+
+
+def check_survey(name: str) -> str:
+    """The service that a survey of this name is. Raises `BadTopicError`."""
+    check_service(name)
+    check_topic(topic_of(f"{SURVEY}{name}"))
+    return f"{SURVEY}{name}"
 
 
 def topic_of(service: str) -> str:

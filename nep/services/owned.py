@@ -4,54 +4,127 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import cast
+from collections.abc import Callable
+from typing import TypeVar, cast
 
-from nep.backends.base import Transport
+from nep.arguments import at_least, function, seconds, text
+from nep.backends.base import Backend, Transport
+from nep.backends.connection import Configuration
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec, ServiceTransport
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import Codec, codec_numbered
+from nep.protocol.service_wire import check_service, check_survey
 from nep.services.client import Client
 from nep.services.server import Callback, Server
+from nep.services.survey import Respondent, Surveyor
 
 __all__ = ["OwnedServices"]
 
+S = TypeVar("S", bound=Server)
+
 
 class OwnedServices:
-    """Makes them through the node's transport, and ends them with the node. May be used from any thread."""
+    """Makes them through the node's transport, and ends them with the node. May be used from any thread.
 
-    def __init__(self, transport: Transport, backend: str) -> None:
+    `new_id` gives the id of each, and the number that proves it. `wake` wakes who spins.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        backend: Backend,
+        wait_s: float | None,
+        new_id: Callable[[], tuple[int, int]],
+        wake: Callable[[], None],
+    ) -> None:
         self._transport = transport
         self._backend = backend
+        self._wait_s = wait_s
+        self._new_id = new_id
+        self._wake = wake
         self._lock = threading.Lock()
         self._servers: tuple[Server, ...] = ()
-        self._clients: tuple[Client, ...] = ()
+        self._clients: tuple[Client | Surveyor, ...] = ()
 
-    def server(self, spec: ServerSpec, callback: Callback | None, threads: int) -> Server:
-        """A new server. Raises as the transport does, and `NepError` when that has no services."""
-        made = Server(self._able().server(spec), spec.service, callback, threads, self._forget)
+    def server(
+        self,
+        service: str,
+        callback: Callback | None,
+        configuration: Configuration,
+        threads: int,
+        msg_type: str,
+    ) -> Server:
+        """See `Node.new_server`. Raises as the transport does, and `NepError` when that has no services."""
+        text("msg_type", msg_type)
+        return self._serve(Server, check_service(service), callback, configuration, threads, msg_type)
+
+    def respondent(
+        self, survey: str, callback: Callback | None, configuration: Configuration, threads: int
+    ) -> Respondent:
+        """See `Node.new_respondent`. Raises as `server` does."""
+        return self._serve(Respondent, check_survey(survey), callback, configuration, threads)
+
+    def _serve(
+        self,
+        kind: type[S],
+        service: str,
+        callback: Callback | None,
+        configuration: Configuration,
+        threads: int,
+        msg_type: str = "json",
+    ) -> S:
+        if callback is not None:
+            function("callback", callback)
+        at_least("threads", threads, 0)
+        if threads and callback is None:
+            raise ValueError(_("threads need a callback to run; give one"))
+        able = self._able()
+        id_, number = self._new_id()
+        spec = ServerSpec(id_, service, configuration, self._wait_s, number, msg_type)
+        made = kind(able.server(spec), service, callback, threads, self._forget)
         with self._lock:
             self._servers = (*self._servers, made)
-        self._transport.wake()  # who spins already answers its calls now
+        self._wake()  # who spins already answers its calls now
         return made
 
-    def client(self, spec: ClientSpec, timeout_s: float | None) -> Client:
-        """A new client. Raises as `server` does."""
-        made = Client(self._able().client(spec), spec.service, spec.codec, timeout_s, self._forget)
+    def client(
+        self, service: str, configuration: Configuration, msg_type: str, timeout_s: float | None
+    ) -> Client:
+        """See `Node.new_client`. Raises as `server` does."""
+        spec = self._client_spec(check_service(service), configuration, msg_type)
+        limit_s = seconds("timeout_s", timeout_s)
+        made = Client(self._able().client(spec), service, spec.codec, limit_s, self._forget)
         with self._lock:
             self._clients = (*self._clients, made)
         return made
+
+    def surveyor(
+        self, survey: str, configuration: Configuration, msg_type: str, timeout_s: float | None
+    ) -> Surveyor:
+        """See `Node.new_surveyor`. Raises as `server` does."""
+        spec = self._client_spec(check_survey(survey), configuration, msg_type)
+        limit_s = seconds("timeout", timeout_s)
+        made = Surveyor(self._able().survey(spec), spec.service, spec.codec, limit_s, self._forget)
+        with self._lock:
+            self._clients = (*self._clients, made)
+        return made
+
+    def _client_spec(self, service: str, configuration: Configuration, msg_type: str) -> ClientSpec:
+        codec = codec_checked(self._backend.codec_for(text("msg_type", msg_type)))
+        id_, number = self._new_id()
+        return ClientSpec(id_, service, codec, configuration, self._wait_s, number)
 
     def _able(self) -> ServiceTransport:
         if not hasattr(self._transport, "server"):
             raise NepError(
                 _("the back end '{backend}' has no services; use 'zeromq' for them").format(
-                    backend=self._backend
+                    backend=self._backend.name
                 )
             )
         return cast("ServiceTransport", self._transport)
 
-    def _forget(self, closed: Server | Client) -> None:
+    def _forget(self, closed: Server | Client | Surveyor) -> None:
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self._clients = tuple(each for each in self._clients if each is not closed)
@@ -90,7 +163,8 @@ class OwnedServices:
         for server in servers:
             server.join(max(0.0, deadline - time.monotonic()))
         for client in clients:
-            client.join()
+            if isinstance(client, Client):
+                client.join()
 
     def forked(self) -> None:
         """In a child that was forked. See `nep.system.forks`."""

@@ -325,6 +325,8 @@ class MemoryTransport:
         """Register a client."""
         return self._services.client(spec)
 
+    survey = client
+
     def wait(
         self,
         subscribers: Sequence[SubscriberTransport],

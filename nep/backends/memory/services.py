@@ -7,7 +7,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from nep.backends.connection import Configuration
@@ -182,6 +182,11 @@ class MemoryClient:
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
         """See `ClientTransport.begin`."""
+        return self._begin(data, timeout_s, then, None)
+
+    def _begin(
+        self, data: bytes | memoryview, timeout_s: float | None, then: Then, server: MemoryServer | None
+    ) -> OpenCall:
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         copied = data if isinstance(data, bytes) else bytes(data)
         with self.hub.lock:
@@ -191,11 +196,27 @@ class MemoryClient:
             call = _Call(next(self._numbers), self, copied, timeout_s, deadline, then)
             self._calls[call.number] = call
             self._bytes += len(copied)
-            servers = self.hub.servers.get(self.spec.service)
-            if servers:
-                servers[0].put(call)
+            server = server or next(iter(self.hub.servers.get(self.spec.service, ())), None)
+            if server is not None:
+                server.put(call)
         self._deadlines.add(deadline)
         return call
+
+    @property
+    def respondents(self) -> int:
+        """How many servers there are now."""
+        return len(self.hub.servers.get(self.spec.service, ()))
+
+    def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
+        """Call each server. See `SurveyTransport.begin_all`."""
+        with self.hub.lock:
+            servers = self.hub.servers.get(self.spec.service, ())
+            return [self._begin(data, timeout_s, then, server) for server in servers]
+
+    def forget_all(self, calls: Sequence[OpenCall]) -> None:
+        """Nobody waits for these any more."""
+        for call in calls:
+            self.forget(call)
 
     def take(self, call: _Call) -> bool:
         """It is not under way any more; whether it was. With the hub's lock held."""

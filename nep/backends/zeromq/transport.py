@@ -20,7 +20,14 @@ from nep.backends.base import (
     SubscriberTransport,
 )
 from nep.backends.connection import Configuration, Direct
-from nep.backends.services import CallQueue, ClientSpec, ClientTransport, ServerSpec, ServerTransport
+from nep.backends.services import (
+    CallQueue,
+    ClientSpec,
+    ClientTransport,
+    ServerSpec,
+    ServerTransport,
+    SurveyTransport,
+)
 from nep.backends.zeromq.io_thread import IoThread, Served, SharedContext, shared_context
 from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
 from nep.backends.zeromq.master_session import MasterSession, SessionPublisher
@@ -319,6 +326,10 @@ class ZeromqTransport:
     def client(self, spec: ClientSpec) -> ClientTransport:
         """A new client. See `ServiceTransport.client`."""
         return self._services.client(spec)
+
+    def survey(self, spec: ClientSpec) -> SurveyTransport:
+        """A new surveyor. See `ServiceTransport.survey`."""
+        return self._services.survey(spec)
 
     # ---- waiting
 

@@ -124,6 +124,8 @@ class SocketClient:
         """The numbers and sizes of all that were sent over this connection, oldest first, also those that are
         over: answers without a number come in this order, and a server that hangs is not sent ever more."""
         self._bytes = self._unanswered_bytes = 0
+        self.place = endpoint
+        """Its server's endpoint, when no master tells of servers."""
         self._servers: dict[int, str] = {0: endpoint} if endpoint else {}
         self._current: int | None = None
         self._leave_at = math.inf
@@ -151,6 +153,11 @@ class SocketClient:
     def late(self) -> int:
         """Answers that came when nobody waited for them any more."""
         return self._late
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether calls are under way."""
+        return bool(self._calls)
 
     @property
     def is_closed(self) -> bool:

@@ -17,6 +17,7 @@ from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.services.client import Connection, SocketClient
 from nep.backends.zeromq.services.connection import CONNECTION_FILES, ServerConnection
 from nep.backends.zeromq.services.server import RouterServer
+from nep.backends.zeromq.services.survey import SurveyClient
 from nep.backends.zeromq.services.tcp_server import TcpServer
 from nep.backends.zeromq.services.tcp_stream import TcpConnection
 from nep.backends.zeromq.sockets import bind
@@ -46,6 +47,7 @@ class ZeromqServices:
         self._lock = threading.Lock()
         self._servers: set[RouterServer | TcpServer] = set()
         self._clients: set[SocketClient] = set()
+        self._surveys: set[SurveyClient] = set()
         self._is_closed = False
 
     # ---- servers
@@ -138,6 +140,35 @@ class ZeromqServices:
             raise
         return client
 
+    def survey(self, spec: ClientSpec) -> SurveyClient:
+        """A new surveyor. See `ServiceTransport.survey`."""
+        if isinstance(spec.configuration, Direct):
+            raise NepError(
+                _("over 'zeromq' a survey needs a master; leave out the configuration, or use 'nanomsg'")
+            )
+        session = self._session(spec.configuration.master)
+        session.wait_for_name(spec.wait_s)
+
+        def close(survey: SurveyClient) -> None:
+            with self._lock:
+                self._surveys.discard(survey)
+            session.remove_subscriber(spec.id)
+            survey.release()
+
+        def ask_at(endpoint: str) -> SocketClient:
+            return self._new_client(spec, NATIVE, lambda: None, None, endpoint)
+
+        survey = SurveyClient(spec, ask_at, close)
+        with self._lock:
+            self._surveys.add(survey)
+        try:
+            record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
+            survey.connect(session.add_subscriber(record, survey, spec.wait_s).publishers)
+        except BaseException:
+            survey.close()
+            raise
+        return survey
+
     def _direct_client(self, spec: ClientSpec, direct: Direct) -> SocketClient:
         address = f"{direct.ip}:{direct.port}"
         if not is_endpoint(endpoint_of(address)):
@@ -199,7 +230,9 @@ class ZeromqServices:
         """Close all of them; answers are delivered within `timeout_s`."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
-            clients, servers = tuple(self._clients), tuple(self._servers)
+            surveys, clients, servers = tuple(self._surveys), tuple(self._clients), tuple(self._servers)
+        for survey in surveys:
+            survey.close()
         for client in clients:
             client.close()
         for server in servers:
@@ -210,6 +243,8 @@ class ZeromqServices:
         for server in self._servers:
             give_up(*server.endpoints)
             server.forked()
+        for survey in self._surveys:
+            survey.forked()
         for client in self._clients:
             give_up(client.endpoint)
             client.forked()

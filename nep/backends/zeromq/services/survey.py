@@ -1,0 +1,185 @@
+"""SurveyClient: a surveyor's end. It has a client for each respondent that the master tells of."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+from nep.backends.services import ClientSpec, OpenCall, Outcome
+from nep.backends.zeromq.services.client import SocketClient
+from nep.errors import ClosedError, NepError
+from nep.i18n import _
+from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+
+__all__ = ["SurveyClient"]
+
+_logger = logging.getLogger("nep")
+
+Then = Callable[[Outcome], None]
+
+
+class _Asked(NamedTuple):
+    """A call that is under way, and the client whose it is."""
+
+    client: SocketClient
+    call: OpenCall
+
+    @property
+    def number(self) -> int:
+        return self.call.number
+
+
+class SurveyClient:
+    """`ask_at` makes a client for the respondent at an endpoint, `closer` ends the survey."""
+
+    def __init__(
+        self, spec: ClientSpec, ask_at: Callable[[str], SocketClient], closer: Callable[[SurveyClient], None]
+    ) -> None:
+        self.spec = spec
+        self.is_closed = False
+        self._ask_at = ask_at
+        self._closer = closer
+        self._lock = threading.Lock()
+        self._clients: dict[int, SocketClient] = {}
+        self._leaving: list[SocketClient] = []
+        """Of respondents that are listed no more: their last answers count."""
+        self._answered = self._failed = self._late = 0
+        """Of clients that are closed."""
+
+    # ---- asking, in any thread
+
+    @property
+    def respondents(self) -> int:
+        """How many there are now."""
+        return len(self._clients)
+
+    @property
+    def late(self) -> int:
+        """Answers that came when nobody waited for them any more."""
+        with self._lock:
+            return self._late + sum(each.late for each in self._all())
+
+    def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
+        """See `SurveyTransport.begin_all`."""
+        self._end_leaving()
+        with self._lock:
+            if self.is_closed:
+                raise self._closed_error()
+            clients = list(self._clients.values())
+        asked: list[OpenCall] = []
+        try:
+            for client in clients:
+                try:
+                    asked.append(_Asked(client, client.begin(data, timeout_s, then)))
+                except ClosedError:  # it has left meanwhile
+                    continue
+        except BaseException:
+            self.forget_all(asked)
+            raise
+        return asked
+
+    def forget_all(self, calls: Sequence[OpenCall]) -> None:
+        """Nobody waits for these any more."""
+        for asked in calls:
+            if isinstance(asked, _Asked):
+                asked.client.forget(asked.call)
+
+    def _all(self) -> list[SocketClient]:
+        return [*self._clients.values(), *self._leaving]
+
+    def _end_leaving(self) -> None:
+        with self._lock:
+            ended = [each for each in self._leaving if not each.is_busy]
+            self._leaving = [each for each in self._leaving if each not in ended]
+        self._end(ended)
+
+    def _end(self, clients: Iterable[SocketClient]) -> None:
+        for client in clients:
+            client.close()
+            counts = client.counts()
+            with self._lock:
+                self._answered += counts.received or 0
+                self._failed += counts.lost or 0
+                self._late += client.late
+
+    # ---- in the node's thread: what its session tells
+
+    def connect(self, remotes: Iterable[RemotePublisher]) -> None:
+        """These respondents are there, too."""
+        with self._lock:
+            for remote in remotes:
+                self._meet(remote.publisher.id, remote.publisher.endpoints)
+
+    def _meet(self, respondent: int, endpoints: Sequence[str]) -> None:
+        if self.is_closed or not endpoints:
+            return
+        known = self._clients.get(respondent)
+        if known is not None and known.place == endpoints[0]:
+            return
+        if known is not None:
+            self._part(respondent)
+        try:
+            self._clients[respondent] = self._ask_at(endpoints[0])
+        except NepError as error:
+            _logger.warning(
+                "a respondent of '%s' at '%s' cannot be asked: %s", self.spec.service, endpoints[0], error
+            )
+
+    def _part(self, respondent: int) -> None:
+        client = self._clients.pop(respondent, None)
+        if client is not None:
+            client.gone(0, 0, is_closed=True)
+            self._leaving.append(client)
+
+    def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - counts messages
+        """A respondent is not listed any more."""
+        with self._lock:
+            self._part(publisher)
+
+    def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
+        """These are all respondents that are there."""
+        listed = {each.publisher.id: each.publisher.endpoints for each in remotes}
+        with self._lock:
+            if not listed and any(each.is_connected for each in self._clients.values()):
+                return  # the master was started again, and they have yet to come back
+            for respondent in [each for each in self._clients if each not in listed]:
+                self._part(respondent)
+            for respondent, endpoints in listed.items():
+                self._meet(respondent, endpoints)
+
+    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+        """Nothing: answers are not counted by those who send them."""
+
+    def counts(self) -> SubscriberCount:
+        """The statistics for a renewal."""
+        with self._lock:
+            counts = [each.counts() for each in self._all()]
+            answered = self._answered + sum(each.received or 0 for each in counts)
+            failed = self._failed + sum(each.lost or 0 for each in counts)
+        problem = next((each.problem for each in counts if each.problem), "")
+        return SubscriberCount(self.spec.id, as_count(answered), as_count(failed), problem)
+
+    # ---- the end
+
+    def close(self) -> None:
+        """Unregister; calls that are under way end with `ClosedError`. May be called twice."""
+        self._closer(self)
+
+    def release(self) -> None:
+        """Close all connections."""
+        with self._lock:
+            self.is_closed = True
+            clients = self._all()
+            self._clients.clear()
+            self._leaving.clear()
+        self._end(clients)
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self.is_closed = True
+        self._lock = threading.Lock()
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(_("surveyor of '{survey}'").format(survey=self.spec.service))

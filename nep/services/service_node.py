@@ -1,0 +1,100 @@
+"""ServiceNode: what `Node` makes of services."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from nep.arguments import seconds
+from nep.backends.base import Transport
+from nep.backends.connection import Configuration
+from nep.services.client import Client
+from nep.services.owned import OwnedServices
+from nep.services.server import Callback, Server
+from nep.services.survey import Respondent, Surveyor
+
+__all__ = ["ServiceNode"]
+
+
+class ServiceNode(ABC):
+    """A node's servers, clients, respondents and surveyors."""
+
+    _services: OwnedServices
+
+    @abstractmethod
+    def _open_transport(self) -> Transport:
+        """Raises `ClosedError`."""
+
+    @abstractmethod
+    def _configured(self, configuration: object) -> Configuration:
+        """The node's own one for None. Raises `ValueError` for what is none."""
+
+    def new_server(
+        self,
+        service: str,
+        callback: Callback | None = None,
+        configuration: Configuration | None = None,
+        *,
+        threads: int = 0,
+        msg_type: str = "json",
+    ) -> Server:
+        """A server of a service: `callback(request)` gives the answer, in the thread that calls `spin`.
+
+        With `threads` it runs in so many threads of the server's own instead, and nobody needs to spin. What
+        it raises is raised at the client, as `ServiceError`. Without a callback, `Server.listen_info` and
+        `send_info` answer. With `node.direct(ip, port)` it serves the original NEP's `client` at that port.
+        `msg_type` is for back ends whose services have types ("ros": "std_srvs/SetBool"); others answer each
+        client in its own. Raises as `new_pub` does.
+        """
+        self._open_transport()
+        configured = self._configured(configuration)
+        return self._services.server(service, callback, configured, threads, msg_type)
+
+    def new_client(
+        self,
+        service: str,
+        configuration: Configuration | None = None,
+        *,
+        msg_type: str = "json",
+        timeout_s: float | None = 5.0,
+    ) -> Client:
+        """A client of a service; a server need not be there yet.
+
+        `timeout_s` is how long its calls wait for a server and their answer, unless they say otherwise.
+        `msg_type="msgpack"` carries bytes, too. With `node.direct(ip, port)` it calls the original NEP's
+        `server` at that port. Raises as `new_pub` does.
+        """
+        self._open_transport()
+        return self._services.client(service, self._configured(configuration), msg_type, timeout_s)
+
+    def new_respondent(
+        self,
+        survey: str,
+        callback: Callback | None = None,
+        configuration: Configuration | None = None,
+        *,
+        threads: int = 0,
+    ) -> Respondent:
+        """Answers the questions of a survey, as `new_server` answers calls: there may be any number of them.
+
+        Without a callback, `Respondent.listen_json` and `send_json` answer. Raises as `new_pub` does.
+        """
+        self._open_transport()
+        return self._services.respondent(survey, callback, self._configured(configuration), threads)
+
+    def new_surveyor(
+        self,
+        survey: str,
+        timeout: float | None = 1000,
+        configuration: Configuration | None = None,
+        *,
+        msg_type: str = "json",
+    ) -> Surveyor:
+        """Asks all respondents of a survey at once; see `Surveyor.ask`.
+
+        `timeout`: so many milliseconds, as in the original NEP, it waits for answers, unless a question says
+        otherwise; None: until all have answered. Raises as `new_pub` does.
+        """
+        self._open_transport()
+        timeout_s = seconds("timeout", timeout)
+        timeout_s = None if timeout_s is None else timeout_s / 1000
+        return self._services.surveyor(survey, self._configured(configuration), msg_type, timeout_s)
