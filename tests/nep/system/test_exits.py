@@ -1,0 +1,22 @@
+"""What ends after all nodes, in a process of its own."""
+
+from __future__ import annotations
+
+from tests.nep.programs import running
+
+
+def test_what_nodes_use_ends_after_them_and_once() -> None:
+    program = """
+        import atexit, nep
+        from nep.system.exits import after_nodes, not_after_nodes
+        node = nep.node("n", "memory")
+        def library_ends(): print("library ends, node closed:", node._is_closed)
+        def forgotten(): print("forgotten")
+        for each in (library_ends, forgotten):
+            atexit.register(each)
+            after_nodes(each)
+        not_after_nodes(forgotten)
+        print("program ends, node closed:", node._is_closed)
+    """
+    with running(program) as ended:
+        assert ended.end() == ("program ends, node closed: False\nlibrary ends, node closed: True\n", "")
