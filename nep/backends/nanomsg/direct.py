@@ -24,7 +24,7 @@ from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.system.addresses import in_numbers
 
-__all__ = ["DirectPublisher", "DirectSubSocket"]
+__all__ = ["DirectPublisher", "DirectSubSocket", "attach", "check_direct"]
 
 _logger = logging.getLogger("nep")
 _LINGER_S = 0.2
@@ -34,19 +34,21 @@ _LARGEST = 2**20
 """libnanomsg takes no larger messages unless it is told to, and says nothing."""
 
 
-def _check(direct: Direct) -> None:
+def check_direct(direct: Direct) -> None:
     """Raises `NepError` for what SP has no form for."""
     if direct.mode == "many2many":
         raise NepError(
             _("the back end 'nanomsg' has no direct connections of mode 'many2many'; use 'one2many'")
         )
-    if direct.wire == "native":
+    if direct.wire != "original":
         raise NepError(
-            _("direct connections of 'nanomsg' carry frames of the original NEP; leave out wire='native'")
+            _(
+                "direct connections of 'nanomsg' carry frames of the original NEP; leave out wire='{wire}'"
+            ).format(wire=direct.wire)
         )
 
 
-def _attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str:  # noqa: ANN401 - pynng's
+def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str:  # noqa: ANN401 - pynng's
     """Listen or dial as the mode says; the endpoint. Raises `AddressInUseError`, `NepError`."""
     nng = library()
     address = f"{direct.ip}:{direct.port}"
@@ -71,7 +73,7 @@ class DirectPublisher:
     def __init__(
         self, spec: PublisherSpec, direct: Direct, on_close: Callable[[DirectPublisher, float], None]
     ) -> None:
-        _check(direct)
+        check_direct(direct)
         self.spec = spec
         self.count = 0
         self.missing: tuple[str, ...] = ()
@@ -88,7 +90,7 @@ class DirectPublisher:
         self._socket.add_post_pipe_connect_cb(self._came)
         self._socket.add_post_pipe_remove_cb(self._went)
         try:
-            self.endpoint = _attach(
+            self.endpoint = attach(
                 self._socket, direct, is_publisher=True, what=f"a publisher of '{spec.topic}'"
             )
         except BaseException:
@@ -182,7 +184,7 @@ class DirectSubSocket(ReadOneByOne):
     """A SUB that takes the frames of both generations. Nobody numbers them: `lost` is not known."""
 
     def __init__(self, spec: SubscriberSpec, direct: Direct) -> None:
-        _check(direct)
+        check_direct(direct)
         self.refusals = Refusals()
         self.received = 0
         self.lost: int | None = None
@@ -193,7 +195,7 @@ class DirectSubSocket(ReadOneByOne):
         self.fd = self._sub.fd
         self._sub.socket.subscribe(b"")  # of another generation no topic stands in front
         try:
-            self.endpoint = _attach(
+            self.endpoint = attach(
                 self._sub.socket, direct, is_publisher=False, what=f"a subscriber of '{spec.topic}'"
             )
         except BaseException:

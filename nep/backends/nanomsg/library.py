@@ -16,9 +16,19 @@ from nep.errors import AddressInUseError, BackendUnavailableError, NepError
 from nep.i18n import _
 from nep.system.addresses import host_of
 from nep.system.descriptors import check_room
+from nep.system.exits import after_nodes, not_after_nodes
 from nep.system.forks import in_child
 
-__all__ = ["MOST", "SOCKET_FILES", "bound_port", "library", "listen", "new_socket", "queue_of"]
+__all__ = [
+    "MOST",
+    "SOCKET_FILES",
+    "bound_port",
+    "keep_for_ever",
+    "library",
+    "listen",
+    "new_socket",
+    "queue_of",
+]
 
 MOST = 8192
 """The largest queue that pynng allows, in messages. Its own ones are so small that a burst overruns them."""
@@ -27,6 +37,7 @@ SOCKET_FILES = 6
 """A socket, its port, its signals, and a connection."""
 _TRIES = 100
 _MODULE = "pynng.nng"
+_at_exit: Callable[[], object] | None = None
 _sockets: WeakSet[Any] = WeakSet()
 _inherited: set[str] = set()
 """The names of libraries that came with a fork: nng's threads stayed behind, and it waits for them."""
@@ -45,11 +56,22 @@ def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
             )
         )
     try:
-        return load("pynng")
+        loaded = load("pynng")
     except (ImportError, OSError) as error:
         raise BackendUnavailableError(
             "nanomsg", _("install it with 'pip install nep-studio[nanomsg]'")
         ) from error
+    _end_after_nodes()
+    return loaded
+
+
+def _end_after_nodes() -> None:
+    """Let nng end after the nodes that use it, once: pynng's own hook would come first."""
+    global _at_exit  # noqa: PLW0603 - there is one a process
+    at_exit = getattr(sys.modules.get(_MODULE), "_pynng_atexit", None)
+    if at_exit is not None and _at_exit is None:
+        _at_exit = at_exit
+        after_nodes(at_exit)
 
 
 def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - it has no types
@@ -59,16 +81,22 @@ def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - it has no
     return made
 
 
+def keep_for_ever(owned: Any) -> None:  # noqa: ANN401 - pynng has no types
+    """Let nobody forget it, not even the end of the interpreter."""
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
+
+
 def _forked() -> None:
     """In a child: nothing of nng may be closed, not even when the interpreter ends: that would never end."""
     if _MODULE not in sys.modules:
         return
     _inherited.add("pynng")
     for socket in _sockets:
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(socket))  # one that is forgotten closes itself
+        keep_for_ever(socket)  # one that is forgotten closes itself
     at_exit = getattr(sys.modules[_MODULE], "_pynng_atexit", None)
     if at_exit is not None:
         atexit.unregister(at_exit)
+        not_after_nodes(at_exit)
 
 
 in_child(_forked)

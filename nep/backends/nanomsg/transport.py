@@ -5,14 +5,17 @@ It is that back end's transport with other sockets: sessions, threads, waiting a
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from nep.backends.base import PublisherSpec, PublisherTransport, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Direct
-from nep.backends.nanomsg.direct import DirectPublisher, DirectSubSocket
+from nep.backends.nanomsg.direct import DirectPublisher, DirectSubSocket, check_direct
 from nep.backends.nanomsg.library import library
 from nep.backends.nanomsg.publisher import NanomsgPublisher
 from nep.backends.nanomsg.sub_socket import NanomsgSubSocket
+from nep.backends.nanomsg.surveys import Surveys
+from nep.backends.services import ClientSpec, ServerSpec, ServerTransport, SurveyTransport
 from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.subscriber import NativeReadable, Readable, SocketSubscriber
 from nep.backends.zeromq.transport import (
@@ -25,6 +28,7 @@ from nep.backends.zeromq.transport import (
 from nep.errors import NepError
 from nep.i18n import _
 from nep.protocol.requests import NodeRecord
+from nep.protocol.service_wire import SURVEY
 from nep.system.addresses import is_loopback
 
 __all__ = ["NanomsgTransport"]
@@ -35,7 +39,38 @@ class NanomsgTransport(ZeromqTransport):
 
     def __init__(self, node: NodeRecord) -> None:
         library()
+        self._surveys = Surveys(node.name)
         super().__init__(node)
+
+    def server(self, spec: ServerSpec) -> ServerTransport:
+        """A respondent without a master is nanomsg's; servers are those of the back end zeromq."""
+        if isinstance(spec.configuration, Direct) and spec.service.startswith(SURVEY):
+            check_direct(spec.configuration)
+            return self._surveys.respondent(spec, spec.configuration)
+        return super().server(spec)
+
+    def survey(self, spec: ClientSpec) -> SurveyTransport:
+        """A surveyor without a master is nanomsg's; others are those of the back end zeromq."""
+        if isinstance(spec.configuration, Direct):
+            check_direct(spec.configuration)
+            return self._surveys.surveyor(spec, spec.configuration, DIRECT_WAIT_S)
+        return super().survey(spec)
+
+    def begin_close(self) -> None:
+        """See `Transport.begin_close`."""
+        super().begin_close()
+        self._surveys.begin_close()
+
+    def close(self, timeout_s: float) -> None:
+        """See `Transport.close`."""
+        deadline = time.monotonic() + timeout_s
+        self._surveys.close(timeout_s)
+        super().close(max(0.0, deadline - time.monotonic()))
+
+    def forked(self) -> None:
+        """In a child. See `nep.system.forks`."""
+        self._surveys.forked()
+        super().forked()
 
     def _session(self, address: str) -> MasterSession:
         if not is_loopback(address):

@@ -347,6 +347,23 @@ def test_a_fork_leaves_the_child_with_closed_ones_and_the_parent_as_it_was(maste
         assert client.call(3) == 3
 
 
+def test_a_program_that_closes_nothing_ends(master: Master) -> None:
+    program = """
+        import nep
+        node = nep.node("forgetful")
+        node.new_server("/x", lambda request: request, threads=2)
+        node.new_server("/unspun", lambda request: request)
+        client = node.new_client("/x", timeout_s=30)
+        node.new_respondent("/who", lambda question: question, threads=1)
+        waiting = node.new_client("/unspun").call_async({}, timeout_s=None)
+        print(client.call(1), node.new_surveyor("/who", 30_000).ask(2), client.call_async(3).result(30))
+    """
+    with running(program, NEP_MASTER=master.address) as forgetful:
+        assert forgetful.end() == ("1 [2] 3\n", "")
+        assert forgetful.process.returncode == 0
+    eventually(lambda: not master.view().services)
+
+
 def test_the_configuration_may_be_another_master(master: Master) -> None:
     with Master("127.0.0.1:0", learn_s=0.0) as other, nep.node("a") as a, nep.node("b") as b:
         there = Hybrid(other.address)
