@@ -68,6 +68,8 @@ class Connection(Protocol):
 
     endpoint: str
     is_open: bool
+    again_s: float
+    """How soon after its end it may be tried again."""
 
     @property
     def is_over(self) -> bool:
@@ -325,7 +327,7 @@ class SocketClient:
         connection = self._connection
         if connection is not None and connection.is_over:
             self._lose(ended)
-            self._tries, self._try_at = 0, 0.0
+            self._tries, self._try_at = 0, now + connection.again_s
         elif connection is not None and connection.is_open:
             self._tries = 0
             if self._current not in self._servers:

@@ -40,6 +40,7 @@ class ServerConnection:
     ) -> None:
         self.endpoint = endpoint
         self.is_open = self.is_over = False
+        self.again_s = 0.0
         self._io: IoThread = shared.io
         what = f"a client of '{service}'"
         self._socket = shared.socket(zmq.DEALER, what)

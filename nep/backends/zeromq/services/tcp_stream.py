@@ -172,6 +172,8 @@ class TcpConnection:
         self._is_dead = False
         """It could not be connected."""
         self.is_open = False
+        # The system accepts connections for a program that is ending, until it has closed its port, too.
+        self.again_s = 0.1
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             self._socket.setblocking(False)
