@@ -1,0 +1,18 @@
+"""The back end `ros2`: nodes that are nodes of ROS 2, by Cyclone DDS and rosbags alone.
+
+`names`, `message_types`, `fields` and `type_mapping` say what is what, `participant` is this program in DDS,
+`publisher`, `subscriber`, `graph` and `transport` are the contract of `nep.backends.base`.
+"""
+
+from nep.backends.base import Backend
+from nep.backends.ros2.environment import domain
+from nep.backends.ros2.message_types import MessageTypes, message_types
+from nep.backends.ros2.quality import QUALITIES
+from nep.backends.ros2.transport import RosTransport
+from nep.backends.ros2.type_mapping import codec_for
+
+__all__ = ["BACKEND", "MessageTypes", "message_types"]
+
+BACKEND = Backend(
+    "ros2", RosTransport, needs="cyclonedds, rosbags", master=domain, codec_for=codec_for, qos=QUALITIES
+)

@@ -1,0 +1,300 @@
+"""Fields of ROS messages: maps become rosbags' objects and back, and what is wrong is told with its place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from nep.i18n import _
+
+__all__ = ["RosField", "RosFieldError", "Types", "from_message", "read_definition", "to_message"]
+
+_BASE, _NAME, _ARRAY = 1, 2, 3
+_PLACEHOLDER = "structure_needs_at_least_one_member"
+"""What a message without fields has in DDS."""
+_BITS = {"int8": 8, "int16": 16, "int32": 32, "int64": 64}
+_RANGES = {
+    **{name: (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for name, bits in _BITS.items()},
+    **{f"u{name}": (0, 2**bits - 1) for name, bits in _BITS.items()},
+    "byte": (0, 255),
+}
+_NUMBERS = {
+    "byte": "uint8",
+    **{name: name for name in ("bool", "float32", "float64", *_RANGES) if name != "byte"},
+}
+_FLOATS = frozenset({"float32", "float64"})
+_LARGEST_FLOAT32 = 3.4028235677973366e38
+"""The first that rounds to infinity."""
+_OCTETS = frozenset({"uint8", "byte"})
+
+
+@dataclass(frozen=True, slots=True)
+class RosField:
+    """A field: `kind` is the type of its value or its items.
+
+    `length`: None for a single value, the count of an array, -1 for a sequence; `size` bounds it, 0 not at
+    all. `text_most` bounds each string.
+    """
+
+    name: str
+    kind: str
+    is_message: bool
+    length: int | None = None
+    size: int = 0
+    text_most: int = 0
+
+
+class RosFieldError(Exception):
+    """Why the value at `path` does not fit."""
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path = path
+        self.reason = f"'{path}' {reason}" if path else reason
+        super().__init__(self.reason)
+
+
+class Types(Protocol):
+    """Where definitions come from."""
+
+    def fields(self, name: str) -> tuple[RosField, ...]:
+        """The fields of a type."""
+
+    def message_class(self, name: str) -> Any:  # noqa: ANN401 - rosbags makes it
+        """Its class."""
+
+
+def read_definition(entries: Sequence[tuple[str, Any]]) -> tuple[list[tuple[str, Any]], tuple[RosField, ...]]:
+    """Rosbags' description with `uint8` for `char`, and the same as `RosField`s."""
+    plain = [(name, _without_char(each)) for name, each in entries]
+    return plain, tuple(_field(name, each) for name, each in plain)
+
+
+def _without_char(described: Any) -> Any:  # noqa: ANN401 - nested pairs
+    kind, rest = described
+    if kind == _BASE:
+        return (kind, ("uint8", 0)) if rest[0] == "char" else described
+    return described if kind == _NAME else (kind, (_without_char(rest[0]), rest[1]))
+
+
+def _field(name: str, described: Any) -> RosField:  # noqa: ANN401 - nested pairs
+    kind, rest = described
+    if kind == _NAME:
+        return RosField(name, rest, is_message=True)
+    if kind == _BASE:
+        return RosField(name, rest[0], is_message=False, text_most=rest[1])
+    item = _field(name, rest[0])
+    length = rest[1] if kind == _ARRAY else -1
+    return RosField(name, item.kind, item.is_message, length, rest[1], item.text_most)
+
+
+# ---- maps become messages
+
+
+def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:  # noqa: ANN401 - rosbags'
+    """The object of a type with these values; what is left out is zero. Raises `RosFieldError`."""
+    if not isinstance(payload, Mapping):
+        raise (
+            RosFieldError(
+                path, _("is a '{kind}'; give a map of the fields").format(kind=type(payload).__name__)
+            )
+            if path
+            else RosFieldError("", _("publish a map of the fields of '{name}'").format(name=name))
+        )
+    fields = {each.name: each for each in types.fields(name) if each.name != _PLACEHOLDER}
+    for key in payload:
+        if key not in fields:
+            raise RosFieldError(
+                _joined(path, str(key)[:100]),
+                _("is no field of '{name}'; it has {fields}").format(
+                    name=name, fields=", ".join(f"'{each}'" for each in fields) or _("none")
+                ),
+            )
+    made = {}
+    for each in types.fields(name):
+        where = _joined(path, each.name)
+        is_given = each.name in payload
+        made[each.name] = _value(types, each, payload[each.name], where) if is_given else _zero(types, each)
+    return types.message_class(name)(**made)
+
+
+def _joined(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name
+
+
+def _zero(types: Types, field: RosField) -> Any:  # noqa: ANN401 - what the field is
+    if field.length is None:
+        if field.is_message:
+            return to_message(types, field.kind, {})
+        return "" if field.kind == "string" else _NUMBERS_ZERO.get(field.kind, 0)
+    count = max(field.length, 0)
+    if field.is_message:
+        return [to_message(types, field.kind, {}) for _ in range(count)]
+    return [""] * count if field.kind == "string" else _numpy().zeros(count, _NUMBERS[field.kind])
+
+
+_NUMBERS_ZERO: Mapping[str, bool | float] = {"bool": False, "float32": 0.0, "float64": 0.0}
+
+
+def _value(types: Types, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - what the field is
+    if field.length is not None:
+        return _items(types, field, value, path)
+    if field.is_message:
+        return to_message(types, field.kind, value, path)
+    return _single(field, value, path)
+
+
+def _single(field: RosField, value: object, path: str) -> str | bool | int | float:
+    if field.kind == "string":
+        return _text(field, value, path)
+    value = _plain(value)
+    if field.kind == "bool":
+        if not isinstance(value, bool):
+            raise RosFieldError(path, _("is a '{kind}'; give True or False").format(kind=_kind(value)))
+        return value
+    if field.kind in _FLOATS:
+        return _float(field, value, path)
+    least, most = _RANGES[field.kind]
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise RosFieldError(path, _("is a '{kind}'; give a whole number").format(kind=_kind(value)))
+    if not least <= value <= most:
+        raise RosFieldError(
+            path,
+            _("is not from {least} to {most}, as '{kind}' is").format(
+                least=least, most=most, kind=field.kind
+            ),
+        )
+    return value - 256 if field.kind == "byte" and value > 127 else value  # rosbags has it signed
+
+
+def _float(field: RosField, value: object, path: str) -> float:
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise RosFieldError(path, _("is a '{kind}'; give a number").format(kind=_kind(value)))
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.nan
+        is_fitting = False
+    else:
+        is_fitting = field.kind != "float32" or math.isinf(number) or not abs(number) >= _LARGEST_FLOAT32
+    if not is_fitting:
+        raise RosFieldError(path, _("is too large for '{kind}'").format(kind=field.kind))
+    return number
+
+
+def _text(field: RosField, value: object, path: str) -> str:
+    if not isinstance(value, str):
+        raise RosFieldError(path, _("is a '{kind}'; give a 'str'").format(kind=_kind(value)))
+    if "\0" in value:
+        raise RosFieldError(path, _("holds a zero byte, which ends a string of ROS"))
+    try:
+        size = len(value.encode())
+    except UnicodeEncodeError:
+        raise RosFieldError(path, _("holds half of a surrogate pair")) from None
+    if field.text_most and size > field.text_most:
+        raise RosFieldError(
+            path, _("has {size} bytes, {most} are allowed").format(size=size, most=field.text_most)
+        )
+    return value
+
+
+def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - a list or an array
+    if isinstance(value, str) or not (
+        isinstance(value, Sequence | bytes | bytearray | memoryview) or hasattr(value, "__array__")
+    ):
+        raise RosFieldError(path, _("is a '{kind}'; give a list").format(kind=_kind(value)))
+    if field.is_message or field.kind == "string":
+        single = RosField(field.name, field.kind, field.is_message, text_most=field.text_most)
+        items: Any = [
+            _value(types, single, each, f"{path}[{number}]")
+            for number, each in enumerate(list(value))  # type: ignore[call-overload]
+        ]
+    else:
+        items = _array(field, value, path)
+    if field.length is not None and field.length >= 0 and len(items) != field.length:
+        raise RosFieldError(
+            path, _("has {count} items; give {length}").format(count=len(items), length=field.length)
+        )
+    if field.size and len(items) > field.size:
+        raise RosFieldError(
+            path, _("has {count} items, {most} are allowed").format(count=len(items), most=field.size)
+        )
+    return items
+
+
+def _array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN401 - an array of numpy
+    """Numbers as an array of the field's type, checked at once; item by item only to find what is wrong."""
+    np = _numpy()
+    wanted = np.dtype(_NUMBERS[field.kind])
+    if isinstance(value, bytes | bytearray | memoryview):
+        if field.kind not in _OCTETS:
+            raise RosFieldError(path, _("is a '{kind}'; give a list").format(kind=_kind(value)))
+        return np.frombuffer(bytes(value), np.uint8)
+    try:
+        found = np.asarray(value)
+    except (ValueError, OverflowError, TypeError):
+        found = np.empty((), object)
+    if found.ndim == 1 and (not found.size or _fits(found, field, wanted)):
+        return np.ascontiguousarray(found.astype(wanted))
+    single = RosField(field.name, "uint8" if field.kind in _OCTETS else field.kind, is_message=False)
+    items = [_single(single, each, f"{path}[{number}]") for number, each in enumerate(list(value))]
+    return np.array(items, wanted)
+
+
+def _fits(found: Any, field: RosField, wanted: Any) -> bool:  # noqa: ANN401 - an array, a type of numbers
+    """Whether all of them fit for sure."""
+    if found.dtype == wanted:
+        return True
+    if field.kind in _FLOATS:
+        if found.dtype.kind not in "iuf":
+            return False
+        if field.kind == "float64" or found.dtype.kind != "f":
+            return True
+        finite = found[_numpy().isfinite(found)]
+        return not finite.size or bool(abs(finite).max() < _LARGEST_FLOAT32)
+    if field.kind == "bool" or found.dtype.kind not in "iu":
+        return False
+    least, most = _RANGES[field.kind]
+    return bool(least <= int(found.min()) and int(found.max()) <= most)
+
+
+def _plain(value: object) -> object:
+    """A scalar of numpy as Python's."""
+    if isinstance(value, bool | int | float | str) or getattr(value, "shape", None) != ():
+        return value
+    return value.item() if hasattr(value, "item") else value
+
+
+def _kind(value: object) -> str:
+    return type(value).__name__
+
+
+# ---- messages become maps
+
+
+def from_message(types: Types, name: str, message: Any) -> dict[str, object]:  # noqa: ANN401 - rosbags'
+    """The fields of a message: maps, lists, `bytes`, numbers, texts."""
+    return {
+        each.name: _plain_field(types, each, getattr(message, each.name))
+        for each in types.fields(name)
+        if each.name != _PLACEHOLDER
+    }
+
+
+def _plain_field(types: Types, field: RosField, value: Any) -> object:  # noqa: ANN401 - what the field is
+    if field.length is None:
+        if field.is_message:
+            return from_message(types, field.kind, value)
+        return value & 255 if field.kind == "byte" else value
+    if field.is_message:
+        return [from_message(types, field.kind, each) for each in value]
+    if field.kind == "string":
+        return list(value)
+    return value.tobytes() if field.kind in _OCTETS else value.tolist()
+
+
+def _numpy() -> Any:  # noqa: ANN401 - optional and heavy
+    import numpy as np  # noqa: PLC0415 - optional and heavy
+
+    return np

@@ -1,0 +1,153 @@
+"""The graph of a domain: what discovery has found, told as a master would tell it.
+
+Nodes of this program are exact, with their counts and problems. Of others there are names, topics, types and
+who belongs to whom; nobody tells how much they send. What belongs to no node of ROS 2, such as a program
+with DDS alone, is listed as a node named after its participant.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.ros2.names import dds_topic, dds_type, ros_topic, ros_type
+from nep.backends.ros2.participant import DdsEndpoint, Local, Participant
+from nep.backends.ros2.subscriber import id_of
+from nep.backends.ros2.type_mapping import CDR, mapping_for
+from nep.errors import NepError
+from nep.masters.graph import Graph
+from nep.messages.codecs import codec_for
+from nep.protocol.graph_view import GraphView
+from nep.protocol.requests import (
+    AddPublisher,
+    AddSubscriber,
+    Join,
+    NodeRecord,
+    PublisherRecord,
+    Renew,
+    SubscriberRecord,
+)
+
+__all__ = ["graph_of"]
+
+_MOST = 10_000
+"""So many writers and readers of others are shown."""
+
+
+@dataclass
+class _Names:
+    """How this program, or another one of nep, calls what has other names in DDS."""
+
+    topics: dict[str, str] = field(default_factory=dict)
+    types: dict[tuple[str, str], str] = field(default_factory=dict)
+    ids: set[int] = field(default_factory=set)
+
+    def topic(self, endpoint: DdsEndpoint) -> str:
+        return self.topics.get(endpoint.topic) or ros_topic(endpoint.topic) or endpoint.topic
+
+    def msg_type(self, endpoint: DdsEndpoint) -> str:
+        known = self.types.get((endpoint.topic, endpoint.type))
+        return known or endpoint.nep.get("neptype") or ros_type(endpoint.type)
+
+    def id(self, endpoint: DdsEndpoint) -> int:
+        """What it says, unless somebody else says it too."""
+        said = id_of(endpoint.gid, endpoint.nep.get("nepid"))
+        found = id_of(endpoint.gid, None) if said in self.ids else said
+        self.ids.add(found)
+        return found
+
+
+def graph_of(participant: Participant) -> GraphView:
+    """The graph as it is known now."""
+    graph, names = Graph(epoch=1, now=0.0, learn_s=0.0), _Names()
+    for local in participant.locals:
+        _add_local(graph, local, names)
+    for number, (node, kind, endpoint) in enumerate(_foreign(participant, names)):
+        if number >= _MOST:
+            break
+        _add_foreign(graph, node, kind, endpoint, names)
+    return graph.view()
+
+
+def _add_local(graph: Graph, local: Local, names: _Names) -> None:
+    publishers, subscribers = local.publishers, local.subscribers
+    specs: list[PublisherSpec | SubscriberSpec] = [each.spec for each in publishers]
+    specs += [each.spec for each in subscribers]
+    for spec in specs:
+        name, mapping = dds_topic(spec.topic), mapping_for(spec.msg_type)
+        names.topics.setdefault(name, spec.topic)
+        names.types.setdefault((name, dds_type(mapping.ros_type)), spec.msg_type)
+        names.ids.add(spec.id)
+    node = local.node
+    graph.apply(Join(node), 0, 0.0, node.id)
+    for publisher in publishers:
+        graph.apply(AddPublisher(node, publisher.record), 0, 0.0, node.id)
+    for subscriber in subscribers:
+        graph.apply(AddSubscriber(node, subscriber.record), 0, 0.0, node.id)
+    counts = tuple(each.counts for each in publishers), tuple(each.counts for each in subscribers)
+    graph.apply(Renew(node.id, graph.epoch, graph.revision, *counts, local.load()), 0, 0.0, node.id)
+
+
+def _foreign(participant: Participant, names: _Names) -> Iterator[tuple[NodeRecord, str, DdsEndpoint | None]]:
+    """Each writer and reader of others with its node; nodes that have none with None."""
+    own = participant.gid
+    alive = participant.participants() - {own}
+    found = [
+        (kind, each)
+        for kind in ("writer", "reader")
+        for each in participant.endpoints(kind)
+        if each.participant != own and ros_topic(each.topic) is not None
+    ]
+    for _kind, each in found:
+        if each.nep.get("neptype"):
+            names.types.setdefault((each.topic, each.type), each.nep["neptype"])
+    said = {each.gid: each.nep["nepnode"] for _kind, each in found if each.nep.get("nepnode")}
+    owners: dict[bytes, NodeRecord] = {}
+    for gid, nodes in sorted(participant.others(alive).items()):
+        for number, node in enumerate(nodes):
+            node_id = next((said[one] for one in sorted(node.gids) if one in said), "")
+            record = _record(node_id or _id_from(gid + number.to_bytes(4, "little")), node.name)
+            owners.update(dict.fromkeys(node.gids, record))
+            yield record, "", None
+    strangers = {each.participant: _stranger(each.participant) for _kind, each in found}
+    for kind, each in found:
+        yield owners.get(each.gid) or strangers[each.participant], kind, each
+
+
+def _id_from(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+def _record(node_id: str, name: str) -> NodeRecord:
+    return NodeRecord(node_id, name, "", None, language="", generation="ros2")
+
+
+def _stranger(gid: bytes) -> NodeRecord:
+    return _record(_id_from(gid), f"dds/{gid.hex()[:24]}")
+
+
+def _add_foreign(
+    graph: Graph, node: NodeRecord, kind: str, endpoint: DdsEndpoint | None, names: _Names
+) -> None:
+    """What a stranger tells and the graph refuses is left out."""
+    if node.id not in graph.members:
+        graph.apply(Join(node), 0, 0.0, node.id)
+    if endpoint is None:
+        return
+    topic, msg_type, number = names.topic(endpoint), names.msg_type(endpoint), names.id(endpoint)
+    if kind == "writer":
+        publisher = PublisherRecord(
+            number, topic, msg_type, _codec_of(msg_type), ("ros2",), endpoint.is_latched
+        )
+        graph.apply(AddPublisher(node, publisher), 0, 0.0, node.id)
+    else:
+        graph.apply(AddSubscriber(node, SubscriberRecord(number, topic, msg_type)), 0, 0.0, node.id)
+
+
+def _codec_of(msg_type: str) -> str:
+    try:
+        return mapping_for(msg_type).codec.name
+    except NepError:  # a type that is not known here
+        return CDR if "/" in msg_type else codec_for(msg_type).name

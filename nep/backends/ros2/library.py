@@ -1,0 +1,82 @@
+"""The libraries cyclonedds and rosbags: found when the first node asks for them, and told of forks."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from nep.errors import BackendUnavailableError, NepError
+from nep.i18n import _
+from nep.system.forks import in_child
+
+__all__ = ["Dds", "dds", "has_forked", "typesys"]
+
+_PARTS = ("core", "domain", "idl", "pub", "sub", "topic", "qos", "builtin")
+_inherited: set[str] = set()
+"""Whether this is a child that was forked: the threads of Cyclone DDS stayed behind."""
+
+
+class Dds(NamedTuple):
+    """The modules of cyclonedds; it is not typed."""
+
+    core: Any
+    domain: Any
+    idl: Any
+    pub: Any
+    sub: Any
+    topic: Any
+    qos: Any
+    builtin: Any
+
+
+def dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds:
+    """Cyclone DDS. Raises `BackendUnavailableError` where it is not installed or its library does not load.
+
+    Raises `NepError` in a child that was forked from a program that uses it.
+    """
+    if _inherited:
+        raise NepError(
+            _(
+                "'ros2' does not work in a program that was forked from one that uses it; start it anew, "
+                "with multiprocessing by the method 'spawn'"
+            )
+        )
+    try:
+        return Dds(*(load(f"cyclonedds.{part}") for part in _PARTS))
+    except Exception as error:  # its loader raises a class of its own
+        raise _unavailable() from error
+
+
+def typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - see `Dds`
+    """`rosbags.typesys`. Raises `BackendUnavailableError` where it is not installed."""
+    try:
+        return load("rosbags.typesys")
+    except (ImportError, OSError) as error:
+        raise _unavailable() from error
+
+
+def _unavailable() -> BackendUnavailableError:
+    return BackendUnavailableError("ros2", _("install it with 'pip install nep-studio[ros2]'"))
+
+
+def has_forked() -> bool:
+    """Whether nothing of DDS may be touched here."""
+    return bool(_inherited)
+
+
+def _forked() -> None:
+    """In a child: nothing of DDS may be deleted, not even when the interpreter ends: that would wait."""
+    core = sys.modules.get("cyclonedds.core")
+    if core is None:
+        return
+    _inherited.add("cyclonedds")
+    for entity in list(core.Entity._entities.values()):  # noqa: SLF001 - what is not there is not deleted
+        if isinstance(entity, core.WaitSet):
+            entity.attached.clear()
+    core.Entity._entities.clear()  # noqa: SLF001
+
+
+in_child(_forked)

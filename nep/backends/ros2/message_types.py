@@ -1,0 +1,204 @@
+"""Types of ROS messages: which there are, and maps ↔ CDR. The definitions and the codec are rosbags'.
+
+The types of common packages come with rosbags for each release of ROS 2; `MessageTypes.add` takes further
+ones from text in the form of a .msg file, `MessageTypes.add_folder` from such files.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from nep.backends.ros2.environment import distribution
+from nep.backends.ros2.fields import RosField, RosFieldError, from_message, read_definition, to_message
+from nep.backends.ros2.library import typesys
+from nep.backends.ros2.names import type_name
+from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
+from nep.i18n import _
+
+__all__ = ["FOLDERS", "MessageTypes", "message_types"]
+
+FOLDERS = "NEP_ROS_MSG_PATH"
+"""The environment's variable with folders of .msg files."""
+_LARGEST_FILE = 2**20
+_MOST_FILES = 10_000
+_GID = "rmw_dds_common/msg/Gid"
+
+
+class MessageTypes:
+    """The types of one release of ROS 2. Used from any thread."""
+
+    def __init__(self, release: str) -> None:
+        rosbags = typesys()
+        try:
+            store = rosbags.Stores[f"ROS2_{release.upper()}"]
+        except KeyError:
+            known = [each.name.removeprefix("ROS2_").lower() for each in rosbags.Stores]
+            raise NepError(
+                _("ROS_DISTRO is '{release}', which rosbags does not know; {did_you_mean}").format(
+                    release=release[:40], did_you_mean=did_you_mean(release, known)
+                )
+            ) from None
+        self._rosbags = rosbags
+        self._store: Any = rosbags.get_typestore(store)
+        self._fields: dict[str, tuple[RosField, ...]] = {}
+        self._lock = threading.RLock()
+        self._read_definitions()
+
+    def _read_definitions(self) -> None:
+        """Make `char` the `uint8` that it is: type hashes are of that."""
+        for name, (constants, entries) in list(self._store.fielddefs.items()):
+            if name not in self._fields:
+                plain, fields = read_definition(entries)
+                self._store.fielddefs[name] = (constants, plain)
+                self._fields[name] = fields
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All types that are known, as "std_msgs/msg/String"."""
+        return tuple(sorted(self._fields))
+
+    @property
+    def gid_bytes(self) -> int:
+        """How long the ids of writers and readers are in this release's `ros_discovery_info`."""
+        return self._fields[_GID][0].size if _GID in self._fields else 24
+
+    def checked(self, msg_type: str) -> str:
+        """The whole name of a type in either form. Raises `NepError` for one that is not known."""
+        name = type_name(msg_type)
+        if name not in self._fields:
+            raise NepError(
+                _(
+                    "no type of message '{name}' is known; {did_you_mean}, or set {variable} to a folder of "
+                    ".msg files"
+                ).format(name=name, did_you_mean=_near(name, self.names), variable=FOLDERS)
+            )
+        return name
+
+    def fields(self, name: str) -> tuple[RosField, ...]:
+        """The fields of a type."""
+        return self._fields[name]
+
+    def type_hash(self, name: str) -> str:
+        """`RIHS01_…`, which ROS 2 tells of a type from Iron on."""
+        with self._lock:
+            return str(self._store.hash_rihs01(name))
+
+    def encode(self, name: str, payload: object) -> bytes:
+        """A map of fields as CDR; fields that are left out are zero, empty or false. Raises `EncodeError`."""
+        kind = type(payload).__name__
+        try:
+            message = to_message(self, name, payload)
+            with self._lock:
+                return bytes(self._store.serialize_cdr(message, name))
+        except RosFieldError as error:
+            raise EncodeError(name, kind, error.reason, place=error.path or ".") from error
+        except Exception as error:  # a type that rosbags has no codec for, such as one with wide strings
+            raise EncodeError(name, kind, str(error) or type(error).__name__) from error
+
+    def decode(self, name: str, data: bytes | memoryview) -> object:
+        """CDR as a map of fields; arrays of `uint8` are `bytes`, others lists. Raises `DecodeError`."""
+        try:
+            with self._lock:
+                message = self._store.deserialize_cdr(data, name)
+        except Exception as error:  # they come from anybody
+            raise DecodeError(name, len(data), str(error) or type(error).__name__) from error
+        return from_message(self, name, message)
+
+    def message_class(self, name: str) -> Any:  # noqa: ANN401 - rosbags makes it
+        """Rosbags' class of a type."""
+        return self._store.types[name]
+
+    def add(self, name: str, text: str) -> None:
+        """Make known a type such as "my_robot/msg/Arm" by the text of its .msg file.
+
+        Raises `NepError` for a text that is none, uses types that are not known, or is another than before.
+        """
+        self._add({type_name(name): text})
+
+    def add_folder(self, folder: Path) -> None:
+        """Make known all .msg files in a folder, each in its package's `msg`: `my_robot/msg/Arm.msg`.
+
+        A file that lies otherwise belongs to the package that its folder is named after. Raises as `add`.
+        """
+        texts: dict[str, str] = {}
+        for path in sorted(folder.rglob("*.msg")):
+            package = path.parent.parent.name if path.parent.name == "msg" else path.parent.name
+            if len(texts) >= _MOST_FILES or path.stat().st_size > _LARGEST_FILE:
+                raise NepError(
+                    _("'{path}' is too large, or one too many; choose a folder with .msg files only").format(
+                        path=path
+                    )
+                )
+            texts[type_name(f"{package}/msg/{path.stem}")] = path.read_text(encoding="utf-8")
+        if not texts:
+            raise NepError(_("there is no .msg file in '{folder}'; choose another").format(folder=folder))
+        self._add(texts)
+
+    def _add(self, texts: Mapping[str, str]) -> None:
+        found: dict[str, Any] = {}
+        for name, text in texts.items():
+            try:
+                found.update(self._rosbags.get_types_from_msg(text, name))
+            except Exception as error:  # its parser raises classes of its own
+                raise NepError(
+                    _("the definition of '{name}' cannot be read: {error}").format(name=name, error=error)
+                ) from error
+        with self._lock:
+            fields = {name: read_definition(entries)[1] for name, (_constants, entries) in found.items()}
+            missing = {
+                (name, field.name, field.kind)
+                for name, each in fields.items()
+                for field in each
+                if field.is_message and field.kind not in fields and field.kind not in self._fields
+            }
+            for name, field, kind in sorted(missing):
+                raise NepError(
+                    _(
+                        "'{name}' uses '{kind}' for its field '{field}', which is not known; add it, too"
+                    ).format(name=name, kind=kind, field=field)
+                )
+            same = {name for name in fields if name in self._fields and self._fields[name] == fields[name]}
+            changed = sorted(name for name in fields if name in self._fields and name not in same)
+            if changed:
+                raise NepError(
+                    _("'{name}' is known with other fields; choose another name, or start anew").format(
+                        name=changed[0]
+                    )
+                )
+            self._store.register({name: each for name, each in found.items() if name not in same})
+            self._read_definitions()
+
+
+def _near(name: str, known: tuple[str, ...]) -> str:
+    ending = name.rpartition("/")[2].lower()
+    alike = [each for each in known if each.rpartition("/")[2].lower() == ending]
+    return did_you_mean(name, tuple(alike) or known) if alike or len(known) < 10 else _near_any(name, known)
+
+
+def _near_any(name: str, known: tuple[str, ...]) -> str:
+    said = did_you_mean(name, known)
+    return said if len(said) < 200 else _("look at 'nep.backends.ros2.message_types().names'")
+
+
+_types: dict[str, MessageTypes] = {}
+_types_lock = threading.Lock()
+
+
+def message_types() -> MessageTypes:
+    """The types of the release in ROS_DISTRO, with those of the folders in NEP_ROS_MSG_PATH.
+
+    Raises `BackendUnavailableError`, and `NepError` as `MessageTypes.add_folder` does.
+    """
+    release = distribution(os.environ)
+    with _types_lock:
+        if release not in _types:
+            made = MessageTypes(release)
+            for folder in os.environ.get(FOLDERS, "").split(os.pathsep):
+                if folder:
+                    made.add_folder(Path(folder))
+            _types[release] = made
+        return _types[release]

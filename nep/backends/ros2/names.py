@@ -1,0 +1,91 @@
+"""Names of ROS 2 and of DDS: topics, types, and what is told in a USER_DATA."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from nep.errors import BadTopicError, NepError
+from nep.i18n import _
+
+__all__ = [
+    "dds_topic",
+    "dds_type",
+    "is_type_name",
+    "ros_topic",
+    "ros_type",
+    "split_node_name",
+    "type_name",
+    "user_data",
+    "user_data_of",
+]
+
+_TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+_TYPE = re.compile(r"([A-Za-z]\w*)(/msg)?/([A-Z]\w*)", re.ASCII)
+_DDS_TYPE = re.compile(r"(\w+)::msg::dds_::(\w+)_", re.ASCII)
+_NO_NAME = re.compile(r"\W", re.ASCII)
+
+
+def dds_topic(topic: str) -> str:
+    """`rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError` for what ROS 2 has no name for."""
+    if _TOPIC.fullmatch(topic) is None or "__" in topic:
+        raise BadTopicError(
+            topic,
+            _(
+                "ROS 2 allows letters of ASCII, digits, '/' and '_', no digit behind a '/' and no '__'; "
+                "choose such a name"
+            ),
+        )
+    return f"rt/{topic.removeprefix('/')}"
+
+
+def ros_topic(topic: str) -> str | None:
+    """`/chatter` for "rt/chatter"; None for a topic that is none of ROS 2."""
+    return topic[2:] if topic.startswith("rt/") else None
+
+
+def is_type_name(msg_type: str) -> bool:
+    """Whether it is written as ROS writes types: "std_msgs/msg/String", "std_msgs/String"."""
+    return _TYPE.fullmatch(msg_type) is not None
+
+
+def type_name(msg_type: str) -> str:
+    """`std_msgs/msg/String` for both forms. Raises `NepError`."""
+    found = _TYPE.fullmatch(msg_type)
+    if found is None:
+        raise NepError(
+            _("'{name}' is no type of a message of ROS; write it as 'std_msgs/msg/String'").format(
+                name=msg_type
+            )
+        )
+    return f"{found[1]}/msg/{found[3]}"
+
+
+def dds_type(ros_type: str) -> str:
+    """`std_msgs::msg::dds_::String_`."""
+    package, _msg, name = ros_type.split("/")
+    return f"{package}::msg::dds_::{name}_"
+
+
+def ros_type(dds_type: str) -> str:
+    """`std_msgs/msg/String` for its name in DDS; the name itself when it is none of ROS 2."""
+    found = _DDS_TYPE.fullmatch(dds_type)
+    return dds_type if found is None else f"{found[1]}/msg/{found[2]}"
+
+
+def split_node_name(name: str) -> tuple[str, str]:
+    """The namespace and the name of a node, both as ROS 2 allows them; other letters become '_'."""
+    *spaces, last = [_NO_NAME.sub("_", part) for part in name.split("/") if part] or ["_"]
+    parts = [f"_{part}" if part[:1].isdigit() else part for part in (*spaces, last)]
+    return "/" + "/".join(parts[:-1]), parts[-1]
+
+
+def user_data(entries: Mapping[str, str]) -> bytes:
+    """`key=value;` for each."""
+    return "".join(f"{key}={value};" for key, value in entries.items()).encode("ascii")
+
+
+def user_data_of(data: bytes) -> dict[str, str]:
+    """What was told in that form by anybody; the rest is left out."""
+    entries = (entry.partition("=") for entry in data.decode("ascii", "replace").split(";"))
+    return {key: value for key, _equals, value in entries if key and value}

@@ -1,0 +1,449 @@
+"""Participant: this program in one domain of DDS. Its nodes share it; a thread of its own reads for them.
+
+Other participants learn of its nodes, and which writers and readers are theirs, from `ros_discovery_info`,
+as ROS 2 does it. What is told of a writer or reader itself stands in its USER_DATA: the type's hash for
+ROS 2, and for other programs of nep the ids of the node and of the publisher or subscriber.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Protocol
+
+from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.ros2.environment import configuration
+from nep.backends.ros2.library import Dds, dds
+from nep.backends.ros2.message_types import MessageTypes, message_types
+from nep.backends.ros2.names import split_node_name, user_data, user_data_of
+from nep.backends.ros2.topics import DdsTopics, sample_of
+from nep.errors import DecodeError, NepError
+from nep.i18n import _
+from nep.protocol.requests import (
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.system import forks
+from nep.system.descriptors import check_room
+
+__all__ = ["DdsEndpoint", "Local", "Participant", "RosNode", "join", "leave", "policy"]
+
+_logger = logging.getLogger("nep")
+_INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
+_INFO_TOPIC = "ros_discovery_info"
+_MOST_PARTICIPANTS = 4096
+"""So many others are remembered."""
+_FILES = 16
+"""What a participant opens."""
+_SETTLE_S = 0.3
+"""So old a participant knows the others that are there: their answers come within milliseconds."""
+_AT_ONCE = 10_000
+
+
+@dataclass(frozen=True)
+class RosNode:
+    """A node as `ros_discovery_info` tells of it; `gids` are those of its writers and readers."""
+
+    name: str
+    gids: frozenset[bytes]
+
+
+@dataclass(frozen=True)
+class DdsEndpoint:
+    """A writer or reader that discovery has found. `nep`: what a program of nep says of it, else empty."""
+
+    gid: bytes
+    participant: bytes
+    topic: str
+    type: str
+    is_latched: bool
+    is_reliable: bool
+    nep: dict[str, str]
+
+
+class Local(Protocol):
+    """A node of this process."""
+
+    node: NodeRecord
+
+    @property
+    def publishers(self) -> Sequence[LocalPublisher]:
+        """Those that are open."""
+
+    @property
+    def subscribers(self) -> Sequence[LocalSubscriber]:
+        """Those that are open."""
+
+    def load(self) -> float | None:
+        """The share of a core that the process uses."""
+
+    def look(self) -> None:
+        """Somebody came or went. In the participant's thread, under its lock."""
+
+
+class LocalPublisher(Protocol):
+    """A publisher of this process."""
+
+    spec: PublisherSpec
+
+    @property
+    def record(self) -> PublisherRecord:
+        """For the graph."""
+
+    @property
+    def counts(self) -> PublisherCount:
+        """For the graph."""
+
+
+class LocalSubscriber(Protocol):
+    """A subscriber of this process."""
+
+    spec: SubscriberSpec
+
+    @property
+    def record(self) -> SubscriberRecord:
+        """For the graph."""
+
+    @property
+    def counts(self) -> SubscriberCount:
+        """For the graph."""
+
+
+@dataclass
+class _Member:
+    local: Local
+    gids: dict[str, set[bytes]] = field(default_factory=lambda: {"reader": set(), "writer": set()})
+
+
+class Participant:
+    """See the module. Raises `NepError` where Cyclone DDS cannot begin, such as without a network."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.dds: Dds = dds()
+        self.types: MessageTypes = message_types()
+        self.changed = threading.Condition(threading.RLock())
+        """Guards everything here; told when somebody comes or goes."""
+        self._members: dict[str, _Member] = {}
+        self._others: dict[bytes, tuple[RosNode, ...]] = {}
+        self._reads: dict[int, tuple[Any, Any, Callable[[], None]]] = {}
+        self._is_closing = self._has_news = False
+        check_room(_FILES, "a participant of ROS 2")
+        try:
+            self._begin()
+        except self.dds.core.DDSException as error:
+            raise NepError(
+                _("Cyclone DDS cannot begin: {error}; look at CYCLONEDDS_URI and the network").format(
+                    error=error
+                )
+            ) from error
+        self._began_at = time.monotonic()
+        self._thread = threading.Thread(target=self._run, name="nep-ros2", daemon=True)
+        self._thread.start()
+
+    def _begin(self) -> None:
+        core, builtin = self.dds.core, self.dds.builtin
+        settings = configuration(os.environ)
+        self._domain = None if settings is None else self._own_domain(settings)
+        self.entity = self.dds.domain.DomainParticipant(
+            self.number, self.qos(policy(self.dds).Userdata(user_data({"enclave": "/"})))
+        )
+        self.gid = self.entity.guid.bytes
+        self.topics = DdsTopics(self.dds, self.types, self.entity)
+        """Under `changed`."""
+        self._waitset = core.WaitSet(self.entity)
+        self._guard = core.GuardCondition(self.entity)
+        self._waitset.attach(self._guard)
+        any_state = core.ViewState.Any | core.SampleState.Any
+        self._alive = {}
+        for kind, topic in (
+            ("writer", builtin.BuiltinTopicDcpsPublication),
+            ("reader", builtin.BuiltinTopicDcpsSubscription),
+        ):
+            reader = builtin.BuiltinDataReader(self.entity, topic)
+            self._alive[kind] = (
+                reader,
+                core.ReadCondition(reader, any_state | core.InstanceState.Alive),
+            )
+            news = core.ReadCondition(
+                reader, core.ViewState.Any | core.SampleState.NotRead | core.InstanceState.Any
+            )
+            self.watch(reader, news, partial(self._read_news, reader, news))
+        policies = policy(self.dds)
+        told = policies.Userdata(user_data({"typehash": self.types.type_hash(_INFO)}))
+        common = (
+            policies.Reliability.Reliable(100_000_000),
+            policies.Durability.TransientLocal,
+            policies.DataRepresentation(use_cdrv0_representation=True),
+            told,
+        )
+        last = policies.History.KeepLast(1)
+        topic = self.topics.topic(_INFO_TOPIC, _INFO)
+        self._info_writer = self.dds.pub.DataWriter(
+            self.entity,
+            topic,
+            self.qos(*common, last, policies.DurabilityService(0, last, -1, -1, -1)),
+        )
+        reader = self.dds.sub.DataReader(
+            self.entity, topic, self.qos(*common, policies.History.KeepLast(1000))
+        )
+        ready = core.ReadCondition(reader, any_state | core.InstanceState.Any)
+        self.watch(reader, ready, lambda: self._read_infos(reader, ready))
+
+    def _own_domain(self, settings: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+        try:
+            return self.dds.domain.Domain(self.number, settings)
+        except self.dds.core.DDSException as error:
+            if error.code != self.dds.core.DDSException.DDS_RETCODE_PRECONDITION_NOT_MET:
+                raise
+            return None  # the program has made it already, with settings of its own
+
+    def qos(self, *policies: Any) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+        """These policies together."""
+        return self.dds.qos.Qos(*policies)
+
+    def settle(self) -> None:
+        """Wait until the others that were there can be known."""
+        with self.changed:
+            while (left := self._began_at + _SETTLE_S - time.monotonic()) > 0.0 and not self._is_closing:
+                self.changed.wait(left)
+
+    # ---- nodes
+
+    def add(self, local: Local) -> None:
+        """A node of this process comes."""
+        with self.changed:
+            self._members[local.node.id] = _Member(local)
+            self._tell()
+
+    def remove(self, node_id: str) -> bool:
+        """It goes; whether it was the last."""
+        with self.changed:
+            self._members.pop(node_id, None)
+            if self._members:
+                self._tell()
+            return not self._members
+
+    def assign(self, node_id: str, kind: str, gid: bytes) -> None:
+        """A "writer" or "reader" is this node's."""
+        with self.changed:
+            if node_id in self._members:
+                self._members[node_id].gids[kind].add(gid)
+                self._tell()
+
+    def withdraw(self, node_id: str, kind: str, gid: bytes) -> None:
+        """It is closed."""
+        with self.changed:
+            if node_id in self._members:
+                self._members[node_id].gids[kind].discard(gid)
+                self._tell()
+
+    def _tell(self) -> None:
+        """Write the nodes of this process into `ros_discovery_info`. With the lock held."""
+        entries = []
+        for member in self._members.values():
+            space, name = split_node_name(member.local.node.name)
+            entries.append(
+                {
+                    "node_namespace": space[:255],
+                    "node_name": name[:255],
+                    "reader_gid_seq": [self._gid_field(each) for each in sorted(member.gids["reader"])],
+                    "writer_gid_seq": [self._gid_field(each) for each in sorted(member.gids["writer"])],
+                }
+            )
+        info = {"gid": self._gid_field(self.gid), "node_entities_info_seq": entries}
+        cdr = self.types.encode(_INFO, info)
+        self._info_writer.write(sample_of(self.topics.sample_class(_INFO), cdr))
+
+    def _gid_field(self, gid: bytes) -> dict[str, bytes]:
+        return {"data": gid.ljust(self.types.gid_bytes, b"\0")}
+
+    def _read_news(self, reader: Any, news: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        """Somebody came or went."""
+        reader.read(_AT_ONCE, news)
+        self._has_news = True
+
+    def _read_infos(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        for sample in reader.take(100, ready):
+            cdr = getattr(sample, "cdr", None)
+            if cdr is None:
+                continue
+            try:
+                info = self.types.decode(_INFO, cdr)
+            except DecodeError as error:
+                _logger.debug("what came on ros_discovery_info cannot be read: %s", error)
+                continue
+            self._note(info)
+
+    def _note(self, info: Any) -> None:  # noqa: ANN401 - a map of the fields
+        gid = info["gid"]["data"][:16]
+        if gid == self.gid or (gid not in self._others and len(self._others) >= _MOST_PARTICIPANTS):
+            return
+        self._others[gid] = tuple(
+            RosNode(
+                f"{each['node_namespace'].rstrip('/')}/{each['node_name']}",
+                frozenset(
+                    one["data"][:16] for key in ("reader_gid_seq", "writer_gid_seq") for one in each[key]
+                ),
+            )
+            for each in info["node_entities_info_seq"]
+        )
+
+    @property
+    def locals(self) -> tuple[Local, ...]:
+        """The nodes of this process."""
+        with self.changed:
+            return tuple(each.local for each in self._members.values())
+
+    def others(self, alive: frozenset[bytes]) -> dict[bytes, tuple[RosNode, ...]]:
+        """The nodes of other participants that are alive; those of others are forgotten."""
+        with self.changed:
+            self._others = {gid: nodes for gid, nodes in self._others.items() if gid in alive}
+            return dict(self._others)
+
+    # ---- discovery
+
+    def participants(self) -> frozenset[bytes]:
+        """All participants of the domain that are there."""
+        core, builtin = self.dds.core, self.dds.builtin
+        with self.changed:
+            reader = builtin.BuiltinDataReader(self.entity, builtin.BuiltinTopicDcpsParticipant)
+            alive = core.ReadCondition(
+                reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Alive
+            )
+            return frozenset(each.key.bytes for each in reader.read(_AT_ONCE, alive))
+
+    def endpoints(self, kind: str, topic: str | None = None) -> list[DdsEndpoint]:
+        """All "writer"s or "reader"s that are there, on every topic or on one of DDS."""
+        with self.changed:
+            if self._is_closing:
+                return []
+            reader, alive = self._alive[kind]
+            found = reader.read(_AT_ONCE, alive)
+        return [
+            self.described(each)
+            for each in found
+            if each.topic_name is not None and (topic is None or each.topic_name == topic)
+        ]
+
+    def described(self, found: Any) -> DdsEndpoint:  # noqa: ANN401 - cyclonedds is not typed
+        """What discovery tells of a writer or reader."""
+        policies = policy(self.dds)
+        has_data = policies.Userdata in found.qos
+        return DdsEndpoint(
+            found.key.bytes,
+            found.participant_key.bytes,
+            found.topic_name,
+            found.type_name,
+            policies.Durability.Volatile not in found.qos and policies.Durability in found.qos,
+            policies.Reliability.BestEffort not in found.qos,
+            user_data_of(found.qos[policies.Userdata].data) if has_data else {},
+        )
+
+    # ---- the thread
+
+    def watch(self, reader: Any, condition: Any, read: Callable[[], None]) -> None:  # noqa: ANN401 - see above
+        """Call `read` in the participant's thread whenever `condition` is true."""
+        with self.changed:
+            self._reads[id(reader)] = (reader, condition, read)
+            self._waitset.attach(condition)
+
+    def unwatch(self, reader: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        """No more."""
+        with self.changed:
+            found = self._reads.pop(id(reader), None)
+            if found is not None:
+                self._waitset.detach(found[1])
+
+    def _run(self) -> None:
+        while not self._ends():
+            self._waitset.wait(1_000_000_000)
+            with self.changed:
+                if self._ends():
+                    return
+                for _reader, condition, read in list(self._reads.values()):
+                    if condition.is_triggered():
+                        try:
+                            read()
+                        except Exception:
+                            _logger.exception("what came over ROS 2 cannot be read")
+                if self._has_news:
+                    self._has_news = False
+                    for member in list(self._members.values()):
+                        member.local.look()
+                self.changed.notify_all()
+
+    def _ends(self) -> bool:
+        return self._is_closing
+
+    def close(self) -> None:
+        """End the thread and leave the domain."""
+        with self.changed:
+            if self._is_closing:
+                return
+            self._is_closing = True
+            self._guard.set(True)
+            self.changed.notify_all()
+        self._thread.join()
+        with self.changed:
+            for _reader, condition, _read in self._reads.values():
+                self._waitset.detach(condition)
+            self._waitset.detach(self._guard)
+            self._reads.clear()
+            self._alive.clear()
+            self.topics.clear()
+            for entity in (self._waitset, self._guard, self.entity, self._domain):
+                if entity is not None:
+                    _delete(entity)
+
+
+def _delete(entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+    """Now, with all that belongs to it, not when Python forgets it."""
+    entity.__del__()
+
+
+def policy(library: Dds) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+    """The policies of cyclonedds."""
+    return library.qos.Policy
+
+
+# ---- one for each domain
+
+_participants: dict[int, Participant] = {}
+_lock = threading.Lock()
+
+
+def join(local: Local, number: int) -> Participant:
+    """The participant of this process in this domain, with this node. Raises as `Participant`."""
+    with _lock:
+        if number not in _participants:
+            _participants[number] = Participant(number)
+        _participants[number].add(local)
+        return _participants[number]
+
+
+def leave(participant: Participant, node_id: str) -> None:
+    """The node is closed; the participant too when it was the last."""
+    with _lock:
+        if participant.remove(node_id):
+            if _participants.get(participant.number) is participant:
+                del _participants[participant.number]
+            participant.close()
+
+
+def _forked() -> None:
+    """In a child: the lock may be held by a thread that is not there."""
+    global _lock  # noqa: PLW0603 - there is one a process
+    _lock = threading.Lock()
+    _participants.clear()
+
+
+forks.in_child(_forked)

@@ -1,0 +1,192 @@
+"""RosPublisher: a writer of DDS. Whom it has found is asked of Cyclone DDS each time."""
+
+from __future__ import annotations
+
+import logging
+import re
+import time
+from collections.abc import Callable
+from typing import Any
+
+from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec
+from nep.backends.ros2.library import has_forked
+from nep.backends.ros2.names import dds_topic, dds_type, user_data
+from nep.backends.ros2.participant import Participant
+from nep.backends.ros2.quality import depth_of, qualities
+from nep.backends.ros2.topics import sample_of
+from nep.backends.ros2.type_mapping import mapping_for
+from nep.errors import ClosedError, WireError
+from nep.i18n import _
+from nep.messages.encoded import Encoded
+from nep.protocol.requests import PublisherCount, PublisherRecord
+
+__all__ = ["RosPublisher", "told_of", "wait_for_others"]
+
+_logger = logging.getLogger("nep")
+_PLAIN = re.compile(r"[\w./-]{1,100}", re.ASCII)
+_GREETING_S = 0.1
+"""What another program needs to get ready after both know of each other; DDS has no word for "I am"."""
+
+
+def wait_for_others(participant: Participant, known: set[bytes], matched: Callable[[], set[bytes]]) -> None:
+    """Wait until all of `known` are matched, half a second at most, and those of other programs are ready."""
+    deadline = time.monotonic() + HANDSHAKE_S
+    with participant.changed:
+        while known - matched() and (left := deadline - time.monotonic()) > 0.0:
+            participant.changed.wait(min(left, 0.01))
+        ready_at = time.monotonic() + _GREETING_S
+        if any(gid[:12] != participant.gid[:12] for gid in matched()):
+            while (left := ready_at - time.monotonic()) > 0.0:
+                participant.changed.wait(left)
+
+
+def told_of(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
+    """What the USER_DATA of a writer or reader says: what ROS 2 asks for, and what programs of nep do."""
+    told = {"typehash": type_hash, "nepnode": node_id, "nepid": f"{spec.id:x}"}
+    if _PLAIN.fullmatch(spec.msg_type):
+        told["neptype"] = spec.msg_type
+    return user_data(told)
+
+
+class RosPublisher:
+    """See the module. Raises `BadTopicError`, `NepError`."""
+
+    def __init__(
+        self,
+        participant: Participant,
+        node_id: str,
+        spec: PublisherSpec,
+        on_close: Callable[[RosPublisher, float], None],
+    ) -> None:
+        self.spec = spec
+        self.count = 0
+        self.problem = ""
+        self.missing: tuple[str, ...] = ()
+        self._bytes = 0
+        self._stamp_ns: int | None = None
+        self._participant = participant
+        self._node_id = node_id
+        self._on_close = on_close
+        self._mapping = mapping_for(spec.msg_type)
+        self._ids: dict[int, str] = {}
+        self._is_closed = False
+        library = participant.dds
+        name, ros_type = dds_topic(spec.topic), self._mapping.ros_type
+        told = told_of(participant.types.type_hash(ros_type), node_id, spec)
+        depth = depth_of(spec.qos, spec.codec.name)
+        with participant.changed:
+            self._kind = participant.topics.sample_class(ros_type)
+            self._writer: Any = library.pub.DataWriter(
+                participant.entity,
+                participant.topics.topic(name, ros_type),
+                participant.qos(*qualities(library, spec.qos, depth, is_latched=spec.is_latched, told=told)),
+            )
+            self.gid: bytes = self._writer.guid.bytes
+            participant.assign(node_id, "writer", self.gid)
+        is_reliable = spec.qos in ("", "reliable")
+        wanted = {
+            each.gid
+            for each in participant.endpoints("reader", name)
+            if each.type == dds_type(ros_type)
+            and (is_reliable or not each.is_reliable)
+            and (spec.is_latched or not each.is_latched)
+        }
+        wait_for_others(participant, wanted, self._matched)
+
+    def _matched(self) -> set[bytes]:
+        """The readers that get what is written."""
+        found = set()
+        for handle in self._writer.get_matched_subscriptions():
+            data = self._writer.get_matched_subscription_data(handle)
+            if data is not None:
+                found.add(data.key.bytes)
+        return found
+
+    @property
+    def record(self) -> PublisherRecord:
+        """For the graph."""
+        spec = self.spec
+        return PublisherRecord(
+            spec.id, spec.topic, spec.msg_type, spec.codec.name, ("ros2",), spec.is_latched
+        )
+
+    @property
+    def counts(self) -> PublisherCount:
+        """For the graph."""
+        return PublisherCount(self.spec.id, self.count, self._bytes, self.count, self._stamp_ns, self.problem)
+
+    @property
+    def subscribers(self) -> int:
+        """How many are matched; the two readers that a subscriber of nep may have are one."""
+        with self._participant.changed:
+            if self._is_closed:
+                return 0
+            handles = self._writer.get_matched_subscriptions()
+            self._ids = {each: self._ids.get(each) or self._id_of(each) for each in handles}
+            return len(set(self._ids.values()))
+
+    def _id_of(self, handle: int) -> str:
+        data = self._writer.get_matched_subscription_data(handle)
+        told = {} if data is None else self._participant.described(data).nep
+        return told.get("nepid") or f"handle {handle}"
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether there are any."""
+        return not self._is_closed and bool(self._writer.get_matched_subscriptions())
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self._participant.changed:
+            self.count += 1
+            self._stamp_ns = time.time_ns()
+
+    def report(self, problem: str) -> None:
+        """Shown as an alert in the graph of this program."""
+        self.problem = problem
+
+    def lend(self, size_bytes: int) -> memoryview | None:  # noqa: ARG002 - there is no memory that all share
+        """None: what is published is copied."""
+        return None
+
+    def send(self, encoded: Encoded) -> None:
+        """Write it. Where a reader is far behind, this waits for room for a tenth of a second at most."""
+        cdr = self._mapping.pack(encoded)
+        sample = sample_of(self._kind, cdr)
+        if self._is_closed:
+            raise ClosedError(f"publisher '{self.spec.topic}'")
+        self._stamp_ns = time.time_ns()
+        try:
+            self._writer.write(sample, self._stamp_ns)
+        except self._participant.dds.core.DDSException as error:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'") from error
+            codes = self._participant.dds.core.DDSException
+            if error.code == codes.DDS_RETCODE_BAD_PARAMETER:  # it looks at every message
+                raise WireError(
+                    _("they are no message of type '{name}'").format(name=self._mapping.ros_type), len(cdr)
+                ) from error
+            if error.code != codes.DDS_RETCODE_TIMEOUT:
+                raise
+        with self._participant.changed:
+            self.count += 1
+            self._bytes += len(encoded.data)
+
+    def close(self, timeout_s: float) -> None:
+        """Wait until readers have confirmed what was written, and close. Called by its publisher."""
+        self._on_close(self, timeout_s)
+
+    def finish(self, timeout_s: float) -> None:
+        """See `close`. May be called twice."""
+        if self._is_closed or has_forked():
+            return
+        if self.spec.qos in ("", "reliable") and timeout_s > 0.0:
+            # Not `wait_for_acks`, which fails when the time is over (cyclonedds 11.0.1).
+            wait = self._writer._wait_for_acks  # noqa: SLF001
+            if wait(self._writer._ref, int(min(timeout_s, 3600.0) * 1e9)):  # noqa: SLF001
+                _logger.warning("'%s' is closed before all its subscribers took everything", self.spec.topic)
+        with self._participant.changed:
+            if not self._is_closed:
+                self._is_closed = True
+                self._participant.withdraw(self._node_id, "writer", self.gid)
+                self._writer.__del__()

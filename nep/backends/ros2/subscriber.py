@@ -1,0 +1,275 @@
+"""RosSubscriber: a reader of DDS, and a second one where a publisher has latched something.
+
+A reader that asks for what was latched (TRANSIENT_LOCAL) is not matched with publishers that do not latch,
+one that does not ask gets nothing that is old. So the usual one does not ask, and one that asks is added
+when a publisher is found that latches; what both bring counts once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import threading
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from nep.backends.base import SubscriberSpec, SubscriberTransport
+from nep.backends.ros2.library import has_forked
+from nep.backends.ros2.names import dds_topic, dds_type
+from nep.backends.ros2.participant import Participant
+from nep.backends.ros2.publisher import told_of, wait_for_others
+from nep.backends.ros2.quality import depth_of, qualities
+from nep.backends.ros2.type_mapping import mapping_for
+from nep.errors import WireError
+from nep.messages.message import Message, MessageKind, arrived
+from nep.messages.queue import Inbox
+from nep.protocol.requests import NodeRecord, SubscriberCount, SubscriberRecord
+from nep.system.log_rarely import is_logged
+
+__all__ = ["RosSubscriber", "id_of"]
+
+_logger = logging.getLogger("nep")
+_BATCH = 256
+_BATCH_BYTES = 64 * 2**20
+_MOST_SOURCES = 4096
+"""So many publishers are remembered."""
+
+
+def id_of(gid: bytes, told: str | None) -> int:
+    """The id of a publisher or subscriber: what a program of nep says, else one made of its GUID."""
+    try:
+        number = int(told or "", 16)
+    except ValueError:
+        number = 0
+    if 0 < number < 2**63:
+        return number
+    return int.from_bytes(hashlib.sha256(gid).digest()[:8], "little") >> 1 or 1
+
+
+class SubscriberOwner(Protocol):
+    """The transport that it belongs to."""
+
+    node: NodeRecord
+    changed: threading.Condition
+
+    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
+        """Wait for a message in one of them, or for `wake`."""
+
+    def wake(self) -> None:
+        """End all waits."""
+
+    def forget(self, subscriber: RosSubscriber) -> None:
+        """It is closed."""
+
+
+@dataclass
+class _Source:
+    """A publisher whose messages came."""
+
+    id: int
+    kind: MessageKind
+    newest_ns: int = -1
+
+
+class RosSubscriber:
+    """See the module. Raises `BadTopicError`, `NepError`."""
+
+    def __init__(self, transport: SubscriberOwner, participant: Participant, spec: SubscriberSpec) -> None:
+        self.spec = spec
+        self.ready: deque[Message] = deque()
+        self.received = self.refused = 0
+        self.problem = ""
+        self.is_closed = False
+        batch = 0 if spec.sink is None else _BATCH_BYTES
+        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
+        self._dropped = 0
+        self._transport = transport
+        self._participant = participant
+        self._mapping = mapping_for(spec.msg_type)
+        self._name = dds_topic(spec.topic)
+        self._sources: dict[int, _Source] = {}
+        self._readers: list[Any] = []
+        self._lost_before = 0
+        self._has_latched = False
+        with participant.changed:
+            self._add_reader(is_latched=False)
+        writers = [
+            each
+            for each in participant.endpoints("writer", self._name)
+            if each.type == dds_type(self._mapping.ros_type)
+            and (each.is_reliable or spec.qos in ("best_effort", "sensor"))
+        ]
+        if any(each.is_latched for each in writers):
+            with participant.changed:
+                self._add_reader(is_latched=True)
+        wait_for_others(participant, {each.gid for each in writers}, self._matched)
+
+    def _add_reader(self, *, is_latched: bool) -> None:
+        """With the participant's lock held."""
+        participant, spec = self._participant, self.spec
+        self._has_latched = self._has_latched or is_latched
+        library, core = participant.dds, participant.dds.core
+        type_hash = participant.types.type_hash(self._mapping.ros_type)
+        told = told_of(type_hash, self._transport.node.id, spec)
+        depth = depth_of(spec.qos, self._mapping.codec.name)
+        reader = library.sub.DataReader(
+            participant.entity,
+            participant.topics.topic(self._name, self._mapping.ros_type),
+            participant.qos(*qualities(library, spec.qos, depth, is_latched=is_latched, told=told)),
+        )
+        self._readers.append(reader)
+        participant.assign(self._transport.node.id, "reader", reader.guid.bytes)
+        ready = core.ReadCondition(reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any)
+        participant.watch(reader, ready, lambda: self._read(reader, ready))
+
+    def _matched(self) -> set[bytes]:
+        """The writers that it hears. With the participant's lock held."""
+        found = set()
+        for reader in self._readers:
+            for handle in reader.get_matched_publications():
+                data = reader.get_matched_publication_data(handle)
+                if data is not None:
+                    found.add(data.key.bytes)
+        return found
+
+    def look_for_latched(self) -> None:
+        """Ask for what was latched when a publisher has come that latches. In the participant's thread."""
+        if not self._has_latched and not self.is_closed:
+            for handle in self._readers[0].get_matched_publications():
+                if self._source(self._readers[0], handle).kind.is_latched:
+                    self._add_reader(is_latched=True)
+                    return
+
+    # ---- messages come
+
+    def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        """In the participant's thread, under its lock."""
+        while samples := reader.take(_BATCH, ready):
+            came = [each for each in (self._message(reader, sample) for sample in samples) if each]
+            if came:
+                self._put(came)
+            if len(samples) < _BATCH:
+                return
+
+    def _message(self, reader: Any, sample: Any) -> Message | None:  # noqa: ANN401 - see above
+        cdr = getattr(sample, "cdr", None)
+        if cdr is None:
+            return None  # a publisher went
+        info = sample.sample_info
+        source = self._source(reader, info.publication_handle)
+        if source.kind.is_latched:
+            if info.source_timestamp <= source.newest_ns:
+                return None  # the other reader has it
+            source.newest_ns = info.source_timestamp
+        try:
+            data = self._mapping.unpack(cdr)
+        except WireError as error:
+            self.refused += 1
+            self.problem = error.reason
+            if is_logged(self.refused):
+                _logger.warning(
+                    "on '%s' came what is no message (%d so far): %s", self.spec.topic, self.refused, error
+                )
+            return None
+        message = arrived(source.kind, data, info.source_timestamp, 0, source.id)
+        message.seq = None  # DDS has numbers, and tells them to nobody
+        return message
+
+    def _source(self, reader: Any, handle: int) -> _Source:  # noqa: ANN401 - see above
+        known = self._sources.get(handle)
+        if known is not None:
+            return known
+        found = reader.get_matched_publication_data(handle)
+        described = None if found is None else self._participant.described(found)
+        is_latched = described is not None and described.is_latched
+        source = _Source(
+            id_of(handle.to_bytes(8, "little", signed=handle < 0), None)
+            if described is None
+            else id_of(described.gid, described.nep.get("nepid")),
+            self._mapping.kind(self.spec.topic, self.spec.msg_type, is_latched=is_latched),
+        )
+        if described is not None:
+            if len(self._sources) >= _MOST_SOURCES:
+                self._sources.pop(next(iter(self._sources)))
+            self._sources[handle] = source
+        return source
+
+    def _put(self, messages: list[Message]) -> None:
+        changed = self._transport.changed
+        with changed:
+            for message in messages:
+                dropped = self.inbox.put(message)
+                self.received += 1 - dropped
+                self._dropped += dropped
+            changed.notify_all()
+
+    # ---- messages go
+
+    def poll(self) -> Message | None:
+        """The next message if one is there."""
+        with self._transport.changed:
+            return self.inbox.take()
+
+    def receive(self, timeout_s: float) -> Message | None:
+        """The next message, waited for."""
+        self._transport.wait((self,), timeout_s)
+        return self.poll()
+
+    def take_batch(self) -> list[Message]:
+        """What a sink gets at once."""
+        with self._transport.changed:
+            return self.inbox.take_all(_BATCH_BYTES)
+
+    @property
+    def lost(self) -> int | None:
+        """What DDS says was lost on the way, and what was dropped here."""
+        with self._participant.changed:
+            return self._lost_before + self._lost_now() + self._dropped
+
+    def _lost_now(self) -> int:
+        if self.is_closed or has_forked():
+            return 0
+        return sum(int(each.get_sample_lost_status().total_count) for each in self._readers)
+
+    @property
+    def record(self) -> SubscriberRecord:
+        """For the graph."""
+        return SubscriberRecord(self.spec.id, self.spec.topic, self.spec.msg_type)
+
+    @property
+    def counts(self) -> SubscriberCount:
+        """For the graph."""
+        return SubscriberCount(self.spec.id, self.received, self.lost, self.problem)
+
+    @property
+    def gids(self) -> frozenset[bytes]:
+        """Its readers."""
+        with self._participant.changed:
+            return frozenset() if self.is_closed else frozenset(each.guid.bytes for each in self._readers)
+
+    def report(self, problem: str) -> None:
+        """Shown as an alert in the graph of this program."""
+        self.problem = problem
+
+    def forked(self) -> None:
+        """In a child. See `SubscriberTransport.forked`."""
+        self.is_closed = True
+
+    def close(self) -> None:
+        """Close its readers and forget what was not read."""
+        if has_forked():
+            return
+        with self._participant.changed:
+            if self.is_closed:
+                return
+            self._lost_before = self._lost_now()
+            self.is_closed = True
+            for reader in self._readers:
+                self._participant.unwatch(reader)
+                self._participant.withdraw(self._transport.node.id, "reader", reader.guid.bytes)
+                reader.__del__()
+            self._readers.clear()
+        self._transport.forget(self)
+        self._transport.wake()

@@ -1,0 +1,81 @@
+"""DdsTopics of Cyclone DDS, and the classes of their samples, which are CDR already.
+
+A class has the members of its ROS message for the type's description in discovery; bytes are made and read
+by rosbags' codec.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nep.backends.ros2.fields import RosField
+from nep.backends.ros2.library import Dds
+from nep.backends.ros2.message_types import MessageTypes
+from nep.backends.ros2.names import dds_type
+
+__all__ = ["DdsTopics", "sample_of"]
+
+_NAMES = {"byte": "uint8"}
+
+
+class DdsTopics:
+    """The topics of one participant: one for each name and type. Its lock guards them."""
+
+    def __init__(self, library: Dds, types: MessageTypes, entity: Any) -> None:  # noqa: ANN401 - see `Dds`
+        self._dds = library
+        self._types = types
+        self._entity = entity
+        self._classes: dict[str, Any] = {}
+        self._topics: dict[tuple[str, str], Any] = {}
+
+    def topic(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+        """The topic of DDS of this name, for samples with `cdr` of this type of ROS."""
+        key = (name, ros_type)
+        if key not in self._topics:
+            self._topics[key] = self._dds.topic.Topic(self._entity, name, self.sample_class(ros_type))
+        return self._topics[key]
+
+    def sample_class(self, ros_type: str) -> Any:  # noqa: ANN401 - made here
+        """The class of samples of a type of ROS."""
+        if ros_type not in self._classes:
+            members = {each.name: self._member(each) for each in self._types.fields(ros_type)}
+            made = self._dds.idl.make_idl_struct(ros_type.rpartition("/")[2], dds_type(ros_type), members)
+            made.serialize = _serialize
+            made.deserialize = classmethod(_deserialize)
+            self._classes[ros_type] = made
+        return self._classes[ros_type]
+
+    def _member(self, field: RosField) -> Any:  # noqa: ANN401 - a type
+        hints = self._dds.idl.types
+        if field.is_message:
+            item = self.sample_class(field.kind)
+        elif field.kind == "bool":
+            item = bool
+        elif field.kind == "string":
+            item = hints.bounded_str[field.text_most] if field.text_most else str
+        else:
+            item = getattr(hints, _NAMES.get(field.kind, field.kind))
+        if field.length is None:
+            return item
+        if field.length >= 0:
+            return hints.array[item, field.length]
+        return hints.sequence[item, field.size] if field.size else hints.sequence[item]
+
+    def clear(self) -> None:
+        """The participant is closed."""
+        self._topics.clear()
+
+
+def sample_of(kind: Any, cdr: bytes) -> Any:  # noqa: ANN401 - made above
+    """A sample of a class of samples."""
+    made = kind.__new__(kind)
+    made.cdr = cdr
+    return made
+
+
+def _serialize(sample: Any, *_arguments: object, **_options: object) -> bytes:  # noqa: ANN401 - see above
+    return bytes(sample.cdr)
+
+
+def _deserialize(kind: Any, /, cdr: bytes, *_arguments: object, **_options: object) -> Any:  # noqa: ANN401
+    return sample_of(kind, cdr)

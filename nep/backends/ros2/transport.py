@@ -1,0 +1,173 @@
+"""The back end `ros2` for one node: its publishers, its subscribers, its sinks' thread, waiting."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Sequence
+
+from nep.backends.base import PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.connection import Configuration, Hybrid
+from nep.backends.ros2.graph import graph_of
+from nep.backends.ros2.library import dds, has_forked, typesys
+from nep.backends.ros2.participant import Participant, join, leave
+from nep.backends.ros2.publisher import RosPublisher
+from nep.backends.ros2.subscriber import RosSubscriber
+from nep.errors import NepError
+from nep.i18n import _
+from nep.protocol.graph_view import GraphView
+from nep.protocol.requests import NodeRecord
+from nep.system.cpu import CpuLoad
+
+__all__ = ["RosTransport"]
+
+_logger = logging.getLogger("nep")
+_BATCH_S = 0.005  # sinks are called 200 times a second at most
+
+
+class RosTransport:
+    """One node's way to the others. Raises `BackendUnavailableError` where its packages are not installed."""
+
+    def __init__(self, node: NodeRecord) -> None:
+        dds()
+        typesys()
+        self.node = node
+        self.changed = threading.Condition()
+        """Guards inboxes; taken after the participant's lock, never before it."""
+        self._wakes = 0
+        self._load = CpuLoad()
+        self._participant: Participant | None = None
+        self._lock = threading.RLock()
+        self._publishers: tuple[RosPublisher, ...] = ()
+        self._subscribers: tuple[RosSubscriber, ...] = ()
+        self._thread: threading.Thread | None = None
+        self._closing = threading.Event()
+
+    def _joined(self, configuration: Configuration) -> Participant:
+        if not isinstance(configuration, Hybrid):
+            raise NepError(
+                _(
+                    "'ros2' has no direct connections: its nodes find each other in a domain; leave the "
+                    "configuration out, or choose the domain by master='5'"
+                )
+            )
+        with self._lock:
+            if self._participant is None:
+                self._participant = join(self, int(configuration.master))
+            participant = self._participant
+        if participant.number != int(configuration.master):
+            raise NepError(
+                _(
+                    "'{name}' is in the domain {domain} of ROS 2; make another node for {other}, by "
+                    "master='{other}'"
+                ).format(name=self.node.name, domain=participant.number, other=configuration.master)
+            )
+        participant.settle()
+        return participant
+
+    def look(self) -> None:
+        """In the participant's thread, under its lock: somebody came or went."""
+        for each in self._subscribers:
+            each.look_for_latched()
+
+    def publisher(self, spec: PublisherSpec) -> RosPublisher:
+        """A new writer; returns when the readers that are known are matched."""
+        participant = self._joined(spec.configuration)
+        publisher = RosPublisher(participant, self.node.id, spec, self._close_publisher)
+        with self._lock:
+            self._publishers = (*self._publishers, publisher)
+        return publisher
+
+    def subscriber(self, spec: SubscriberSpec) -> RosSubscriber:
+        """A new reader; returns when the writers that are known are matched."""
+        participant = self._joined(spec.configuration)
+        subscriber = RosSubscriber(self, participant, spec)
+        with self._lock:
+            self._subscribers = (*self._subscribers, subscriber)
+            if spec.sink is not None and self._thread is None:
+                self._thread = threading.Thread(
+                    target=self._run, name=f"nep-sinks-{self.node.name}", daemon=True
+                )
+                self._thread.start()
+        return subscriber
+
+    def _close_publisher(self, publisher: RosPublisher, timeout_s: float) -> None:
+        publisher.finish(timeout_s)
+        with self._lock:
+            self._publishers = tuple(each for each in self._publishers if each is not publisher)
+
+    def forget(self, subscriber: RosSubscriber) -> None:
+        """It is closed."""
+        with self._lock:
+            self._subscribers = tuple(each for each in self._subscribers if each is not subscriber)
+
+    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
+        """Wait for a message in one of `subscribers`, or for `wake`."""
+        mine = [each for each in subscribers if isinstance(each, RosSubscriber)]
+        with self.changed:
+            before = self._wakes
+            self.changed.wait_for(
+                lambda: self._wakes != before or any(len(each.inbox) or each.is_closed for each in mine),
+                timeout_s,
+            )
+
+    def wake(self) -> None:
+        """End all waits."""
+        with self.changed:
+            self._wakes += 1
+            self.changed.notify_all()
+
+    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - at once
+        """Who has been found in the domain."""
+        return graph_of(self._joined(configuration))
+
+    @property
+    def publishers(self) -> tuple[RosPublisher, ...]:
+        """Those that are open."""
+        return self._publishers
+
+    @property
+    def subscribers(self) -> tuple[RosSubscriber, ...]:
+        """Those that are open."""
+        return self._subscribers
+
+    def load(self) -> float | None:
+        """The share of a core that the process uses."""
+        return self._load.ratio()
+
+    def begin_close(self) -> None:
+        """What is written is on its way already."""
+
+    def close(self, timeout_s: float) -> None:
+        """Close all, leave the domain, end the thread."""
+        if has_forked():
+            return
+        self._closing.set()
+        deadline = time.monotonic() + timeout_s
+        try:
+            for subscriber in self._subscribers:
+                subscriber.close()
+            for publisher in self._publishers:
+                publisher.close(max(0.0, deadline - time.monotonic()))
+        finally:
+            with self._lock:
+                participant, self._participant = self._participant, None
+            if participant is not None:
+                leave(participant, self.node.id)
+        self.wake()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            sinks = [each for each in self._subscribers if each.spec.sink is not None]
+            self.wait(sinks, 0.1)
+            for subscriber in sinks:
+                messages = subscriber.take_batch()
+                if messages and subscriber.spec.sink is not None:
+                    try:
+                        subscriber.spec.sink(messages)
+                    except BaseException:  # also SystemExit, which would end all sinks' thread
+                        _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
+            self._closing.wait(_BATCH_S)

@@ -1,0 +1,208 @@
+"""Type mapping: in which ROS message a message type of nep travels, and how its bytes get in and out.
+
+| msg_type                 | ROS type                      | what is in it                               |
+|--------------------------|-------------------------------|---------------------------------------------|
+| json, and any other      | std_msgs/msg/String           | the JSON text                               |
+| string                   | std_msgs/msg/String           | the text                                    |
+| bytes, msgpack           | std_msgs/msg/UInt8MultiArray  | the bytes, no dimensions                    |
+| image                    | sensor_msgs/msg/CompressedImage | the JPEG or PNG file                      |
+| a ROS type by its name   | that one                      | its fields                                  |
+
+A ROS type by its name has the codec "cdr": its payload is a map, its bytes are the message as DDS has it.
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+from nep.backends.ros2.message_types import message_types
+from nep.backends.ros2.names import is_type_name
+from nep.errors import DecodeError, EncodeError, WireError
+from nep.i18n import _
+from nep.messages import codecs, image_codec
+from nep.messages.codecs import Codec
+from nep.messages.encoded import Encoded
+from nep.messages.image_files import examine
+from nep.messages.message import MessageKind
+from nep.protocol.wire import extension_part
+
+__all__ = ["CDR", "TypeMapping", "codec_for", "mapping_for"]
+
+CDR = "cdr"
+"""The codec of messages that are ROS messages to their readers."""
+_STRING = "std_msgs/msg/String"
+_BYTES = "std_msgs/msg/UInt8MultiArray"
+_IMAGE = "sensor_msgs/msg/CompressedImage"
+_HEAD = b"\0\1\0\0"
+"""Plain CDR, its numbers little-endian."""
+_FILES = ("jpeg", "png")
+_MOST = 2**32 - 64
+
+
+@dataclass(frozen=True)
+class TypeMapping:
+    """How one message type travels. `pack` and `unpack` raise `WireError` for bytes that are none of it."""
+
+    ros_type: str
+    codec: Codec
+    pack: Callable[[Encoded], bytes]
+    unpack: Callable[[bytes], bytes | memoryview]
+
+    def kind(self, topic: str, msg_type: str, *, is_latched: bool) -> MessageKind:
+        """What messages from one publisher have in common."""
+        return MessageKind(topic, self.codec.name, msg_type, is_latched, self.codec.decode)
+
+
+def codec_for(msg_type: str) -> Codec:
+    """The codec of a message type. Raises `NepError` for a ROS type that is not known."""
+    return mapping_for(msg_type).codec
+
+
+def mapping_for(msg_type: str) -> TypeMapping:
+    """How a message type travels. Raises `NepError` for a ROS type that is not known."""
+    if is_type_name(msg_type):
+        return _ros_mapping(message_types().checked(msg_type))
+    codec = codecs.codec_for(msg_type)
+    if codec.name == "image":
+        return TypeMapping(_IMAGE, replace(codec, encode=_encode_image), _pack_image, _unpack_image)
+    if codec.name in ("bytes", "msgpack"):
+        return TypeMapping(_BYTES, codec, _pack_bytes, _unpack_bytes)
+    if codec.name == "string":
+        codec = replace(codec, encode=_encode_text)
+    return TypeMapping(_STRING, codec, _pack_text, _unpack_text)
+
+
+# ---- a ROS message by its name
+
+
+def _ros_mapping(name: str) -> TypeMapping:
+    types = message_types()
+
+    def encode(payload: object) -> Encoded:
+        return Encoded(types.encode(name, payload))
+
+    def decode(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
+        return types.decode(name, data)
+
+    return TypeMapping(name, Codec(CDR, 0, encode, decode, dict, partial(_check_map, name)), _as_it_is, bytes)
+
+
+def _check_map(name: str, payload: object) -> None:
+    if not isinstance(payload, Mapping):
+        raise EncodeError(
+            name, type(payload).__name__, _("publish a map of the fields of '{name}'").format(name=name)
+        )
+
+
+def _as_it_is(made: Encoded) -> bytes:
+    data = _plain(made)
+    if len(data) < 4 or data[:1] != b"\0" or data[1] > 1:
+        raise WireError(_("the bytes of a ROS message begin with CDR's four"), len(data))
+    return data
+
+
+# ---- nep's own types
+
+
+def _plain(made: Encoded) -> bytes:
+    """The bytes alone: ROS has no place for an extension. Raises `WireError` as other back ends do."""
+    if made.extension:
+        extension_part(made.extension)
+    data = made.data if isinstance(made.data, bytes) else bytes(made.data)
+    if len(data) > _MOST:
+        raise WireError(_("a message of ROS has less than 4 GB"), len(data))
+    return data
+
+
+def _encode_text(payload: object) -> Encoded:
+    """As the codec does; refuses what would end the text. Raises `EncodeError`."""
+    made = codecs.STRING.encode(payload)
+    if 0 in made.data:
+        raise EncodeError("string", "str", _zero_reason())
+    return made
+
+
+def _zero_reason() -> str:
+    return _("it holds a zero byte, which ends a string of ROS; use the type 'bytes'")
+
+
+def _pack_text(made: Encoded) -> bytes:
+    data = _plain(made)
+    if 0 in data:
+        raise WireError(_zero_reason(), len(data))
+    return b"".join((_HEAD, struct.pack("<I", len(data) + 1), data, b"\0"))
+
+
+def _unpack_text(cdr: bytes) -> memoryview:
+    (size,) = _numbers(cdr, "I", 4)
+    if not 0 < size <= len(cdr) - 8 or cdr[7 + size] != 0:
+        raise WireError(_("it is no text of ROS"), len(cdr))
+    return memoryview(cdr)[8 : 7 + size]
+
+
+def _pack_bytes(made: Encoded) -> bytes:
+    data = _plain(made)
+    return b"".join((_HEAD, struct.pack("<III", 0, 0, len(data)), data))
+
+
+def _unpack_bytes(cdr: bytes) -> bytes | memoryview:
+    dimensions, _offset, size = _numbers(cdr, "III", 4)
+    if dimensions:
+        return _from_field(_BYTES, cdr)
+    if size > len(cdr) - 16:
+        raise WireError(_("it is no array of bytes of ROS"), len(cdr))
+    return memoryview(cdr)[16 : 16 + size]
+
+
+def _numbers(cdr: bytes, form: str, at: int) -> tuple[int, ...]:
+    """Numbers in the order that its first four bytes tell. Raises `WireError`."""
+    if len(cdr) < at + 4 * len(form) or cdr[0] != 0 or cdr[1] > 1:
+        raise WireError(_("it is no message of ROS"), len(cdr))
+    return struct.unpack_from(f"{'<' if cdr[1] else '>'}{form}", cdr, at)
+
+
+def _from_field(name: str, cdr: bytes) -> bytes:
+    """The field `data` of a message. Raises `WireError`."""
+    try:
+        decoded = message_types().decode(name, cdr)
+    except DecodeError as error:
+        raise WireError(error.reason, len(cdr)) from error
+    data = decoded.get("data") if isinstance(decoded, dict) else None
+    return data if isinstance(data, bytes) else b""
+
+
+def _encode_image(payload: object) -> Encoded:
+    """As the codec does; refuses what would be sent raw. Raises `EncodeError`."""
+    made = image_codec.encode(payload)
+    if (made.extension or {}).get("encoding") not in _FILES:
+        raise EncodeError("image", type(payload).__name__, _raw_reason())
+    return made
+
+
+def _raw_reason() -> str:
+    return _(
+        "a compressed image of ROS is a JPEG or PNG; publish 'uint8' or 'uint16', or a map as "
+        "'sensor_msgs/msg/Image'"
+    )
+
+
+def _pack_image(made: Encoded) -> bytes:
+    data = _plain(made)
+    try:
+        kind = examine(data).kind
+    except DecodeError as error:
+        raise WireError(_raw_reason(), len(data)) from error
+    seconds, nanoseconds = divmod(time.time_ns(), 10**9)
+    # A stamp, an empty frame_id and its filling, the format's name, the file.
+    head = struct.pack("<iI", seconds, nanoseconds) + struct.pack("<I4x", 1)
+    name = kind.encode() + b"\0"
+    named = struct.pack("<I", len(name)) + name + bytes(-len(name) % 4)
+    return b"".join((_HEAD, head, named, struct.pack("<I", len(data)), data))
+
+
+def _unpack_image(cdr: bytes) -> bytes:
+    return _from_field(_IMAGE, cdr)

@@ -1,0 +1,63 @@
+"""A program with another vendor's DDS: `dust_peer.py hear|say TOPIC`.
+
+Every line it prints is a text that it heard; every line it is given is a text that it says.
+"""
+
+import os
+import sys
+from dataclasses import dataclass
+
+import dust_dds
+
+
+@dataclass
+class String:
+    data: str
+
+
+String.__name__ = "std_msgs::msg::dds_::String_"  # its name in DDS
+WAIT = dust_dds.Duration(sec=60, nanosec=0)
+KEPT = dust_dds.HistoryQosPolicy(dust_dds.HistoryQosPolicyKind.KeepLast(100))
+"""Else a reader has the last one alone, and a writer waits for each to be confirmed."""
+
+
+def tell(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+def wait(entity, status) -> None:
+    condition = entity.get_statuscondition()
+    condition.set_enabled_statuses([status])
+    waiting = dust_dds.WaitSet()
+    waiting.attach_condition(dust_dds.Condition.StatusCondition(condition))
+    waiting.wait(WAIT)
+
+
+def hear(participant, topic) -> None:
+    reliable = dust_dds.DEFAULT_RELIABILITY_QOS_POLICY_DATA_WRITER
+    qos = dust_dds.DataReaderQos(reliability=reliable, history=KEPT)
+    reader = participant.create_subscriber().create_datareader(topic, qos=qos)
+    tell("ready")
+    wait(reader, dust_dds.StatusKind.SubscriptionMatched)
+    tell("matched")
+    while True:
+        wait(reader, dust_dds.StatusKind.DataAvailable)
+        for sample in reader.take(max_samples=10):
+            tell(sample.get_data().data)
+
+
+def say(participant, topic) -> None:
+    writer = participant.create_publisher().create_datawriter(topic, qos=dust_dds.DataWriterQos(history=KEPT))
+    tell("ready")
+    for line in sys.stdin:
+        writer.write(String(line.strip()))
+
+
+def main(what: str, topic: str) -> None:
+    factory = dust_dds.DomainParticipantFactory.get_instance()
+    participant = factory.create_participant(domain_id=int(os.environ["ROS_DOMAIN_ID"]))
+    {"hear": hear, "say": say}[what](participant, participant.create_topic(topic_name=topic, type_=String))
+
+
+main(*sys.argv[1:])

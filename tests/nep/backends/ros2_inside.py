@@ -1,0 +1,463 @@
+"""ROS 2's conventions over real sockets. Run by test_ros2.py in a network of its own: see there."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import textwrap
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count, islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nep
+from nep.backends.ros2 import message_types
+from nep.backends.ros2.environment import configuration
+from nep.backends.ros2.library import dds
+from nep.backends.ros2.names import user_data_of
+from tests.nep.programs import Program, eventually, running
+
+NEEDS_DUST = "needs another vendor's DDS: pip install dust-dds==0.15.0"
+Make = Callable[[str], nep.Node]
+PEER = Path(__file__).with_name("dust_peer.py").read_text(encoding="utf-8")
+
+
+_domains = count(1)
+
+
+@pytest.fixture(autouse=True)
+def _a_domain_for_each_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs that were killed are there for ten seconds more."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(next(_domains)))
+
+
+@pytest.fixture
+def make() -> Iterator[Make]:
+    made: list[nep.Node] = []
+
+    def new(name: str) -> nep.Node:
+        made.append(nep.node(name, "ROS2"))
+        return made[-1]
+
+    yield new
+    for node in made:
+        node.close()
+
+
+BEGIN = "import nep, os, sys\nnode = nep.node('other', 'ros2')\nsay = lambda it: print(it, flush=True)\n"
+
+
+@contextmanager
+def nep_program(code: str, **environment: str) -> Iterator[Program]:
+    """A program with a node, which is asked to end by the end of its input."""
+    with running(BEGIN + textwrap.dedent(code), **environment) as other:
+        yield other
+        other.end()
+
+
+def killed_soon() -> dict[str, str]:
+    """For a program that is to be killed: others see after a second that it is gone, not after ten."""
+    settings = configuration({})
+    assert settings is not None
+    return {"CYCLONEDDS_URI": settings.replace("<Discovery>", "<Discovery><LeaseDuration>1s</LeaseDuration>")}
+
+
+# ---- two programs
+
+
+@pytest.mark.parametrize("quality", ["", "reliable"])
+def test_the_first_message_reaches_a_subscriber_that_another_program_had(make: Make, quality: str) -> None:
+    code = f"sub = node.new_sub('t', qos={quality!r})\nsay('ready')\n"
+    code += "for _ in range(3): say(sub.listen(timeout_s=60)[1])\nsay(sub.lost)"
+    with nep_program(code) as other:
+        assert other.line() == "ready"
+        pub = make("a").new_pub("t", qos=quality)
+        assert pub.subscribers == 1
+        for number in range(3):
+            pub.publish(number)
+        assert [other.line() for _ in range(4)] == ["0", "1", "2", "0"]
+
+
+def test_the_next_message_reaches_a_subscriber_that_another_program_gets(make: Make) -> None:
+    pub = make("a").new_pub("t")
+    code = "sub = node.new_sub('t')\nsay('ready')\nsay(sub.listen(timeout_s=60)[1])"
+    with nep_program(code) as other:
+        assert other.line() == "ready"
+        pub.publish("first")
+        assert other.line() == "first"
+
+
+def test_every_type_travels_between_programs(make: Make) -> None:
+    code = """
+import numpy as np
+pubs = [node.new_pub(*each) for each in [
+    ('j', 'json'), ('s', 'string'), ('b', 'bytes'), ('i', 'image'), ('m', 'msgpack'),
+    ('twist', 'geometry_msgs/Twist'), ('scan', 'sensor_msgs/msg/LaserScan'),
+    ('raw', 'sensor_msgs/msg/Image')]]
+say('ready')
+sys.stdin.readline()
+for pub, payload in zip(pubs, [
+    {'a': [1, None]}, 'grüß', bytes(range(256)), np.full((40, 60, 3), 200, np.uint8), {'b': b'x'},
+    {'linear': {'x': 0.5}}, {'ranges': np.arange(3, dtype=np.float32)},
+    {'height': 2, 'width': 2, 'encoding': 'mono8', 'step': 2, 'data': b'abcd'}]):
+    pub.publish(payload)
+sys.stdin.read()
+"""
+    node = make("a")
+    with nep_program(code) as other:
+        assert other.line() == "ready"
+        subs = [node.new_sub(*each) for each in [("j", "json"), ("s", "string"), ("b", "bytes")]]
+        picture, packed = node.new_sub("i", "image"), node.new_sub("m", "msgpack")
+        twist = node.new_sub("/twist", "geometry_msgs/msg/Twist")
+        scan, raw = (
+            node.new_sub("scan", "sensor_msgs/LaserScan"),
+            node.new_sub("raw", "sensor_msgs/msg/Image"),
+        )
+        other.say("")
+        got = [sub.listen(timeout_s=60.0)[1] for sub in subs]
+        assert got == [{"a": [1, None]}, "grüß", bytes(range(256))]
+        frame = picture.listen(timeout_s=60.0)[1]
+        assert isinstance(frame, np.ndarray)
+        assert (frame.shape, int(frame.mean())) == ((40, 60, 3), 200)
+        assert packed.listen(timeout_s=60.0) == (True, {"b": b"x"})
+        message = twist.receive(60.0)
+        assert message is not None
+        zero = {"x": 0.0, "y": 0.0, "z": 0.0}
+        assert message.payload == {"linear": zero | {"x": 0.5}, "angular": zero}
+        assert (message.codec, message.msg_type) == ("cdr", "geometry_msgs/msg/Twist")
+        assert scan.listen(timeout_s=60.0)[1]["ranges"] == [0.0, 1.0, 2.0]  # type: ignore[index]
+        assert raw.listen(timeout_s=60.0)[1]["data"] == b"abcd"  # type: ignore[index]
+
+
+def test_a_burst_and_8_mb_arrive_whole(make: Make) -> None:
+    code = """
+sub = node.new_sub('t', 'bytes')
+say('ready')
+import hashlib
+for _ in range(5): say(hashlib.sha256(sub.listen(timeout_s=60)[1]).hexdigest())
+many = node.new_sub('many')
+say('ready')
+got = [many.listen(timeout_s=60)[1] for _ in range(5000)]
+say(got == list(range(5000))); say(many.lost)
+"""
+    sent = [b"", b"\0", os.urandom(65_000), os.urandom(8_000_000), os.urandom(8_000_001)]
+    with nep_program(code) as other:
+        assert other.line() == "ready"
+        node = make("a")
+        pub = node.new_pub("t", "bytes")
+        for data in sent:
+            pub.publish(data)
+        assert [other.line() for _ in sent] == [hashlib.sha256(data).hexdigest() for data in sent]
+        assert other.line() == "ready"
+        many = node.new_pub("many")
+        for number in range(5000):
+            many.publish(number)
+        assert (other.line(), other.line()) == ("True", "0")
+
+
+def test_what_is_latched_reaches_another_program_once(make: Make) -> None:
+    pub = make("a").new_pub("/robot/description", latched=True)
+    pub.publish(1)
+    pub.publish(2)
+    code = "sub = node.new_sub('robot/description')\nm = sub.receive(60)\nsay((m.payload, m.is_latched))\n"
+    code += "say('ready')\nsay(sub.listen(timeout_s=60)[1])\nsay(sub.listen(timeout_s=0.3))"
+    with nep_program(code) as other:
+        assert other.line() == "(2, True)"
+        assert other.line() == "ready"
+        pub.publish(3)
+        assert (other.line(), other.line()) == ("3", "(False, {})")
+
+
+def test_a_publisher_that_dies_leaves_its_subscribers_well(make: Make) -> None:
+    node = make("a")
+    sub = node.new_sub("t")
+    code = "pub = node.new_pub('t')\npub.publish(1)\nsay('ready')\nsys.stdin.read()"
+    with nep_program(code, **killed_soon()) as other:
+        assert other.line() == "ready"
+        assert sub.listen(timeout_s=60.0) == (True, 1)
+        other.kill()
+    with nep_program(code) as other:
+        assert sub.listen(timeout_s=60.0) == (True, 1)
+    assert sub.lost == 0
+    eventually(lambda: "other" not in {each.name.strip("/") for each in node.graph().nodes.values()})
+
+
+def test_a_subscriber_that_dies_stops_no_publisher(make: Make) -> None:
+    code = "sub = node.new_sub('t', 'bytes')\nsay('ready')\nsys.stdin.read()"
+    pub = make("a").new_pub("t", "bytes")
+    with nep_program(code, **killed_soon()) as other:
+        assert other.line() == "ready"
+        other.kill()
+        for _ in range(20):
+            pub.publish(bytes(1_000_000))
+        assert pub.count == 20
+    sub = make("b").new_sub("t", "bytes")
+    pub.publish(b"1")
+    assert sub.listen(timeout_s=60.0) == (True, b"1")
+
+
+# ---- another vendor
+
+
+def test_another_vendor_hears_what_nep_says(make: Make) -> None:
+    pytest.importorskip("dust_dds", reason=NEEDS_DUST)
+    with running(PEER, "hear", "rt/chatter") as other:
+        assert other.line() == "ready"
+        pub = make("a").new_pub("/chatter", "std_msgs/msg/String")
+        assert other.line() == "matched"
+        eventually(lambda: pub.subscribers == 1)
+        for word in ("grüß", "", "gott"):
+            pub.publish({"data": word})
+        assert [other.line() for _ in range(3)] == ["grüß", "", "gott"]
+
+
+def test_nep_hears_what_another_vendor_says(make: Make) -> None:
+    """What is said before both have found each other may be lost, and is said again."""
+    pytest.importorskip("dust_dds", reason=NEEDS_DUST)
+    node = make("a")
+    text, data = node.new_sub("chatter", "std_msgs/String"), node.new_sub("chatter", "json")
+    with running(PEER, "say", "rt/chatter") as other:
+        assert other.line() == "ready"
+        for sub in (text, data):
+            while not sub.listen(timeout_s=0.2)[0]:
+                other.say("0")
+        for number in (1, 2, 3):
+            other.say(str(number))
+
+        def three(sub: nep.Subscriber, nothing: object) -> list[object]:
+            heard = (sub.listen(timeout_s=60.0)[1] for _ in count())
+            return list(islice((each for each in heard if each != nothing), 3))
+
+        assert three(data, 0) == [1, 2, 3]
+        assert three(text, {"data": "0"}) == [{"data": "1"}, {"data": "2"}, {"data": "3"}]
+        view = node.graph()
+        (publisher,) = view.topics["chatter"].publishers
+        assert view.nodes[publisher.node_id].name.startswith("dds/")
+
+
+# ---- what ROS 2 is told
+
+
+def test_the_graph_of_another_program_has_its_nodes_topics_and_ids(make: Make) -> None:
+    code = """
+second = nep.node('space/second', 'ros2')
+pub = node.new_pub('t', 'geometry_msgs/Twist'); sub = second.new_sub('u', 'json')
+say(node.id); say(second.id); say(pub.id); say(sub.id)
+sys.stdin.read()
+"""
+    node = make("a")
+    mine = node.new_sub("t", "geometry_msgs/Twist")
+    with nep_program(code) as other:
+        first, second, pub, sub = (other.line() for _ in range(4))
+        eventually(lambda: {first, second} <= set(node.graph().nodes))
+        view = node.graph()
+        assert {view.nodes[first].name, view.nodes[second].name} == {"/other", "/space/second"}
+        topic = view.topics["t"]
+        assert (topic.msg_type, topic.codec, topic.rate_hz) == ("geometry_msgs/Twist", "cdr", None)
+        assert [(each.id, each.node_id) for each in topic.publishers] == [(int(pub), first)]
+        assert [(each.id, each.node_id) for each in topic.subscribers] == [(mine.id, node.id)]
+        assert [(each.id, each.node_id) for each in view.topics["/u"].subscribers] == [(int(sub), second)]
+        assert view.topics["/u"].msg_type == "json"
+        assert not view.alerts
+    eventually(lambda: set(node.graph().nodes) == {node.id})
+
+
+def discovered(topic: str) -> tuple[object, object]:
+    """A participant of its own, and what it finds of a topic's only writer."""
+    library = dds()
+    participant = library.domain.DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+    reader = library.builtin.BuiltinDataReader(participant, library.builtin.BuiltinTopicDcpsPublication)
+    found: list[object] = []
+
+    def has_come() -> bool:
+        found.extend(each for each in reader.take(100) if each.topic_name == topic)
+        return bool(found)
+
+    eventually(has_come)
+    return participant, found[0]
+
+
+def test_a_writer_tells_what_ros_2_reads(make: Make) -> None:
+    make("a").new_pub("/chatter", "std_msgs/msg/String", qos="sensor")
+    participant, found = discovered("rt/chatter")
+    policies = dds().qos.Policy
+    assert found.type_name == "std_msgs::msg::dds_::String_"  # type: ignore[attr-defined]
+    qos = found.qos  # type: ignore[attr-defined]
+    told = user_data_of(qos[policies.Userdata].data)
+    assert told["typehash"] == "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+    assert policies.Reliability.BestEffort in qos
+    assert policies.Durability.Volatile in qos
+    participant.__del__()  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(("release", "length"), [("humble", 24), ("iron", 16), ("jazzy", 16)])
+def test_ids_are_as_long_as_the_release_has_them(make: Make, release: str, length: int) -> None:
+    code = """
+from nep.backends.ros2 import message_types
+print(message_types().gid_bytes, len(message_types().encode('rmw_dds_common/msg/Gid', {})) - 4)
+pub = node.new_pub('t')
+say([each.name for each in node.graph().nodes.values()])
+"""
+    with nep_program(code, ROS_DISTRO=release) as other:
+        assert other.line() == f"{length} {length}"
+        assert other.line() == "['other']"
+
+
+def test_what_tells_of_the_graph_has_the_hash_of_ros_2(make: Make) -> None:
+    make("a").new_pub("t")
+    participant, found = discovered("ros_discovery_info")
+    told = user_data_of(found.qos[dds().qos.Policy.Userdata].data)  # type: ignore[attr-defined]
+    assert told == {"typehash": "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"}
+    participant.__del__()  # type: ignore[attr-defined]
+
+
+# ---- qualities, and what is wrong
+
+
+def test_who_wants_reliability_does_not_hear_who_has_none(make: Make) -> None:
+    pub = make("a").new_pub("t", qos="best_effort")
+    node = make("b")
+    wants, takes = node.new_sub("t"), node.new_sub("t", qos="sensor")
+    assert pub.subscribers == 1
+    pub.publish(1)
+    assert takes.listen(timeout_s=60.0) == (True, 1)
+    assert wants.listen() == (False, {})
+
+
+def test_words_that_are_none(make: Make) -> None:
+    node = make("a")
+    with pytest.raises(ValueError, match="qos is 'quick'; use '', 'reliable', 'best_effort' or 'sensor'"):
+        node.new_pub("t", qos="quick")
+    with pytest.raises(nep.NepError, match=r"no type of message 'std_msgs/msg/Strng' is known; did you mean"):
+        node.new_sub("t", "std_msgs/Strng")
+    with pytest.raises(nep.NepError, match="no direct connections"):
+        node.new_pub("t", "json", node.direct())
+    for topic in ("ü", "a b"[:1] + "-b", "1a", "a//b", "a/", "a__b"):
+        with pytest.raises(nep.BadTopicError, match="ROS 2 allows"):
+            node.new_pub(topic)
+    assert node.graph().topics == {}
+
+
+def test_a_node_is_in_the_domain_that_it_is_given_and_in_no_other(make: Make) -> None:
+    here = make("here")
+    hears = here.new_sub("t")
+    with nep.node("there", "ros2", master="201") as there, nep.node("too", "ros2", master="201") as too:
+        pub, sub = there.new_pub("t"), too.new_sub("t")
+        pub.publish(1)
+        assert sub.listen(timeout_s=60.0) == (True, 1)
+        assert pub.subscribers == 1
+        assert {each.name for each in there.graph().nodes.values()} == {"there", "too"}
+        with pytest.raises(nep.NepError, match="'there' is in the domain 201 of ROS 2; make another node"):
+            there.new_sub("t", "json", there.hybrid("202"))
+    assert hears.listen() == (False, {})
+    assert {each.name for each in here.graph().nodes.values()} == {"here"}
+
+
+def test_fields_that_do_not_fit_are_named(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+    node = make("a")
+    pub = node.new_pub("t", "geometry_msgs/Twist")
+    sub = make("b").new_sub("t", "geometry_msgs/Twist")
+    pub.publish({"linear": {"x": 1}, "angular": {"z": "fast"}})
+    assert "'angular.z' is a 'str'; give a number" in caplog.text
+    assert "it is at" not in caplog.text
+    with pytest.raises(nep.EncodeError, match="publish a map of the fields of 'geometry_msgs/msg/Twist'"):
+        pub.publish([1])
+    (alert,) = node.graph().alerts
+    assert "'angular.z' is a 'str'" in alert.sentence
+    pub.publish({"angular": {"z": 1}})
+    assert sub.listen(timeout_s=60.0)[0]
+    assert (pub.count, pub.refused) == (1, 1)
+
+
+def test_bytes_that_are_no_message_are_refused_and_change_nothing(make: Make) -> None:
+    node = make("a")
+    twist, pub = node.new_sub("t", "geometry_msgs/Twist"), node.new_pub("t", "geometry_msgs/Twist")
+    bad = (b"", b"ab", b"\0\1\0\0", b"\0\1\0\0" + bytes(40), b"\0\3\0\0" + bytes(48))
+    for data in bad:
+        pub.publish_bytes(data)
+    assert (pub.count, pub.refused) == (0, len(bad))
+    with pytest.raises(nep.EncodeError):
+        pub.publish_bytes("text")  # type: ignore[arg-type]
+    pub.publish_bytes(message_types().encode("geometry_msgs/msg/Twist", {"linear": {"x": 1}}))
+    got = twist.listen(timeout_s=60.0)[1]
+    assert isinstance(got, dict)
+    assert got["linear"]["x"] == 1.0
+    assert twist.listen() == (False, {})
+
+
+def test_a_zero_byte_has_no_place_in_a_text(make: Make) -> None:
+    node = make("a")
+    sub, pub = node.new_sub("t", "string"), node.new_pub("t", "string")
+    pub.publish("a\0b")
+    pub.publish("c")
+    assert sub.listen(timeout_s=60.0) == (True, "c")
+    assert pub.refused == 1
+
+
+def test_a_child_that_is_forked_is_closed_and_ends(make: Make) -> None:
+    node = make("a")
+    sub, pub = node.new_sub("t"), node.new_pub("t")
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            with pytest.raises(nep.ClosedError):
+                sub.listen()
+            with pytest.raises(nep.ClosedError):
+                pub.publish(1)
+            with pytest.raises(nep.NepError, match="forked"):
+                nep.node("child", "ros2")
+            node.close()
+            sub.close()
+            status = 0
+        finally:
+            os._exit(status)
+    assert os.waitpid(child, 0)[1] == 0
+    pub.publish(1)
+    assert sub.listen(timeout_s=60.0) == (True, 1)
+
+
+def test_an_interpreter_that_was_forked_ends_by_itself() -> None:
+    code = """
+import os
+pub, sub = node.new_pub('t'), node.new_sub('t')
+child = os.fork()
+if child:
+    say(os.waitpid(child, 0)[1])
+"""
+    with nep_program(code) as other:
+        assert other.line() == "0"
+
+
+def test_closing_in_any_order_and_twice(make: Make) -> None:
+    first, second = make("a"), make("b")
+    pub, sub = first.new_pub("t"), second.new_sub("t")
+    first.close()
+    first.close()
+    pub.close()
+    second.close()
+    sub.close()
+    with pytest.raises(nep.ClosedError):
+        pub.publish(1)
+    third = make("c")
+    sub, pub = third.new_sub("t"), third.new_pub("t")
+    pub.publish(1)
+    assert sub.listen(timeout_s=60.0) == (True, 1)
+
+
+def test_types_of_one_s_own(make: Make, tmp_path: Path) -> None:
+    folder = tmp_path / "my_robot" / "msg"
+    folder.mkdir(parents=True)
+    (folder / "Arm.msg").write_text("float64[2] joints\nJoint[] more\nstring<=3 name\n")
+    (folder / "Joint.msg").write_text("uint8 id\nbuiltin_interfaces/Time at\n")
+    code = "sub = node.new_sub('t', 'my_robot/Arm')\nsay('ready')\nsay(sub.listen(timeout_s=60)[1])"
+    message_types().add_folder(tmp_path)
+    with nep_program(code, NEP_ROS_MSG_PATH=str(tmp_path)) as other:
+        assert other.line() == "ready"
+        payload = {"joints": [1, 2], "more": [{"id": 7, "at": {"sec": 1}}], "name": "abc"}
+        make("a").new_pub("t", "my_robot/msg/Arm").publish(payload)
+        said = "{'joints': [1.0, 2.0], 'more': [{'id': 7, 'at': {'sec': 1, 'nanosec': 0}}], 'name': 'abc'}"
+        assert other.line() == said

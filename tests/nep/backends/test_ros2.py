@@ -1,0 +1,270 @@
+"""ROS 2: what needs no network here, and ros2_inside.py and the contract in a network of their own.
+
+Cyclone DDS listens at every address of a computer (0.0.0.0), whatever it is told, so tests that open it run
+in a network namespace that has loopback and nothing else.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep.backends.base import backend_named
+from nep.backends.ros2.environment import configuration, domain, is_loopback_only
+from nep.backends.ros2.library import dds, typesys
+from nep.backends.ros2.message_types import MessageTypes
+from nep.backends.ros2.names import dds_topic, dds_type, is_type_name, ros_type, split_node_name, user_data_of
+from nep.backends.ros2.type_mapping import mapping_for
+from nep.errors import WireError, WrongTypeError
+
+HERE = Path(__file__).parent
+NEEDS = "ROS 2 without an installation needs Cyclone DDS: pip install 'nep-studio[ros2]'"
+NAMESPACE = [
+    "unshare", "-rn", "bash", "-c",
+    'ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo && exec "$@"', "--",
+]  # fmt: skip
+
+
+def why_not() -> str:
+    """What is missing for a network of its own; empty when nothing is."""
+    missing = [each for each in ("unshare", "bash", "ip") if shutil.which(each) is None]
+    if missing:
+        return f"a network of its own needs {', '.join(missing)} (Linux: util-linux, iproute2)"
+    done = subprocess.run([*NAMESPACE, "true"], capture_output=True, text=True, check=False)
+    return f"a network of its own cannot be made: {done.stderr.strip()[:200]}" if done.returncode else ""
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("file", ["ros2_inside.py", "test_contract.py"])
+def test_in_a_network_of_its_own(file: str) -> None:
+    pytest.importorskip("cyclonedds", reason=NEEDS)
+    pytest.importorskip("rosbags", reason=NEEDS)
+    if reason := why_not():
+        pytest.skip(reason)
+    known = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "CYCLONEDDS_"))}
+    done = subprocess.run(
+        [*NAMESPACE, sys.executable, "-m", "pytest", "-q", "-n0", "--color=no", str(HERE / file)],
+        env=known | {"NEP_TEST_ROS2": "1"},
+        cwd=HERE.parents[2],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-20_000:] + done.stderr[-2000:]
+    assert " passed" in done.stdout
+
+
+# ---- names and the environment
+
+
+def test_names() -> None:
+    assert dds_topic("chatter") == dds_topic("/chatter") == "rt/chatter"
+    assert dds_type("std_msgs/msg/String") == "std_msgs::msg::dds_::String_"
+    assert ros_type("std_msgs::msg::dds_::String_") == "std_msgs/msg/String"
+    assert ros_type("Anything") == "Anything"
+    assert is_type_name("std_msgs/String")
+    assert not any(map(is_type_name, ("json", "robot/description", "a/srv/B", "std_msgs/msg/", "/String")))
+    assert split_node_name("face tracker") == ("/", "face_tracker")
+    assert split_node_name("/a/1b") == ("/a", "_1b")
+    assert split_node_name("/") == ("/", "_")
+    assert user_data_of(b"typehash=RIHS01_a;x=;=y;\xff;nepid=1f;") == {"typehash": "RIHS01_a", "nepid": "1f"}
+
+
+@pytest.mark.parametrize("said", ["-1", "233", "1.0", "9" * 5000, "\u0661", "x"])
+def test_domains_that_are_none(said: str) -> None:
+    with pytest.raises(nep.NepError, match="set it to a number from 0 to 232"):
+        domain(None, {"ROS_DOMAIN_ID": said})
+    with pytest.raises(nep.NepError, match="is no domain of ROS 2; use a number from 0 to 232"):
+        domain(said, {})
+
+
+def test_a_domain_is_what_the_node_is_told_else_the_environment_s() -> None:
+    assert domain("7", {"ROS_DOMAIN_ID": "5"}) == domain(" 007 ", {}) == "7"
+    assert domain(None, {"ROS_DOMAIN_ID": "232"}) == "232"
+    assert domain("", {}) == domain(None, {"ROS_DOMAIN_ID": ""}) == "0"
+    with pytest.raises(WrongTypeError, match="a domain of ROS 2 is a 'str' such as '5', not a 'int'"):
+        domain(5, {})  # type: ignore[arg-type]
+
+
+def test_only_this_computer_is_reached_unless_it_is_said() -> None:
+    assert is_loopback_only({})
+    assert is_loopback_only({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
+    assert is_loopback_only({"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"})
+    assert not is_loopback_only({"ROS_AUTOMATIC_DISCOVERY_RANGE": "subnet"})
+    assert not is_loopback_only({"ROS_LOCALHOST_ONLY": "0"})
+    assert '"127.0.0.1" multicast' in str(configuration({}))
+    assert "127.0.0.1" not in str(configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}))
+    assert "Peer" not in str(configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}))
+    peers = str(configuration({"ROS_STATIC_PEERS": '192.0.2.1;"<'}))
+    assert '<Peer Address="192.0.2.1"/>' in peers
+    assert '<Peer Address="&quot;&lt;"/>' in peers
+    assert configuration({"CYCLONEDDS_URI": "file:///mine.xml"}) is None
+    with pytest.raises(nep.NepError, match="use SUBNET, LOCALHOST or OFF"):
+        configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "everywhere"})
+
+
+# ---- what is missing, and other back ends
+
+
+def test_without_the_packages_one_sentence_says_what_to_install() -> None:
+    def missing(_name: str) -> object:
+        raise ImportError
+
+    for library in (dds, typesys):
+        with pytest.raises(nep.NepError, match=r"'ros2' is not installed; install it with 'pip install"):
+            library(missing)  # type: ignore[operator]
+
+
+def test_who_does_not_ask_for_it_does_not_import_its_packages() -> None:
+    code = "import sys, nep; nep.node('a', 'memory').close(); "
+    code += "sys.exit(bool({'cyclonedds', 'rosbags'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_its_other_names() -> None:
+    assert backend_named("ROS2") is backend_named("ros2")
+
+
+# ---- messages
+
+
+@pytest.fixture(scope="module")
+def types() -> MessageTypes:
+    pytest.importorskip("rosbags", reason=NEEDS)
+    return MessageTypes("jazzy")
+
+
+def test_every_type_that_is_known_comes_back_from_its_bytes(types: MessageTypes) -> None:
+    assert len(types.names) > 150
+    for name in types.names:
+        empty = types.encode(name, {})
+        assert types.encode(name, types.decode(name, empty)) == empty
+
+
+def test_hashes_are_those_of_ros_2(types: MessageTypes) -> None:
+    """As real ROS 2 told them; `Gid` has a `char`, which rosbags takes for a type of its own."""
+    string = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+    info = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
+    assert types.type_hash("std_msgs/msg/String") == string
+    assert types.type_hash("rmw_dds_common/msg/ParticipantEntitiesInfo") == info
+
+
+@pytest.mark.parametrize(
+    ("name", "payload", "sentence"),
+    [
+        ("geometry_msgs/msg/Twist", {"linear": {"q": 1}}, "'linear.q' is no field of 'geometry_msgs/msg/Vec"),
+        ("geometry_msgs/msg/Twist", {"linear": 5}, "'linear' is a 'int'; give a map of the fields"),
+        ("geometry_msgs/msg/Twist", {1: 2}, "'1' is no field"),
+        ("sensor_msgs/msg/Image", {"height": -1}, "'height' is not from 0 to 4294967295, as 'uint32' is"),
+        ("sensor_msgs/msg/Image", {"data": [0, 256]}, r"'data\[1\]' is not from 0 to 255"),
+        ("sensor_msgs/msg/Image", {"data": "text"}, "'data' is a 'str'; give a list"),
+        ("sensor_msgs/msg/JointState", {"name": ["a", 1]}, r"'name\[1\]' is a 'int'; give a 'str'"),
+        ("sensor_msgs/msg/JointState", {"position": [1, None]}, r"'position\[1\]' is a 'NoneType'"),
+        ("sensor_msgs/msg/JointState", {"position": b"ab"}, "'position' is a 'bytes'; give a list"),
+        ("geometry_msgs/msg/PoseWithCovariance", {"covariance": []}, "'covariance' has 0 items; give 36"),
+        ("std_msgs/msg/UInt64", {"data": 2**64}, "'data' is not from 0 to 18446744073709551615"),
+        ("std_msgs/msg/Int64", {"data": 2**63}, "'data' is not from -9223372036854775808 to"),
+        ("std_msgs/msg/Int64", {"data": 1.0}, "'data' is a 'float'; give a whole number"),
+        ("std_msgs/msg/Int8", {"data": True}, "'data' is a 'bool'"),
+        ("std_msgs/msg/Float32", {"data": 1e39}, "'data' is too large for 'float32'"),
+        ("std_msgs/msg/Float64", {"data": 10**400}, "'data' is too large for 'float64'"),
+        ("std_msgs/msg/Bool", {"data": 1}, "'data' is a 'int'; give True or False"),
+        ("std_msgs/msg/String", {"data": "\ud800"}, "'data' holds half of a surrogate pair"),
+        ("std_msgs/msg/String", {"data": "a\0"}, "'data' holds a zero byte"),
+        ("std_msgs/msg/Float32MultiArray", {"data": [1e39]}, r"'data\[0\]' is too large"),
+        ("tf2_msgs/msg/TFMessage", {"transforms": [{"child": 1}]}, r"'transforms\[0\].child' is no field"),
+    ],
+)
+def test_what_does_not_fit_is_named_with_its_place(
+    types: MessageTypes, name: str, payload: object, sentence: str
+) -> None:
+    with pytest.raises(nep.EncodeError, match=sentence) as caught:
+        types.encode(name, payload)
+    assert caught.value.place
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("std_msgs/msg/UInt64", 2**64 - 1),
+        ("std_msgs/msg/Int64", -(2**63)),
+        ("std_msgs/msg/Float32", float("inf")),
+        ("std_msgs/msg/Byte", 255),
+        ("std_msgs/msg/Char", 255),
+        ("std_msgs/msg/String", "grüß \U0001f916"),
+        ("std_msgs/msg/UInt8MultiArray", b""),
+        ("std_msgs/msg/ByteMultiArray", b"\0\x7f\x80\xff"),
+        ("std_msgs/msg/Int64MultiArray", [-(2**63), 0, 2**63 - 1]),
+        ("std_msgs/msg/UInt64MultiArray", [0, 2**64 - 1]),
+        ("std_msgs/msg/Float64MultiArray", [0.5, float("-inf")]),
+    ],
+)
+def test_extremes_travel(types: MessageTypes, name: str, value: object) -> None:
+    decoded = types.decode(name, types.encode(name, {"data": value}))
+    assert isinstance(decoded, dict)
+    assert decoded["data"] == value
+
+
+def test_nan_travels_and_arrays_of_numpy_are_taken(types: MessageTypes) -> None:
+    np = pytest.importorskip("numpy")
+    name = "sensor_msgs/msg/LaserScan"
+    ranges = np.array([1.0, np.nan, np.inf])
+    decoded = types.decode(name, types.encode(name, {"ranges": ranges, "angle_min": np.float64(0.5)}))
+    assert isinstance(decoded, dict)
+    assert np.array_equal(decoded["ranges"], ranges, equal_nan=True)
+    assert decoded["angle_min"] == 0.5
+
+
+@pytest.mark.parametrize("cut", range(0, 60, 3))
+def test_bytes_that_are_cut_off_are_no_message(types: MessageTypes, cut: int) -> None:
+    name = "sensor_msgs/msg/JointState"
+    whole = types.encode(name, {"name": ["a", "b"], "position": [1.0, 2.0]})
+    with pytest.raises(nep.DecodeError):
+        types.decode(name, whole[:cut])
+
+
+def test_definitions_that_cannot_be(types: MessageTypes, tmp_path: Path) -> None:
+    types.add("mine/Arm", "float64[2] joints\n")
+    types.add("mine/msg/Arm", "float64[2] joints\n")  # the same again
+    with pytest.raises(nep.NepError, match="'mine/msg/Arm' is known with other fields"):
+        types.add("mine/Arm", "float64[3] joints\n")
+    with pytest.raises(nep.NepError, match="the definition of 'mine/msg/Leg' cannot be read"):
+        types.add("mine/Leg", "nonsense\n")
+    with pytest.raises(nep.NepError, match="'mine/msg/Leg' uses 'no/msg/Thing' for its field 'a'"):
+        types.add("mine/Leg", "no/Thing a\n")
+    with pytest.raises(nep.NepError, match="is no type of a message of ROS"):
+        types.add("mine", "int8 a\n")
+    with pytest.raises(nep.NepError, match=r"there is no \.msg file"):
+        types.add_folder(tmp_path)
+    assert "mine/msg/Leg" not in types.names
+
+
+def test_a_release_that_is_none() -> None:
+    pytest.importorskip("rosbags", reason=NEEDS)
+    with pytest.raises(nep.NepError, match="ROS_DISTRO is 'jazy', which rosbags does not know; did you mean"):
+        MessageTypes("jazy")
+
+
+@pytest.mark.parametrize("msg_type", ["json", "string", "bytes", "image"])
+@pytest.mark.parametrize(
+    "cdr",
+    [
+        b"", b"\0", b"\0\1\0\0", b"\0\1\0\0\0\0\0\0", b"\0\1\0\0\xff\xff\xff\xff", b"\0\3\0\0\2\0\0\0a\0",
+        b"\0\1\0\0\2\0\0\0ab", b"\0\1\0\0\0\0\0\0\0\0\0\0\xff\xff\xff\xff",
+    ],
+)  # fmt: skip
+def test_what_is_no_message_is_refused(msg_type: str, cdr: bytes) -> None:
+    pytest.importorskip("rosbags", reason=NEEDS)
+    with pytest.raises(WireError):
+        mapping_for(msg_type).unpack(cdr)
+
+
+def test_texts_of_a_computer_with_the_other_order_of_bytes_are_read() -> None:
+    assert bytes(mapping_for("string").unpack(b"\0\0\0\0\0\0\0\3ab\0")) == b"ab"
