@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Mapping
 from html import escape
+from typing import Literal
 
 from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
@@ -19,8 +21,11 @@ _PARTICIPANTS = 32
 """So many programs of a computer are looked for where multicast does not work."""
 _SIZES = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
 """Large messages need few packets, 8 MB a seventh of the time."""
-_ROOM = "<Internal><Watermarks><WhcHigh>64MB</WhcHigh></Watermarks></Internal>"
-"""So much is on its way before publishing waits."""
+_INTERNAL = (
+    "<Internal><Watermarks><WhcHigh>64MB</WhcHigh></Watermarks>"
+    "<WriterLingerDuration>0s</WriterLingerDuration></Internal>"
+)
+"""So much is on its way before publishing waits; whoever closes has waited already."""
 
 
 def domain(master: str | None, environment: Mapping[str, str] = os.environ) -> str:
@@ -66,31 +71,46 @@ def _range(environment: Mapping[str, str]) -> str:
     return said
 
 
-def is_loopback_only(environment: Mapping[str, str]) -> bool:
-    """Whether only programs of this computer are met. So it is unless it is said otherwise."""
-    local = environment.get("ROS_LOCALHOST_ONLY", "").strip()
+def _reach(environment: Mapping[str, str]) -> Literal["nobody", "computer", "peers", "subnet"]:
+    """Who may be met. Raises `NepError`."""
+    local, said = environment.get("ROS_LOCALHOST_ONLY", "").strip(), _range(environment)
+    if said == "OFF":
+        return "nobody"
     if local == "1":
-        return True
-    return local != "0" and _range(environment) not in _EVERYWHERE
+        return "computer"
+    if local == "0" or said in _EVERYWHERE:
+        return "subnet"
+    return "peers" if _peers(environment) else "computer"
+
+
+def _peers(environment: Mapping[str, str]) -> list[str]:
+    return [each.strip() for each in environment.get("ROS_STATIC_PEERS", "").split(";") if each.strip()]
+
+
+def is_loopback_only(environment: Mapping[str, str]) -> bool:
+    """Whether only programs of this computer are met, or none. So it is unless it is said otherwise."""
+    return _reach(environment) in {"nobody", "computer"}
 
 
 def configuration(environment: Mapping[str, str]) -> str | None:
     """Settings for Cyclone DDS as XML; None when CYCLONEDDS_URI has the user's own."""
     if environment.get("CYCLONEDDS_URI"):
         return None
-    is_off = _range(environment) == "OFF"
-    peers = [each for each in environment.get("ROS_STATIC_PEERS", "").split(";") if each.strip()]
-    interface = ""
-    if is_loopback_only(environment):
-        interface = (
-            '<Interfaces><NetworkInterface address="127.0.0.1" multicast="true"/></Interfaces>'
-            f"<AllowMulticast>{'false' if is_off else 'true'}</AllowMulticast>"
-        )
-        peers = [*peers, *([] if is_off else ["127.0.0.1"])]
-    listed = "".join(f'<Peer Address="{escape(each.strip())}"/>' for each in peers)
+    reach = _reach(environment)
+    peers = {
+        "nobody": [],
+        "computer": ["127.0.0.1"],
+        "peers": [*_peers(environment), "127.0.0.1"],
+        "subnet": _peers(environment),
+    }[reach]
+    interface = '<Interfaces><NetworkInterface address="127.0.0.1" multicast="true"/></Interfaces>'
+    is_cast = reach in {"computer", "subnet"}
+    listed = "".join(f'<Peer Address="{escape(each)}"/>' for each in peers)
     return (
-        f'<CycloneDDS><Domain Id="any"><General>{interface}{_SIZES}</General>'
-        f"<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+        f'<CycloneDDS><Domain Id="any"><General>{interface if is_loopback_only(environment) else ""}'
+        f"<AllowMulticast>{'default' if is_cast else 'false'}</AllowMulticast>{_SIZES}</General>"
+        f"<Discovery>{f'<Tag>nobody-{secrets.token_hex(8)}</Tag>' if reach == 'nobody' else ''}"
+        f"<ParticipantIndex>auto</ParticipantIndex>"
         f"<MaxAutoParticipantIndex>{_PARTICIPANTS}</MaxAutoParticipantIndex>"
-        f"{f'<Peers>{listed}</Peers>' if listed else ''}</Discovery>{_ROOM}</Domain></CycloneDDS>"
+        f"{f'<Peers>{listed}</Peers>' if listed else ''}</Discovery>{_INTERNAL}</Domain></CycloneDDS>"
     )

@@ -1,10 +1,13 @@
-"""The libraries cyclonedds and rosbags: found when the first node asks for them, and told of forks."""
+"""The libraries cyclonedds and rosbags: found when the first node asks; told of forks, kept to loopback."""
 
 from __future__ import annotations
 
 import importlib
+import os
+import socket
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -12,9 +15,12 @@ from nep.errors import BackendUnavailableError, NepError
 from nep.i18n import _
 from nep.system.forks import in_child
 
-__all__ = ["Dds", "dds", "has_forked", "typesys"]
+__all__ = ["Dds", "dds", "has_forked", "keep_to_loopback", "typesys"]
 
 _PARTS = ("core", "domain", "idl", "pub", "sub", "topic", "qos", "builtin")
+_DESCRIPTORS = "/proc/self/fd"
+_PORTS, _PORTS_OF_A_DOMAIN = 7400, 250
+"""Where the ports of domain 0 begin, and how many each has, as DDS's wire protocol says."""
 _inherited: set[str] = set()
 """Whether this is a child that was forked: the threads of Cyclone DDS stayed behind."""
 
@@ -60,6 +66,30 @@ def typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
 
 def _unavailable() -> BackendUnavailableError:
     return BackendUnavailableError("ros2", _("install it with 'pip install nep-studio[ros2]'"))
+
+
+def keep_to_loopback(domain: int) -> None:
+    """Let this process's sockets of a domain hear loopback alone, where the system can do that (Linux).
+
+    Cyclone DDS binds what it hears with to every address, whatever it is told.
+    """
+    if not sys.platform.startswith("linux"):
+        return
+    first = _PORTS + _PORTS_OF_A_DOMAIN * domain
+    for each in Path(_DESCRIPTORS).iterdir():
+        try:
+            if not each.is_socket():
+                continue
+            with socket.socket(fileno=os.dup(int(each.name))) as copy:
+                host, port = copy.getsockname()[:2]
+                if host == "0.0.0.0" and port in range(first, first + _PORTS_OF_A_DOMAIN):  # noqa: S104
+                    copy.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo\0")
+        except (
+            OSError,
+            ValueError,
+            TypeError,
+        ):  # gone, of another kind, or an old kernel forbids it
+            continue
 
 
 def has_forked() -> bool:

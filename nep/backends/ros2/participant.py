@@ -17,8 +17,8 @@ from functools import partial
 from typing import Any, Protocol
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
-from nep.backends.ros2.environment import configuration
-from nep.backends.ros2.library import Dds, dds
+from nep.backends.ros2.environment import configuration, is_loopback_only
+from nep.backends.ros2.library import Dds, dds, keep_to_loopback
 from nep.backends.ros2.message_types import MessageTypes, message_types
 from nep.backends.ros2.names import split_node_name, user_data, user_data_of
 from nep.backends.ros2.topics import DdsTopics, sample_of
@@ -156,6 +156,8 @@ class Participant:
         self.entity = self.dds.domain.DomainParticipant(
             self.number, self.qos(policy(self.dds).Userdata(user_data({"enclave": "/"})))
         )
+        if self._domain is not None and is_loopback_only(os.environ):
+            keep_to_loopback(self.number)
         self.gid = self.entity.guid.bytes
         self.topics = DdsTopics(self.dds, self.types, self.entity)
         """Under `changed`."""

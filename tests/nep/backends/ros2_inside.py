@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import socket
 import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -312,6 +313,53 @@ def test_what_tells_of_the_graph_has_the_hash_of_ros_2(make: Make) -> None:
     told = user_data_of(found.qos[dds().qos.Policy.Userdata].data)  # type: ignore[attr-defined]
     assert told == {"typehash": "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"}
     participant.__del__()  # type: ignore[attr-defined]
+
+
+# ---- who may be met
+
+
+def udp_sockets() -> dict[int, tuple[str, bytes]]:
+    """The UDP sockets of this process: at each port the address, and the device that is heard alone."""
+    found = {}
+    for each in Path("/proc/self/fd").iterdir():
+        if not each.is_socket():
+            continue
+        with socket.socket(fileno=os.dup(int(each.name))) as copy:
+            if copy.family == socket.AF_INET and copy.type == socket.SOCK_DGRAM:
+                host, port = copy.getsockname()
+                device = copy.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16)
+                found[port] = (host, device.rstrip(b"\0"))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("environment", "is_open"),
+    [
+        ({}, False),
+        ({"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, False),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, True),
+        ({"ROS_STATIC_PEERS": "127.0.0.1"}, True),
+    ],
+)
+def test_sockets_hear_loopback_alone_unless_it_is_said(
+    make: Make, monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], *, is_open: bool
+) -> None:
+    for key, value in environment.items():
+        monkeypatch.setenv(key, value)
+    make("a").new_pub("t")
+    found = udp_sockets()
+    assert len(found) >= 3
+    heard = {host for host, device in found.values() if device != b"lo"}
+    assert (heard <= {"127.0.0.1"}) is not is_open
+
+
+def test_who_is_off_meets_nobody(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
+    with nep_program("node.new_pub('t'); say('ready'); sys.stdin.read()") as other:
+        assert other.line() == "ready"
+        node = make("a")
+        node.new_sub("t")
+        assert {each.name for each in node.graph().nodes.values()} == {"a"}
 
 
 # ---- qualities, and what is wrong

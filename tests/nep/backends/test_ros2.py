@@ -102,8 +102,13 @@ def test_only_this_computer_is_reached_unless_it_is_said() -> None:
     assert '"127.0.0.1" multicast' in str(configuration({}))
     assert "127.0.0.1" not in str(configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}))
     assert "Peer" not in str(configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}))
-    peers = str(configuration({"ROS_STATIC_PEERS": '192.0.2.1;"<'}))
+    named = {"ROS_STATIC_PEERS": '192.0.2.1; "<;'}
+    peers = str(configuration(named))
+    assert not is_loopback_only(named)
     assert '<Peer Address="192.0.2.1"/>' in peers
+    assert "<AllowMulticast>false" in peers
+    assert "Peer" not in str(configuration(named | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}))
+    assert "192.0.2.1" not in str(configuration(named | {"ROS_LOCALHOST_ONLY": "1"}))
     assert '<Peer Address="&quot;&lt;"/>' in peers
     assert configuration({"CYCLONEDDS_URI": "file:///mine.xml"}) is None
     with pytest.raises(nep.NepError, match="use SUBNET, LOCALHOST or OFF"):
