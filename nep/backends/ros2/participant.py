@@ -11,14 +11,15 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Protocol
 
-from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec
 from nep.backends.ros2.environment import configuration, is_loopback_only
 from nep.backends.ros2.library import Dds, dds, keep_to_loopback
+from nep.backends.ros2.matches import Matches
 from nep.backends.ros2.message_types import MessageTypes, message_types
 from nep.backends.ros2.names import split_node_name, user_data, user_data_of
 from nep.backends.ros2.topics import DdsTopics, sample_of
@@ -45,6 +46,7 @@ _FILES = 16
 """What a participant opens."""
 _SETTLE_S = 0.3
 """So old a participant knows the others that are there: their answers come within milliseconds."""
+_LOOK_S = 0.01
 _AT_ONCE = 10_000
 
 
@@ -135,7 +137,7 @@ class Participant:
         self._members: dict[str, _Member] = {}
         self._others: dict[bytes, tuple[RosNode, ...]] = {}
         self._reads: dict[int, tuple[Any, Any, Callable[[], None]]] = {}
-        self._is_closing = self._has_news = False
+        self._is_closing = self._has_news = self._is_settled = False
         check_room(_FILES, "a participant of ROS 2")
         try:
             self._begin()
@@ -179,26 +181,14 @@ class Participant:
                 reader, core.ViewState.Any | core.SampleState.NotRead | core.InstanceState.Any
             )
             self.watch(reader, news, partial(self._read_news, reader, news))
-        policies = policy(self.dds)
-        told = policies.Userdata(user_data({"typehash": self.types.type_hash(_INFO)}))
-        common = (
-            policies.Reliability.Reliable(100_000_000),
-            policies.Durability.TransientLocal,
-            policies.DataRepresentation(use_cdrv0_representation=True),
-            told,
-        )
-        last = policies.History.KeepLast(1)
-        topic = self.topics.topic(_INFO_TOPIC, _INFO)
-        self._info_writer = self.dds.pub.DataWriter(
-            self.entity,
-            topic,
-            self.qos(*common, last, policies.DurabilityService(0, last, -1, -1, -1)),
-        )
-        reader = self.dds.sub.DataReader(
-            self.entity, topic, self.qos(*common, policies.History.KeepLast(1000))
-        )
-        ready = core.ReadCondition(reader, any_state | core.InstanceState.Any)
-        self.watch(reader, ready, lambda: self._read_infos(reader, ready))
+        self._info_writer = self.topics.state_writer(_INFO_TOPIC, _INFO)
+        self.matches = Matches(self.dds, self.types, self.topics, self.gid)
+        for state, hear in (
+            (self.topics.state_reader(_INFO_TOPIC, _INFO), self._hear_info),
+            (self.matches.reader, self.matches.hear),
+        ):
+            ready = core.ReadCondition(state, any_state | core.InstanceState.Any)
+            self.watch(state, ready, partial(_read_states, state, ready, hear))
 
     def _own_domain(self, settings: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         try:
@@ -214,9 +204,25 @@ class Participant:
 
     def settle(self) -> None:
         """Wait until the others that were there can be known."""
+        if self._is_settled:
+            return
         with self.changed:
             while (left := self._began_at + _SETTLE_S - time.monotonic()) > 0.0 and not self._is_closing:
                 self.changed.wait(left)
+            deadline = time.monotonic() + HANDSHAKE_S
+            while not self._is_complete() and (left := deadline - time.monotonic()) > 0.0:
+                self.changed.wait(min(left, _LOOK_S))
+            self._is_settled = True
+
+    def _is_complete(self) -> bool:
+        """Whether all participants of ROS 2 that are known have told of their nodes, and these are found."""
+        if self._is_closing:
+            return True
+        found = {each.gid for kind in ("writer", "reader") for each in self.endpoints(kind)}
+        telling = self.participants(with_nodes=True) - {self.gid}
+        return all(
+            gid in self._others and all(node.gids <= found for node in self._others[gid]) for gid in telling
+        )
 
     # ---- nodes
 
@@ -234,19 +240,24 @@ class Participant:
                 self._tell()
             return not self._members
 
-    def assign(self, node_id: str, kind: str, gid: bytes) -> None:
+    def assign(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """A "writer" or "reader" is this node's."""
         with self.changed:
             if node_id in self._members:
-                self._members[node_id].gids[kind].add(gid)
+                self._members[node_id].gids[kind].add(entity.guid.bytes)
                 self._tell()
+            self.matches.follow(entity)
+            self._waitset.attach(entity)
 
-    def withdraw(self, node_id: str, kind: str, gid: bytes) -> None:
+    def withdraw(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """It is closed."""
         with self.changed:
             if node_id in self._members:
-                self._members[node_id].gids[kind].discard(gid)
+                self._members[node_id].gids[kind].discard(entity.guid.bytes)
                 self._tell()
+            self.matches.forget(entity.guid.bytes)
+            self._waitset.detach(entity)
+            _delete(entity)
 
     def _tell(self) -> None:
         """Write the nodes of this process into `ros_discovery_info`. With the lock held."""
@@ -273,19 +284,12 @@ class Participant:
         reader.read(_AT_ONCE, news)
         self._has_news = True
 
-    def _read_infos(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        for sample in reader.take(100, ready):
-            cdr = getattr(sample, "cdr", None)
-            if cdr is None:
-                continue
-            try:
-                info = self.types.decode(_INFO, cdr)
-            except DecodeError as error:
-                _logger.debug("what came on ros_discovery_info cannot be read: %s", error)
-                continue
-            self._note(info)
-
-    def _note(self, info: Any) -> None:  # noqa: ANN401 - a map of the fields
+    def _hear_info(self, cdr: bytes) -> None:
+        try:
+            info: Any = self.types.decode(_INFO, cdr)
+        except DecodeError as error:
+            _logger.debug("what came on ros_discovery_info cannot be read: %s", error)
+            return
         gid = info["gid"]["data"][:16]
         if gid == self.gid or (gid not in self._others and len(self._others) >= _MOST_PARTICIPANTS):
             return
@@ -298,6 +302,13 @@ class Participant:
             )
             for each in info["node_entities_info_seq"]
         )
+
+    def names_of(self, gids: Iterable[bytes]) -> tuple[str, ...]:
+        """The names of the nodes that these writers and readers of others are of, each once."""
+        wanted = set(gids)
+        with self.changed:
+            nodes = [node for others in self._others.values() for node in others if node.gids & wanted]
+        return tuple(sorted({each.name for each in nodes}))
 
     @property
     def locals(self) -> tuple[Local, ...]:
@@ -313,15 +324,21 @@ class Participant:
 
     # ---- discovery
 
-    def participants(self) -> frozenset[bytes]:
-        """All participants of the domain that are there."""
+    def participants(self, *, with_nodes: bool = False) -> frozenset[bytes]:
+        """All participants of the domain that are there, or those that have nodes of ROS 2."""
         core, builtin = self.dds.core, self.dds.builtin
         with self.changed:
             reader = builtin.BuiltinDataReader(self.entity, builtin.BuiltinTopicDcpsParticipant)
             alive = core.ReadCondition(
                 reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Alive
             )
-            return frozenset(each.key.bytes for each in reader.read(_AT_ONCE, alive))
+            found = reader.read(_AT_ONCE, alive)
+        told = policy(self.dds).Userdata
+        return frozenset(
+            each.key.bytes
+            for each in found
+            if not with_nodes or (told in each.qos and "enclave" in user_data_of(each.qos[told].data))
+        )
 
     def endpoints(self, kind: str, topic: str | None = None) -> list[DdsEndpoint]:
         """All "writer"s or "reader"s that are there, on every topic or on one of DDS."""
@@ -377,6 +394,7 @@ class Participant:
                             read()
                         except Exception:
                             _logger.exception("what came over ROS 2 cannot be read")
+                self.matches.look()
                 if self._has_news:
                     self._has_news = False
                     for member in list(self._members.values()):
@@ -405,6 +423,13 @@ class Participant:
             for entity in (self._waitset, self._guard, self.entity, self._domain):
                 if entity is not None:
                     _delete(entity)
+
+
+def _read_states(reader: Any, ready: Any, hear: Callable[[bytes], None]) -> None:  # noqa: ANN401 - see above
+    for sample in reader.take(100, ready):
+        cdr = getattr(sample, "cdr", None)
+        if cdr is not None:
+            hear(cdr)
 
 
 def _delete(entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed

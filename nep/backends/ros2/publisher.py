@@ -5,13 +5,13 @@ from __future__ import annotations
 import logging
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec
 from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.names import dds_topic, dds_type, user_data
-from nep.backends.ros2.participant import Participant
+from nep.backends.ros2.participant import DdsEndpoint, Participant
 from nep.backends.ros2.quality import depth_of, qualities
 from nep.backends.ros2.topics import sample_of
 from nep.backends.ros2.type_mapping import mapping_for
@@ -25,19 +25,29 @@ __all__ = ["RosPublisher", "told_of", "wait_for_others"]
 _logger = logging.getLogger("nep")
 _PLAIN = re.compile(r"[\w./-]{1,100}", re.ASCII)
 _GREETING_S = 0.1
-"""What another program needs to get ready after both know of each other; DDS has no word for "I am"."""
+"""What another program than nep's needs to get ready after both know of each other."""
+_LOOK_S = 0.01
 
 
-def wait_for_others(participant: Participant, known: set[bytes], matched: Callable[[], set[bytes]]) -> None:
-    """Wait until all of `known` are matched, half a second at most, and those of other programs are ready."""
+def wait_for_others(
+    participant: Participant, known: Sequence[DdsEndpoint], entities: Callable[[], Sequence[Any]]
+) -> tuple[str, ...]:
+    """Wait until all of `known` and ours have found each other, half a second at most; nodes that have not.
+
+    `entities`: our writer or readers. Other programs than nep's do not tell when they are ready.
+    """
     deadline = time.monotonic() + HANDSHAKE_S
+    expected = [(each.gid, each.participant, "nepid" in each.nep) for each in known]
     with participant.changed:
-        while known - matched() and (left := deadline - time.monotonic()) > 0.0:
-            participant.changed.wait(min(left, 0.01))
-        ready_at = time.monotonic() + _GREETING_S
-        if any(gid[:12] != participant.gid[:12] for gid in matched()):
+        while (unready := participant.matches.unready(entities(), expected)) and (
+            left := deadline - time.monotonic()
+        ) > 0.0:
+            participant.changed.wait(min(left, _LOOK_S))
+        if any(each.participant != participant.gid and "nepid" not in each.nep for each in known):
+            ready_at = time.monotonic() + _GREETING_S
             while (left := ready_at - time.monotonic()) > 0.0:
                 participant.changed.wait(left)
+        return participant.names_of(unready)
 
 
 def told_of(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
@@ -61,7 +71,6 @@ class RosPublisher:
         self.spec = spec
         self.count = 0
         self.problem = ""
-        self.missing: tuple[str, ...] = ()
         self._bytes = 0
         self._stamp_ns: int | None = None
         self._participant = participant
@@ -81,26 +90,16 @@ class RosPublisher:
                 participant.topics.topic(name, ros_type),
                 participant.qos(*qualities(library, spec.qos, depth, is_latched=spec.is_latched, told=told)),
             )
-            self.gid: bytes = self._writer.guid.bytes
-            participant.assign(node_id, "writer", self.gid)
+            participant.assign(node_id, "writer", self._writer)
         is_reliable = spec.qos in ("", "reliable")
-        wanted = {
-            each.gid
+        wanted = [
+            each
             for each in participant.endpoints("reader", name)
             if each.type == dds_type(ros_type)
             and (is_reliable or not each.is_reliable)
             and (spec.is_latched or not each.is_latched)
-        }
-        wait_for_others(participant, wanted, self._matched)
-
-    def _matched(self) -> set[bytes]:
-        """The readers that get what is written."""
-        found = set()
-        for handle in self._writer.get_matched_subscriptions():
-            data = self._writer.get_matched_subscription_data(handle)
-            if data is not None:
-                found.add(data.key.bytes)
-        return found
+        ]
+        self.missing = wait_for_others(participant, wanted, lambda: [self._writer])
 
     @property
     def record(self) -> PublisherRecord:
@@ -188,5 +187,4 @@ class RosPublisher:
         with self._participant.changed:
             if not self._is_closed:
                 self._is_closed = True
-                self._participant.withdraw(self._node_id, "writer", self.gid)
-                self._writer.__del__()
+                self._participant.withdraw(self._node_id, "writer", self._writer)

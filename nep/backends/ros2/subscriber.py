@@ -104,7 +104,7 @@ class RosSubscriber:
         if any(each.is_latched for each in writers):
             with participant.changed:
                 self._add_reader(is_latched=True)
-        wait_for_others(participant, {each.gid for each in writers}, self._matched)
+        wait_for_others(participant, writers, lambda: self._readers)
 
     def _add_reader(self, *, is_latched: bool) -> None:
         """With the participant's lock held."""
@@ -120,19 +120,9 @@ class RosSubscriber:
             participant.qos(*qualities(library, spec.qos, depth, is_latched=is_latched, told=told)),
         )
         self._readers.append(reader)
-        participant.assign(self._transport.node.id, "reader", reader.guid.bytes)
+        participant.assign(self._transport.node.id, "reader", reader)
         ready = core.ReadCondition(reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any)
         participant.watch(reader, ready, lambda: self._read(reader, ready))
-
-    def _matched(self) -> set[bytes]:
-        """The writers that it hears. With the participant's lock held."""
-        found = set()
-        for reader in self._readers:
-            for handle in reader.get_matched_publications():
-                data = reader.get_matched_publication_data(handle)
-                if data is not None:
-                    found.add(data.key.bytes)
-        return found
 
     def look_for_latched(self) -> None:
         """Ask for what was latched when a publisher has come that latches. In the participant's thread."""
@@ -268,8 +258,7 @@ class RosSubscriber:
             self.is_closed = True
             for reader in self._readers:
                 self._participant.unwatch(reader)
-                self._participant.withdraw(self._transport.node.id, "reader", reader.guid.bytes)
-                reader.__del__()
+                self._participant.withdraw(self._transport.node.id, "reader", reader)
             self._readers.clear()
         self._transport.forget(self)
         self._transport.wake()

@@ -11,10 +11,11 @@ from typing import Any
 from nep.backends.ros2.fields import RosField
 from nep.backends.ros2.library import Dds
 from nep.backends.ros2.message_types import MessageTypes
-from nep.backends.ros2.names import dds_type
+from nep.backends.ros2.names import dds_type, user_data
 
 __all__ = ["DdsTopics", "sample_of"]
 
+_BLOCKING_NS = 100_000_000
 _NAMES = {"byte": "uint8"}
 
 
@@ -34,6 +35,32 @@ class DdsTopics:
         if key not in self._topics:
             self._topics[key] = self._dds.topic.Topic(self._entity, name, self.sample_class(ros_type))
         return self._topics[key]
+
+    def state_writer(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+        """A writer whose last sample is also read by those that come later."""
+        policies = self._dds.qos.Policy
+        last = policies.History.KeepLast(1)
+        kept = (last, policies.DurabilityService(0, last, -1, -1, -1))
+        return self._dds.pub.DataWriter(
+            self._entity, self.topic(name, ros_type), self._state_qos(ros_type, *kept)
+        )
+
+    def state_reader(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+        """A reader of what such writers have written."""
+        kept = self._dds.qos.Policy.History.KeepLast(1000)
+        return self._dds.sub.DataReader(
+            self._entity, self.topic(name, ros_type), self._state_qos(ros_type, kept)
+        )
+
+    def _state_qos(self, ros_type: str, *kept: Any) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+        policies = self._dds.qos.Policy
+        return self._dds.qos.Qos(
+            policies.Reliability.Reliable(_BLOCKING_NS),
+            policies.Durability.TransientLocal,
+            policies.DataRepresentation(use_cdrv0_representation=True),
+            policies.Userdata(user_data({"typehash": self._types.type_hash(ros_type)})),
+            *kept,
+        )
 
     def sample_class(self, ros_type: str) -> Any:  # noqa: ANN401 - made here
         """The class of samples of a type of ROS."""

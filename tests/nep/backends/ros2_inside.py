@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import signal
 import socket
 import textwrap
 from collections.abc import Callable, Iterator
@@ -19,7 +20,7 @@ from nep.backends.ros2 import message_types
 from nep.backends.ros2.environment import configuration
 from nep.backends.ros2.library import dds
 from nep.backends.ros2.names import user_data_of
-from tests.nep.programs import Program, eventually, running
+from tests.nep.programs import GREETINGS_S, Program, eventually, running
 
 NEEDS_DUST = "needs another vendor's DDS: pip install dust-dds==0.15.0"
 Make = Callable[[str], nep.Node]
@@ -35,6 +36,19 @@ def _a_domain_for_each_test(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", str(next(_domains)))
 
 
+@pytest.fixture(autouse=True)
+def _all_are_patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However busy the computer is, programs find each other in time."""
+    for module in ("participant", "publisher"):
+        monkeypatch.setattr(f"nep.backends.ros2.{module}.HANDSHAKE_S", GREETINGS_S)
+
+
+def knows(node: nep.Node, topic: str) -> nep.Node:
+    """The node, when it has found the topic."""
+    eventually(lambda: topic in {each.strip("/") for each in node.graph().topics})
+    return node
+
+
 @pytest.fixture
 def make() -> Iterator[Make]:
     made: list[nep.Node] = []
@@ -48,7 +62,16 @@ def make() -> Iterator[Make]:
         node.close()
 
 
-BEGIN = "import nep, os, sys\nnode = nep.node('other', 'ros2')\nsay = lambda it: print(it, flush=True)\n"
+BEGIN = f"""
+import nep, os, sys, threading
+from nep.backends.ros2 import participant, publisher
+participant.HANDSHAKE_S = publisher.HANDSHAKE_S = {GREETINGS_S}
+node = nep.node('other', 'ros2')
+say = lambda it: print(it, flush=True)
+def knows(topic):
+    while topic not in {{each.strip('/') for each in node.graph().topics}}:
+        threading.Event().wait(0.01)
+"""
 
 
 @contextmanager
@@ -75,7 +98,7 @@ def test_the_first_message_reaches_a_subscriber_that_another_program_had(make: M
     code += "for _ in range(3): say(sub.listen(timeout_s=60)[1])\nsay(sub.lost)"
     with nep_program(code) as other:
         assert other.line() == "ready"
-        pub = make("a").new_pub("t", qos=quality)
+        pub = knows(make("a"), "t").new_pub("t", qos=quality)
         assert pub.subscribers == 1
         for number in range(3):
             pub.publish(number)
@@ -84,7 +107,7 @@ def test_the_first_message_reaches_a_subscriber_that_another_program_had(make: M
 
 def test_the_next_message_reaches_a_subscriber_that_another_program_gets(make: Make) -> None:
     pub = make("a").new_pub("t")
-    code = "sub = node.new_sub('t')\nsay('ready')\nsay(sub.listen(timeout_s=60)[1])"
+    code = "knows('t')\nsub = node.new_sub('t')\nsay('ready')\nsay(sub.listen(timeout_s=60)[1])"
     with nep_program(code) as other:
         assert other.line() == "ready"
         pub.publish("first")
@@ -110,6 +133,7 @@ sys.stdin.read()
     node = make("a")
     with nep_program(code) as other:
         assert other.line() == "ready"
+        knows(node, "raw")
         subs = [node.new_sub(*each) for each in [("j", "json"), ("s", "string"), ("b", "bytes")]]
         picture, packed = node.new_sub("i", "image"), node.new_sub("m", "msgpack")
         twist = node.new_sub("/twist", "geometry_msgs/msg/Twist")
@@ -147,13 +171,13 @@ say(got == list(range(5000))); say(many.lost)
     sent = [b"", b"\0", os.urandom(65_000), os.urandom(8_000_000), os.urandom(8_000_001)]
     with nep_program(code) as other:
         assert other.line() == "ready"
-        node = make("a")
+        node = knows(make("a"), "t")
         pub = node.new_pub("t", "bytes")
         for data in sent:
             pub.publish(data)
         assert [other.line() for _ in sent] == [hashlib.sha256(data).hexdigest() for data in sent]
         assert other.line() == "ready"
-        many = node.new_pub("many")
+        many = knows(node, "many").new_pub("many")
         for number in range(5000):
             many.publish(number)
         assert (other.line(), other.line()) == ("True", "0")
@@ -175,7 +199,7 @@ def test_what_is_latched_reaches_another_program_once(make: Make) -> None:
 def test_a_publisher_that_dies_leaves_its_subscribers_well(make: Make) -> None:
     node = make("a")
     sub = node.new_sub("t")
-    code = "pub = node.new_pub('t')\npub.publish(1)\nsay('ready')\nsys.stdin.read()"
+    code = "knows('t')\npub = node.new_pub('t')\npub.publish(1)\nsay('ready')\nsys.stdin.read()"
     with nep_program(code, **killed_soon()) as other:
         assert other.line() == "ready"
         assert sub.listen(timeout_s=60.0) == (True, 1)
@@ -198,6 +222,23 @@ def test_a_subscriber_that_dies_stops_no_publisher(make: Make) -> None:
     sub = make("b").new_sub("t", "bytes")
     pub.publish(b"1")
     assert sub.listen(timeout_s=60.0) == (True, b"1")
+
+
+def test_who_does_not_answer_is_named_and_waited_for_no_longer_than_it_is_said(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nep.backends.ros2.publisher.HANDSHAKE_S", 0.2)
+    node = make("a")
+    code = "sub = node.new_sub('t')\nsay('ready')\nsay(sub.listen(timeout_s=60)[1])"
+    with nep_program(code) as other:
+        assert other.line() == "ready"
+        knows(node, "t")
+        other.stop()
+        pub = node.new_pub("t", latched=True)
+        assert pub.missing == ("/other",)
+        pub.publish("later")
+        other.signal(signal.SIGCONT)
+        assert other.line() == "later"
 
 
 # ---- another vendor
@@ -506,6 +547,6 @@ def test_types_of_one_s_own(make: Make, tmp_path: Path) -> None:
     with nep_program(code, NEP_ROS_MSG_PATH=str(tmp_path)) as other:
         assert other.line() == "ready"
         payload = {"joints": [1, 2], "more": [{"id": 7, "at": {"sec": 1}}], "name": "abc"}
-        make("a").new_pub("t", "my_robot/msg/Arm").publish(payload)
+        knows(make("a"), "t").new_pub("t", "my_robot/msg/Arm").publish(payload)
         said = "{'joints': [1.0, 2.0], 'more': [{'id': 7, 'at': {'sec': 1, 'nanosec': 0}}], 'name': 'abc'}"
         assert other.line() == said

@@ -1,0 +1,120 @@
+"""Matches: programs of nep tell each other which of their writers and readers have found which others.
+
+What a writer of DDS sends reaches a reader only when the reader's program has found the writer, too, and DDS
+has no word for that. So each program tells it on a topic that ROS 2 does not show: its participant's GUID,
+then pairs of GUIDs, one of its own and the one that was found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from nep.backends.ros2.library import Dds
+from nep.backends.ros2.message_types import MessageTypes
+from nep.backends.ros2.topics import DdsTopics, sample_of
+from nep.errors import DecodeError
+
+__all__ = ["GID_BYTES", "PREFIX_BYTES", "Matches", "matched_gids"]
+
+GID_BYTES, PREFIX_BYTES = 16, 12
+"""A GUID, and the part that all of a participant have in common."""
+_TOPIC = "nep_matches"
+_TYPE = "std_msgs/msg/UInt8MultiArray"
+_MOST_PAIRS, _MOST_PARTICIPANTS = 100_000, 4096
+
+
+def matched_gids(entity: Any) -> frozenset[bytes]:  # noqa: ANN401 - cyclonedds is not typed
+    """The GUIDs of all that a writer or reader has found."""
+    if hasattr(entity, "get_matched_subscriptions"):
+        handles, look = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
+    else:
+        handles, look = entity.get_matched_publications(), entity.get_matched_publication_data
+    return frozenset(data.key.bytes for data in map(look, handles) if data is not None)
+
+
+class Matches:
+    """See the module. Guarded by the lock of its participant."""
+
+    def __init__(self, library: Dds, types: MessageTypes, topics: DdsTopics, gid: bytes) -> None:
+        self._types = types
+        self._gid = gid
+        self._mask = (
+            library.core.DDSStatus.PublicationMatched,
+            library.core.DDSStatus.SubscriptionMatched,
+        )
+        self._followed: dict[bytes, Any] = {}
+        self._found: dict[bytes, frozenset[bytes]] = {}
+        self._told = b""
+        self._confirmed: dict[bytes, frozenset[tuple[bytes, bytes]]] = {}
+        self._sample_class = topics.sample_class(_TYPE)
+        self._writer = topics.state_writer(_TOPIC, _TYPE)
+        self.reader = topics.state_reader(_TOPIC, _TYPE)
+
+    def follow(self, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        """A writer or reader of this program is there."""
+        entity.set_status_mask(self._mask[not hasattr(entity, "get_matched_subscriptions")])
+        self._followed[entity.guid.bytes] = entity
+        self._found[entity.guid.bytes] = frozenset()
+
+    def forget(self, gid: bytes) -> None:
+        """It is closed."""
+        self._followed.pop(gid, None)
+        self._found.pop(gid, None)
+
+    def look(self) -> None:
+        """Tell what has changed since the last look."""
+        for gid, entity in self._followed.items():
+            if entity.take_status():
+                found = matched_gids(entity)
+                self._found[gid] = frozenset(each for each in found if not self._is_own(each))
+        pairs = sorted(own + other for own, found in self._found.items() for other in found)
+        told = b"".join((self._gid, *pairs[:_MOST_PAIRS]))
+        if told != self._told:
+            self._told = told
+            self._writer.write(sample_of(self._sample_class, self._types.encode(_TYPE, {"data": told})))
+
+    def _is_own(self, gid: bytes) -> bool:
+        return gid[:PREFIX_BYTES] == self._gid[:PREFIX_BYTES]
+
+    def hear(self, cdr: bytes) -> None:
+        """Another program has told; what is none of it is left out."""
+        try:
+            told = self._types.decode(_TYPE, cdr)
+        except DecodeError:
+            return
+        data = told["data"] if isinstance(told, dict) else b""
+        sender, pairs = data[:GID_BYTES], data[GID_BYTES:]
+        if len(sender) < GID_BYTES or len(pairs) % (2 * GID_BYTES) or self._is_own(sender):
+            return
+        found = (
+            (pairs[at : at + GID_BYTES], pairs[at + GID_BYTES : at + 2 * GID_BYTES])
+            for at in range(0, len(pairs), 2 * GID_BYTES)
+        )
+        self._confirmed.pop(sender, None)
+        if len(self._confirmed) >= _MOST_PARTICIPANTS:
+            self._confirmed.pop(next(iter(self._confirmed)))
+        self._confirmed[sender] = frozenset(
+            pair
+            for pair in found
+            if self._is_own(pair[1]) and pair[0][:PREFIX_BYTES] == sender[:PREFIX_BYTES]
+        )
+
+    def is_confirmed(self, own: bytes, other: bytes, participant: bytes) -> bool:
+        """Whether the other one's program has told that it has found ours."""
+        return self._is_own(other) or (other, own) in self._confirmed.get(participant, ())
+
+    def unready(self, entities: Iterable[Any], known: Iterable[tuple[bytes, bytes, bool]]) -> set[bytes]:
+        """Those of `known` that no one of ours has found, or that tell (the third) and have not found it.
+
+        Each is its GUID and that of its participant, and whether its program tells what it has found.
+        """
+        found = [(each.guid.bytes, matched_gids(each)) for each in entities]
+        return {
+            gid
+            for gid, participant, tells in known
+            if not any(
+                gid in matched and (not tells or self.is_confirmed(own, gid, participant))
+                for own, matched in found
+            )
+        }
