@@ -8,10 +8,12 @@ with DDS alone, is listed as a node named after its participant.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.ros2.mismatches import Party, mismatches
 from nep.backends.ros2.names import dds_topic, dds_type, ros_topic, ros_type
 from nep.backends.ros2.participant import DdsEndpoint, Local, Participant
 from nep.backends.ros2.subscriber import id_of
@@ -27,6 +29,7 @@ from nep.protocol.requests import (
     NodeRecord,
     PublisherRecord,
     Renew,
+    ReportAlerts,
     SubscriberRecord,
 )
 
@@ -49,11 +52,11 @@ class _Names:
 
     def msg_type(self, endpoint: DdsEndpoint) -> str:
         known = self.types.get((endpoint.topic, endpoint.type))
-        return known or endpoint.nep.get("neptype") or ros_type(endpoint.type)
+        return known or endpoint.told.get("neptype") or ros_type(endpoint.type)
 
     def id(self, endpoint: DdsEndpoint) -> int:
         """What it says, unless somebody else says it too."""
-        said = id_of(endpoint.gid, endpoint.nep.get("nepid"))
+        said = id_of(endpoint.gid, endpoint.told.get("nepid"))
         found = id_of(endpoint.gid, None) if said in self.ids else said
         self.ids.add(found)
         return found
@@ -64,11 +67,33 @@ def graph_of(participant: Participant) -> GraphView:
     graph, names = Graph(epoch=1, now=0.0, learn_s=0.0), _Names()
     for local in participant.locals:
         _add_local(graph, local, names)
-    for number, (node, kind, endpoint) in enumerate(_foreign(participant, names)):
-        if number >= _MOST:
-            break
+    found = [
+        (kind, each)
+        for kind in ("writer", "reader")
+        for each in participant.endpoints(kind)
+        if ros_topic(each.topic) is not None
+    ]
+    parties: dict[str, dict[str, list[Party]]] = {}
+    own = participant.own_gids()
+    for kind, each in found:
+        if each.gid in own:
+            _note(parties, names, Party(own[each.gid], each), kind)
+    for node, kind, endpoint in islice(_foreign(participant, found, names), _MOST):
         _add_foreign(graph, node, kind, endpoint, names)
+        if endpoint is not None:
+            _note(parties, names, Party(node.name, endpoint), kind)
+    alerts = (
+        alert
+        for topic, each in sorted(parties.items())
+        for alert in mismatches(topic, each["writer"], each["reader"])
+    )
+    graph.apply(ReportAlerts("ros2", tuple(alerts)), 0, 0.0, "")
     return graph.view()
+
+
+def _note(parties: dict[str, dict[str, list[Party]]], names: _Names, party: Party, kind: str) -> None:
+    topic = names.topic(party.endpoint)
+    parties.setdefault(topic, {"writer": [], "reader": []})[kind].append(party)
 
 
 def _add_local(graph: Graph, local: Local, names: _Names) -> None:
@@ -90,20 +115,17 @@ def _add_local(graph: Graph, local: Local, names: _Names) -> None:
     graph.apply(Renew(node.id, graph.epoch, graph.revision, *counts, local.load()), 0, 0.0, node.id)
 
 
-def _foreign(participant: Participant, names: _Names) -> Iterator[tuple[NodeRecord, str, DdsEndpoint | None]]:
+def _foreign(
+    participant: Participant, all_found: Sequence[tuple[str, DdsEndpoint]], names: _Names
+) -> Iterator[tuple[NodeRecord, str, DdsEndpoint | None]]:
     """Each writer and reader of others with its node; nodes that have none with None."""
     own = participant.gid
     alive = participant.participants() - {own}
-    found = [
-        (kind, each)
-        for kind in ("writer", "reader")
-        for each in participant.endpoints(kind)
-        if each.participant != own and ros_topic(each.topic) is not None
-    ]
+    found = [(kind, each) for kind, each in all_found if each.participant != own]
     for _kind, each in found:
-        if each.nep.get("neptype"):
-            names.types.setdefault((each.topic, each.type), each.nep["neptype"])
-    said = {each.gid: each.nep["nepnode"] for _kind, each in found if each.nep.get("nepnode")}
+        if each.told.get("neptype"):
+            names.types.setdefault((each.topic, each.type), each.told["neptype"])
+    said = {each.gid: each.told["nepnode"] for _kind, each in found if each.told.get("nepnode")}
     owners: dict[bytes, NodeRecord] = {}
     for gid, nodes in sorted(participant.others(alive).items()):
         for number, node in enumerate(nodes):

@@ -60,7 +60,7 @@ class RosNode:
 
 @dataclass(frozen=True)
 class DdsEndpoint:
-    """A writer or reader that discovery has found. `nep`: what a program of nep says of it, else empty."""
+    """A writer or reader that discovery has found, its own too. `told`: what its USER_DATA says of it."""
 
     gid: bytes
     participant: bytes
@@ -68,7 +68,11 @@ class DdsEndpoint:
     type: str
     is_latched: bool
     is_reliable: bool
-    nep: dict[str, str]
+    told: dict[str, str]
+
+    def is_of(self, kind: str, type_hash: str) -> bool:
+        """Whether it has this type, and tells of no other definition."""
+        return self.type == kind and self.told.get("typehash", type_hash) == type_hash
 
 
 class Local(Protocol):
@@ -309,6 +313,16 @@ class Participant:
         with self.changed:
             nodes = [node for others in self._others.values() for node in others if node.gids & wanted]
         return tuple(sorted({each.name for each in nodes}))
+
+    def own_gids(self) -> dict[bytes, str]:
+        """The writers and readers of this process, each with the name of its node."""
+        with self.changed:
+            return {
+                gid: member.local.node.name
+                for member in self._members.values()
+                for gids in member.gids.values()
+                for gid in gids
+            }
 
     @property
     def locals(self) -> tuple[Local, ...]:

@@ -37,13 +37,13 @@ def wait_for_others(
     `entities`: our writer or readers. Other programs than nep's do not tell when they are ready.
     """
     deadline = time.monotonic() + HANDSHAKE_S
-    expected = [(each.gid, each.participant, "nepid" in each.nep) for each in known]
+    expected = [(each.gid, each.participant, "nepid" in each.told) for each in known]
     with participant.changed:
         while (unready := participant.matches.unready(entities(), expected)) and (
             left := deadline - time.monotonic()
         ) > 0.0:
             participant.changed.wait(min(left, _LOOK_S))
-        if any(each.participant != participant.gid and "nepid" not in each.nep for each in known):
+        if any(each.participant != participant.gid and "nepid" not in each.told for each in known):
             ready_at = time.monotonic() + _GREETING_S
             while (left := ready_at - time.monotonic()) > 0.0:
                 participant.changed.wait(left)
@@ -81,7 +81,8 @@ class RosPublisher:
         self._is_closed = False
         library = participant.dds
         name, ros_type = dds_topic(spec.topic), self._mapping.ros_type
-        told = told_of(participant.types.type_hash(ros_type), node_id, spec)
+        type_hash = participant.types.type_hash(ros_type)
+        told = told_of(type_hash, node_id, spec)
         depth = depth_of(spec.qos, spec.codec.name)
         with participant.changed:
             self._kind = participant.topics.sample_class(ros_type)
@@ -95,7 +96,7 @@ class RosPublisher:
         wanted = [
             each
             for each in participant.endpoints("reader", name)
-            if each.type == dds_type(ros_type)
+            if each.is_of(dds_type(ros_type), type_hash)
             and (is_reliable or not each.is_reliable)
             and (spec.is_latched or not each.is_latched)
         ]
@@ -126,7 +127,7 @@ class RosPublisher:
 
     def _id_of(self, handle: int) -> str:
         data = self._writer.get_matched_subscription_data(handle)
-        told = {} if data is None else self._participant.described(data).nep
+        told = {} if data is None else self._participant.described(data).told
         return told.get("nepid") or f"handle {handle}"
 
     @property

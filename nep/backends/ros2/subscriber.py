@@ -88,6 +88,7 @@ class RosSubscriber:
         self._transport = transport
         self._participant = participant
         self._mapping = mapping_for(spec.msg_type)
+        self._type_hash = participant.types.type_hash(self._mapping.ros_type)
         self._name = dds_topic(spec.topic)
         self._sources: dict[int, _Source] = {}
         self._readers: list[Any] = []
@@ -98,7 +99,7 @@ class RosSubscriber:
         writers = [
             each
             for each in participant.endpoints("writer", self._name)
-            if each.type == dds_type(self._mapping.ros_type)
+            if each.is_of(dds_type(self._mapping.ros_type), self._type_hash)
             and (each.is_reliable or spec.qos in ("best_effort", "sensor"))
         ]
         if any(each.is_latched for each in writers):
@@ -111,8 +112,7 @@ class RosSubscriber:
         participant, spec = self._participant, self.spec
         self._has_latched = self._has_latched or is_latched
         library, core = participant.dds, participant.dds.core
-        type_hash = participant.types.type_hash(self._mapping.ros_type)
-        told = told_of(type_hash, self._transport.node.id, spec)
+        told = told_of(self._type_hash, self._transport.node.id, spec)
         depth = depth_of(spec.qos, self._mapping.codec.name)
         reader = library.sub.DataReader(
             participant.entity,
@@ -177,7 +177,7 @@ class RosSubscriber:
         source = _Source(
             id_of(handle.to_bytes(8, "little", signed=handle < 0), None)
             if described is None
-            else id_of(described.gid, described.nep.get("nepid")),
+            else id_of(described.gid, described.told.get("nepid")),
             self._mapping.kind(self.spec.topic, self.spec.msg_type, is_latched=is_latched),
         )
         if described is not None:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import nep
-from nep.backends.ros2 import message_types
+from nep.backends.ros2 import MessageTypes, message_types
 from nep.backends.ros2.environment import configuration
 from nep.backends.ros2.library import dds
 from nep.backends.ros2.names import user_data_of
@@ -335,17 +335,17 @@ def test_a_writer_tells_what_ros_2_reads(make: Make) -> None:
     participant.__del__()  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize(("release", "length"), [("humble", 24), ("iron", 16), ("jazzy", 16)])
-def test_ids_are_as_long_as_the_release_has_them(make: Make, release: str, length: int) -> None:
+def test_ids_are_as_long_as_the_release_has_them() -> None:
     code = """
 from nep.backends.ros2 import message_types
 print(message_types().gid_bytes, len(message_types().encode('rmw_dds_common/msg/Gid', {})) - 4)
 pub = node.new_pub('t')
 say([each.name for each in node.graph().nodes.values()])
 """
-    with nep_program(code, ROS_DISTRO=release) as other:
-        assert other.line() == f"{length} {length}"
+    with nep_program(code, ROS_DISTRO="humble") as other:
+        assert other.line() == "24 24"
         assert other.line() == "['other']"
+    assert (MessageTypes("iron").gid_bytes, MessageTypes("jazzy").gid_bytes) == (16, 16)
 
 
 def test_what_tells_of_the_graph_has_the_hash_of_ros_2(make: Make) -> None:
@@ -414,6 +414,38 @@ def test_who_wants_reliability_does_not_hear_who_has_none(make: Make) -> None:
     pub.publish(1)
     assert takes.listen(timeout_s=60.0) == (True, 1)
     assert wants.listen() == (False, {})
+    (alert,) = node.graph().alerts
+    assert alert.sentence == "“b” hears nothing of “a” on “t”: it wants “reliable”, and gets “best effort”"
+    wants.close()
+    assert node.graph().alerts == ()
+
+
+def test_another_type_on_the_topic_is_an_alert_and_nothing_is_heard(make: Make) -> None:
+    node = make("a")
+    sub = node.new_sub("t", "std_msgs/Int64")
+    code = "knows('t')\npub = node.new_pub('t', 'std_msgs/Float64')\nsay('ready')\n"
+    code += "pub.publish({'data': 1.0})\nsys.stdin.read()"
+    with nep_program(code) as other:
+        assert other.line() == "ready"
+        eventually(lambda: len(node.graph().alerts) == 1)
+        (alert,) = node.graph().alerts
+        said = "it wants “std_msgs/msg/Int64”, and gets “std_msgs/msg/Float64”"
+        assert alert.sentence == f"“a” hears nothing of “/other” on “t”: {said}"
+        assert sub.listen() == (False, {})
+    eventually(lambda: node.graph().alerts == ())
+
+
+def test_another_definition_of_a_type_is_an_alert(make: Make, tmp_path: Path) -> None:
+    code = "sub = node.new_sub('t', 'changed/Pose')\nsay('ready')\nsys.stdin.read()"
+    (tmp_path / "changed").mkdir()
+    (tmp_path / "changed" / "Pose.msg").write_text("float64 x\nfloat64 y\n")
+    message_types().add("changed/Pose", "float64 x\n")
+    with nep_program(code, NEP_ROS_MSG_PATH=str(tmp_path)) as other:
+        assert other.line() == "ready"
+        node = knows(make("a"), "t")
+        node.new_pub("t", "changed/Pose").publish({"x": 1.0})
+        (alert,) = node.graph().alerts
+        assert alert.sentence == "“/other” and “a” have different definitions of “changed/msg/Pose” on “t”"
 
 
 def test_words_that_are_none(make: Make) -> None:

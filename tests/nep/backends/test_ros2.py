@@ -19,7 +19,9 @@ from nep.backends.base import backend_named
 from nep.backends.ros2.environment import configuration, domain, is_loopback_only
 from nep.backends.ros2.library import dds, typesys
 from nep.backends.ros2.message_types import MessageTypes
+from nep.backends.ros2.mismatches import Party, mismatches
 from nep.backends.ros2.names import dds_topic, dds_type, is_type_name, ros_type, split_node_name, user_data_of
+from nep.backends.ros2.participant import DdsEndpoint
 from nep.backends.ros2.type_mapping import mapping_for
 from nep.errors import WireError, WrongTypeError
 
@@ -135,6 +137,55 @@ def test_who_does_not_ask_for_it_does_not_import_its_packages() -> None:
 
 def test_its_other_names() -> None:
     assert backend_named("ROS2") is backend_named("ros2")
+
+
+# ---- who does not hear whom
+
+
+def party(
+    node: str,
+    *,
+    kind: str = "std_msgs/msg/String",
+    is_latched: bool = False,
+    is_reliable: bool = True,
+    **told: str,
+) -> Party:
+    gid = f"{node}{kind}{is_latched}{is_reliable}".encode()
+    return Party(node, DdsEndpoint(gid, b"", "rt/t", dds_type(kind), is_latched, is_reliable, told))
+
+
+def alerts(writers: list[Party], readers: list[Party]) -> dict[str, str]:
+    return {each.id: each.sentence for each in mismatches("t", writers, readers)}
+
+
+def test_who_fits_is_no_alert() -> None:
+    writers = [party("a", typehash="RIHS01_1"), party("b", is_latched=True)]
+    readers = [party("c", typehash="RIHS01_1"), party("d", is_reliable=False)]
+    assert alerts(writers, readers) == alerts([], readers) == alerts(writers, []) == {}
+
+
+def test_mismatches_are_alerts_in_plain_words() -> None:
+    heard = "“c” hears nothing of “a” on “t”: it wants "
+    assert alerts([party("a", is_reliable=False)], [party("c")]) == {
+        "ros2-reliability:t": heard + "“reliable”, and gets “best effort”"
+    }
+    assert alerts([party("a")], [party("c", kind="std_msgs/msg/Int8")]) == {
+        "ros2-type:t": heard + "“std_msgs/msg/Int8”, and gets “std_msgs/msg/String”"
+    }
+    (said,) = alerts([party("a"), party("b", is_latched=True)], [party("c", is_latched=True)]).values()
+    assert said.startswith(heard + "what was published before, too")
+    assert alerts([party("a", typehash="RIHS01_1")], [party("c", typehash="RIHS01_2")]) == {
+        "ros2-definition:t": "“c” and “a” have different definitions of “std_msgs/msg/String” on “t”"
+    }
+    many = [party(f"n{number}", is_reliable=False) for number in range(5000)]
+    (said,) = alerts(many, [party(f"m{number}") for number in range(5000)]).values()
+    assert "“n0”, “n1”, “n10” and 97 more" in said
+
+
+def test_the_second_reader_of_a_subscriber_is_no_alert() -> None:
+    readers = [party("c", nepid="1", is_latched=latched) for latched in (True, False)]
+    for order in (readers, readers[::-1]):
+        assert alerts([party("a"), party("b", is_latched=True)], order) == {}
 
 
 # ---- messages

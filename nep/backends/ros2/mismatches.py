@@ -1,0 +1,119 @@
+"""Mismatches: writers and readers of one topic that DDS does not let meet, as alerts in plain words.
+
+DDS itself says nothing where people look: who asks for more than is offered hears nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from nep.backends.ros2.names import ros_type
+from nep.backends.ros2.participant import DdsEndpoint
+from nep.i18n import _
+from nep.protocol.graph_view import Alert
+
+__all__ = ["Party", "mismatches"]
+
+_NAMES = 3
+"""So many nodes are named in a sentence."""
+_MOST = 100
+"""So many of a topic's writers, and of its readers, are compared."""
+
+
+@dataclass(frozen=True)
+class Party:
+    """A writer or reader, and the name of its node."""
+
+    node: str
+    endpoint: DdsEndpoint
+
+
+def mismatches(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Iterator[Alert]:
+    """What keeps readers of a topic from hearing its writers."""
+    readers, writers = tuple(_once(readers[:_MOST])), writers[:_MOST]
+    kinds: tuple[tuple[Callable[[DdsEndpoint, DdsEndpoint], bool], Callable[..., Alert]], ...] = (
+        (lambda writer, reader: writer.type != reader.type, _other_type),
+        (_are_defined_otherwise, _other_definition),
+        (lambda writer, reader: reader.is_reliable and not writer.is_reliable, _unreliable),
+        (lambda writer, reader: reader.is_latched and not writer.is_latched, _not_latched),
+    )
+    for is_wrong, alert in kinds:
+        pairs = [
+            (one, other) for one in writers for other in readers if is_wrong(one.endpoint, other.endpoint)
+        ]
+        if pairs:
+            yield alert(topic, [one for one, _other in pairs], [other for _one, other in pairs])
+
+
+def _once(readers: Iterable[Party]) -> Iterator[Party]:
+    """Of the two readers that a subscriber of nep may have, the one that asks for less."""
+    known: dict[str, Party] = {}
+    for each in readers:
+        said = each.endpoint.told.get("nepid") or each.endpoint.gid.hex()
+        other = known.get(said)
+        is_latched = each.endpoint.is_latched and (other is None or other.endpoint.is_latched)
+        known[said] = replace(each, endpoint=replace(each.endpoint, is_latched=is_latched))
+    yield from known.values()
+
+
+def _are_defined_otherwise(writer: DdsEndpoint, reader: DdsEndpoint) -> bool:
+    hashes = writer.told.get("typehash", ""), reader.told.get("typehash", "")
+    return writer.type == reader.type and all(hashes) and hashes[0] != hashes[1]
+
+
+def _named(parties: Iterable[Party]) -> str:
+    said = sorted({each.node for each in parties})
+    names = ", ".join(f"“{name}”" for name in said[:_NAMES])
+    if len(said) <= _NAMES:
+        return names
+    return _("{names} and {count} more").format(names=names, count=len(said) - _NAMES)
+
+
+def _type_of(parties: Sequence[Party]) -> str:
+    return ros_type(parties[0].endpoint.type)
+
+
+def _other_type(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Alert:
+    return Alert(
+        f"ros2-type:{topic}",
+        _("{readers} hears nothing of {writers} on “{topic}”: it wants “{wanted}”, and gets “{sent}”").format(
+            readers=_named(readers),
+            writers=_named(writers),
+            topic=topic,
+            wanted=_type_of(readers),
+            sent=_type_of(writers),
+        ),
+        _("Use the same type in all programs, or give one of the topics another name."),
+    )
+
+
+def _other_definition(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Alert:
+    return Alert(
+        f"ros2-definition:{topic}",
+        _("{readers} and {writers} have different definitions of “{kind}” on “{topic}”").format(
+            readers=_named(readers), writers=_named(writers), kind=_type_of(readers), topic=topic
+        ),
+        _("Give both programs the same .msg file, and ROS_DISTRO the same release; what is read is wrong."),
+    )
+
+
+def _unreliable(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Alert:
+    return Alert(
+        f"ros2-reliability:{topic}",
+        _(
+            "{readers} hears nothing of {writers} on “{topic}”: it wants “reliable”, and gets “best effort”"
+        ).format(readers=_named(readers), writers=_named(writers), topic=topic),
+        _("Subscribe with qos='sensor' or qos='best_effort', or publish with qos='reliable'."),
+    )
+
+
+def _not_latched(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Alert:
+    return Alert(
+        f"ros2-durability:{topic}",
+        _(
+            "{readers} hears nothing of {writers} on “{topic}”: it wants what was published before, too "
+            "(“transient local”), which is not kept (“volatile”)"
+        ).format(readers=_named(readers), writers=_named(writers), topic=topic),
+        _("Publish with latched=True, or subscribe with the durability “volatile”."),
+    )
