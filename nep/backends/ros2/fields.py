@@ -204,6 +204,11 @@ def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # n
         isinstance(value, Sequence | bytes | bytearray | memoryview) or hasattr(value, "__array__")
     ):
         raise RosFieldError(path, _("is a '{kind}'; give a list").format(kind=_kind(value)))
+    dimensions = getattr(value, "ndim", 1)
+    if dimensions != 1:
+        raise RosFieldError(
+            path, _("has {count} dimensions; give one, such as by 'ravel()'").format(count=dimensions)
+        )
     if field.is_message or field.kind == "string":
         single = RosField(field.name, field.kind, field.is_message, text_most=field.text_most)
         items: Any = [

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ FOLDERS = "NEP_ROS_MSG_PATH"
 """The environment's variable with folders of .msg files."""
 _LARGEST_FILE = 2**20
 _MOST_FILES = 10_000
+_WIDE = "wstring"
 _GID = "rmw_dds_common/msg/Gid"
 
 
@@ -45,6 +46,7 @@ class MessageTypes:
         self._rosbags = rosbags
         self._store: Any = rosbags.get_typestore(store)
         self._fields: dict[str, tuple[RosField, ...]] = {}
+        self._left_out: dict[str, NepError] = {}
         self._lock = threading.RLock()
         self._read_definitions()
 
@@ -69,6 +71,8 @@ class MessageTypes:
     def checked(self, msg_type: str) -> str:
         """The whole name of a type in either form. Raises `NepError` for one that is not known."""
         name = type_name(msg_type)
+        if name in self._left_out and name not in self._fields:
+            raise self._left_out[name]
         if name not in self._fields:
             raise NepError(
                 _(
@@ -117,12 +121,14 @@ class MessageTypes:
 
         Raises `NepError` for a text that is none, uses types that are not known, or is another than before.
         """
-        self._add({type_name(name): text})
+        for wrong in self._add({type_name(name): text}).values():
+            raise wrong
 
     def add_folder(self, folder: Path) -> None:
         """Make known all .msg files in a folder, each in its package's `msg`: `my_robot/msg/Arm.msg`.
 
-        A file that lies otherwise belongs to the package that its folder is named after. Raises as `add`.
+        A file that lies otherwise belongs to the package that its folder is named after. What is wrong with
+        one is said when its type is asked for; raises as `add` when none is right.
         """
         texts: dict[str, str] = {}
         for path in sorted(folder.rglob("*.msg")):
@@ -136,31 +142,27 @@ class MessageTypes:
             texts[type_name(f"{package}/msg/{path.stem}")] = path.read_text(encoding="utf-8")
         if not texts:
             raise NepError(_("there is no .msg file in '{folder}'; choose another").format(folder=folder))
-        self._add(texts)
+        wrong = self._add(texts)
+        if len(wrong) == len(texts):
+            raise next(iter(wrong.values()))
+        self._left_out.update(wrong)
 
-    def _add(self, texts: Mapping[str, str]) -> None:
+    def _add(self, texts: Mapping[str, str]) -> dict[str, NepError]:
+        """Make known what can be; why the others cannot. Raises `NepError` for one that was another."""
         found: dict[str, Any] = {}
+        wrong: dict[str, NepError] = {}
         for name, text in texts.items():
             try:
                 found.update(self._rosbags.get_types_from_msg(text, name))
-            except Exception as error:  # its parser raises classes of its own
-                raise NepError(
+            except Exception as error:  # noqa: BLE001 - its parser raises classes of its own
+                wrong[name] = NepError(
                     _("the definition of '{name}' cannot be read: {error}").format(name=name, error=error)
-                ) from error
+                )
         with self._lock:
             fields = {name: read_definition(entries)[1] for name, (_constants, entries) in found.items()}
-            missing = {
-                (name, field.name, field.kind)
-                for name, each in fields.items()
-                for field in each
-                if field.is_message and field.kind not in fields and field.kind not in self._fields
-            }
-            for name, field, kind in sorted(missing):
-                raise NepError(
-                    _(
-                        "'{name}' uses '{kind}' for its field '{field}', which is not known; add it, too"
-                    ).format(name=name, kind=kind, field=field)
-                )
+            while missing := self._missing(fields):
+                wrong.update(missing)
+                fields = {name: each for name, each in fields.items() if name not in missing}
             same = {name for name in fields if name in self._fields and self._fields[name] == fields[name]}
             changed = sorted(name for name in fields if name in self._fields and name not in same)
             if changed:
@@ -169,8 +171,24 @@ class MessageTypes:
                         name=changed[0]
                     )
                 )
-            self._store.register({name: each for name, each in found.items() if name not in same})
+            self._store.register({name: found[name] for name in fields if name not in same})
             self._read_definitions()
+        return wrong
+
+    def _missing(self, fields: Mapping[str, Sequence[RosField]]) -> dict[str, NepError]:
+        """Those that use what neither they nor this has."""
+        wide = _("'{name}' has a wide string, '{field}', which 'ros2' cannot carry; use a string")
+        unknown = _("'{name}' uses '{kind}' for its field '{field}', which is not known; add it, too")
+        return {
+            name: NepError(
+                (wide if field.kind.endswith(f"/{_WIDE}") else unknown).format(
+                    name=name, field=field.name, kind=field.kind
+                )
+            )
+            for name, each in fields.items()
+            for field in each
+            if field.is_message and field.kind not in fields and field.kind not in self._fields
+        }
 
 
 def _near(name: str, known: tuple[str, ...]) -> str:

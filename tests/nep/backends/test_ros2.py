@@ -7,7 +7,9 @@ in a network namespace that has loopback and nothing else.
 from __future__ import annotations
 
 import os
+import random
 import shutil
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -300,6 +302,93 @@ def test_definitions_that_cannot_be(types: MessageTypes, tmp_path: Path) -> None
     with pytest.raises(nep.NepError, match=r"there is no \.msg file"):
         types.add_folder(tmp_path)
     assert "mine/msg/Leg" not in types.names
+
+
+def test_wide_strings_are_refused_in_one_sentence(types: MessageTypes) -> None:
+    with pytest.raises(
+        nep.NepError, match="'mine/msg/Wide' has a wide string, 'a', which 'ros2' cannot carry"
+    ):
+        types.add("mine/Wide", "wstring a\n")
+
+
+def test_a_folder_s_wrong_file_is_told_when_it_is_asked_for(types: MessageTypes, tmp_path: Path) -> None:
+    for name, text in {
+        "Good": "int8 a\nfolder/Also b\n",
+        "Also": "bool[2] c\n",
+        "Wide": "wstring[] a\n",
+    }.items():
+        (tmp_path / "folder").mkdir(exist_ok=True)
+        (tmp_path / "folder" / f"{name}.msg").write_text(text)
+    (tmp_path / "folder" / "Uses.msg").write_text("folder/Wide a\n")
+    types.add_folder(tmp_path)
+    assert types.decode("folder/msg/Good", types.encode("folder/msg/Good", {"a": -1})) == {
+        "a": -1, "b": {"c": [False, False]},
+    }  # fmt: skip
+    with pytest.raises(nep.NepError, match="'folder/msg/Wide' has a wide string"):
+        types.checked("folder/Wide")
+    with pytest.raises(nep.NepError, match="'folder/msg/Uses' uses 'folder/msg/Wide' for its field 'a'"):
+        types.checked("folder/Uses")
+
+
+def test_every_kind_of_field_comes_back(types: MessageTypes) -> None:
+    types.add("mine/Inner", "float32[2] f\nuint64 u\nbyte[] raw\nstring<=3[<=2] s\n")
+    types.add("mine/Outer", "int8 first\nmine/Inner[2] two\nmine/Inner[] more\nbool[] flags\nbool[3] three\n")
+    inner = {"f": [float("-inf"), 0.0], "u": 2**64 - 1, "raw": b"\x80\xff", "s": ["", "é"]}
+    zero = {"f": [0.0, 0.0], "u": 0, "raw": b"", "s": []}
+    said = {"first": -128, "two": [inner, {}], "more": [], "flags": [True, False, True]}
+    assert types.decode("mine/msg/Outer", types.encode("mine/msg/Outer", said)) == said | {
+        "two": [inner, zero], "three": [False] * 3,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("payload", "sentence"),
+    [
+        ({"two": [{}]}, "'two' has 1 items; give 2"),
+        ({"more": [{}, {"s": ["abcd"]}]}, r"'more\[1\].s\[0\]' has 4 bytes, 3 are allowed"),
+        ({"more": [{"s": [""] * 3}]}, r"'more\[0\].s' has 3 items, 2 are allowed"),
+        ({"more": [{"f": [0]}]}, r"'more\[0\].f' has 1 items; give 2"),
+        ({"flags": [1]}, r"'flags\[0\]' is a 'int'; give True or False"),
+        ({"three": [True] * 4}, "'three' has 4 items; give 3"),
+    ],
+)
+def test_bounds_of_arrays_and_texts_are_kept(types: MessageTypes, payload: object, sentence: str) -> None:
+    types.add("mine/Inner", "float32[2] f\nuint64 u\nbyte[] raw\nstring<=3[<=2] s\n")
+    types.add("mine/Outer", "int8 first\nmine/Inner[2] two\nmine/Inner[] more\nbool[] flags\nbool[3] three\n")
+    with pytest.raises(nep.EncodeError, match=sentence):
+        types.encode("mine/msg/Outer", payload)
+
+
+@pytest.mark.parametrize(("shape", "count"), [((2, 3), 2), ((), 0)])
+def test_an_array_has_one_dimension(types: MessageTypes, shape: tuple[int, ...], count: int) -> None:
+    np = pytest.importorskip("numpy")
+    with pytest.raises(
+        nep.EncodeError, match=rf"'data' has {count} dimensions; give one, such as by 'ravel\(\)'"
+    ):
+        types.encode("sensor_msgs/msg/Image", {"data": np.zeros(shape, np.uint8)})
+
+
+def test_bytes_of_a_stranger_are_a_message_or_a_decode_error(types: MessageTypes) -> None:
+    """What is said of the graph, and a few others, with all kinds of damage."""
+    chance = random.Random(1)
+    names = ["rmw_dds_common/msg/ParticipantEntitiesInfo", "sensor_msgs/msg/Image", "tf2_msgs/msg/TFMessage"]
+    gid = {"data": bytes(16)}
+    entities = [{"node_name": "a", "reader_gid_seq": [gid]}]
+    given = ({"gid": gid, "node_entities_info_seq": entities}, {"data": b"ab"}, {"transforms": [{}]})
+    refused = 0
+    for name, payload in zip(names, given, strict=True):
+        whole = types.encode(name, payload)
+        for _ in range(500):
+            damaged = bytearray(whole)
+            at = chance.randrange(len(damaged) - 4)
+            damaged[at : at + 4] = struct.pack("<I", chance.choice([0, 2, 10**6, 2**31, 2**32 - 1]))
+            try:
+                assert isinstance(
+                    types.decode(name, bytes(damaged[: chance.randrange(4 * len(whole))])), dict
+                )
+            except nep.DecodeError:
+                refused += 1
+    assert refused > 300
 
 
 def test_a_release_that_is_none() -> None:
