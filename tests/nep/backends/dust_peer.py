@@ -1,4 +1,4 @@
-"""A program with another vendor's DDS: `dust_peer.py hear|say TOPIC`.
+"""A program with another vendor's DDS: `dust_peer.py hear|say TOPIC [latched]`.
 
 Every line it prints is a text that it heard; every line it is given is a text that it says.
 """
@@ -34,9 +34,9 @@ def wait(entity, status) -> None:
     waiting.wait(WAIT)
 
 
-def hear(participant, topic) -> None:
+def hear(participant, topic, durability) -> None:
     reliable = dust_dds.DEFAULT_RELIABILITY_QOS_POLICY_DATA_WRITER
-    qos = dust_dds.DataReaderQos(reliability=reliable, history=KEPT)
+    qos = dust_dds.DataReaderQos(reliability=reliable, history=KEPT, durability=durability)
     reader = participant.create_subscriber().create_datareader(topic, qos=qos)
     tell("ready")
     wait(reader, dust_dds.StatusKind.SubscriptionMatched)
@@ -47,17 +47,22 @@ def hear(participant, topic) -> None:
             tell(sample.get_data().data)
 
 
-def say(participant, topic) -> None:
-    writer = participant.create_publisher().create_datawriter(topic, qos=dust_dds.DataWriterQos(history=KEPT))
+def say(participant, topic, durability) -> None:
+    writer = participant.create_publisher().create_datawriter(
+        topic, qos=dust_dds.DataWriterQos(history=KEPT, durability=durability)
+    )
     tell("ready")
     for line in sys.stdin:
         writer.write(String(line.strip()))
 
 
-def main(what: str, topic: str) -> None:
+def main(what: str, name: str, kept: str = "") -> None:
     factory = dust_dds.DomainParticipantFactory.get_instance()
     participant = factory.create_participant(domain_id=int(os.environ["ROS_DOMAIN_ID"]))
-    {"hear": hear, "say": say}[what](participant, participant.create_topic(topic_name=topic, type_=String))
+    topic = participant.create_topic(topic_name=name, type_=String)
+    kind = dust_dds.DurabilityQosPolicyKind
+    durability = dust_dds.DurabilityQosPolicy(kind.TransientLocal if kept else kind.Volatile)
+    {"hear": hear, "say": say}[what](participant, topic, durability)
 
 
 main(*sys.argv[1:])

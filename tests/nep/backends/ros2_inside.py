@@ -6,6 +6,7 @@ import hashlib
 import os
 import signal
 import socket
+import struct
 import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ from nep.backends.ros2 import MessageTypes, message_types
 from nep.backends.ros2.environment import configuration
 from nep.backends.ros2.library import dds
 from nep.backends.ros2.names import user_data_of
+from nep.backends.ros2.topics import DdsTopics
 from tests.nep.programs import GREETINGS_S, Program, eventually, running
 
 NEEDS_DUST = "needs another vendor's DDS: pip install dust-dds==0.15.0"
@@ -280,6 +282,29 @@ def test_nep_hears_what_another_vendor_says(make: Make) -> None:
         assert view.nodes[publisher.node_id].name.startswith("dds/")
 
 
+def test_another_vendor_that_comes_late_hears_what_is_latched(make: Make) -> None:
+    pytest.importorskip("dust_dds", reason=NEEDS_DUST)
+    pub = make("a").new_pub("map", "std_msgs/msg/String", latched=True)
+    pub.publish({"data": "old"})
+    pub.publish({"data": "last"})
+    with running(PEER, "hear", "rt/map", "latched") as other:
+        assert [other.line() for _ in range(3)] == ["ready", "matched", "last"]
+        pub.publish({"data": "new"})
+        assert other.line() == "new"
+
+
+def test_nep_that_comes_late_hears_what_another_vendor_has_latched(make: Make) -> None:
+    pytest.importorskip("dust_dds", reason=NEEDS_DUST)
+    with running(PEER, "say", "rt/map", "latched") as other:
+        assert other.line() == "ready"
+        other.say("last")
+        sub = make("a").new_sub("map", "string")
+        message = sub.receive(60.0)
+        assert message is not None
+        assert (message.payload, message.is_latched) == ("last", True)
+        assert not sub.listen(timeout_s=0.2)[0]
+
+
 # ---- what ROS 2 is told
 
 
@@ -354,6 +379,57 @@ def test_what_tells_of_the_graph_has_the_hash_of_ros_2(make: Make) -> None:
     told = user_data_of(found.qos[dds().qos.Policy.Userdata].data)  # type: ignore[attr-defined]
     assert told == {"typehash": "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"}
     participant.__del__()  # type: ignore[attr-defined]
+
+
+def test_ros_2_node_list_reads_the_nodes_and_what_belongs_to_them(make: Make) -> None:
+    """The bytes of `ros_discovery_info`, read by hand as they are laid down by ROS 2's message."""
+    first, second = make("talker"), make("arm/left/grip per")
+    pub, sub = first.new_pub("t", "std_msgs/String"), second.new_sub("t", "std_msgs/String")
+    writer, readers = pub._transport._writer.guid.bytes, sub._transport.gids
+    library, types = dds(), message_types()
+    participant = library.domain.DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+    topics = DdsTopics(library, types, participant)
+    reader = topics.state_reader("ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo")
+    told: list[bytes] = []
+
+    def has_come() -> bool:
+        told.extend(each.cdr for each in reader.take(10))
+        return bool(told)
+
+    eventually(has_come)
+    participant.__del__()
+    info = Bytes(told[-1])
+    assert info.take("4s") == b"\0\1\0\0"
+    gid = info.take("16s")
+    assert gid[:12] == writer[:12]
+    assert info.take("I") == 2
+    assert (info.text(), info.text()) == ("/", "talker")
+    assert (info.gids(), info.gids()) == ([], [writer])
+    assert (info.text(), info.text()) == ("/arm/left", "grip_per")
+    assert (info.gids(), info.gids()) == (list(readers), [])
+    assert info.at == len(info.data)
+
+
+class Bytes:
+    """CDR that is read by hand."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data, self.at = data, 0
+
+    def take(self, form: str) -> object:
+        if form == "I":
+            self.at += -self.at % 4
+        (value,) = struct.unpack_from(f"<{form}", self.data, self.at)
+        self.at += struct.calcsize(form)
+        return value
+
+    def text(self) -> str:
+        text = self.take(f"{self.take('I')}s")
+        assert isinstance(text, bytes)
+        return text.removesuffix(b"\0").decode()
+
+    def gids(self) -> list[object]:
+        return [self.take("16s") for _ in range(int(str(self.take("I"))))]
 
 
 # ---- who may be met
