@@ -34,6 +34,7 @@ LONG_S = {
     "tests/e2e/test_path_keys.py": 60.0,
     "tests/e2e/test_soak.py": 65.0,
     "tests/ui/shell/test_layout_orders.py": 50.0,
+    "tests/nep/backends/test_ros2.py": 40.0,
     "tests/core/robots/test_claims.py": 33.0,
     "tests/ui/theme/test_high_dpi.py": 32.0,
     "tests/core/test_session.py": 32.0,

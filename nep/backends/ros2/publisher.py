@@ -133,7 +133,8 @@ class RosPublisher:
     @property
     def is_heard(self) -> bool:
         """Whether there are any."""
-        return not self._is_closed and bool(self._writer.get_matched_subscriptions())
+        with self._participant.changed:
+            return not self._is_closed and bool(self._writer.get_matched_subscriptions())
 
     def skip(self) -> None:
         """Count a message that nobody wants."""

@@ -7,10 +7,6 @@ import os
 import signal
 import socket
 import struct
-import textwrap
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from itertools import count, islice
 from pathlib import Path
 
 import numpy as np
@@ -18,78 +14,19 @@ import pytest
 
 import nep
 from nep.backends.ros2 import MessageTypes, message_types
-from nep.backends.ros2.environment import configuration
 from nep.backends.ros2.library import dds
 from nep.backends.ros2.names import user_data_of
 from nep.backends.ros2.topics import DdsTopics
-from tests.nep.programs import GREETINGS_S, Program, eventually, running
-
-NEEDS_DUST = "needs another vendor's DDS: pip install dust-dds==0.15.0"
-Make = Callable[[str], nep.Node]
-PEER = Path(__file__).with_name("dust_peer.py").read_text(encoding="utf-8")
-
-
-_domains = count(1)
-
-
-@pytest.fixture(autouse=True)
-def _a_domain_for_each_test(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Programs that were killed are there for ten seconds more."""
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(next(_domains)))
-
-
-@pytest.fixture(autouse=True)
-def _all_are_patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However busy the computer is, programs find each other in time."""
-    for module in ("participant", "publisher"):
-        monkeypatch.setattr(f"nep.backends.ros2.{module}.HANDSHAKE_S", GREETINGS_S)
-
-
-def knows(node: nep.Node, topic: str) -> nep.Node:
-    """The node, when it has found the topic."""
-    eventually(lambda: topic in {each.strip("/") for each in node.graph().topics})
-    return node
-
-
-@pytest.fixture
-def make() -> Iterator[Make]:
-    made: list[nep.Node] = []
-
-    def new(name: str) -> nep.Node:
-        made.append(nep.node(name, "ROS2"))
-        return made[-1]
-
-    yield new
-    for node in made:
-        node.close()
-
-
-BEGIN = f"""
-import nep, os, sys, threading
-from nep.backends.ros2 import participant, publisher
-participant.HANDSHAKE_S = publisher.HANDSHAKE_S = {GREETINGS_S}
-node = nep.node('other', 'ros2')
-say = lambda it: print(it, flush=True)
-def knows(topic):
-    while topic not in {{each.strip('/') for each in node.graph().topics}}:
-        threading.Event().wait(0.01)
-"""
-
-
-@contextmanager
-def nep_program(code: str, **environment: str) -> Iterator[Program]:
-    """A program with a node, which is asked to end by the end of its input."""
-    with running(BEGIN + textwrap.dedent(code), **environment) as other:
-        yield other
-        other.end()
-
-
-def killed_soon() -> dict[str, str]:
-    """For a program that is to be killed: others see after a second that it is gone, not after ten."""
-    settings = configuration({})
-    assert settings is not None
-    return {"CYCLONEDDS_URI": settings.replace("<Discovery>", "<Discovery><LeaseDuration>1s</LeaseDuration>")}
-
+from tests.nep.backends.ros2_programs import (  # noqa: F401 - fixtures
+    Make,
+    a_domain_for_each_test,
+    all_are_patient,
+    killed_soon,
+    knows,
+    making,
+    nep_program,
+)
+from tests.nep.programs import eventually
 
 # ---- two programs
 
@@ -241,68 +178,6 @@ def test_who_does_not_answer_is_named_and_waited_for_no_longer_than_it_is_said(
         pub.publish("later")
         other.signal(signal.SIGCONT)
         assert other.line() == "later"
-
-
-# ---- another vendor
-
-
-def test_another_vendor_hears_what_nep_says(make: Make) -> None:
-    pytest.importorskip("dust_dds", reason=NEEDS_DUST)
-    with running(PEER, "hear", "rt/chatter") as other:
-        assert other.line() == "ready"
-        pub = make("a").new_pub("/chatter", "std_msgs/msg/String")
-        assert other.line() == "matched"
-        eventually(lambda: pub.subscribers == 1)
-        for word in ("grüß", "", "gott"):
-            pub.publish({"data": word})
-        assert [other.line() for _ in range(3)] == ["grüß", "", "gott"]
-
-
-def test_nep_hears_what_another_vendor_says(make: Make) -> None:
-    """What is said before both have found each other may be lost, and is said again."""
-    pytest.importorskip("dust_dds", reason=NEEDS_DUST)
-    node = make("a")
-    text, data = node.new_sub("chatter", "std_msgs/String"), node.new_sub("chatter", "json")
-    with running(PEER, "say", "rt/chatter") as other:
-        assert other.line() == "ready"
-        for sub in (text, data):
-            while not sub.listen(timeout_s=0.2)[0]:
-                other.say("0")
-        for number in (1, 2, 3):
-            other.say(str(number))
-
-        def three(sub: nep.Subscriber, nothing: object) -> list[object]:
-            heard = (sub.listen(timeout_s=60.0)[1] for _ in count())
-            return list(islice((each for each in heard if each != nothing), 3))
-
-        assert three(data, 0) == [1, 2, 3]
-        assert three(text, {"data": "0"}) == [{"data": "1"}, {"data": "2"}, {"data": "3"}]
-        view = node.graph()
-        (publisher,) = view.topics["chatter"].publishers
-        assert view.nodes[publisher.node_id].name.startswith("dds/")
-
-
-def test_another_vendor_that_comes_late_hears_what_is_latched(make: Make) -> None:
-    pytest.importorskip("dust_dds", reason=NEEDS_DUST)
-    pub = make("a").new_pub("map", "std_msgs/msg/String", latched=True)
-    pub.publish({"data": "old"})
-    pub.publish({"data": "last"})
-    with running(PEER, "hear", "rt/map", "latched") as other:
-        assert [other.line() for _ in range(3)] == ["ready", "matched", "last"]
-        pub.publish({"data": "new"})
-        assert other.line() == "new"
-
-
-def test_nep_that_comes_late_hears_what_another_vendor_has_latched(make: Make) -> None:
-    pytest.importorskip("dust_dds", reason=NEEDS_DUST)
-    with running(PEER, "say", "rt/map", "latched") as other:
-        assert other.line() == "ready"
-        other.say("last")
-        sub = make("a").new_sub("map", "string")
-        message = sub.receive(60.0)
-        assert message is not None
-        assert (message.payload, message.is_latched) == ("last", True)
-        assert not sub.listen(timeout_s=0.2)[0]
 
 
 # ---- what ROS 2 is told

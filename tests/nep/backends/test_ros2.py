@@ -44,17 +44,47 @@ def why_not() -> str:
     return f"a network of its own cannot be made: {done.stderr.strip()[:200]}" if done.returncode else ""
 
 
+def why_no_fast_dds() -> str:
+    """What is missing for a program with Fast DDS; empty when nothing is."""
+    if shutil.which("g++") is not None:
+        header = "#include <fastdds/dds/domain/DomainParticipant.hpp>\n"
+        command = ["g++", "-E", "-xc++", "-"]
+        done = subprocess.run(command, input=header, capture_output=True, text=True, check=False)
+        if done.returncode == 0:
+            return ""
+    return "Fast DDS, what ROS 2 has by default, is not there: apt-get install g++ libfastrtps-dev"
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("file", ["ros2_inside.py", "test_contract.py"])
-def test_in_a_network_of_its_own(file: str) -> None:
+@pytest.mark.parametrize(
+    ("file", "chosen"),
+    [
+        ("ros2_inside.py", ""),
+        ("ros2_vendors_inside.py", "dust"),
+        ("ros2_vendors_inside.py", "fast"),
+        ("test_contract.py", ""),
+    ],
+)
+def test_in_a_network_of_its_own(file: str, chosen: str) -> None:
     pytest.importorskip("cyclonedds", reason=NEEDS)
     pytest.importorskip("rosbags", reason=NEEDS)
-    if reason := why_not():
+    if reason := why_not() or (why_no_fast_dds() if chosen == "fast" else ""):
         pytest.skip(reason)
     known = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "CYCLONEDDS_"))}
     done = subprocess.run(
-        [*NAMESPACE, sys.executable, "-m", "pytest", "-q", "-n0", "--color=no", str(HERE / file)],
+        [
+            *NAMESPACE,
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-n0",
+            "--color=no",
+            "-k",
+            chosen,
+            str(HERE / file),
+        ],
         env=known | {"NEP_TEST_ROS2": "1"},
         cwd=HERE.parents[2],
         capture_output=True,

@@ -1,0 +1,86 @@
+"""What the tests of ros2 in a network of their own share: domains, nodes, other programs."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
+
+import pytest
+
+import nep
+from nep.backends.ros2.environment import configuration
+from tests.nep.programs import GREETINGS_S, Program, eventually, running
+
+__all__ = [
+    "Make",
+    "a_domain_for_each_test",
+    "all_are_patient",
+    "killed_soon",
+    "knows",
+    "making",
+    "nep_program",
+]
+
+Make = Callable[[str], nep.Node]
+_domains = count(1)
+
+
+@pytest.fixture(autouse=True)
+def a_domain_for_each_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs that were killed are there for ten seconds more."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(next(_domains)))
+
+
+@pytest.fixture(autouse=True)
+def all_are_patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However busy the computer is, programs find each other in time."""
+    for module in ("participant", "publisher"):
+        monkeypatch.setattr(f"nep.backends.ros2.{module}.HANDSHAKE_S", GREETINGS_S)
+
+
+def knows(node: nep.Node, topic: str) -> nep.Node:
+    """The node, when it has found the topic."""
+    eventually(lambda: topic in {each.strip("/") for each in node.graph().topics})
+    return node
+
+
+@pytest.fixture(name="make")
+def making() -> Iterator[Make]:
+    made: list[nep.Node] = []
+
+    def new(name: str) -> nep.Node:
+        made.append(nep.node(name, "ROS2"))
+        return made[-1]
+
+    yield new
+    for node in made:
+        node.close()
+
+
+BEGIN = f"""
+import nep, os, sys, threading
+from nep.backends.ros2 import participant, publisher
+participant.HANDSHAKE_S = publisher.HANDSHAKE_S = {GREETINGS_S}
+node = nep.node('other', 'ros2')
+say = lambda it: print(it, flush=True)
+def knows(topic):
+    while topic not in {{each.strip('/') for each in node.graph().topics}}:
+        threading.Event().wait(0.01)
+"""
+
+
+@contextmanager
+def nep_program(code: str, **environment: str) -> Iterator[Program]:
+    """A program with a node, which is asked to end by the end of its input."""
+    with running(BEGIN + textwrap.dedent(code), **environment) as other:
+        yield other
+        other.end()
+
+
+def killed_soon() -> dict[str, str]:
+    """For a program that is to be killed: others see after a second that it is gone, not after ten."""
+    settings = configuration({})
+    assert settings is not None
+    return {"CYCLONEDDS_URI": settings.replace("<Discovery>", "<Discovery><LeaseDuration>1s</LeaseDuration>")}
