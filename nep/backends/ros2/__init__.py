@@ -8,11 +8,11 @@ from nep.backends.base import Backend
 from nep.backends.ros2.environment import domain
 from nep.backends.ros2.message_types import MessageTypes, message_types
 from nep.backends.ros2.quality import QUALITIES
-from nep.backends.ros2.transport import RosTransport
+from nep.backends.ros2.transport import Ros2Transport
 from nep.backends.ros2.type_mapping import codec_for
 
 __all__ = ["BACKEND", "MessageTypes", "message_types"]
 
 BACKEND = Backend(
-    "ros2", RosTransport, needs="cyclonedds, rosbags", master=domain, codec_for=codec_for, qos=QUALITIES
+    "ros2", Ros2Transport, needs="cyclonedds, rosbags", master=domain, codec_for=codec_for, qos=QUALITIES
 )

@@ -1,4 +1,4 @@
-"""RosPublisher: a writer of DDS. Whom it has found is asked of Cyclone DDS each time."""
+"""Ros2Publisher: a writer of DDS. Whom it has found is asked of Cyclone DDS each time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from nep.i18n import _
 from nep.messages.encoded import Encoded
 from nep.protocol.requests import PublisherCount, PublisherRecord
 
-__all__ = ["RosPublisher", "told_of", "wait_for_others"]
+__all__ = ["Ros2Publisher", "told_of", "wait_for_others"]
 
 _logger = logging.getLogger("nep")
 _PLAIN = re.compile(r"[\w./-]{1,100}", re.ASCII)
@@ -58,7 +58,7 @@ def told_of(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) 
     return user_data(told)
 
 
-class RosPublisher:
+class Ros2Publisher:
     """See the module. Raises `BadTopicError`, `NepError`."""
 
     def __init__(
@@ -66,7 +66,7 @@ class RosPublisher:
         participant: Participant,
         node_id: str,
         spec: PublisherSpec,
-        on_close: Callable[[RosPublisher, float], None],
+        on_close: Callable[[Ros2Publisher, float], None],
     ) -> None:
         self.spec = spec
         self.count = 0

@@ -1,4 +1,4 @@
-"""RosSubscriber: a reader of DDS, and a second one where a publisher has latched something.
+"""Ros2Subscriber: a reader of DDS, and a second one where a publisher has latched something.
 
 A reader that asks for what was latched (TRANSIENT_LOCAL) is not matched with publishers that do not latch,
 one that does not ask gets nothing that is old. So the usual one does not ask, and one that asks is added
@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from nep.backends.base import SubscriberSpec, SubscriberTransport
+from nep.backends.base import SubscriberSpec, SubscriberTransport, Wakes
 from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.names import dds_topic, dds_type
 from nep.backends.ros2.participant import Participant
@@ -28,7 +28,7 @@ from nep.messages.queue import Inbox
 from nep.protocol.requests import NodeRecord, SubscriberCount, SubscriberRecord
 from nep.system.log_rarely import is_logged
 
-__all__ = ["RosSubscriber", "id_of"]
+__all__ = ["Ros2Subscriber", "id_of"]
 
 _logger = logging.getLogger("nep")
 _BATCH = 256
@@ -48,7 +48,7 @@ def id_of(gid: bytes, told: str | None) -> int:
     return int.from_bytes(hashlib.sha256(gid).digest()[:8], "little") >> 1 or 1
 
 
-class SubscriberOwner(Protocol):
+class ReaderOwner(Protocol):
     """The transport that it belongs to."""
 
     node: NodeRecord
@@ -60,7 +60,7 @@ class SubscriberOwner(Protocol):
     def wake(self) -> None:
         """End all waits."""
 
-    def forget(self, subscriber: RosSubscriber) -> None:
+    def forget(self, subscriber: Ros2Subscriber) -> None:
         """It is closed."""
 
 
@@ -73,15 +73,17 @@ class _Source:
     newest_ns: int = -1
 
 
-class RosSubscriber:
+class Ros2Subscriber:
     """See the module. Raises `BadTopicError`, `NepError`."""
 
-    def __init__(self, transport: SubscriberOwner, participant: Participant, spec: SubscriberSpec) -> None:
+    def __init__(self, transport: ReaderOwner, participant: Participant, spec: SubscriberSpec) -> None:
         self.spec = spec
         self.ready: deque[Message] = deque()
         self.received = self.refused = 0
         self.problem = ""
         self.is_closed = False
+        self.fd = -1
+        self._waiting: tuple[Wakes, ...] = ()
         batch = 0 if spec.sink is None else _BATCH_BYTES
         self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
         self._dropped = 0
@@ -187,15 +189,33 @@ class RosSubscriber:
         return source
 
     def _put(self, messages: list[Message]) -> None:
-        changed = self._transport.changed
-        with changed:
+        with self._transport.changed:
             for message in messages:
                 dropped = self.inbox.put(message)
                 self.received += 1 - dropped
                 self._dropped += dropped
-            changed.notify_all()
+            self._tell_waiting()
+
+    def _tell_waiting(self) -> None:
+        """Something is there, or will not be any more. With the transport's lock held."""
+        self._transport.changed.notify_all()
+        for each in self._waiting:
+            each.wake()
 
     # ---- messages go
+
+    def enter_wait(self, waker: Wakes) -> bool:
+        """Before waiting. See `SubscriberTransport.enter_wait`."""
+        with self._transport.changed:
+            if self.is_closed or self.inbox.messages:
+                return False
+            self._waiting = (*self._waiting, waker)
+            return True
+
+    def leave_wait(self, waker: Wakes) -> None:
+        """After waiting."""
+        with self._transport.changed:
+            self._waiting = tuple(each for each in self._waiting if each is not waker)
 
     def poll(self) -> Message | None:
         """The next message if one is there."""
@@ -260,5 +280,7 @@ class RosSubscriber:
                 self._participant.unwatch(reader)
                 self._participant.withdraw(self._transport.node.id, "reader", reader)
             self._readers.clear()
+        with self._transport.changed:
+            self._tell_waiting()
         self._transport.forget(self)
         self._transport.wake()

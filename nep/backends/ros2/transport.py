@@ -12,21 +12,21 @@ from nep.backends.connection import Configuration, Hybrid
 from nep.backends.ros2.graph import graph_of
 from nep.backends.ros2.library import dds, has_forked, typesys
 from nep.backends.ros2.participant import Participant, join, leave
-from nep.backends.ros2.publisher import RosPublisher
-from nep.backends.ros2.subscriber import RosSubscriber
+from nep.backends.ros2.publisher import Ros2Publisher
+from nep.backends.ros2.subscriber import Ros2Subscriber
 from nep.errors import NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord
 from nep.system.cpu import CpuLoad
 
-__all__ = ["RosTransport"]
+__all__ = ["Ros2Transport"]
 
 _logger = logging.getLogger("nep")
 _BATCH_S = 0.005  # sinks are called 200 times a second at most
 
 
-class RosTransport:
+class Ros2Transport:
     """One node's way to the others. Raises `BackendUnavailableError` where its packages are not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
@@ -39,8 +39,8 @@ class RosTransport:
         self._load = CpuLoad()
         self._participant: Participant | None = None
         self._lock = threading.RLock()
-        self._publishers: tuple[RosPublisher, ...] = ()
-        self._subscribers: tuple[RosSubscriber, ...] = ()
+        self._publishers: tuple[Ros2Publisher, ...] = ()
+        self._subscribers: tuple[Ros2Subscriber, ...] = ()
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
 
@@ -71,18 +71,18 @@ class RosTransport:
         for each in self._subscribers:
             each.look_for_latched()
 
-    def publisher(self, spec: PublisherSpec) -> RosPublisher:
+    def publisher(self, spec: PublisherSpec) -> Ros2Publisher:
         """A new writer; returns when the readers that are known are matched."""
         participant = self._joined(spec.configuration)
-        publisher = RosPublisher(participant, self.node.id, spec, self._close_publisher)
+        publisher = Ros2Publisher(participant, self.node.id, spec, self._close_publisher)
         with self._lock:
             self._publishers = (*self._publishers, publisher)
         return publisher
 
-    def subscriber(self, spec: SubscriberSpec) -> RosSubscriber:
+    def subscriber(self, spec: SubscriberSpec) -> Ros2Subscriber:
         """A new reader; returns when the writers that are known are matched."""
         participant = self._joined(spec.configuration)
-        subscriber = RosSubscriber(self, participant, spec)
+        subscriber = Ros2Subscriber(self, participant, spec)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
             if spec.sink is not None and self._thread is None:
@@ -92,19 +92,19 @@ class RosTransport:
                 self._thread.start()
         return subscriber
 
-    def _close_publisher(self, publisher: RosPublisher, timeout_s: float) -> None:
+    def _close_publisher(self, publisher: Ros2Publisher, timeout_s: float) -> None:
         publisher.finish(timeout_s)
         with self._lock:
             self._publishers = tuple(each for each in self._publishers if each is not publisher)
 
-    def forget(self, subscriber: RosSubscriber) -> None:
+    def forget(self, subscriber: Ros2Subscriber) -> None:
         """It is closed."""
         with self._lock:
             self._subscribers = tuple(each for each in self._subscribers if each is not subscriber)
 
     def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
         """Wait for a message in one of `subscribers`, or for `wake`."""
-        mine = [each for each in subscribers if isinstance(each, RosSubscriber)]
+        mine = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
         with self.changed:
             before = self._wakes
             self.changed.wait_for(
@@ -123,12 +123,12 @@ class RosTransport:
         return graph_of(self._joined(configuration))
 
     @property
-    def publishers(self) -> tuple[RosPublisher, ...]:
+    def publishers(self) -> tuple[Ros2Publisher, ...]:
         """Those that are open."""
         return self._publishers
 
     @property
-    def subscribers(self) -> tuple[RosSubscriber, ...]:
+    def subscribers(self) -> tuple[Ros2Subscriber, ...]:
         """Those that are open."""
         return self._subscribers
 
