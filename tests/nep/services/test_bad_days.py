@@ -77,6 +77,21 @@ def test_a_server_that_is_stopped_keeps_its_calls(client) -> None:
         assert future.result(LONG_S) == {"pid": program.process.pid}
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
+def test_a_server_that_is_stopped_while_it_is_called_is_replaced_by_another(master: Master, client) -> None:
+    with running(SERVER) as program, nep.node("other") as other:
+        assert program.line() == "ready"
+        waiting = client.call_async("hang", timeout_s=None)
+        assert program.line() == "asked"
+        program.stop()
+        other.new_server("/x", lambda request: ["other", request], threads=1)
+        eventually(lambda: len(master.view().services["/x"].servers) == 1)  # it was unlisted
+        assert client.call(1) == ["other", 1]
+        with pytest.raises(nep.ServerGoneError):  # nobody can know any more
+            waiting.result(LONG_S)
+        assert client.call(2) == ["other", 2]
+
+
 def test_calls_go_on_while_the_master_is_away() -> None:
     master = Master("127.0.0.1:0", learn_s=0.0).start()
     address = master.address

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import select
 import selectors
+import socket
 import sys
 import threading
 from pathlib import Path
@@ -190,6 +192,39 @@ def test_the_io_thread_serves_on_descriptors_orders_and_times() -> None:
     assert not bell.served.acquire(timeout=0.02)
     io.close()
     bell.waker.close()
+
+
+def test_the_io_thread_serves_who_sends_as_soon_as_it_can_be_written() -> None:
+    io = IoThread("nep-io-test")
+    io.start()
+    ours, theirs = socket.socketpair()
+
+    class Sender:
+        """Sends until the other side takes no more."""
+
+        fd = ours.fileno()
+        left = 4_000_000
+        sent = threading.Event()
+
+        def serve(self, now: float) -> Rest:
+            with contextlib.suppress(BlockingIOError):
+                while self.left:
+                    self.left -= ours.send(bytes(min(self.left, 65_536)))
+            if not self.left:
+                self.sent.set()
+            return Rest(is_quiet=True, sends=self.left > 0)
+
+    with ours, theirs:
+        ours.setblocking(False)
+        theirs.settimeout(30.0)
+        sender = Sender()
+        io.add(sender)
+        taken = 0
+        while taken < 4_000_000:
+            taken += len(theirs.recv(65_536))
+        assert sender.sent.wait(30.0)
+        io.remove(sender)
+        io.close()
 
 
 def test_one_broken_socket_does_not_silence_the_others(caplog: pytest.LogCaptureFixture) -> None:
