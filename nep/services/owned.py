@@ -63,6 +63,7 @@ class OwnedServices:
         self, survey: str, callback: Callback | None, configuration: Configuration, threads: int
     ) -> Respondent:
         """See `Node.new_respondent`. Raises as `server` does."""
+        self._able_to_survey()
         return self._serve(Respondent, check_survey(survey), callback, configuration, threads)
 
     def _serve(
@@ -105,7 +106,7 @@ class OwnedServices:
         """See `Node.new_surveyor`. Raises as `server` does."""
         spec = self._client_spec(check_survey(survey), configuration, msg_type)
         limit_s = seconds("timeout", timeout_s)
-        made = Surveyor(self._able().survey(spec), spec.service, spec.codec, limit_s, self._forget)
+        made = Surveyor(self._able_to_survey().survey(spec), spec.service, spec.codec, limit_s, self._forget)
         with self._lock:
             self._clients = (*self._clients, made)
         return made
@@ -123,6 +124,16 @@ class OwnedServices:
                 )
             )
         return cast("ServiceTransport", self._transport)
+
+    def _able_to_survey(self) -> ServiceTransport:
+        able = self._able()
+        if not hasattr(able, "survey"):
+            raise NepError(
+                _("the back end '{backend}' has no surveys; use 'zeromq' for them").format(
+                    backend=self._backend.name
+                )
+            )
+        return able
 
     def _forget(self, closed: Server | Client | Surveyor) -> None:
         with self._lock:

@@ -136,16 +136,29 @@ def test_several_clients_at_once(make: Make) -> None:
     assert server.calls == 200
 
 
+class UntellableError(Exception):
+    """One that cannot even be told."""
+
+    def __str__(self) -> str:
+        raise ZeroDivisionError
+
+
 @pytest.mark.parametrize(
     ("error", "kind", "reason"),
     [
         (ZeroDivisionError("division by zero"), "ZeroDivisionError", "division by zero"),
         (KeyError(), "KeyError", ""),
         (RuntimeError("\ud800 grüß \x1b[2J" + "x" * 9000), "RuntimeError", None),
+        (SystemExit(3), "SystemExit", "3"),
+        (KeyboardInterrupt(), "KeyboardInterrupt", ""),
+        (GeneratorExit(), "GeneratorExit", ""),
+        (UntellableError(), "UntellableError", ""),
     ],
 )
 def test_what_the_callback_raises_is_raised_at_the_client(make: Make, error, kind, reason) -> None:
-    def answer(_request):
+    def answer(request):
+        if request == "again":
+            return "alive"
         raise error
 
     server = make("server").new_server("/fails", answer, threads=1)
@@ -157,6 +170,7 @@ def test_what_the_callback_raises_is_raised_at_the_client(make: Make, error, kin
     assert "\x1b" not in str(raised.value)
     assert "Traceback" not in str(raised.value)
     assert (server.calls, server.errors) == (1, 1)
+    assert client.call("again", timeout_s=LONG_S) == "alive"
 
 
 def test_an_answer_that_cannot_be_sent_is_an_error_of_the_server(make: Make) -> None:

@@ -10,6 +10,7 @@ from itertools import count
 import pytest
 
 import nep
+from nep.backends.zeromq.transport import ZeromqTransport
 from nep.masters.master import Master
 from tests.nep.programs import eventually, running
 
@@ -254,6 +255,18 @@ def test_what_cannot_be_is_refused(make: Make) -> None:
         node.new_respondent("/who", "json")
     with pytest.raises(nep.NepError, match=r"a survey needs a master|no direct connections"):
         node.new_surveyor("/who", 1000, node.direct("127.0.0.1", 9000))
+
+
+def test_a_back_end_without_them_says_so(master: Master, monkeypatch: pytest.MonkeyPatch) -> None:
+    with nep.node("here") as node:
+        monkeypatch.delattr(ZeromqTransport, "survey")
+        for make_one in (node.new_surveyor, node.new_respondent):
+            with pytest.raises(nep.NepError, match="'zeromq' has no surveys; use"):
+                make_one("/who")
+        monkeypatch.delattr(ZeromqTransport, "server")
+        for make_one in (node.new_server, node.new_client, node.new_surveyor, node.new_respondent):
+            with pytest.raises(nep.NepError, match="'zeromq' has no services; use"):
+                make_one("/who")
 
 
 RESPONDENT = """
