@@ -21,5 +21,11 @@ def _open(node: NodeRecord) -> Transport:
 
 
 BACKEND = Backend(
-    "ros", _open, needs="python3-rospy", aliases=("ros1",), codec_for=codec_of, master=address_of
+    "ros",
+    _open,
+    needs="python3-rospy",
+    aliases=("ros1",),
+    master=address_of,
+    codec_for=codec_of,
+    has_extensions=False,
 )

@@ -24,7 +24,7 @@ from nep.protocol.requests import (
 )
 from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
-__all__ = ["OwnNode", "view_of"]
+__all__ = ["OwnNode", "publisher_id", "view_of"]
 
 _CODECS = {
     "std_msgs/String": "json",
@@ -61,7 +61,7 @@ def view_of(known: RosNodes, own: list[OwnNode]) -> GraphView:
         kind = known.types.get(topic, "*")
         uri = known.uris.get(name, "")
         codec = _CODECS.get(kind, "ros")
-        record = PublisherRecord(_id(name, topic, "o"), topic, kind, codec, (uri,) if uri else ())
+        record = PublisherRecord(publisher_id(name, topic), topic, kind, codec, (uri,) if uri else ())
         _tell(graph, AddPublisher(_node(name, uri), record))
     for topic, name in _others(known.subscribers, own, lambda each: each.subscribers):
         heard = SubscriberRecord(_id(name, topic, "i"), topic, known.types.get(topic, "*"))
@@ -117,6 +117,11 @@ def _node(name: str, uri: str) -> NodeRecord:
     """A node of ROS: its name is its id, because a master has one of a name."""
     host = urlsplit(uri).hostname or "" if uri else ""
     return NodeRecord(name, name.lstrip("/"), host, None, language="", generation=_GENERATION)
+
+
+def publisher_id(node: str, topic: str) -> int:
+    """The id of the publisher of a topic in a node of ROS, both by their whole names."""
+    return _id(node, topic, "o")
 
 
 def _id(*words: str) -> int:

@@ -81,6 +81,7 @@ class RosProcess:
         self._seqs: Counter[str] = Counter()
         self.subscribed: Counter[str] = Counter()
         """How many subscribers of nep's there are here, by topic."""
+        self._published: dict[str, dict[int, Any]] = {}
         self.handshakes = Handshakes()
         self.at_shutdown: set[Callable[[], None]] = set()
         """Called when rospy is shut down before the program ends."""
@@ -151,6 +152,29 @@ class RosProcess:
             )  # fmt: skip
             self._types[topic] = definition.name, users + 1
         return made
+
+    def publishes(self, topic: str, id_: int, publisher: Any) -> None:  # noqa: ANN401 - rospy has no types
+        """A publisher of nep's with this id is there, by what `advertise` made for it."""
+        with self._lock:
+            self._published.setdefault(topic, {})[id_] = publisher
+
+    def publishes_no_more(self, topic: str, id_: int) -> None:
+        """It is closed."""
+        with self._lock:
+            self._published.get(topic, {}).pop(id_, None)
+
+    def publisher_on(self, topic: str) -> int | None:
+        """The id of who publishes a topic in this process; None when it is not one publisher of nep's alone.
+
+        ROS tells of a message only which process it is from.
+        """
+        with self._lock:
+            found = self._published.get(topic, {})
+            if len(found) != 1:
+                return None
+            ((id_, publisher),) = found.items()
+            impl = publisher.impl
+            return id_ if impl is not None and impl.ref_count == 1 else None
 
     def withdraw(self, topic: str, publisher: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy has no types
         """Unregister it."""

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from nep.backends.base import SubscriberSpec, Wakes
 from nep.backends.ros.carried import STAMP, Unpacker, installed, is_ros_type, unpacker
+from nep.backends.ros.graph import publisher_id
 from nep.backends.ros.process import RosProcess, RosShutdownError
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import DecodeError, NepError, WireError
@@ -46,13 +47,18 @@ class SubscriberOwner(Protocol):
 
 @dataclass
 class _Source:
-    """One publisher, as its connection tells. `seq` is that of its newest header."""
+    """One publisher, as its connection tells. `seq` is that of its newest header.
+
+    `publisher` is its id; None for one of this process, of which `is_own` tells.
+    """
 
     unpacker: Unpacker | None
     kind: MessageKind | None
     problem: str = ""
     seq: int = 0
     last: object = None
+    publisher: int | None = None
+    is_own: bool = False
 
 
 def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy has no types
@@ -163,9 +169,11 @@ class RosSubscriber:
             return _Source(None, None, problem)
         is_latched = header.get("latching") == "1"
         codec = found.codec
-        return _Source(
-            found, MessageKind(self.spec.topic, codec.name, found.msg_type, is_latched, codec.decode)
-        )
+        kind = MessageKind(self.spec.topic, codec.name, found.msg_type, is_latched, codec.decode)
+        name = header.get("callerid", "")
+        is_own = name == self.process.name
+        publisher = publisher_id(name, self.topic) if name and not is_own else None
+        return _Source(found, kind, publisher=publisher, is_own=is_own)
 
     def _read(self, source: _Source, body: memoryview) -> Message:
         if source.unpacker is None or source.kind is None:
@@ -175,7 +183,10 @@ class RosSubscriber:
         except DecodeError as error:
             raise WireError(error.reason, len(body)) from error
         message = arrived(source.kind, data, None, 0, 0, extension or NOTHING)
-        message.seq = message.publisher = None
+        message.seq = None
+        message.publisher = source.publisher
+        if source.is_own:
+            message.publisher = self.process.publisher_on(self.topic)
         if source.unpacker.has_header:
             seq, secs, nsecs = STAMP.unpack_from(body, 0)
             message.stamp_ns = secs * 1_000_000_000 + nsecs

@@ -65,6 +65,7 @@ class RosPublisher:
         self._publisher: Any = process.advertise(
             self.topic, self._definition, is_latched=spec.is_latched, queue=queue
         )
+        process.publishes(self.topic, spec.id, self._publisher)
 
     @property
     def ros_type(self) -> str:
@@ -146,6 +147,7 @@ class RosPublisher:
                 return
             self._is_closed = True
         self._transport.forget(self)
+        self.process.publishes_no_more(self.topic, self.spec.id)
         left = self.process.unsent(self._publisher, deadline)
         if left:
             _logger.warning("'%s' is closed before %d subscriber(s) took everything", self.spec.topic, left)
