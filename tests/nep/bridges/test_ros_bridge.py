@@ -60,11 +60,12 @@ def test_one_line_stands_beside_a_robot_and_nothing_is_said_twice(ros: str, mast
         assert robot.line() == "ready"
         with running(COMMAND, "bridge", *words, "--json", **told(ros)) as bridge:
             when(bridge, lambda it: it["is_ready"] and not any(each["trouble"] for each in it["routes"]))
-            hears, says = person.new_sub("/chat"), person.new_pub("/chat")
+            hears = person.new_sub("/chat")
             robot.say("chat hello from ROS")
             message = hears.receive(30.0)
             assert (message.payload, message.msg_type) == ({"data": "hello from ROS"}, "std_msgs/String")
             assert robot.line() == "chat hello from ROS"
+            says = person.new_pub("/chat")
             for _time in range(3):
                 says.publish({"data": "hello from nep"})
             assert [robot.line() for _time in range(3)] == ["chat hello from nep"] * 3
