@@ -25,7 +25,7 @@ BACKEND = Backend(
     _open,
     needs="python3-rospy",
     aliases=("ros1",),
-    master=address_of,
     codec_for=codec_of,
+    master=address_of,
     has_extensions=False,
 )

@@ -237,7 +237,7 @@ def unpacker(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpa
     if is_ros_type(msg_type) and msg_type != ros_type:
         raise _mismatch(msg_type, ros_type)
     if ros_type in _PICTURES and (msg_type in _PICTURES or wanted is IMAGE):
-        return Unpacker(IMAGE, msg_type, _from_raw if ros_type == _RAW else _from_compressed, True)
+        return Unpacker(IMAGE, IMAGE.name, _from_raw if ros_type == _RAW else _from_compressed, True)
     if not is_ros_type(msg_type) and ros_type == _CARRIERS[wanted.name]:
         read = _from_string if ros_type == _STRING else _from_array
         return Unpacker(wanted, msg_type, read, has_header=False)
