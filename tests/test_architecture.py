@@ -195,7 +195,7 @@ def test_imports_inside_functions_are_of_heavy_packages_only() -> None:
     heavy_of_ours = {
         "app.ui.blockly.view",
         "app.ui.blockly.view.BlocklyView",
-        "nep.backends.ros.transport.RosTransport",
+        "nep.backends.ros.transport.RospyTransport",
     }
     only_on_some_systems = {"fcntl", "msvcrt", "resource", "winreg"}
     own_or_standard = {"nep", "app", *sys.stdlib_module_names} - only_on_some_systems

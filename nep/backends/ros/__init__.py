@@ -15,9 +15,9 @@ __all__ = ["BACKEND"]
 
 
 def _open(node: NodeRecord) -> Transport:
-    from nep.backends.ros.transport import RosTransport  # noqa: PLC0415 - XML-RPC is heavy, and for ROS only
+    from nep.backends.ros.transport import RospyTransport  # noqa: PLC0415 - XML-RPC is heavy, and for ROS only
 
-    return RosTransport(node)
+    return RospyTransport(node)
 
 
 BACKEND = Backend(

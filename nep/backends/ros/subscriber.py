@@ -1,4 +1,4 @@
-"""RosSubscriber: what rospy hears, in an inbox of nep's. Bodies are decoded by whoever reads them."""
+"""RospySubscriber: what rospy hears, in an inbox of nep's. Bodies are decoded by whoever reads them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from nep.messages.message import NOTHING, Message, MessageKind, arrived
 from nep.messages.queue import Inbox
 from nep.text import escaped, shortened
 
-__all__ = ["RosSubscriber"]
+__all__ = ["RospySubscriber"]
 
 _logger = logging.getLogger("nep")
 _BUFFER_BYTES = 2**18
@@ -30,7 +30,7 @@ _BUFFER_BYTES = 2**18
 _SOURCES = 1_000
 
 
-class SubscriberOwner(Protocol):
+class RospyOwner(Protocol):
     """What a subscriber needs of its transport."""
 
     changed: threading.Condition
@@ -71,12 +71,10 @@ def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy has no types
     return stream.getvalue()
 
 
-class RosSubscriber:
+class RospySubscriber:
     """Takes messages of any type, so that one of a wrong type becomes a problem instead of silence."""
 
-    def __init__(
-        self, owner: SubscriberOwner, process: RosProcess, spec: SubscriberSpec, max_bytes: int
-    ) -> None:
+    def __init__(self, owner: RospyOwner, process: RosProcess, spec: SubscriberSpec, max_bytes: int) -> None:
         if is_ros_type(spec.msg_type):
             installed(spec.msg_type)
         self.spec = spec

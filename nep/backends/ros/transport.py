@@ -18,7 +18,7 @@ from nep.backends.ros.process import RosProcess, RosShutdownError, process_with
 from nep.backends.ros.queue_room import QueueRoom
 from nep.backends.ros.service_client import RosClient
 from nep.backends.ros.service_server import RosServer
-from nep.backends.ros.subscriber import RosSubscriber
+from nep.backends.ros.subscriber import RospySubscriber
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import ClosedError, NepError
@@ -27,7 +27,7 @@ from nep.messages.encoded import Encoded
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, PublisherCount, SubscriberCount
 
-__all__ = ["RosPublisher", "RosTransport"]
+__all__ = ["RospyPublisher", "RospyTransport"]
 
 _logger = logging.getLogger("nep")
 _QUEUES = {"image": 64, "bytes": 1000, "ros": 1000}
@@ -44,10 +44,10 @@ def _address(configuration: Configuration) -> str:
     return configuration.master
 
 
-class RosPublisher:
+class RospyPublisher:
     """Publishes through rospy. Its number of messages is nep's; a header's seq counts for the whole topic."""
 
-    def __init__(self, transport: RosTransport, process: RosProcess, spec: PublisherSpec) -> None:
+    def __init__(self, transport: RospyTransport, process: RosProcess, spec: PublisherSpec) -> None:
         self.spec = spec
         self.count = 0
         self.bytes = 0
@@ -154,7 +154,7 @@ class RosPublisher:
         self.process.withdraw(self.topic, self._publisher, deadline - time.monotonic())
 
 
-class RosTransport:
+class RospyTransport:
     """One node's way to the others. Raises `BackendUnavailableError` where rospy is not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
@@ -162,8 +162,8 @@ class RosTransport:
         self.node = node
         self.changed = threading.Condition()
         self._wakes = 0
-        self._publishers: tuple[RosPublisher, ...] = ()
-        self._subscribers: tuple[RosSubscriber, ...] = ()
+        self._publishers: tuple[RospyPublisher, ...] = ()
+        self._subscribers: tuple[RospySubscriber, ...] = ()
         self._servers: tuple[RosServer, ...] = ()
         self._clients: tuple[RosClient, ...] = ()
         self._lock = threading.RLock()
@@ -172,10 +172,10 @@ class RosTransport:
         self._closing = threading.Event()
         _transports.add(self)
 
-    def publisher(self, spec: PublisherSpec) -> RosPublisher:
+    def publisher(self, spec: PublisherSpec) -> RospyPublisher:
         """A publisher, when all nodes with registered subscribers have connected, or half a second later."""
         process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
-        publisher = RosPublisher(self, process, spec)
+        publisher = RospyPublisher(self, process, spec)
         with self._lock:
             self._publishers = (*self._publishers, publisher)
         try:
@@ -186,11 +186,11 @@ class RosTransport:
             raise
         return publisher
 
-    def subscriber(self, spec: SubscriberSpec) -> RosSubscriber:
+    def subscriber(self, spec: SubscriberSpec) -> RospySubscriber:
         """A subscriber, when all publishers that are registered have connected, or half a second later."""
         process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
         batch = 0 if spec.sink is None else _BATCH_BYTES
-        subscriber = RosSubscriber(self, process, spec, spec.max_bytes - batch)
+        subscriber = RospySubscriber(self, process, spec, spec.max_bytes - batch)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
         try:
@@ -208,7 +208,7 @@ class RosTransport:
         if self._is_closed:
             raise ClosedError(f"node '{self.node.name}'")
 
-    def forget(self, closed: RosPublisher | RosSubscriber | RosServer | RosClient) -> None:
+    def forget(self, closed: RospyPublisher | RospySubscriber | RosServer | RosClient) -> None:
         """It was closed."""
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
@@ -251,7 +251,7 @@ class RosTransport:
 
         Raises `RosShutdownError` when no call can come any more.
         """
-        mine = [each for each in subscribers if isinstance(each, RosSubscriber)]
+        mine = [each for each in subscribers if isinstance(each, RospySubscriber)]
         before = self._wakes
         entered: list[CallQueue] = []
         try:
@@ -284,10 +284,10 @@ class RosTransport:
 
     def own(self, address: str) -> OwnNode:
         """What the graph tells of this node beyond what the master knows."""
-        outs: list[RosPublisher] = [
+        outs: list[RospyPublisher] = [
             each for each in self._publishers if each.process.master.address == address
         ]
-        ins: list[RosSubscriber] = [
+        ins: list[RospySubscriber] = [
             each for each in self._subscribers if each.process.master.address == address
         ]
         servers = [each for each in self._servers if each.process.master.address == address]
@@ -356,4 +356,4 @@ class RosTransport:
             self._closing.wait(_BATCH_S)
 
 
-_transports: set[RosTransport] = set()
+_transports: set[RospyTransport] = set()
