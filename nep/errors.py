@@ -7,6 +7,7 @@
     ├── ServiceError            a server's callback raised
     ├── ServerGoneError         a server ended while it was called
     ├── ClosedError             the object was closed before
+    ├── ParameterError          a parameter cannot have a value, or there is none
     ├── BadTopicError           a topic name that the grammar refuses
     ├── BadNameError            a node's name that the grammar refuses
     ├── UnknownBackendError     no back end has this name
@@ -45,6 +46,7 @@ __all__ = [
     "MasterUnreachable",
     "NepError",
     "NoServerError",
+    "ParameterError",
     "PluginsMissingError",
     "RecordingError",
     "RequestRefusedError",
@@ -115,6 +117,22 @@ class NoServerError(WaitTimeoutError):
             _("no server for '{service}' within {seconds:g} s; {step}").format(
                 service=service, seconds=timeout_s, step=step
             ),
+        )
+
+
+class ParameterError(NepError, ValueError):
+    """The parameter `name` cannot be `value`, as a program writes it ("": none is meant), for `reason`."""
+
+    def __init__(self, name: str, value: str, reason: str) -> None:
+        self.name = name
+        self.value = value
+        self.reason = reason
+        super().__init__(
+            _("the parameter '{name}' cannot be {value}; {reason}").format(
+                name=name, value=value, reason=reason
+            )
+            if value
+            else _("the parameter '{name}': {reason}").format(name=name, reason=reason)
         )
 
 

@@ -13,6 +13,7 @@ from nep.errors import EncodeError as EncodeError
 from nep.errors import MasterUnreachable as MasterUnreachable
 from nep.errors import NepError as NepError
 from nep.errors import NoServerError as NoServerError
+from nep.errors import ParameterError as ParameterError
 from nep.errors import RequestRefusedError as RequestRefusedError
 from nep.errors import ServerGoneError as ServerGoneError
 from nep.errors import ServiceError as ServiceError
@@ -32,6 +33,9 @@ from nep.nodes.node import spin as spin
 from nep.nodes.publisher import Publisher as Publisher
 from nep.nodes.subscriber import Subscriber as Subscriber
 from nep.nodes.timer import Timer as Timer
+from nep.parameters.owned import Parameters as Parameters
+from nep.parameters.parameter import NodeParameter as NodeParameter
+from nep.parameters.remote import RemoteParameters as RemoteParameters
 from nep.protocol.graph_view import Alert as Alert
 from nep.protocol.graph_view import ClientInfo as ClientInfo
 from nep.protocol.graph_view import GraphView as GraphView

@@ -28,9 +28,9 @@ from nep.backends.base import (
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port, for_messages
 from nep.errors import BadTopicError, ClosedError, WrongTypeError
 from nep.i18n import _
-from nep.messages.history import MAX_HISTORY
 from nep.messages.queue import MAX_MESSAGES, Keep
-from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text, within
+from nep.nodes.abilities import history_for, is_pattern_for, quality_for
+from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
 from nep.nodes.async_spinning import spin as spin_in_loop
 from nep.nodes.executor import spin_all
 from nep.nodes.log_handler import LogHandler, handler_of
@@ -38,10 +38,11 @@ from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
 from nep.nodes.timer import Timer
 from nep.nodes.work import Callback, Work
+from nep.parameters.owned import MSG_TYPE, Parameters, place_of
+from nep.parameters.remote import RemoteParameters, node_with_parameters
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
 from nep.protocol.service_wire import PREFIX
-from nep.protocol.topic_pattern import is_pattern
 from nep.protocol.wire import check_node_name, check_topic
 from nep.services.owned import OwnedServices
 from nep.services.service_node import ServiceNode
@@ -100,6 +101,7 @@ class Node(ServiceNode):
         self._is_closed = False
         self._is_forked = False
         self._log_handler: LogHandler | None = None
+        self._parameters: Parameters | None = None
         record = NodeRecord(
             self.id,
             name,
@@ -179,8 +181,8 @@ class Node(ServiceNode):
         `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and `ValueError` for what is
         none of the allowed arguments.
         """
-        connected = self._configured(configuration)
-        kept = max(self._history(history, connected), 1 if latched is True else 0)
+        connected = for_messages(self._configured(configuration))
+        kept = max(history_for(self._backend, history, connected), 1 if latched is True else 0)
         number = next(self._numbers)
         spec = PublisherSpec(
             id_from(self._key, number),
@@ -188,11 +190,11 @@ class Node(ServiceNode):
             text("msg_type", msg_type),
             self._backend.codec_for(msg_type),
             flag("latched", latched) or kept > 0,
-            for_messages(connected),
+            connected,
             self._wait_s,
             number,
             flag("batch", batch),
-            self._quality(qos),
+            quality_for(self._backend, qos),
             kept,
         )
         publisher = Publisher(self._open_transport().publisher(spec), spec, self._publishers.discard)
@@ -235,8 +237,8 @@ class Node(ServiceNode):
             at_least("max_messages", max_messages, 1),
             sink=None if sink is None else function("sink", sink),
             number=number,
-            qos=self._quality(qos),
-            is_pattern=flag("wildcards", wildcards) and self._is_pattern(topic, configuration),
+            qos=quality_for(self._backend, qos),
+            is_pattern=flag("wildcards", wildcards) and is_pattern_for(self._backend, topic, configuration),
         )
         return self._subscribed(self._open_transport().subscriber(spec), spec)
 
@@ -273,8 +275,8 @@ class Node(ServiceNode):
             one_of("keep", keep, ("all", "latest")),
             at_least("max_messages", max_messages, 1),
             number=number,
-            qos=self._quality(qos),
-            is_pattern=self._is_pattern(topic, configuration),
+            qos=quality_for(self._backend, qos),
+            is_pattern=is_pattern_for(self._backend, topic, configuration),
         )
         incoming = transport.subscriber(spec)
         subscriber = self._subscribed(incoming, spec)
@@ -289,6 +291,34 @@ class Node(ServiceNode):
         """Who spins looks again at what there is to do."""
         self._work.wake()
 
+    # ---- parameters
+
+    @property
+    def parameters(self) -> Parameters:
+        """Its parameters: values that others may read and set while it runs (`nep param`)."""
+        with self._lock:
+            self._parameters = self._parameters or Parameters(self)
+            return self._parameters
+
+    def parameters_of(self, node: str, timeout_s: float | None = 5.0) -> RemoteParameters:
+        """The parameters of another node, by its name or id. `timeout_s` is how long it may take to answer.
+
+        Raises `NepError` when there is no such node, or several, or when it has declared none.
+        """
+        found = node_with_parameters(self.graph(), node)
+        return RemoteParameters(self.new_client(place_of(found), timeout_s=timeout_s))
+
+    def open_parameters(self, place: str, answer: Callable[[object], object]) -> Publisher:
+        """See `nep.parameters.owned.ParameterHost`."""
+        publisher = self.new_pub(place, MSG_TYPE, latched=True)
+        if hasattr(self._open_transport(), "server"):
+            try:
+                self.new_server(place, answer, threads=1)
+            except BaseException:
+                publisher.close(0.0)
+                raise
+        return publisher
+
     def _configured(self, configuration: object) -> Configuration:
         if configuration is None:
             return self.hybrid()
@@ -300,38 +330,6 @@ class Node(ServiceNode):
                 )
             )
         return configuration
-
-    def _is_pattern(self, topic: str, configuration: Configuration | None) -> bool:
-        if isinstance(configuration, Direct) or not is_pattern(topic):
-            return False
-        if not self._backend.has_patterns:
-            raise ValueError(
-                _("the back end '{name}' takes no wildcards; subscribe to each topic by its name").format(
-                    name=self._backend.name
-                )
-            )
-        return True
-
-    def _history(self, history: int, configuration: Configuration) -> int:
-        within("history", history, 0, MAX_HISTORY)
-        is_original = isinstance(configuration, Direct) and configuration.wire == "original"
-        if history and (is_original or not self._backend.has_history):
-            where = _("the original wire") if is_original else _("the back end '{name}'")
-            raise ValueError(
-                _("{where} keeps no history for subscribers that come late; leave out history").format(
-                    where=where.format(name=self._backend.name)
-                )
-            )
-        return history
-
-    def _quality(self, qos: str) -> str:
-        if qos and not self._backend.qos:
-            raise ValueError(
-                _("the back end '{name}' has no qualities of service; leave out qos").format(
-                    name=self._backend.name
-                )
-            )
-        return one_of("qos", qos, ("", *self._backend.qos))
 
     def _subscribed(self, transport: SubscriberTransport, spec: SubscriberSpec) -> Subscriber:
         subscriber = Subscriber(transport, spec, self._forget)
@@ -446,6 +444,8 @@ class Node(ServiceNode):
         for subscriber in self._subscribers:
             subscriber.forked()
         self._services.forked()
+        if self._parameters is not None:
+            self._parameters.forked()
         _alive.discard(self)
         _inherited.append(self)
 

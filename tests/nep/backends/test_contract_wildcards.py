@@ -17,6 +17,7 @@ from nep.errors import WireError
 from nep.masters.graph import Graph
 from nep.masters.master import Master
 from nep.masters.pattern_index import ALL_PATTERNS_MAX, PATTERNS_MAX, PatternIndex
+from nep.nodes.abilities import is_pattern_for
 from nep.protocol.requests import (
     AddPublisher,
     AddSubscriber,
@@ -255,7 +256,8 @@ def test_a_back_end_without_says_so(make: Make) -> None:
 
 def test_a_direct_connection_takes_the_name_as_it_is() -> None:
     with nep.node("a") as node:
-        assert not node._is_pattern("a/*", node.direct(port=9999))
+        assert not is_pattern_for(node._backend, "a/*", node.direct(port=9999))
+        assert is_pattern_for(node._backend, "a/*", node.hybrid())
 
 
 @pytest.mark.parametrize("backend", ["zeromq", "zenoh"])

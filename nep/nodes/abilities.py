@@ -1,0 +1,48 @@
+"""What a back end can do, and a caller asks for: refused in a sentence where it cannot."""
+
+from __future__ import annotations
+
+from nep.backends.base import Backend
+from nep.backends.connection import Configuration, Direct
+from nep.i18n import _
+from nep.messages.history import MAX_HISTORY
+from nep.nodes.arguments import one_of, within
+from nep.protocol.topic_pattern import is_pattern
+
+__all__ = ["history_for", "is_pattern_for", "quality_for"]
+
+
+def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | None) -> bool:
+    """Whether a subscriber of `topic` hears all topics that match. Raises `ValueError`."""
+    if isinstance(configuration, Direct) or not is_pattern(topic):
+        return False
+    if not backend.has_patterns:
+        raise ValueError(
+            _("the back end '{name}' takes no wildcards; subscribe to each topic by its name").format(
+                name=backend.name
+            )
+        )
+    return True
+
+
+def history_for(backend: Backend, history: int, configuration: Configuration) -> int:
+    """`history` itself when a publisher can keep so many messages. Raises `ValueError`."""
+    within("history", history, 0, MAX_HISTORY)
+    is_original = isinstance(configuration, Direct) and configuration.wire == "original"
+    if history and (is_original or not backend.has_history):
+        where = _("the original wire") if is_original else _("the back end '{name}'")
+        raise ValueError(
+            _("{where} keeps no history for subscribers that come late; leave out history").format(
+                where=where.format(name=backend.name)
+            )
+        )
+    return history
+
+
+def quality_for(backend: Backend, qos: str) -> str:
+    """`qos` itself when it is one of the back end's words. Raises `ValueError`."""
+    if qos and not backend.qos:
+        raise ValueError(
+            _("the back end '{name}' has no qualities of service; leave out qos").format(name=backend.name)
+        )
+    return one_of("qos", qos, ("", *backend.qos))

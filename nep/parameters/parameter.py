@@ -1,0 +1,167 @@
+"""NodeParameter: a value with a name, a type and limits. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+import orjson
+
+from nep.errors import ParameterError
+from nep.i18n import _, listed
+from nep.protocol.wire import check_topic
+from nep.text import escaped, shortened
+
+__all__ = ["KINDS", "NodeParameter", "declared", "shown"]
+
+KINDS: Mapping[str, type] = {
+    "bool": bool,
+    "int": int,
+    "float": float,
+    "str": str,
+    "list": list,
+    "dict": dict,
+}
+_VALUE_MAX_BYTES = 2**20
+_CHOICES_MAX = 1000
+_DESCRIPTION_LETTERS = 1000
+_SHOWN = 60
+_MOST = 2**63 - 1
+
+
+@dataclass(frozen=True)
+class NodeParameter:
+    """A parameter of a node as it is now.
+
+    `kind` is "bool", "int", "float", "str", "list" or "dict". `minimum` and `maximum` bound numbers, both
+    included; `choices` are the only values there are, if there are any. `is_read_only`: only its own node
+    may set it.
+    """
+
+    name: str
+    value: object
+    kind: str
+    default: object
+    description: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[object, ...] = ()
+    is_read_only: bool = False
+
+    def with_value(self, value: object) -> NodeParameter:
+        """The same with another value. Raises `ParameterError` for one that it cannot have."""
+        return replace(self, value=self._checked(value))
+
+    def _checked(self, value: object) -> object:
+        found = self._of_kind(value)
+        if isinstance(found, int | float) and not isinstance(found, bool):
+            if self.minimum is not None and found < self.minimum:
+                raise self._error(value, _("the least is {least}").format(least=self.minimum))
+            if self.maximum is not None and found > self.maximum:
+                raise self._error(value, _("the most is {most}").format(most=self.maximum))
+        if self.choices and found not in self.choices:
+            names = listed([shown(each) for each in self.choices], "or")
+            raise self._error(value, _("use {choices}").format(choices=names))
+        return found
+
+    def _of_kind(self, value: object) -> object:
+        """`value` as one of this kind; whole numbers are numbers, and 2.0 is a whole one."""
+        if isinstance(value, int | float) and not isinstance(value, bool) and self.kind in {"int", "float"}:
+            return self._number(value)
+        if type(value) is not KINDS[self.kind]:
+            raise self._error(value, _("give a '{kind}'").format(kind=self.kind))
+        return self._copied(value)
+
+    def _number(self, value: float) -> float:
+        if not _is_finite(value):
+            raise self._error(value, _("give a finite number"))
+        if self.kind == "float":
+            return float(value)
+        if int(value) != value or abs(value) > _MOST:
+            raise self._error(value, _("give a whole number"))
+        return int(value)
+
+    def _copied(self, value: object) -> object:
+        """As others will read it: what JSON has, and a copy, so that nobody changes it in place."""
+        try:
+            data = orjson.dumps(value)
+        except (TypeError, ValueError) as error:
+            raise self._error(value, str(error)) from error
+        if len(data) > _VALUE_MAX_BYTES:
+            raise self._error(
+                value,
+                _("it has {size} bytes, {most} are allowed").format(size=len(data), most=_VALUE_MAX_BYTES),
+            )
+        return cast("object", orjson.loads(data))
+
+    def _error(self, value: object, reason: str) -> ParameterError:
+        return ParameterError(self.name, shown(value), reason)
+
+    def as_map(self) -> dict[str, object]:
+        """For others, as JSON has it."""
+        return {
+            "name": self.name,
+            "value": self.value,
+            "type": self.kind,
+            "default": self.default,
+            "description": self.description,
+            "min": self.minimum,
+            "max": self.maximum,
+            "choices": list(self.choices),
+            "read_only": self.is_read_only,
+        }
+
+
+def declared(
+    name: str,
+    default: object,
+    *,
+    kind: type | str | None,
+    description: str,
+    minimum: float | None,
+    maximum: float | None,
+    choices: Sequence[object],
+    is_read_only: bool,
+) -> NodeParameter:
+    """A new parameter that has its default. Raises `ValueError` for what cannot be one."""
+    word = kind if isinstance(kind, str) else (type(default) if kind is None else kind).__name__
+    if word not in KINDS:
+        raise ParameterError(
+            check_topic(name),
+            shown(default),
+            _("its type is {kinds}").format(kinds=listed([f"'{each}'" for each in KINDS], "or")),
+        )
+    for each in (minimum, maximum):
+        if each is not None and (word not in {"int", "float"} or not _is_finite(each)):
+            raise ParameterError(
+                check_topic(name), shown(default), _("only numbers have limits, and finite ones")
+            )
+    bare = NodeParameter(check_topic(name), None, word, None, _told(description))
+    if len(choices) > _CHOICES_MAX:
+        raise ParameterError(name, shown(default), _("it has too many choices"))
+    allowed = tuple(bare.with_value(each).value for each in choices)
+    made = replace(bare, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
+    value = made.with_value(default).value
+    return replace(made, value=value, default=value)
+
+
+def _told(description: object) -> str:
+    text = str(description).encode("utf-8", "replace").decode()
+    return shortened(text, _DESCRIPTION_LETTERS)
+
+
+def _is_finite(value: object) -> bool:
+    if isinstance(value, int) and not isinstance(value, bool):
+        return abs(value) <= _MOST
+    return isinstance(value, float) and math.isfinite(value)
+
+
+def shown(value: object) -> str:
+    """As a program writes it, for a sentence; what is long is shortened."""
+    try:
+        written = repr(value)
+    except Exception:  # noqa: BLE001 - a value may be of any class, or have more digits than are written
+        written = f"a '{type(value).__name__}'"
+    return escaped(shortened(written, _SHOWN))

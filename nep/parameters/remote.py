@@ -1,0 +1,88 @@
+"""RemoteParameters: those of another node. Made by `Node.parameters_of`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from nep.errors import NepError, RequestRefusedError, did_you_mean
+from nep.i18n import _
+from nep.parameters.owned import place_of
+from nep.protocol.graph_view import GraphView
+from nep.services.client import Client
+from nep.text import escaped
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["RemoteParameters", "node_with_parameters"]
+
+
+class RemoteParameters:
+    """Reads and sets another node's parameters; a context manager. `client` calls it."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+
+    def list(self) -> tuple[Mapping[str, object], ...]:
+        """All of them, each as a map: name, value, type, default, description, min, max, choices, read_only.
+
+        Raises as `Client.call` does.
+        """
+        return self._asked({})
+
+    def get(self, name: str) -> object:
+        """The value of one. Raises `NepError` when there is none of this name, and as `list` does."""
+        found = {str(each.get("name")): each for each in self.list()}
+        if name not in found:
+            said = did_you_mean(name, tuple(found)) if found else _("there are none")
+            raise NepError(_("no parameter '{name}'; {said}").format(name=escaped(name), said=said))
+        return found[name].get("value")
+
+    def set(self, name: str, value: object) -> None:
+        """Give one another value. Raises `RequestRefusedError` with what the node says, and as `list`."""
+        self.set_all({name: value})
+
+    def set_all(self, values: Mapping[str, object]) -> None:
+        """Give several other values: all of them, or none. Raises as `set` does."""
+        self._asked({"set": dict(values)})
+
+    def _asked(self, request: Mapping[str, object]) -> tuple[Mapping[str, object], ...]:
+        answer = self._client.call(request)
+        said = answer if isinstance(answer, Mapping) else {}
+        if "refused" in said:
+            raise RequestRefusedError(str(said["refused"]))
+        found = said.get("parameters")
+        return tuple(each for each in found if isinstance(each, Mapping)) if isinstance(found, list) else ()
+
+    def close(self) -> None:
+        """End the client."""
+        self._client.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+
+def node_with_parameters(graph: GraphView, name: str) -> str:
+    """The id of the node of this name (or id) that has parameters.
+
+    Raises `NepError` when there is none, or more than one.
+    """
+    able = {each.id: each.name for each in graph.nodes.values() if place_of(each.id) in graph.services}
+    found = [id_ for id_, known in able.items() if name in {id_, known}]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise NepError(
+            _("{count} nodes are called '{name}'; use an id: {ids}").format(
+                count=len(found), name=escaped(name), ids=", ".join(sorted(found))
+            )
+        )
+    if any(name in {each.id, each.name} for each in graph.nodes.values()):
+        raise NepError(_("the node '{name}' has declared no parameters").format(name=escaped(name)))
+    known = tuple(sorted(set(able.values())))
+    said = did_you_mean(name, known) if known else _("no node has parameters")
+    raise NepError(_("no node is called '{name}'; {said}").format(name=escaped(name), said=said))

@@ -1,0 +1,84 @@
+"""`nep param` as a person uses it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep.masters.master import Master
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "nep", "param", *arguments],
+        capture_output=True,
+        encoding="utf-8",
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "COLUMNS": "120"},
+        check=False,
+    )
+
+
+@pytest.fixture
+def node(master: Master) -> Iterator[nep.Node]:
+    with nep.node("robot") as made:
+        made.parameters.declare("speed", 0.5, min=0, max=2, description="how fast, in m/s")
+        made.parameters.declare("mode", "walk", choices=("walk", "run"))
+        made.parameters.declare("serial", "7", read_only=True)
+        yield made
+
+
+def test_list_get_and_set(node: nep.Node) -> None:
+    told = run("list", "robot")
+    assert told.returncode == 0
+    for word in ("speed", "0.5", "float", "0 ≤ … ≤ 2", "how fast, in m/s", '["walk","run"]', "read only"):
+        assert word in told.stdout
+    assert [each["name"] for each in json.loads(run("list", "robot", "--json").stdout)] == [
+        "speed",
+        "mode",
+        "serial",
+    ]
+    assert run("set", "robot", "speed", "1.5").returncode == 0
+    assert run("set", "robot", "mode", "run").returncode == 0
+    assert (node.parameters["speed"], node.parameters["mode"]) == (1.5, "run")
+    assert run("get", "robot", "speed").stdout == "1.5\n"
+    assert run("get", node.id, "mode", "--json").stdout.strip() == '"run"'
+
+
+def test_what_is_refused_is_a_sentence(node: nep.Node) -> None:
+    refused = run("set", "robot", "speed", "9")
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert "the parameter 'speed' cannot be 9; the most is 2" in refused.stderr
+    assert "no parameter 'spead'; did you mean 'speed'?" in run("get", "robot", "spead").stderr
+    assert "no node is called 'robt'; did you mean 'robot'?" in run("list", "robt").stderr
+    node.parameters.declare("word", "x")
+    assert run("set", "robot", "word", "5").returncode == 0
+    assert node.parameters["word"] == "5", "a text stays one"
+
+
+def test_to_a_file_and_back(node: nep.Node, tmp_path: Path) -> None:
+    file = tmp_path / "robot.json"
+    assert run("dump", "robot", str(file)).returncode == 0
+    assert json.loads(file.read_text()) == {"speed": 0.5, "mode": "walk", "serial": "7"}
+    assert json.loads(run("dump", "robot").stdout) == json.loads(file.read_text())
+    assert os.listdir(tmp_path) == ["robot.json"]  # noqa: PTH208 - names
+    node.parameters.set_all({"speed": 2, "mode": "run"})
+    assert run("load", "robot", str(file)).returncode == 0
+    assert (node.parameters["speed"], node.parameters["mode"]) == (0.5, "walk")
+    file.write_text('{"speed": 1, "mode": "fly"}')
+    refused = run("load", "robot", str(file))
+    assert "the parameter 'mode' cannot be 'fly'; use 'walk' or 'run'" in refused.stderr
+    assert node.parameters["speed"] == 0.5
+    for text in ("[1]", "{no json"):
+        file.write_text(text)
+        assert run("load", "robot", str(file)).returncode == 1
+    assert run("dump", "robot", str(tmp_path / "no" / "folder")).returncode == 1
