@@ -1,0 +1,42 @@
+"""docs/patterns.md: its programs run and print what it says."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from nep.masters.master import Master
+from tests.nep.programs import ROOT, running
+
+_GUIDE = (ROOT / "docs" / "patterns.md").read_text(encoding="utf-8")
+_SECTION = re.compile(r"^## (.*?)\n(.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
+_PROGRAM = re.compile(r"^```python\n(.*?)^```\n(.*)", re.MULTILINE | re.DOTALL)
+_SAID = re.compile(r"`([^`]+)`")
+
+
+def _programs() -> dict[str, tuple[str, list[str]]]:
+    """By the head of its section: a program, and the lines that it is said to print."""
+    found = {}
+    for head, text in _SECTION.findall(_GUIDE):
+        program = _PROGRAM.search(text)
+        if program is not None:
+            after = program[2].strip().partition("\n\n")
+            said = _SAID.findall(after[0].partition(". ")[0]) if "`" in after[0] else []
+            if after[0] == "It prints":
+                said = [line.strip() for line in after[2].partition("\n\n")[0].splitlines()]
+            found[head] = (program[1], said)
+    return found
+
+
+@pytest.mark.parametrize("head", sorted(_programs()))
+def test_the_program_prints_what_is_said(master: Master, head: str) -> None:
+    program, said = _programs()[head]
+    with running(program, NEP_MASTER=master.address) as example:
+        printed, errors = example.end()
+    assert errors == ""
+    assert printed.splitlines() == said
+
+
+def test_each_pattern_has_its_program() -> None:
+    assert len(_programs()) == 5
