@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import selectors
 from collections import deque
+from contextlib import suppress
 
 from nep.backends.base import SubscriberTransport
 from nep.system.wakeup import Waker
@@ -70,7 +71,10 @@ class SharedWait:
         bell = self._bells.pop(subscriber, None)
         if bell is not None:
             if subscriber.fd >= 0:
-                self._selector.unregister(subscriber.fd)
+                with suppress(
+                    OSError, ValueError, KeyError
+                ):  # it was closed, and the number may be another's
+                    self._selector.unregister(subscriber.fd)
             subscriber.leave_wait(bell)
 
     def disarm_all(self) -> None:

@@ -6,6 +6,7 @@ import functools
 import inspect
 import threading
 from collections.abc import Callable
+from itertools import chain
 from typing import Any, NamedTuple
 
 from nep.backends.base import SubscriberTransport, Transport, Wakes
@@ -67,7 +68,7 @@ class Work:
         """It is closed."""
         with self._lock:
             self.callbacks = tuple(each for each in self.callbacks if each.subscriber is not subscriber)
-            self._coroutine = self._first_coroutine()
+            self._look_again()
 
     def new_timer(self, period_s: float, callback: Callable[[], object]) -> Timer:
         """A timer that runs from now on. See `Timer`."""
@@ -77,7 +78,8 @@ class Work:
                 timer.node_closes()
             else:
                 self.timers = (*self.timers, timer)
-                self._coroutine = self._first_coroutine()
+                if is_coroutine_function(callback):
+                    self._coroutine = self._coroutine or repr(timer)
         self.wake()  # who spins already waits for less long now
         return timer
 
@@ -85,13 +87,14 @@ class Work:
         """It is cancelled."""
         with self._lock:
             self.timers = tuple(each for each in self.timers if each is not timer)
-            self._coroutine = self._first_coroutine()
+            self._look_again()
 
-    def _first_coroutine(self) -> str:
-        for each in self.callbacks:
-            if is_coroutine_function(each.call):
-                return each.subscriber.topic
-        return next((repr(each) for each in self.timers if is_coroutine_function(each.callback)), "")
+    def _look_again(self) -> None:
+        """Something ended: whether there is anything left that only a loop can run."""
+        if self._coroutine:
+            topics = (each.subscriber.topic for each in self.callbacks if is_coroutine_function(each.call))
+            timers = (repr(each) for each in self.timers if is_coroutine_function(each.callback))
+            self._coroutine = next(chain(topics, timers), "")
 
     # ---- whether it is to be done
 

@@ -281,7 +281,9 @@ class LiveSource:
         if self._node is None:
             return
         try:
-            subscriber = self._node.new_sub(topic, msg_type, sink=partial(self._deliver, topic))
+            subscriber = self._node.new_sub(
+                topic, msg_type, sink=partial(self._deliver, topic), wildcards=False
+            )
         except NepError as error:
             self._post_event(WatchFailed(topic, str(error)))
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import selectors
 import sys
@@ -263,7 +264,11 @@ def test_a_callback_of_a_loop_is_refused_before_its_message_is_lost(make: Nodes)
         with pytest.raises(nep.NepError, match=sentence):
             spin()
     assert sub.listen() == (True, 1)
+    timer = node.new_timer(1.0, functools.partial(callback, 1))
     sub.close()
+    with pytest.raises(nep.NepError, match=r"the callback of 'Timer\(1.0\)' is a coroutine function"):
+        node.spin()
+    timer.cancel()
     node.spin(0.0)
 
 
