@@ -17,6 +17,7 @@ BENCH = Path(__file__).resolve().parent.parent / "bench"
 NAMES = (
     "nep_roundtrip",
     "nep_rate",
+    "nep_large",
     "nep_logs",
     "nep_join",
     "nep_master",

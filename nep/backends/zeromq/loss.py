@@ -29,6 +29,8 @@ class HeardPublisher:
     """
 
     form: int = 0
+    shared_form: int = 0
+    """The same of its last message in shared memory."""
     kind: MessageKind = _UNKNOWN
     remote: RemotePublisher | None = None
     endpoint: str = ""

@@ -10,6 +10,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import cast
 
 import zmq
 
@@ -378,7 +379,10 @@ class NativePublisher(GreetedPublisher):
             return
         readers = self._shared_readers()
         if readers >= self._seen.keys():
-            self._send_parts(self._topic, shared)
+            if len(shared) == 2:  # whoever shares reads messages of one part
+                self._send(b"".join((self._topic, *cast("tuple[bytes, bytes]", shared))))
+            else:
+                self._send_parts(self._topic, shared)
             return
         for each, own in self._subscriptions.hellos.items():
             self._send_parts(own, shared if each in readers else tail)

@@ -18,6 +18,7 @@ import stat
 import sys
 import tempfile
 import threading
+import time
 import weakref
 from collections import deque
 from pathlib import Path
@@ -27,14 +28,15 @@ from weakref import WeakValueDictionary
 
 from nep.system.forks import in_child
 
-__all__ = ["SHARED_BYTES", "Loan", "SharedReader", "SharedWriter", "begin_sharing", "can_share"]
+__all__ = ["SHARED_BYTES", "Loan", "SharedReader", "SharedWriter", "begin_sharing", "can_share", "room_bytes"]
 
-SHARED_BYTES = 128 * 2**10
+SHARED_BYTES = 32 * 2**10
 """Smaller payloads are quicker through the socket."""
 _LARGEST_BYTES = 64 * 2**20
 _SLOTS_BYTES = 320 * 2**20
 """So much the slots of one publisher have together; at least `_FEWEST`."""
-_FEWEST, _MOST = 4, 64
+_FEWEST, _MOST = 4, 256
+_SMALLEST_BYTES = 64 * 2**10
 _HELD_MOST = 12
 """Payloads of a publisher that a reader keeps where they lie; more are copied, so that slots come back."""
 _HEAD = 64
@@ -43,10 +45,15 @@ _LOANS = 4
 _READERS = 64
 _SPARE_BYTES = 64 * 2**20
 """What stays free where shared memory lives: a program that touches a page without room there is ended."""
+_ASK_S = 0.05
+_ASK_BYTES = _LARGEST_BYTES
+"""So long, or for so many bytes of a publisher, it is not asked again."""
 _MEMORY = "/dev/shm"  # noqa: S108 - it is asked for its room, and nothing is put there by name
 _MODULE = "iceoryx2"
 _logger = logging.getLogger("nep")
 _lock = threading.Lock()
+_forks = 0
+"""How many forks lie between this process and the one that loaded this module."""
 
 
 class _Opened:
@@ -138,8 +145,8 @@ def _keep_for_ever(*inherited: object) -> None:
 
 def _forked() -> None:
     """In a child, which begins anew."""
-    global _lock  # noqa: PLW0603 - another thread of the parent may have held it
-    _lock = threading.Lock()
+    global _lock, _forks
+    _lock, _forks = threading.Lock(), _forks + 1
     opened = None if _process.opened is None else _process.opened()
     _keep_for_ever(opened, *_writers.values(), *_readers.values())
     _process.opened = None
@@ -148,14 +155,33 @@ def _forked() -> None:
 in_child(_forked)
 
 
-def _has_room(size_bytes: int) -> bool:
-    if sys.platform != "linux":
+class _Room:
+    """Whether there is room for more. Asked now and then: that takes as long as a small payload."""
+
+    _asked_at = float("-inf")
+    _left_bytes = 0
+
+    def has(self, size_bytes: int) -> bool:
+        """Whether so many bytes more may be written."""
+        if sys.platform != "linux":
+            return True
+        now = time.monotonic()
+        if now >= self._asked_at + _ASK_S or self._left_bytes < size_bytes:
+            self._asked_at = now
+            self._left_bytes = min(_ASK_BYTES, room_bytes() - _SPARE_BYTES)
+        if self._left_bytes < size_bytes:
+            return False
+        self._left_bytes -= size_bytes
         return True
+
+
+def room_bytes() -> int:
+    """How much room there is where shared memory lives; 0 when that is not known (Linux)."""
     try:
         found = os.statvfs(_MEMORY)
     except OSError:
-        return False
-    return found.f_bavail * found.f_frsize >= size_bytes + _SPARE_BYTES
+        return 0
+    return found.f_bavail * found.f_frsize
 
 
 class Loan:
@@ -163,7 +189,7 @@ class Loan:
 
     def __init__(self, port: Any, sample: Any, size: int) -> None:  # noqa: ANN401 - iceoryx2 has no types
         self.size = size
-        self._pid = os.getpid()
+        self._forks = _forks
         self._port = port  # the memory lasts as long as the port that it is lent by
         self._sample = sample
         self.address = int(sample.payload_ptr) + _HEAD
@@ -180,7 +206,7 @@ class Loan:
         sample.assume_init().send()
 
     def __del__(self) -> None:
-        if self._pid != os.getpid():
+        if self._forks != _forks:
             _keep_for_ever(self._port, self._sample)
 
 
@@ -194,6 +220,7 @@ class SharedWriter:
         """Payloads sent."""
         self._publisher = publisher
         self._slot_bytes = 0
+        self._room = _Room()
         self._opened: _Opened | None = None
         self._service: Any = None
         self._port: Any = None
@@ -206,7 +233,7 @@ class SharedWriter:
         opened = _open() if size <= _LARGEST_BYTES else None
         if opened is None:
             return False
-        slot_bytes = max(2**20, 1 << (size - 1).bit_length())
+        slot_bytes = max(_SMALLEST_BYTES, 1 << (size - 1).bit_length())
         slots = max(_FEWEST, min(_MOST, _SLOTS_BYTES // slot_bytes))
         self.close()
         self._opened = opened
@@ -232,7 +259,7 @@ class SharedWriter:
 
     def loan(self, size: int) -> Loan | None:
         """A slot; None when none is free: readers have not taken what is in them."""
-        if self._port is None or size > self._slot_bytes or not _has_room(size):
+        if self._port is None or size > self._slot_bytes or not self._room.has(size):
             return None
         try:
             sample = self._port.loan_slice_uninit(size + _HEAD)
@@ -274,10 +301,10 @@ class _Held:
 
     def __init__(self, sample: Any, returned: deque[None]) -> None:  # noqa: ANN401
         self._sample, self._returned = sample, returned
-        self._pid = os.getpid()
+        self._forks = _forks
 
     def __del__(self) -> None:
-        if self._pid != os.getpid():
+        if self._forks != _forks:
             _keep_for_ever(self._sample)
         self._sample = None
         self._returned.append(None)

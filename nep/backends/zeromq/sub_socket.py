@@ -55,6 +55,7 @@ Into = list[Message] | deque[Message]
 
 _NO_COPY_BYTES = 8_192
 """Larger ones libzmq receives into memory of their own: a kept view of one keeps nothing else alive."""
+SHARED_FORM = SHARED << 16
 _Part = bytes | memoryview
 
 _logger = logging.getLogger("nep")
@@ -168,7 +169,14 @@ class CarefulParser:
         source = self._sources.get(header.publisher)
         msg_type = self._msg_type if source.remote is None else source.remote.publisher.msg_type
         source.kind = kind_of(self._name, codec.name, msg_type, is_latched=bool(header.flags & LATCHED))
-        source.form = 0 if header.flags & (EXTENSION | SHARED) else form_of(header.codec, header.flags)
+        # `kind` goes with both forms: what has another codec is read carefully again.
+        plain = 0 if header.flags & EXTENSION else form_of(header.codec, header.flags & ~SHARED)
+        if header.flags & SHARED:
+            source.shared_form = plain and plain | SHARED_FORM
+            source.form = source.form if source.form == plain else 0
+        else:
+            source.form = plain
+            source.shared_form = source.shared_form if source.shared_form == plain | SHARED_FORM else 0
         if shared is not None:
             return arrived(source.kind, shared, header.stamp_ns, header.seq, header.publisher, extension)
         # A small view must not keep a large receive buffer alive.
@@ -333,7 +341,10 @@ class SubSocket:
                         got, new = self._read_batch(first, into)
                         count, others, room, first = count + got, others + got - new, room - len(first), None
                         continue
-                first, other = self._in_parts(first)
+                    other = self._read_shared(first) if form & SHARED_FORM else None
+                else:
+                    other = None
+                first, other = (None, other) if other is not None else self._in_parts(first)
                 if other is not None:
                     append(other)
                     count += 1
@@ -373,6 +384,24 @@ class SubSocket:
             seq += 1
         source.last = seq - 1
         return count, count
+
+    def _read_shared(self, first: bytes) -> Message | None:
+        """The usual message in shared memory: the next one of its publisher. None: look carefully."""
+        form, size, seq, stamp_ns, publisher = unpack_at(first, self._cut)
+        source = self.sources.by_id.get(publisher)
+        if (
+            not source
+            or source.last != seq - 1
+            or source.shared_form != form
+            or len(first) != self._body + size
+        ):
+            return None
+        data = self._shared.take(publisher, first[self._body :])
+        if data is None:
+            return None
+        self.sources.received += 1
+        source.last = seq
+        return arrived(source.kind, data, stamp_ns, seq, publisher)
 
     def _read_batch_carefully(self, first: bytes, into: Into) -> tuple[int, int]:
         """The messages of any batch."""
