@@ -42,7 +42,8 @@ DIRECTIONS: dict[str, Direction] = {"a->b": "a->b", "b->a": "b->a", "both": "bot
 NODE_PREFIX = "bridge-"
 """How the names of a bridge's nodes begin."""
 _WILDCARD = re.compile(r"\*\*|\*")
-_HERE = re.compile(r"127\.\d+\.\d+\.\d+\b|localhost\b|local\b", re.ASCII)
+_FAR = re.compile(r"(?:^|[/,])(?!127\.|localhost:)[\w.-]+:\d+", re.ASCII)
+"""The address of another computer, or one of this computer that others know, too."""
 _NAME_MOST = 60
 
 
@@ -157,11 +158,11 @@ def side_of(backend: str, master: str = "", network: str = "") -> SideConfigurat
 
 
 def _network(backend: Backend, master: str) -> str:
-    """The name of a network that was given none. Where it ends at the computer or process, that is in it."""
+    """The name of a network that was given none, with the computer or process where it may end there."""
     name = f"{backend.name}:{master}"
     if backend.is_in_process:
         return f"{name}@{platform.node()}/{os.getpid()}"
-    return f"{name}@{platform.node()}" if _HERE.match(master) else name
+    return name if _FAR.search(master) else f"{name}@{platform.node()}"
 
 
 def checked_topic_names(a: str, b: str) -> None:

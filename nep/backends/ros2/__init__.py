@@ -14,5 +14,11 @@ from nep.backends.ros2.type_mapping import codec_for
 __all__ = ["BACKEND", "MessageTypes", "message_types"]
 
 BACKEND = Backend(
-    "ros2", Ros2Transport, needs="cyclonedds, rosbags", master=domain, codec_for=codec_for, qos=QUALITIES
+    "ros2",
+    Ros2Transport,
+    needs="cyclonedds, rosbags",
+    master=domain,
+    codec_for=codec_for,
+    qos=QUALITIES,
+    has_extensions=False,
 )
