@@ -275,7 +275,7 @@ class _Report:
 def _problem(route: Route, counts: RouteCounts) -> str:
     if route.rival:
         return _("the bridge '{name}' carries it; end one of the two").format(name=escaped(route.rival))
-    return route.trouble or counts.problem
+    return escaped(route.trouble or counts.problem)
 
 
 class _JsonReport(_Report):
@@ -369,7 +369,7 @@ class _LiveReport(_Report):
         for at in used:
             table.add_column(_(_HEADS[at]), justify="right", no_wrap=True)
         for row in rows:
-            table.add_row(shortened(row.name, _NAME_MOST), *(row.figures[at] for at in used))
+            table.add_row(Text(shortened(row.name, _NAME_MOST)), *(row.figures[at] for at in used))
         below = [Text(f"! {row.name}: {row.problem}", "yellow", no_wrap=True) for row in rows if row.problem]
         if left > 0:
             below.append(Text(_("and {count} more").format(count=left), "dim"))

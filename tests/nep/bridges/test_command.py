@@ -217,8 +217,10 @@ class OnTerminal:
 @pytest.mark.skipif(sys.platform == "win32", reason="terminals of Unix")
 def test_on_a_terminal_a_table_stands_in_its_place_and_warnings_above_it(file, nodes):
     on_a, _on_b = nodes
-    shown = OnTerminal("bridge", file('[[topics]]\na = "/t"\ndirection = "a->b"\nb_type = "string"\n'))
+    topics = '[[topics]]\na = "/t"\ndirection = "a->b"\nb_type = "string"\n[[topics]]\na = "/[/red][bold]"\n'
+    shown = OnTerminal("bridge", file(topics))
     try:
+        shown.shows("/[/red][bold]")
         shown.shows("zeromq → zenoh  /t")
         assert "returned" not in shown.text, "columns that are all 0 need no room"
         eventually(lambda: "/t" in on_a.graph().topics)
