@@ -244,7 +244,7 @@ class Route:
         ear.open()
 
     def _new_sub(self, node: Node, msg_type: str, ear: _Ear) -> Subscriber:
-        return node.new_sub(self.origin.topic, msg_type, sink=ear.hear, qos=self.origin.qos)
+        return node.new_sub(self.origin.topic, msg_type, sink=ear.hear, qos=self.origin.qos, wildcards=False)
 
     def end_taking(self) -> None:
         """Subscribe no more, and carry at once what waits for its turn."""

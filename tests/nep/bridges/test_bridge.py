@@ -373,6 +373,20 @@ def test_a_pattern_both_ways_finds_topics_of_both_and_never_its_own():
         assert ways == {("a", "/a/x/y"), ("b", "/b/z")}
 
 
+def test_a_topic_whose_name_has_a_star_is_that_topic_and_no_pattern():
+    with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/r/**", "/s/**", "a->b")) as bridge:
+        on_a, on_b = a.node("a"), b.node("b")
+        pubs = [on_a.new_pub(name) for name in ("/r/*", "/r/x")]
+        eventually(lambda: len(bridge.routes) == 2 and all(each.is_subscribed for each in bridge.routes))
+        hears = on_b.new_sub("/s/x")
+        for pub in pubs:
+            pub.publish(pub.topic)
+        assert taken(hears, 1) == ["/r/x"]
+        assert settled(route(bridge, "a", "/r/*"), 1).received == 1
+        assert settled(route(bridge, "a", "/r/x"), 1).received == 1
+        assert silent(hears)
+
+
 def test_a_topic_that_is_named_is_not_matched_again():
     with (
         nets("memory", "memory") as (a, b),
