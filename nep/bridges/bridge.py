@@ -35,6 +35,8 @@ __all__ = ["Bridge", "check_installed"]
 
 ROUTES_MOST = 500
 """Patterns find no more topics than these, both ways together."""
+IDLE_S = 60.0
+"""So long a topic that a pattern found is kept when nobody publishes it any more."""
 _OWN_TOPICS = "/nep/"
 _SLICE_S = 0.05
 _FLUSH_S, _LEAVE_S = 2.0, 0.2
@@ -151,6 +153,7 @@ class Bridge:
                 pacer=self._pacer,
                 max_rate_hz=topic.max_rate_hz,
             )
+            route.is_found = topic.is_pattern
             self._routes = (*self._routes, route)
 
     def _end(self, topic: BridgeTopic, side: SideName, name: str) -> RouteEnd:
@@ -161,6 +164,7 @@ class Bridge:
     def find(self, side: BridgeSide, view: GraphView) -> None:
         """Make routes for topics that others publish there and a pattern matches. In the side's thread."""
         self._heed_others()
+        self._forget_idle(side, view, time.monotonic())
         named = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
         for name in view.topics:
             if name in named or name.startswith(_OWN_TOPICS) or not type_in(view, name, self.own_nodes):
@@ -176,6 +180,24 @@ class Bridge:
                         name,
                         ROUTES_MOST,
                     )
+
+    def _forget_idle(self, side: BridgeSide, view: GraphView, now: float) -> None:
+        """Make room: what a pattern found and nobody publishes any more is let go, with its counts."""
+        for route in self._routes:
+            if not route.is_found or route.origin.side != side.name:
+                continue
+            if type_in(view, route.origin.topic, self.own_nodes):
+                route.idle_since = None
+            elif route.idle_since is None:
+                route.idle_since = now
+            elif now - route.idle_since >= IDLE_S:
+                with self._lock:
+                    self._routes = tuple(each for each in self._routes if each is not route)
+                    a, b = route.origin, route.end
+                    if a.side == "b":
+                        a, b = b, a
+                    self._known.discard((side.name, a.topic, b.topic))
+                route.close()
 
     def speaks_on(self, side: BridgeSide, view: GraphView) -> bool:
         """Not on side b where both back ends have one graph: their nodes on one topic would miss each other.

@@ -131,6 +131,10 @@ class Route:
     ) -> None:
         self.origin = origin
         self.end = end
+        self.is_found = False
+        """Whether a pattern found its topic."""
+        self.idle_since: float | None = None
+        """Since when (monotonic, s) nobody else publishes its topic, as far as the bridge has looked."""
         self.troubles: dict[SideName, str] = {}
         """Why it cannot subscribe or publish at present, by the side on which that is."""
         self.rival = ""
@@ -147,6 +151,7 @@ class Route:
         self._subscriber: Subscriber | None = None
         self._ear: _Ear | None = None
         self._waits_for_type = False
+        self._is_closed = False
         self._lost_before: int | None = 0
         self._publishers: dict[tuple[bool, int | None], Publisher] = {}
         self._gone_since: dict[tuple[bool, int | None], float] = {}
@@ -254,6 +259,15 @@ class Route:
             subscriber.close()
         self._take_newest()
 
+    def close(self) -> None:
+        """End it, while its bridge goes on."""
+        self.end_taking()
+        with self._lock:
+            self._is_closed = True
+            publishers, self._publishers = list(self._publishers.values()), {}
+        for publisher in publishers:
+            publisher.close()
+
     # ---- messages come
 
     def _take(self, messages: Sequence[Message]) -> None:
@@ -344,7 +358,12 @@ class Route:
             publisher = node.new_pub(self.end.topic, form.msg_type, latched=key[0], qos=self.end.qos)
             with self._lock:
                 self._own.add(publisher.id)
-                self._publishers[key] = publisher
+                is_late = self._is_closed
+                if not is_late:
+                    self._publishers[key] = publisher
+            if is_late:
+                publisher.close()
+                return
 
     def _form_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> _Form:
         """As what it is published: decided by the first message, and kept."""

@@ -399,6 +399,24 @@ def test_a_topic_that_is_named_is_not_matched_again():
         assert {each.end.topic for each in bridge.routes if each.origin.side == "a"} == {"/own", "/all/found"}
 
 
+def test_what_a_pattern_found_is_let_go_when_nobody_publishes_it_and_found_again(monkeypatch):
+    monkeypatch.setattr("nep.bridges.bridge.IDLE_S", 0.0)
+    with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/r/*", "/s/*"), topic("/named")) as bridge:
+        on_a, on_b = a.node("a"), b.node("b")
+        hears = on_b.new_sub("/s/x")
+        for number in range(3):
+            pub = on_a.new_pub("/r/x")
+            eventually(lambda: any(each.is_found and each.is_subscribed for each in bridge.routes))
+            pub.publish(number)
+            assert hears.listen(timeout_s=30.0) == (True, number)
+            pub.close()
+            eventually(lambda: not any(each.is_found for each in bridge.routes))
+            assert len(bridge.routes) == 2, "what is named stays"
+            eventually(lambda: not on_b.graph().topics["/s/x"].publishers)
+            assert "/r/x" not in on_a.graph().topics
+        assert hears.lost == 0
+
+
 def test_patterns_have_a_bound(monkeypatch, caplog):
     monkeypatch.setattr("nep.bridges.bridge.ROUTES_MOST", 2)
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/**", "/all/**")) as bridge:
