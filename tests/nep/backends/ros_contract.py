@@ -125,9 +125,13 @@ def is_same(one: object, other: object) -> bool:
     return one == other
 
 
+# The publishers come first: ROS's master takes a tenth of a second to tell of one that comes later.
+
+
 def listened(make: Make, kind: str, payload: object) -> object:
+    pub = make("a").new_pub("/typed", kind)
     sub = make("b").new_sub("/typed", kind)
-    make("a").new_pub("/typed", kind).publish(payload)
+    pub.publish(payload)
     return sub.listen(timeout_s=30.0)[1]
 
 
@@ -137,6 +141,7 @@ def latched(make: Make, kind: str, payload: object) -> object:
 
 
 def called_back(make: Make, kind: str, payload: object) -> object:
+    pub = make("a").new_pub("/typed", kind)
     node, came = make("b"), []
 
     def callback(message: object) -> None:
@@ -144,29 +149,31 @@ def called_back(make: Make, kind: str, payload: object) -> object:
         node.stop_spin()
 
     node.new_callback("/typed", kind, callback)
-    make("a").new_pub("/typed", kind).publish(payload)
+    pub.publish(payload)
     node.spin(30.0)
     return came[0]
 
 
 def newest(make: Make, kind: str, payload: object) -> object:
-    sub = make("b").new_sub("/typed", kind, keep="latest")
     pub = make("a").new_pub("/typed", kind)
+    sub = make("b").new_sub("/typed", kind, keep="latest")
     pub.publish(payload)
     return sub.listen(timeout_s=30.0)[1]
 
 
 def poured(make: Make, kind: str, payload: object) -> object:
     came: queue.SimpleQueue[object] = queue.SimpleQueue()
+    pub = make("a").new_pub("/typed", kind)
     make("b").new_sub("/typed", kind, sink=lambda messages: [came.put(each.payload) for each in messages])
-    make("a").new_pub("/typed", kind).publish(payload)
+    pub.publish(payload)
     return came.get(timeout=30.0)
 
 
 def from_two_to_two(make: Make, kind: str, payload: object) -> object:
+    pubs = [make(name).new_pub("/typed", kind) for name in ("a", "b")]
     subs = [make(name).new_sub("/typed", kind) for name in ("c", "d")]
-    for name in ("a", "b"):
-        make(name).new_pub("/typed", kind).publish(payload)
+    for pub in pubs:
+        pub.publish(payload)
     came = [sub.listen(timeout_s=30.0)[1] for sub in subs for _both in range(2)]
     assert all(is_same(each, payload) for each in came)
     return came[0]
