@@ -418,6 +418,10 @@ class Participant:
     def _ends(self) -> bool:
         return self._is_closing
 
+    def has_closed(self) -> bool:
+        """Whether all that belongs to it is gone, or goes."""
+        return self._is_closing
+
     def close(self) -> None:
         """End the thread and leave the domain."""
         with self.changed:

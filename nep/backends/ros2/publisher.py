@@ -100,7 +100,11 @@ class Ros2Publisher:
             and (is_reliable or not each.is_reliable)
             and (spec.is_latched or not each.is_latched)
         ]
-        self.missing = wait_for_others(participant, wanted, lambda: [self._writer])
+        try:
+            self.missing = wait_for_others(participant, wanted, lambda: [self._writer])
+        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+            self.finish(0.0)
+            raise
 
     @property
     def record(self) -> PublisherRecord:
@@ -181,6 +185,9 @@ class Ros2Publisher:
         """See `close`. May be called twice."""
         if self._is_closed or has_forked():
             return
+        if self._participant.has_closed():
+            self._is_closed = True
+            return
         if self.spec.qos in ("", "reliable") and timeout_s > 0.0:
             # Not `wait_for_acks`, which fails when the time is over (cyclonedds 11.0.1).
             wait = self._writer._wait_for_acks  # noqa: SLF001
@@ -189,4 +196,6 @@ class Ros2Publisher:
         with self._participant.changed:
             if not self._is_closed:
                 self._is_closed = True
+                if self._participant.has_closed():
+                    return
                 self._participant.withdraw(self._node_id, "writer", self._writer)

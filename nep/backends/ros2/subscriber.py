@@ -107,7 +107,11 @@ class Ros2Subscriber:
         if any(each.is_latched for each in writers):
             with participant.changed:
                 self._add_reader(is_latched=True)
-        wait_for_others(participant, writers, lambda: self._readers)
+        try:
+            wait_for_others(participant, writers, lambda: self._readers)
+        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+            self.close()
+            raise
 
     def _add_reader(self, *, is_latched: bool) -> None:
         """With the participant's lock held."""
@@ -239,7 +243,7 @@ class Ros2Subscriber:
             return self._lost_before + self._lost_now() + self._dropped
 
     def _lost_now(self) -> int:
-        if self.is_closed or has_forked():
+        if self.is_closed or has_forked() or self._participant.has_closed():
             return 0
         return sum(int(each.get_sample_lost_status().total_count) for each in self._readers)
 
@@ -276,6 +280,8 @@ class Ros2Subscriber:
                 return
             self._lost_before = self._lost_now()
             self.is_closed = True
+            if self._participant.has_closed():
+                self._readers.clear()
             for reader in self._readers:
                 self._participant.unwatch(reader)
                 self._participant.withdraw(self._transport.node.id, "reader", reader)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from nep.backends.base import PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
@@ -14,7 +15,7 @@ from nep.backends.ros2.library import dds, has_forked, typesys
 from nep.backends.ros2.participant import Participant, join, leave
 from nep.backends.ros2.publisher import Ros2Publisher
 from nep.backends.ros2.subscriber import Ros2Subscriber
-from nep.errors import NepError
+from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord
@@ -53,6 +54,7 @@ class Ros2Transport:
                 )
             )
         with self._lock:
+            self._check_open()
             if self._participant is None:
                 self._participant = join(self, int(configuration.master))
             participant = self._participant
@@ -66,6 +68,20 @@ class Ros2Transport:
         participant.settle()
         return participant
 
+    def _check_open(self) -> None:
+        """Raises `ClosedError`."""
+        if self._closing.is_set():
+            raise ClosedError(f"node '{self.node.name}'")
+
+    @contextmanager
+    def _unless_closed(self) -> Iterator[None]:
+        """What Cyclone DDS raises when the node was closed meanwhile becomes `ClosedError`."""
+        try:
+            yield
+        except dds().core.DDSException:
+            self._check_open()
+            raise
+
     def look(self) -> None:
         """In the participant's thread, under its lock: somebody came or went."""
         for each in self._subscribers:
@@ -73,24 +89,32 @@ class Ros2Transport:
 
     def publisher(self, spec: PublisherSpec) -> Ros2Publisher:
         """A new writer; returns when the readers that are known are matched."""
-        participant = self._joined(spec.configuration)
-        publisher = Ros2Publisher(participant, self.node.id, spec, self._close_publisher)
+        with self._unless_closed():
+            participant = self._joined(spec.configuration)
+            publisher = Ros2Publisher(participant, self.node.id, spec, self._close_publisher)
         with self._lock:
-            self._publishers = (*self._publishers, publisher)
-        return publisher
+            if not self._closing.is_set():
+                self._publishers = (*self._publishers, publisher)
+                return publisher
+        publisher.close(0.0)
+        raise ClosedError(f"node '{self.node.name}'")
 
     def subscriber(self, spec: SubscriberSpec) -> Ros2Subscriber:
         """A new reader; returns when the writers that are known are matched."""
-        participant = self._joined(spec.configuration)
-        subscriber = Ros2Subscriber(self, participant, spec)
+        with self._unless_closed():
+            participant = self._joined(spec.configuration)
+            subscriber = Ros2Subscriber(self, participant, spec)
         with self._lock:
-            self._subscribers = (*self._subscribers, subscriber)
-            if spec.sink is not None and self._thread is None:
-                self._thread = threading.Thread(
-                    target=self._run, name=f"nep-sinks-{self.node.name}", daemon=True
-                )
-                self._thread.start()
-        return subscriber
+            if not self._closing.is_set():
+                self._subscribers = (*self._subscribers, subscriber)
+                if spec.sink is not None and self._thread is None:
+                    self._thread = threading.Thread(
+                        target=self._run, name=f"nep-sinks-{self.node.name}", daemon=True
+                    )
+                    self._thread.start()
+                return subscriber
+        subscriber.close()
+        raise ClosedError(f"node '{self.node.name}'")
 
     def _close_publisher(self, publisher: Ros2Publisher, timeout_s: float) -> None:
         publisher.finish(timeout_s)
@@ -120,7 +144,8 @@ class Ros2Transport:
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - at once
         """Who has been found in the domain."""
-        return graph_of(self._joined(configuration))
+        with self._unless_closed():
+            return graph_of(self._joined(configuration))
 
     @property
     def publishers(self) -> tuple[Ros2Publisher, ...]:
@@ -143,7 +168,8 @@ class Ros2Transport:
         """Close all, leave the domain, end the thread."""
         if has_forked():
             return
-        self._closing.set()
+        with self._lock:
+            self._closing.set()
         deadline = time.monotonic() + timeout_s
         try:
             for subscriber in self._subscribers:

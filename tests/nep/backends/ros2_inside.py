@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 import struct
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -501,6 +502,31 @@ if child:
 """
     with nep_program(code) as other:
         assert other.line() == "0"
+
+
+def test_a_node_that_is_closed_while_others_make_things_on_it_ends_them(make: Make) -> None:
+    def work(node: nep.Node, begun: threading.Event, ended: list[object]) -> None:
+        try:
+            while True:
+                with node.new_pub("t") as pub, node.new_sub("t") as sub:
+                    pub.publish(1)
+                    sub.listen(timeout_s=0.01)
+                    node.graph()
+                    begun.set()
+        except nep.ClosedError:
+            ended.append(node)
+
+    for number in range(5):
+        node, begun = make(f"a{number}"), threading.Event()
+        ended: list[object] = []
+        threads = [threading.Thread(target=work, args=(node, begun, ended)) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        assert begun.wait(60.0)
+        node.close()
+        for thread in threads:
+            thread.join(60.0)
+        assert ended == [node] * 3
 
 
 def test_closing_in_any_order_and_twice(make: Make) -> None:
