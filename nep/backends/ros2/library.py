@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import platform
 import socket
 import sys
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from nep.system.forks import in_child
 __all__ = ["Dds", "dds", "has_forked", "keep_to_loopback", "typesys"]
 
 _PARTS = ("core", "domain", "idl", "pub", "sub", "topic", "qos", "builtin")
+_MACHINES_WITH_WHEELS = frozenset({"x86_64", "amd64"})
 _DESCRIPTORS = "/proc/self/fd"
 _PORTS, _PORTS_OF_A_DOMAIN = 7400, 250
 """Where the ports of domain 0 begin, and how many each has, as DDS's wire protocol says."""
@@ -65,6 +67,11 @@ def typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
 
 
 def _unavailable() -> BackendUnavailableError:
+    if sys.platform != "darwin" and platform.machine().lower() not in _MACHINES_WITH_WHEELS:
+        needs = _(
+            "Cyclone DDS has no wheel for '{machine}'; build 'cyclonedds' 11 there, and install 'rosbags'"
+        )
+        return BackendUnavailableError("ros2", needs.format(machine=platform.machine()))
     return BackendUnavailableError("ros2", _("install it with 'pip install nep-studio[ros2]'"))
 
 

@@ -152,13 +152,26 @@ def test_only_this_computer_is_reached_unless_it_is_said() -> None:
 # ---- what is missing, and other back ends
 
 
-def test_without_the_packages_one_sentence_says_what_to_install() -> None:
+def test_without_the_packages_one_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(_name: str) -> object:
         raise ImportError
 
+    monkeypatch.setattr("platform.machine", lambda: "x86_64")
     for library in (dds, typesys):
         with pytest.raises(nep.NepError, match=r"'ros2' is not installed; install it with 'pip install"):
             library(missing)  # type: ignore[operator]
+
+
+def test_a_computer_that_has_no_wheels_is_told_what_to_build(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(_name: str) -> object:
+        raise ImportError
+
+    monkeypatch.setattr("platform.machine", lambda: "aarch64")
+    monkeypatch.setattr("sys.platform", "linux")
+    with pytest.raises(
+        nep.NepError, match="Cyclone DDS has no wheel for 'aarch64'; build 'cyclonedds' 11 there"
+    ):
+        dds(missing)  # type: ignore[arg-type]
 
 
 def test_who_does_not_ask_for_it_does_not_import_its_packages() -> None:
