@@ -377,7 +377,7 @@ class Graph:
         )
         # A probe that cannot be sent takes a dead publisher out of the reply: nobody waits for its echo.
         out.extend(self.probes(sorted({remote.node_id for remote in found} - {member.node.id})))
-        return Found(self.epoch, self.revision, found)
+        return Found(self.epoch, self.revision, found, pattern=request.subscriber.pattern)
 
     def _join(self, request: Join, now: float, sender: str, out: list[Outgoing]) -> Reply:
         records: tuple[PublisherRecord | SubscriberRecord, ...] = (*request.publishers, *request.subscribers)

@@ -302,10 +302,14 @@ class Added(_FromMaster):
 
 @dataclass(frozen=True)
 class Found(_FromMaster):
-    """A subscriber is registered, or a node has joined: the publishers to connect to."""
+    """A subscriber is registered, or a node has joined: the publishers to connect to.
+
+    `pattern`: the master knows that the subscriber hears all topics that match; an older one does not.
+    """
 
     publishers: tuple[RemotePublisher, ...] = ()
     hosts: tuple[str, ...] = ()
+    pattern: bool = False
 
 
 @dataclass(frozen=True)

@@ -250,6 +250,12 @@ class ZeromqTransport:
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number, spec.is_pattern)
         try:
             reply = session.add_subscriber(record, subscriber, spec.wait_s)
+            if spec.is_pattern and not reply.pattern:
+                raise NepError(
+                    _("the master at '{address}' is older and knows no wildcards; start a newer one").format(
+                        address=session.address
+                    )
+                )
             subscriber.begin(reply.publishers)
             if isinstance(subscriber, NativeSubscriber):
                 io.add(subscriber)

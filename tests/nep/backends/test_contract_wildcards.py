@@ -7,6 +7,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import count
 
 import pytest
@@ -294,6 +295,26 @@ def test_a_master_that_is_started_again_knows_it(master: Master) -> None:
             new.publish(2)
             old.publish(3)
             assert sorted(read(sub, 2)) == [("r/new", 2), ("r/old", 3)]
+
+
+@pytest.mark.parametrize("backend", ["zeromq", "nanomsg"])
+def test_a_master_that_is_older_is_named(
+    master: Master, monkeypatch: pytest.MonkeyPatch, backend: str
+) -> None:
+    real = Graph.apply
+
+    def apply(self: Graph, request: object, *args: object, **named: object) -> object:
+        if isinstance(request, AddSubscriber):  # it knows nothing of the field
+            request = replace(request, subscriber=replace(request.subscriber, pattern=False))
+        return real(self, request, *args, **named)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Graph, "apply", apply)
+    with nep.node("b", backend) as node:
+        sentence = f"the master at '{master.address}' is older and knows no wildcards; start a newer one"
+        with pytest.raises(nep.NepError, match=sentence):
+            node.new_sub("r/*")
+        assert "r/*" not in node.graph().topics
+        node.new_sub("r/x")
 
 
 def test_topics_that_end_are_left(master: Master) -> None:
