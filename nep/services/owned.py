@@ -46,6 +46,8 @@ class OwnedServices:
         self._lock = threading.Lock()
         self._servers: tuple[Server, ...] = ()
         self._clients: tuple[Client | Surveyor, ...] = ()
+        self.has_servers = False
+        """Whether there are any; asked for every message of a node that spins."""
 
     def server(
         self,
@@ -86,6 +88,7 @@ class OwnedServices:
         made = kind(able.server(spec), service, callback, threads, self._forget)
         with self._lock:
             self._servers = (*self._servers, made)
+            self.has_servers = True
         self._wake()  # who spins already answers its calls now
         return made
 
@@ -138,6 +141,7 @@ class OwnedServices:
     def _forget(self, closed: Server | Client | Surveyor) -> None:
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
+            self.has_servers = bool(self._servers)
             self._clients = tuple(each for each in self._clients if each is not closed)
 
     # ---- for who spins

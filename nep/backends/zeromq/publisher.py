@@ -257,8 +257,8 @@ class NativePublisher(GreetedPublisher):
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self._flush()
-            if self._flags:  # whoever is greeted now gets what was kept, and then this one like all others
-                self._read_subscriptions()
+            if self._flags:
+                self._greet_before(size)
             self._count = seq = self._count + 1
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
@@ -271,6 +271,14 @@ class NativePublisher(GreetedPublisher):
             else:
                 self._send_apart(data, size, seq, stamp_ns)
             self._look(stamp_ns)
+
+    def _greet_before(self, size: int) -> None:
+        """Before a message is counted that is kept: who is greeted now gets it like all others, and once.
+
+        With a history the sooner the better; else only if `_send_all` would look for subscriptions.
+        """
+        if self.spec.history > 1 or self._bytes + size >= self._settle_at:
+            self._read_subscriptions()
 
     def _send_large(self, given: bytes | memoryview, extension: bytes | None) -> None:
         """Through shared memory to those who read that; the payload is copied at most once."""
@@ -286,7 +294,7 @@ class NativePublisher(GreetedPublisher):
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self._flush()
             if self._flags:
-                self._read_subscriptions()
+                self._greet_before(size)
             number = shared.place(given, self._seen, time.monotonic()) if shared and not self._apart else None
             if data is None and not (number is not None and shared and shared.readers >= self._seen.keys()):
                 data = sendable(given)
