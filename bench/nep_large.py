@@ -151,9 +151,11 @@ def measure(size: int, count: int, blocks: int, *, is_picture: bool) -> tuple[di
                 variants["nep, loan"] = partial(bursts.take, "loan", partial(listen, sub))
             else:
                 heard(child, "zenoh", lambda: not came.empty())
-                time.sleep(0.2)
-                while not came.empty():
-                    came.get()
+                while True:  # until those that were asked for have come
+                    try:
+                        came.get(timeout=0.2)
+                    except queue.Empty:
+                        break
                 variants["zenoh"] = partial(bursts.take, "zenoh", came.get)
             samples = interleaved(variants, blocks, limit=3)
             lost = (sub.lost or 0) + (socket_sub.lost or 0)

@@ -33,9 +33,13 @@ from nep.nodes.node import spin as spin
 from nep.nodes.publisher import Publisher as Publisher
 from nep.nodes.subscriber import Subscriber as Subscriber
 from nep.nodes.timer import Timer as Timer
-from nep.parameters.owned import Parameters as Parameters
-from nep.parameters.parameter import NodeParameter as NodeParameter
-from nep.parameters.remote import RemoteParameters as RemoteParameters
+from nep.patterns.parameters.owned import Parameters as Parameters
+from nep.patterns.parameters.parameter import NodeParameter as NodeParameter
+from nep.patterns.parameters.remote import RemoteParameters as RemoteParameters
+from nep.patterns.services.client import Client as Client
+from nep.patterns.services.server import Server as Server
+from nep.patterns.services.survey import Respondent as Respondent
+from nep.patterns.services.survey import Surveyor as Surveyor
 from nep.protocol.graph_view import Alert as Alert
 from nep.protocol.graph_view import ClientInfo as ClientInfo
 from nep.protocol.graph_view import GraphView as GraphView
@@ -45,10 +49,6 @@ from nep.protocol.graph_view import ServerInfo as ServerInfo
 from nep.protocol.graph_view import ServiceInfo as ServiceInfo
 from nep.protocol.graph_view import SubscriberInfo as SubscriberInfo
 from nep.protocol.graph_view import TopicInfo as TopicInfo
-from nep.services.client import Client as Client
-from nep.services.server import Server as Server
-from nep.services.survey import Respondent as Respondent
-from nep.services.survey import Surveyor as Surveyor
 
 node = Node
 """A node; see `Node`. The paper's spelling."""

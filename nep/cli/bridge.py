@@ -372,7 +372,7 @@ class _LiveReport(_Report):
             table.add_row(Text(shortened(row.name, _NAME_MOST)), *(row.figures[at] for at in used))
         below = [Text(f"! {row.name}: {row.problem}", "yellow", no_wrap=True) for row in rows if row.problem]
         if left > 0:
-            below.append(Text(_("and {count} more").format(count=left), "dim"))
+            below.append(Text(_("and {count} more topics").format(count=left), "dim"))
         return Group(table, *below[: max(1, most - len(rows) + 1)])
 
 

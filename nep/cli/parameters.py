@@ -20,7 +20,7 @@ from nep.cli.values import json_of, presented
 from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.nodes.node import Node
-from nep.parameters.remote import RemoteParameters
+from nep.patterns.parameters.remote import RemoteParameters
 from nep.system.replace_file import replace_file
 from nep.text import escaped, shortened
 

@@ -38,14 +38,14 @@ from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
 from nep.nodes.timer import Timer
 from nep.nodes.work import Callback, Work
-from nep.parameters.owned import MSG_TYPE, Parameters, place_of
-from nep.parameters.remote import RemoteParameters, node_with_parameters
+from nep.patterns.parameters.owned import MSG_TYPE, Parameters, place_of
+from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
+from nep.patterns.services.owned import OwnedServices
+from nep.patterns.services.service_node import ServiceNode
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
 from nep.protocol.service_wire import PREFIX
 from nep.protocol.wire import check_node_name, check_topic
-from nep.services.owned import OwnedServices
-from nep.services.service_node import ServiceNode
 from nep.system import forks
 from nep.system.addresses import checked_host
 
@@ -309,7 +309,7 @@ class Node(ServiceNode):
         return RemoteParameters(self.new_client(place_of(found), timeout_s=timeout_s))
 
     def open_parameters(self, place: str, answer: Callable[[object], object]) -> Publisher:
-        """See `nep.parameters.owned.ParameterHost`."""
+        """See `nep.patterns.parameters.owned.ParameterHost`."""
         publisher = self.new_pub(place, MSG_TYPE, latched=True)
         if hasattr(self._open_transport(), "server"):
             try:

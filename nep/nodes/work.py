@@ -14,7 +14,7 @@ from nep.errors import ClosedError, DecodeError, NepError
 from nep.i18n import _
 from nep.nodes.subscriber import SLICE_S, Subscriber
 from nep.nodes.timer import Timer, next_due
-from nep.services.owned import OwnedServices
+from nep.patterns.services.owned import OwnedServices
 
 __all__ = ["NOTHING", "Callback", "Work", "is_coroutine_function"]
 

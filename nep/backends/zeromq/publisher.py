@@ -19,8 +19,8 @@ from nep.backends.zeromq.bindings import SMALL, Bindings
 from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog
 from nep.backends.zeromq.io_thread import Rest, Served
 from nep.backends.zeromq.pending_batch import MOST, SMALL_BYTES, SOON_NS, WAIT_NS, PendingBatch
-from nep.backends.zeromq.shared_memory import SHARED_BYTES, begin_sharing, can_share
-from nep.backends.zeromq.shared_payloads import SharedPayloads
+from nep.backends.zeromq.shared.memory import SHARED_BYTES, begin_sharing, can_share
+from nep.backends.zeromq.shared.payloads import SharedPayloads
 from nep.backends.zeromq.sockets import Part, Refusals, Socket, send_mark, sendable, wait_until
 from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.errors import ClosedError

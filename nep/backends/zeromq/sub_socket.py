@@ -17,7 +17,7 @@ import zmq
 from nep.backends.base import SubscriberSpec
 from nep.backends.zeromq.byte_window import WINDOW_BYTES
 from nep.backends.zeromq.loss import HeardPublisher, HeardPublishers
-from nep.backends.zeromq.shared_payloads import SharedSources
+from nep.backends.zeromq.shared.payloads import SharedSources
 from nep.backends.zeromq.sockets import Refusals, Socket, keep_alive, receive_mark, wait_shortly
 from nep.errors import WireError
 from nep.i18n import _, lazy

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 
 from nep.backends.zeromq.byte_window import SendWindow
-from nep.backends.zeromq.shared_payloads import SharedPayloads
+from nep.backends.zeromq.shared.payloads import SharedPayloads
 from nep.backends.zeromq.sockets import Refusals
 from nep.protocol.wire import Hello, parse_hello, parse_read, parse_shares, topic_part
 

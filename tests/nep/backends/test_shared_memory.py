@@ -17,9 +17,9 @@ import pytest
 import zmq
 
 import nep
-from nep.backends.zeromq import shared_memory
 from nep.backends.zeromq.publisher import NativePublisher
-from nep.backends.zeromq.shared_memory import SHARED_BYTES, SharedReader, SharedWriter
+from nep.backends.zeromq.shared import memory as shared_memory
+from nep.backends.zeromq.shared.memory import SHARED_BYTES, SharedReader, SharedWriter
 from nep.masters.master import Master
 from nep.protocol import wire
 from tests.nep.programs import eventually, running
@@ -321,7 +321,7 @@ def test_who_reads_late_gets_what_was_sent_and_losses_are_counted(node: nep.Node
 def test_the_memory_of_a_killed_publisher_goes_when_the_next_program_shares() -> None:
     code = """
         import sys, time
-        from nep.backends.zeromq.shared_memory import SharedWriter
+        from nep.backends.zeromq.shared.memory import SharedWriter
         writer = SharedWriter(int(sys.argv[1]))
         assert writer.prepare(5_000_000)
         loan = writer.loan(5_000_000)
@@ -353,7 +353,7 @@ def _files() -> list[str]:
 def test_slots_of_a_killed_reader_come_back() -> None:
     code = """
         import sys
-        from nep.backends.zeromq.shared_memory import SharedReader
+        from nep.backends.zeromq.shared.memory import SharedReader
         reader = SharedReader(int(sys.argv[1]), 1)
         print("open")
         kept = []

@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from nep.parameters.owned import place_of
+from nep.patterns.parameters.owned import place_of
 from tests.nep.programs import eventually, running
 
 _names = count()
@@ -66,7 +66,7 @@ def test_others_read_them_on_a_topic_that_is_latched(make: Make) -> None:
     node.parameters.declare("speed", 0.5)
     node.parameters.declare("names", ["a"])
     node.parameters["speed"] = 0.75
-    sub = make("tool").new_sub(place_of(node.id), "nep/parameters")
+    sub = make("tool").new_sub(place_of(node.id), "nep/patterns/parameters")
     ok, state = sub.listen(timeout_s=30.0)
     assert ok
     assert state["node"] == "robot"  # type: ignore[index]

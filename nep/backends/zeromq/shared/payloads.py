@@ -9,7 +9,7 @@ import struct
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from nep.backends.zeromq.shared_memory import SHARED_BYTES, Loan, SharedReader, SharedWriter
+from nep.backends.zeromq.shared.memory import SHARED_BYTES, Loan, SharedReader, SharedWriter
 from nep.errors import WireError
 from nep.i18n import _
 from nep.protocol.wire import Shares

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Literal
 
-from nep.arguments import seconds
 from nep.backends.services import ClientTransport, OpenCall, Outcome
 from nep.errors import (
     ClosedError,
@@ -23,6 +22,7 @@ from nep.errors import (
 from nep.i18n import _
 from nep.messages.codecs import Codec, codec_numbered
 from nep.protocol.service_wire import CallKind, read_failure
+from nep.system.arguments import seconds
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -9,12 +9,12 @@ from typing import Protocol
 
 from nep.errors import ClosedError, ParameterError, did_you_mean
 from nep.i18n import _
-from nep.parameters.parameter import NodeParameter, declared, shown
+from nep.patterns.parameters.parameter import NodeParameter, declared, shown
 from nep.text import escaped, shortened
 
 __all__ = ["MSG_TYPE", "OnChange", "ParameterHost", "Parameters", "place_of"]
 
-MSG_TYPE = "nep/parameters"
+MSG_TYPE = "nep/patterns/parameters"
 """The type of the topic on which a node tells its parameters, latched."""
 _MOST = 1_000
 
@@ -41,7 +41,7 @@ class ParameterHost(Protocol):
 
 def place_of(node_id: str) -> str:
     """The name of the service, and of the topic, of a node's parameters."""
-    return f"/nep/parameters/{node_id}"
+    return f"/nep/patterns/parameters/{node_id}"
 
 
 class Parameters:

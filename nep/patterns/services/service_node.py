@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from nep.arguments import seconds
 from nep.backends.base import Transport
 from nep.backends.connection import Configuration
-from nep.services.client import Client
-from nep.services.owned import OwnedServices
-from nep.services.server import Callback, Server
-from nep.services.survey import Respondent, Surveyor
+from nep.patterns.services.client import Client
+from nep.patterns.services.owned import OwnedServices
+from nep.patterns.services.server import Callback, Server
+from nep.patterns.services.survey import Respondent, Surveyor
+from nep.system.arguments import seconds
 
 __all__ = ["ServiceNode"]
 

@@ -9,14 +9,14 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from nep.arguments import at_least, seconds
 from nep.backends.services import OpenCall, Outcome, SurveyTransport
 from nep.errors import ClosedError, NepError, WaitTimeoutError
 from nep.i18n import _
 from nep.messages.codecs import Codec, codec_numbered
+from nep.patterns.services.client import SLICE_S, Limit
+from nep.patterns.services.server import Server
 from nep.protocol.service_wire import SURVEY, CallKind, read_failure
-from nep.services.client import SLICE_S, Limit
-from nep.services.server import Server
+from nep.system.arguments import at_least, seconds
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Respondent", "Surveyor"]
 
-_logger = logging.getLogger("nep.services")
+_logger = logging.getLogger("nep.patterns.services")
 
 
 class Surveyor:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from nep.errors import NepError, RequestRefusedError, did_you_mean
 from nep.i18n import _
-from nep.parameters.owned import place_of
+from nep.patterns.parameters.owned import place_of
+from nep.patterns.services.client import Client
 from nep.protocol.graph_view import GraphView
-from nep.services.client import Client
 from nep.text import escaped
 
 if TYPE_CHECKING:

@@ -8,12 +8,12 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from nep.arguments import limit, seconds
 from nep.backends.services import CallQueue, IncomingCall, ServerTransport
 from nep.errors import ClosedError, DecodeError, EncodeError, NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_numbered
 from nep.protocol.service_wire import CallKind, Reply, failure
+from nep.system.arguments import limit, seconds
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Callback", "Server"]
 
-_logger = logging.getLogger("nep.services")
+_logger = logging.getLogger("nep.patterns.services")
 
 SLICE_S = 0.1
 """Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""

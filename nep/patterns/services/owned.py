@@ -7,17 +7,17 @@ import time
 from collections.abc import Callable
 from typing import TypeVar, cast
 
-from nep.arguments import at_least, function, seconds, text
 from nep.backends.base import Backend, Transport
 from nep.backends.connection import Configuration
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec, ServiceTransport
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import Codec, codec_numbered
+from nep.patterns.services.client import Client
+from nep.patterns.services.server import Callback, Server
+from nep.patterns.services.survey import Respondent, Surveyor
 from nep.protocol.service_wire import check_service, check_survey
-from nep.services.client import Client
-from nep.services.server import Callback, Server
-from nep.services.survey import Respondent, Surveyor
+from nep.system.arguments import at_least, function, seconds, text
 
 __all__ = ["OwnedServices"]
 

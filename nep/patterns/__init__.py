@@ -1,0 +1,1 @@
+"""What nodes do beside topics: services and surveys, parameters."""
