@@ -7,6 +7,8 @@ from collections import deque
 from contextlib import suppress
 
 from nep.backends.base import SubscriberTransport
+from nep.errors import TooManyFilesError
+from nep.system.descriptors import is_lack, limit, opened
 from nep.system.wakeup import Waker
 
 __all__ = ["SharedWait"]
@@ -38,8 +40,10 @@ class SharedWait:
         self._waker = Waker()
         try:
             self._selector = selectors.DefaultSelector()
-        except BaseException:
+        except OSError as error:
             self._waker.close()
+            if is_lack(error.errno):
+                raise TooManyFilesError("a thread that waits", opened(), limit()) from error
             raise
         self._selector.register(self._waker.fd, selectors.EVENT_READ)
         self._bells: dict[SubscriberTransport, _Bell] = {}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import errno
 import functools
 import os
 import selectors
@@ -337,6 +339,31 @@ def test_two_threads_may_spin_the_same_nodes(make: Nodes) -> None:
     for thread in threads:
         thread.join(30.0)
     assert sorted(got) == list(range(500))  # type: ignore[type-var]
+
+
+def test_without_room_for_one_more_file_it_says_so(make: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
+    nodes = [make("a", "zeromq"), make("b", "memory")]
+
+    def no_room() -> None:
+        raise OSError(errno.EMFILE, "too many open files")
+
+    monkeypatch.setattr(selectors, "DefaultSelector", no_room)
+    with pytest.raises(nep.TooManyFilesError, match="no room for a thread that waits"):
+        nep.spin(*nodes)
+
+    async def main() -> None:
+        sub = nodes[1].new_sub("t")
+        with pytest.raises(nep.TooManyFilesError, match="no room for a thread that waits"):
+            await sub.receive_async(0.01)
+        monkeypatch.undo()
+        assert await sub.receive_async(0.01) is None
+
+    loop = asyncio.SelectorEventLoop(selectors.SelectSelector())
+    try:
+        loop.run_until_complete(main())
+        loop.run_until_complete(loop.shutdown_asyncgens())
+    finally:
+        loop.close()
 
 
 def test_a_descriptor_that_cannot_be_polled_is_looked_at(
