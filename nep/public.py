@@ -26,6 +26,7 @@ from nep.masters.master import is_running as is_running
 from nep.masters.master import master_address as master_address
 from nep.masters.master import start_process as start_process
 from nep.messages.encoded import Encoded as Encoded
+from nep.messages.image_codec import ImageFormat as ImageFormat
 from nep.messages.image_codec import raw_image as raw_image
 from nep.messages.message import Message as Message
 from nep.nodes.node import Node as Node

@@ -4,8 +4,9 @@ The extension that travels beside the bytes is `{"shape": [height, width, channe
 NAME is "jpeg", "png", or says how raw bytes are laid out: "mono8", "bgr8", "bgra8", "mono16", "bgr16",
 "bgra16", "rgb8", "rgba8", or the type of its numbers and the count of channels, such as "32FC1" (float).
 
-An array is published as what keeps it: `uint8` of one or three channels, which a camera sends, as JPEG of
-quality 90; with an alpha channel or of 16 bits (depth) as PNG; any other numbers as raw bytes.
+An array is published as a publisher's `ImageFormat` says, else as what keeps it: `uint8` of one or three
+channels, which a camera sends, as JPEG of quality 90; with an alpha channel or of 16 bits (depth) as PNG; any
+other numbers as raw bytes.
 `raw_image(array)` makes a payload that is sent raw, without loss and without the time for a PNG. Bytes that
 already are a JPEG or PNG file pass unchanged. Who receives it gets an array (height, width) of one channel,
 else (height, width, channels), of the same numbers. Messages of the original NEP carry no extension: their
@@ -24,6 +25,7 @@ from nep.errors import DecodeError, EncodeError
 from nep.i18n import _, lazy
 from nep.messages.encoded import Encoded
 from nep.messages.image_files import ImageFile, check_size, examine
+from nep.system.arguments import one_of, within
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "JPEG_QUALITY",
+    "ImageFormat",
     "RawLayout",
     "decode",
     "encode",
@@ -42,6 +45,8 @@ __all__ = [
 ]
 
 JPEG_QUALITY = 90
+WIDEST = 65_535
+"""Pixels."""
 _NEEDS = lazy("install the picture codec with: pip install 'nep-studio[image]'")
 _QUICK_PNG = [16, 1]  # IMWRITE_PNG_COMPRESSION: the quickest that compresses
 _NAMED = {
@@ -53,6 +58,55 @@ _NUMBERS = {"8U": "u1", "8S": "i1", "16U": "<u2", "16S": "<i2", "32S": "<i4", "3
 _LAYOUT = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)C([1-4])")
 _ENCODING = {value: key for key, value in _NAMED.items() if not key.startswith("rgb")}
 _TYPE_NAMES = lazy("uint8, int8, uint16, int16, int32, float32 or float64")
+
+
+@dataclass(frozen=True)
+class ImageFormat:
+    """How a publisher sends its pictures: `nep.ImageFormat("jpeg", quality=70, width=640)`.
+
+    `kind`: "jpeg" (of `uint8` with one or three channels), "png", "raw", or "auto", which keeps what there
+    is. `quality` of a JPEG, 1 to 100. `width`: a wider picture is made so wide, and its height goes with it;
+    of depth and labels (16 bits and more) pixels are left out then, not mixed. Bytes that are a file already,
+    and `raw_image`, are sent as they are. Raises `ValueError` for what is none of these.
+    """
+
+    kind: str = "auto"
+    quality: int = JPEG_QUALITY
+    width: int | None = None
+
+    def __post_init__(self) -> None:
+        one_of("kind", self.kind, ("auto", "jpeg", "png", "raw"))
+        within("quality", self.quality, 1, 100)
+        if self.width is not None:
+            within("width", self.width, 1, WIDEST)
+
+    def encode(self, payload: object) -> Encoded:
+        """A picture as bytes of this kind. Raises `EncodeError`."""
+        if isinstance(payload, bytes | bytearray | memoryview):
+            return encode(payload)
+        try:
+            frame = self._sized(_checked(payload))
+            if self.kind == "jpeg":
+                return _as_jpeg(frame, self.quality)
+            if self.kind == "png":
+                return _as_png(frame)
+        except ImportError as error:
+            raise EncodeError("image", type(payload).__name__, _(_NEEDS)) from error
+        return _raw(frame) if self.kind == "raw" else _kept(frame, self.quality)
+
+    def _sized(self, frame: NDArray[Any]) -> NDArray[Any]:
+        """The picture, not wider than it may be."""
+        height, width = frame.shape[:2]
+        if self.width is None or width <= self.width:
+            return frame
+        opencv, rows = _opencv(), max(1, round(height * self.width / width))
+        if frame.dtype.name != "uint8":
+            columns = _numpy().arange(self.width) * width // self.width
+            lines = _numpy().arange(rows) * height // rows
+            picked: NDArray[Any] = frame[lines][:, columns]
+            return picked
+        sized: NDArray[Any] = opencv.resize(frame, (self.width, rows), interpolation=3)  # INTER_AREA
+        return sized
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,16 +144,38 @@ def encode(payload: object) -> Encoded:
         except DecodeError as error:
             raise EncodeError("image", kind, error.reason) from error
     try:
-        frame = _checked(payload)
-        channels = 1 if frame.ndim == 2 else frame.shape[2]
-        numbers = frame.dtype.name
-        if numbers == "uint8" and channels in (1, 3):
-            return _as_file(frame, "jpeg", [1, JPEG_QUALITY])  # 1 = IMWRITE_JPEG_QUALITY
-        if numbers in ("uint8", "uint16") and channels in (1, 3, 4):
-            return _as_file(frame, "png", _QUICK_PNG)
+        return _kept(_checked(payload), JPEG_QUALITY)
     except ImportError as error:
         raise EncodeError("image", kind, _(_NEEDS)) from error
-    return _raw(frame)
+
+
+def _channels(frame: NDArray[Any]) -> int:
+    return 1 if frame.ndim == 2 else int(frame.shape[2])
+
+
+def _kept(frame: NDArray[Any], quality: int) -> Encoded:
+    """As what keeps it; see the module."""
+    if frame.dtype.name == "uint8" and _channels(frame) in (1, 3):
+        return _as_jpeg(frame, quality)
+    return _as_png(frame) if _has_png(frame) else _raw(frame)
+
+
+def _has_png(frame: NDArray[Any]) -> bool:
+    return frame.dtype.name in ("uint8", "uint16") and _channels(frame) in (1, 3, 4)
+
+
+def _as_jpeg(frame: NDArray[Any], quality: int) -> Encoded:
+    if frame.dtype.name != "uint8" or _channels(frame) not in (1, 3):
+        reason = _("a JPEG has 'uint8' and one or three channels; choose 'png', 'raw' or 'auto'")
+        raise EncodeError("image", type(frame).__name__, reason)
+    return _as_file(frame, "jpeg", [1, quality])  # 1 = IMWRITE_JPEG_QUALITY
+
+
+def _as_png(frame: NDArray[Any]) -> Encoded:
+    if not _has_png(frame):
+        reason = _("a PNG has 'uint8' or 'uint16' and one, three or four channels; choose 'raw' or 'auto'")
+        raise EncodeError("image", type(frame).__name__, reason)
+    return _as_file(frame, "png", _QUICK_PNG)
 
 
 def raw_image(payload: object) -> Encoded:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from nep.backends.base import Backend
 from nep.backends.connection import Configuration, Direct
+from nep.errors import WrongTypeError
 from nep.i18n import _
+from nep.messages.codecs import CODECS, Codec
 from nep.messages.history import MAX_HISTORY
+from nep.messages.image_codec import ImageFormat
 from nep.nodes.arguments import one_of, within
 from nep.protocol.topic_pattern import is_pattern
 
-__all__ = ["history_for", "is_pattern_for", "quality_for"]
+__all__ = ["codec_with", "history_for", "is_pattern_for", "quality_for"]
 
 
 def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | None) -> bool:
@@ -23,6 +28,20 @@ def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | 
             )
         )
     return True
+
+
+def codec_with(backend: Backend, msg_type: str, image: ImageFormat | None) -> Codec:
+    """The codec of a publisher, whose pictures are sent as `image` says. Raises `ValueError`."""
+    codec = backend.codec_for(msg_type)
+    if image is None:
+        return codec
+    if not isinstance(image, ImageFormat):
+        raise WrongTypeError(
+            _("image is a '{kind}'; give a 'nep.ImageFormat'").format(kind=type(image).__name__)
+        )
+    if codec is not CODECS["image"]:
+        raise ValueError(_("image is for pictures; publish them as 'image'"))
+    return replace(codec, encode=image.encode)
 
 
 def history_for(backend: Backend, history: int, configuration: Configuration) -> int:

@@ -28,8 +28,9 @@ from nep.backends.base import (
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port, for_messages
 from nep.errors import BadTopicError, ClosedError, WrongTypeError
 from nep.i18n import _
+from nep.messages.image_codec import ImageFormat
 from nep.messages.queue import MAX_MESSAGES, Keep
-from nep.nodes.abilities import history_for, is_pattern_for, quality_for
+from nep.nodes.abilities import codec_with, history_for, is_pattern_for, quality_for
 from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
 from nep.nodes.async_spinning import spin as spin_in_loop
 from nep.nodes.executor import spin_all
@@ -170,16 +171,17 @@ class Node(ServiceNode):
         history: int = 0,
         batch: bool = True,
         qos: str = "",
+        image: ImageFormat | None = None,
     ) -> Publisher:
         """A publisher. The first message reaches every subscriber that was there before this returned.
 
         `latched`: whoever subscribes later gets the last message at once. `history`: it gets so many of the
         last ones, up to 1000 and 64 MB, in order and before those that follow. `batch`: messages published
         within 20 microseconds of each other may go out together, 100 microseconds later at most (the last
-        ones of a burst that goes on for longer: 500). `qos`: a quality of service in one word, where the back
-        end knows such ("ros2": "reliable", "best_effort", "sensor"). Raises `MasterUnreachable`,
-        `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and `ValueError` for what is
-        none of the allowed arguments.
+        ones of a burst that goes on for longer: 500). `qos`: a quality of service in one word, where the
+        back end knows such ("ros2": "reliable", "best_effort", "sensor"). `image`: how pictures are sent,
+        JPEG, PNG or raw, and how large. Raises `MasterUnreachable`, `BadTopicError`, `AddressInUseError`,
+        `TooManyFilesError`, `ClosedError`, and `ValueError` for what is none of the allowed arguments.
         """
         connected = for_messages(self._configured(configuration))
         kept = max(history_for(self._backend, history, connected), 1 if latched is True else 0)
@@ -188,7 +190,7 @@ class Node(ServiceNode):
             id_from(self._key, number),
             _own_topic(topic),
             text("msg_type", msg_type),
-            self._backend.codec_for(msg_type),
+            codec_with(self._backend, msg_type, image),
             flag("latched", latched) or kept > 0,
             connected,
             self._wait_s,

@@ -1,0 +1,150 @@
+"""How a publisher sends its pictures: their kind, quality and size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nep
+from nep.errors import EncodeError
+from nep.messages import image_codec
+from nep.messages.codecs import codec
+from nep.messages.image_codec import ImageFormat
+
+COLOUR = np.random.default_rng(1).integers(0, 255, (60, 80, 3), np.uint8)
+DEPTH = np.arange(60 * 80, dtype=np.uint16).reshape(60, 80)
+
+
+def back(image: ImageFormat, frame: Any) -> Any:
+    """The picture as a subscriber gets it."""
+    made = image.encode(frame)
+    return codec("image").decode(memoryview(made.data), made.extension or {})
+
+
+@pytest.fixture
+def node() -> Iterator[nep.Node]:
+    with nep.node("pictures", "memory") as made:
+        yield made
+
+
+@pytest.mark.parametrize(
+    ("image", "frame", "encoding"),
+    [
+        (ImageFormat(), COLOUR, "jpeg"),
+        (ImageFormat(), DEPTH, "png"),
+        (ImageFormat("jpeg"), COLOUR, "jpeg"),
+        (ImageFormat("png"), COLOUR, "png"),
+        (ImageFormat("png"), DEPTH, "png"),
+        (ImageFormat("raw"), COLOUR, "bgr8"),
+        (ImageFormat("raw"), DEPTH, "mono16"),
+        (ImageFormat("raw"), DEPTH.astype(np.float32), "32FC1"),
+        (ImageFormat(), DEPTH.astype(np.float32), "32FC1"),
+    ],
+)
+def test_a_picture_is_sent_as_asked_for(image: ImageFormat, frame: Any, encoding: str) -> None:
+    made = image.encode(frame)
+    assert made.extension is not None
+    assert made.extension["encoding"] == encoding
+    if encoding != "jpeg":
+        np.testing.assert_array_equal(back(image, frame), frame)
+
+
+def test_less_quality_takes_fewer_bytes() -> None:
+    sizes = [len(ImageFormat("jpeg", quality=each).encode(COLOUR).data) for each in (1, 50, 90, 100)]
+    assert sizes == sorted(set(sizes))
+    assert ImageFormat("jpeg").encode(COLOUR).data == image_codec.encode(COLOUR).data
+
+
+@pytest.mark.parametrize("kind", ["auto", "jpeg", "png", "raw"])
+def test_a_wide_picture_is_made_narrower_and_keeps_its_form(kind: str) -> None:
+    assert back(ImageFormat(kind, width=40), COLOUR).shape == (30, 40, 3)
+    assert back(ImageFormat(kind, width=80), COLOUR).shape == COLOUR.shape
+    assert back(ImageFormat(kind, width=1000), COLOUR).shape == COLOUR.shape
+    assert back(ImageFormat(kind, width=1), np.zeros((1, 500, 3), np.uint8)).shape == (1, 1, 3)
+
+
+def test_depth_is_thinned_and_never_mixed() -> None:
+    frame = np.where(np.arange(80) % 2, 0, 5000).astype(np.uint16) * np.ones((60, 1), np.uint16)
+    small = back(ImageFormat("png", width=30), frame)
+    assert small.shape == (22, 30)
+    assert set(np.unique(small).tolist()) <= {0, 5000}
+
+
+def test_colour_is_mixed() -> None:
+    frame = np.where(np.arange(80) % 2, 0, 200).astype(np.uint8)[None, :, None] * np.ones(
+        (60, 1, 3), np.uint8
+    )
+    assert np.unique(back(ImageFormat("raw", width=40), frame)).tolist() == [100]
+
+
+@pytest.mark.parametrize(
+    ("image", "frame", "sentence"),
+    [
+        (ImageFormat("jpeg"), DEPTH, "a JPEG has 'uint8' and one or three channels"),
+        (ImageFormat("jpeg"), np.zeros((4, 4, 4), np.uint8), "a JPEG has 'uint8' and one or three channels"),
+        (ImageFormat("png"), DEPTH.astype(np.float32), "a PNG has 'uint8' or 'uint16'"),
+        (ImageFormat("png"), np.zeros((4, 4, 2), np.uint8), "a PNG has 'uint8' or 'uint16'"),
+        (ImageFormat("raw"), "picture", "publish a 'uint8' array"),
+        (ImageFormat("raw"), b"no file", "picture"),
+    ],
+)
+def test_what_has_no_such_form_is_refused(image: ImageFormat, frame: Any, sentence: str) -> None:
+    with pytest.raises(EncodeError, match=sentence):
+        image.encode(frame)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"kind": "gif"}, "kind is 'gif'; use 'auto', 'jpeg', 'png' or 'raw'"),
+        ({"quality": 0}, "quality is 0; give a whole number from 1 to 100"),
+        ({"quality": 101}, "quality is 101; give a whole number from 1 to 100"),
+        ({"quality": 50.0}, "quality is 50.0; give a whole number"),
+        ({"width": 0}, "width is 0; give a whole number from 1 to 65535"),
+        ({"width": -1}, "width is -1; give a whole number"),
+        ({"width": True}, "width is True; give a whole number"),
+    ],
+)
+def test_a_format_that_is_none_is_refused(given: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        ImageFormat(**given)
+
+
+def test_a_publisher_has_its_own_format_and_files_pass_unchanged(node: nep.Node) -> None:
+    sub = node.new_sub("camera", "image")
+    with node.new_pub("camera", "image", image=nep.ImageFormat("png", width=40)) as pub:
+        pub.publish(COLOUR)
+        assert sub.listen(timeout_s=30.0)[1].shape == (30, 40, 3)
+        file = image_codec.encode(COLOUR).data
+        pub.publish(file)
+        message = sub.receive(30.0)
+        assert message is not None
+        assert (bytes(message.data), message.extension["encoding"]) == (file, "jpeg")
+        pub.publish(nep.raw_image(DEPTH))
+        np.testing.assert_array_equal(sub.listen(timeout_s=30.0)[1], DEPTH)
+
+
+def test_what_cannot_be_sent_so_is_refused_and_named(
+    node: nep.Node, caplog: pytest.LogCaptureFixture
+) -> None:
+    node.new_sub("camera", "image")
+    pub = node.new_pub("camera", "image", image=nep.ImageFormat("jpeg"))
+    pub.publish(DEPTH)
+    assert pub.refused == 1
+    assert "a JPEG has 'uint8' and one or three channels" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("msg_type", "image", "sentence"),
+    [
+        ("json", ImageFormat(), "image is for pictures; publish them as 'image'"),
+        ("image", "jpeg", "image is a 'str'; give a 'nep.ImageFormat'"),
+    ],
+)
+def test_only_pictures_have_a_format(node: nep.Node, msg_type: str, image: Any, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        node.new_pub("camera", msg_type, image=image)
+    assert not node.graph().topics
