@@ -2,7 +2,7 @@
 
 `configuration` has what a bridge is told and `toml_file` reads it, `bridge` joins two of `side`, a `route`
 carries one topic one way at the pace of `pacer`. `trail` keeps a message from coming back, `other_bridges`
-know who joins the same networks.
+know who joins the same networks, and `topic_types` as what messages are subscribed and published.
 """
 
 from nep.bridges.bridge import Bridge

@@ -20,8 +20,9 @@ from nep.bridges.configuration import (
 )
 from nep.bridges.other_bridges import OtherBridges, Way
 from nep.bridges.pacer import Pacer
-from nep.bridges.route import Route, RouteEnd, type_in
+from nep.bridges.route import Route, RouteEnd
 from nep.bridges.side import BridgeSide
+from nep.bridges.topic_types import type_in
 from nep.bridges.trail import Echoes
 from nep.errors import DecodeError, NepError
 from nep.messages.message import Message

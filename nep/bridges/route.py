@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from nep.backends.base import Backend
 from nep.bridges.configuration import SideName
 from nep.bridges.pacer import Limit, Pacer
+from nep.bridges.topic_types import Form, default_type, type_for, type_in
 from nep.bridges.trail import TRAIL_KEY, Echoes, Trail, read_trail
 from nep.errors import ClosedError, EncodeError, NepError
-from nep.messages.codecs import CODECS, Codec, JsonEncoder, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
@@ -22,7 +22,7 @@ from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
 
-__all__ = ["Route", "RouteCounts", "RouteEnd", "type_in"]
+__all__ = ["Route", "RouteCounts", "RouteEnd"]
 
 HELD_MESSAGES = 10_000
 """So many wait for the other side, 64 MB at most; then the oldest are dropped and counted."""
@@ -32,9 +32,6 @@ _LATCHED_MOST = 256
 _GONE_S = 10.0
 """Who is not in the graph for so long is gone; a master that was started again knows it sooner."""
 _PROBLEM_MOST = 300
-_DEFAULT_TYPE = "json"
-_NO_MAPS = frozenset({"string", "bytes", "image"})
-"""Codecs whose payloads have no fields, and so are none of a back end's own types."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +45,6 @@ class RouteEnd:
     msg_type: str = ""
     qos: str = ""
     echoes: Echoes = field(default_factory=Echoes)
-
-    @property
-    def default_type(self) -> str:
-        """As what a topic is subscribed that nobody publishes; "" when the type would decide what is read."""
-        return _DEFAULT_TYPE if self.backend.codec_for is codec_for else ""
 
 
 @dataclass(frozen=True)
@@ -155,7 +147,7 @@ class Route:
         self._lost_before: int | None = 0
         self._publishers: dict[tuple[bool, int | None], Publisher] = {}
         self._gone_since: dict[tuple[bool, int | None], float] = {}
-        self._form: _Form | None = None
+        self._form: Form | None = None
         self._has_room = end.backend.has_extensions
         self._received = self._sent = self._bytes = 0
         self._thinned = self._failed = self._dropped = self._returned = 0
@@ -216,7 +208,7 @@ class Route:
         """
         known = type_in(view, self.origin.topic, own_nodes)
         if self._subscriber is None:
-            msg_type = self.origin.msg_type or known or self.origin.default_type
+            msg_type = self.origin.msg_type or known or default_type(self.origin.backend)
             self._waits_for_type = not msg_type
             if not msg_type:
                 return
@@ -365,11 +357,13 @@ class Route:
                 publisher.close()
                 return
 
-    def _form_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> _Form:
+    def _form_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> Form:
         """As what it is published: decided by the first message, and kept."""
         if self._form is None:
-            msg_type = self.end.msg_type or _type_for(message, self.end, view, own_nodes)
-            self._form = _Form(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
+            msg_type = self.end.msg_type or type_for(
+                message, self.end.backend, view.topics.get(self.end.topic), own_nodes
+            )
+            self._form = Form(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
         return self._form
 
     def close_gone(self, origin: GraphView, now: float) -> None:
@@ -406,7 +400,7 @@ class Route:
         except Exception as error:  # noqa: BLE001 - payloads and back ends may be of any kind; others go on
             self._fail(str(error) if isinstance(error, NepError) else f"{type(error).__name__}: {error}")
 
-    def _converted(self, publisher: Publisher, message: Message, form: _Form) -> Encoded:
+    def _converted(self, publisher: Publisher, message: Message, form: Form) -> Encoded:
         """Its payload in the other side's form. What cannot be read or written is an alert in the graph."""
         subscriber = self._subscriber
         payload = message.payload if subscriber is None else subscriber.decoded(message)
@@ -447,56 +441,3 @@ class Route:
 
 def _has_heard(subscriber: Subscriber) -> bool:
     return subscriber.received > 0
-
-
-class _Form:
-    """How messages are written on the other side."""
-
-    def __init__(self, msg_type: str, codec: Codec, topic: str) -> None:
-        self.msg_type = msg_type
-        self.codec = codec
-        self.encode: Callable[[object], Encoded] = codec.encode
-        if codec is CODECS["json"]:
-            self.encode = JsonEncoder(topic).encode
-
-    def has(self, message: Message) -> bool:
-        """Whether a message has it already. A codec of a back end's own says nothing without the type."""
-        if message.codec != self.codec.name:
-            return False
-        return message.codec in CODECS or message.msg_type == self.msg_type
-
-
-def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
-    """The type under which others publish a topic; "" when nobody does."""
-    known = view.topics.get(topic)
-    if known is None or all(each.node_id in own_nodes for each in known.publishers):
-        return ""
-    return known.msg_type if known.msg_type != "*" else ""
-
-
-def _type_for(message: Message, end: RouteEnd, view: GraphView, own_nodes: Collection[str]) -> str:
-    """As what messages such as this one are published at an end where no type is told.
-
-    As what others have there, when only this back end knows that type and the message may be a map, or they
-    publish and its codec is the same: a topic shall not have two types. Else as what it is.
-    """
-    known = view.topics.get(end.topic)
-    if known is None or known.msg_type in {"", "*"}:
-        return message.msg_type
-    members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
-    codec = _codec_name(end, known.msg_type)
-    if members <= set(own_nodes) or not codec:
-        return message.msg_type
-    if codec not in CODECS:
-        return message.msg_type if message.codec in _NO_MAPS else known.msg_type
-    is_published = bool(type_in(view, end.topic, own_nodes))
-    is_same = is_published and codec == _codec_name(end, message.msg_type)
-    return known.msg_type if is_same else message.msg_type
-
-
-def _codec_name(end: RouteEnd, msg_type: str) -> str:
-    """The name of the codec that carries a type there; "" when there is none."""
-    try:
-        return end.backend.codec_for(msg_type).name
-    except NepError:
-        return ""

@@ -1,0 +1,76 @@
+"""Topics' types at both ends of a bridge: as what a topic is subscribed, and as what it is published."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from nep.backends.base import Backend
+from nep.errors import NepError
+from nep.messages.codecs import CODECS, Codec, JsonEncoder, codec_for
+from nep.messages.encoded import Encoded
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView, TopicInfo
+
+__all__ = ["Form", "default_type", "type_for", "type_in"]
+
+_DEFAULT_TYPE = "json"
+_NO_MAPS = frozenset({"string", "bytes", "image"})
+"""Codecs whose payloads have no fields, and so are none of a back end's own types."""
+_UNKNOWN = frozenset({"", "*"})
+
+
+class Form:
+    """How messages are written on the other side."""
+
+    def __init__(self, msg_type: str, codec: Codec, topic: str) -> None:
+        self.msg_type = msg_type
+        self.codec = codec
+        self.encode: Callable[[object], Encoded] = codec.encode
+        if codec is CODECS["json"]:
+            self.encode = JsonEncoder(topic).encode
+
+    def has(self, message: Message) -> bool:
+        """Whether a message has it already. A codec of a back end's own says nothing without the type."""
+        if message.codec != self.codec.name:
+            return False
+        return message.codec in CODECS or message.msg_type == self.msg_type
+
+
+def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
+    """The type under which others publish a topic; "" when nobody does."""
+    known = view.topics.get(topic)
+    if known is None or all(each.node_id in own_nodes for each in known.publishers):
+        return ""
+    return "" if known.msg_type in _UNKNOWN else known.msg_type
+
+
+def default_type(backend: Backend) -> str:
+    """As what a topic is subscribed that nobody publishes; "" where the type would decide what is read."""
+    return _DEFAULT_TYPE if backend.codec_for is codec_for else ""
+
+
+def type_for(message: Message, backend: Backend, known: TopicInfo | None, own_nodes: Collection[str]) -> str:
+    """As what messages such as this one are published on a topic of `backend` whose type is not told.
+
+    As what others have there, when only this back end knows that type and the message may be a map, or they
+    publish and its codec is the same: a topic shall not have two types. Else as what it is.
+    """
+    if known is None or known.msg_type in _UNKNOWN:
+        return message.msg_type
+    members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
+    codec = _codec_name(backend, known.msg_type)
+    if members <= set(own_nodes) or not codec:
+        return message.msg_type
+    if codec not in CODECS:
+        return message.msg_type if message.codec in _NO_MAPS else known.msg_type
+    is_published = any(each.node_id not in own_nodes for each in known.publishers)
+    is_same = is_published and codec == _codec_name(backend, message.msg_type)
+    return known.msg_type if is_same else message.msg_type
+
+
+def _codec_name(backend: Backend, msg_type: str) -> str:
+    """The name of the codec that carries a type there; "" when there is none."""
+    try:
+        return backend.codec_for(msg_type).name
+    except NepError:
+        return ""
