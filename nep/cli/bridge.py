@@ -19,23 +19,19 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from nep.bridges.bridge import Bridge, check_installed
 from nep.bridges.configuration import BridgeConfiguration, direction_named, join_line
+from nep.bridges.route import Route, RouteCounts
 from nep.bridges.toml_file import EXAMPLE, read_configuration
 from nep.cli.options import JsonOption
 from nep.cli.screen import UNKNOWN, cells, console, padded, rate, say, show_json, write
 from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.masters.rates import Meter
-from nep.system.lazy_import import lazy_module
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
-
-    from nep.bridges import bridge as bridges
-    from nep.bridges.route import Route, RouteCounts
-else:
-    bridges = lazy_module("nep.bridges.bridge")
 
 _EVERY_S = 1.0
 _SLICE_S = 0.1
@@ -107,11 +103,11 @@ def bridge(
     configuration = _configuration(what or [], direction, rate_hz)
     _check_reach(configuration)
     if check:
-        bridges.check_installed(configuration)
+        check_installed(configuration)
         _say_right(configuration)
         return
     signal.signal(signal.SIGTERM, _end)
-    with _warnings() as notes, bridges.Bridge(configuration) as running, _published(running):
+    with _warnings() as notes, Bridge(configuration) as running, _published(running):
         report = _report_for(running, notes, as_json=as_json)
         if not as_json:
             said = _("{name} joins a, {a}, and b, {b}; Ctrl+C ends it")
@@ -150,9 +146,9 @@ def _check_reach(configuration: BridgeConfiguration) -> None:
     for side in (configuration.a, configuration.b):
         if side.backend.is_in_process:
             raise NepError(
-                _(
-                    "nodes of '{name}' meet within one program only; join them there by nep.bridges.Bridge"
-                ).format(name=side.backend.name)
+                _("nodes of '{name}' meet within one program only; join them there by nep.Bridge").format(
+                    name=side.backend.name
+                )
             )
 
 
@@ -205,7 +201,7 @@ def _warnings() -> Iterator[_Notes]:
 
 
 @contextmanager
-def _published(running: bridges.Bridge) -> Iterator[None]:
+def _published(running: Bridge) -> Iterator[None]:
     """Both nodes publish the library's warnings as log records, for `nep log` and Studio's Console."""
     logger = logging.getLogger("nep")
     handlers = [side.node.log_handler for side in running.sides.values()]
@@ -232,7 +228,7 @@ class _Row(NamedTuple):
 class _Report:
     """What the routes carry, read each second."""
 
-    def __init__(self, running: bridges.Bridge) -> None:
+    def __init__(self, running: Bridge) -> None:
         self._running = running
         self._meters: dict[Route, Meter] = {}
         names = [running.configuration.side(side).backend.name for side in ("a", "b")]
@@ -295,7 +291,7 @@ class _JsonReport(_Report):
 class _PlainReport(_Report):
     """Lines of those routes whose figures have changed, for a file or a program."""
 
-    def __init__(self, running: bridges.Bridge) -> None:
+    def __init__(self, running: Bridge) -> None:
         super().__init__(running)
         self._shown: dict[str, tuple[str, ...]] = {}
         self._width = 0
@@ -324,7 +320,7 @@ class _PlainReport(_Report):
 class _LiveReport(_Report):
     """A table that each report takes the place of; what is said beside it stands above."""
 
-    def __init__(self, running: bridges.Bridge, notes: _Notes) -> None:
+    def __init__(self, running: Bridge, notes: _Notes) -> None:
         from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
 
         super().__init__(running)
@@ -376,7 +372,7 @@ class _LiveReport(_Report):
         return Group(table, *below[: max(1, most - len(rows) + 1)])
 
 
-def _report_for(running: bridges.Bridge, notes: _Notes, *, as_json: bool) -> _Report:
+def _report_for(running: Bridge, notes: _Notes, *, as_json: bool) -> _Report:
     if as_json:
         return _JsonReport(running)
     return _LiveReport(running, notes) if sys.stdout.isatty() else _PlainReport(running)
