@@ -55,17 +55,27 @@ def type_for(message: Message, backend: Backend, known: TopicInfo | None, own_no
     As what others have there, when only this back end knows that type and the message may be a map, or they
     publish and its codec is the same: a topic shall not have two types. Else as what it is.
     """
+    own = _kept_type(message, backend)
     if known is None or known.msg_type in _UNKNOWN:
-        return message.msg_type
+        return own
     members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
     codec = _codec_name(backend, known.msg_type)
     if members <= set(own_nodes) or not codec:
-        return message.msg_type
+        return own
     if codec not in CODECS:
-        return message.msg_type if message.codec in _NO_MAPS else known.msg_type
+        return own if message.codec in _NO_MAPS else known.msg_type
     is_published = any(each.node_id not in own_nodes for each in known.publishers)
-    is_same = is_published and codec == _codec_name(backend, message.msg_type)
-    return known.msg_type if is_same else message.msg_type
+    is_same = is_published and codec == _codec_name(backend, own)
+    return known.msg_type if is_same else own
+
+
+def _kept_type(message: Message, backend: Backend) -> str:
+    """Its own type, unless that would change its form: a picture of ROS's type is an `image` elsewhere.
+
+    Also one that the back end should know and does not: then it says so.
+    """
+    is_kept = message.codec not in CODECS or _codec_name(backend, message.msg_type) in {"", message.codec}
+    return message.msg_type if is_kept else message.codec
 
 
 def _codec_name(backend: Backend, msg_type: str) -> str:

@@ -163,6 +163,22 @@ def test_a_back_end_with_types_of_its_own_is_subscribed_by_the_type_that_somebod
             )
 
 
+def test_a_picture_of_a_back_end_s_own_type_is_a_picture_elsewhere(twist_side):
+    import nep
+
+    with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
+        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (topic("/camera"),))
+        with Bridge(told) as bridge:
+            pub, hears = (
+                robot.new_pub("/camera", "test_msgs/Picture"),
+                a.node("a").new_sub("/camera", "image"),
+            )
+            eventually(lambda: route(bridge, "b", "/camera").is_subscribed)
+            pub.publish(np.zeros((4, 6, 3), np.uint8))
+            message = hears.receive(30.0)
+            assert (message.codec, message.msg_type, message.payload.shape) == ("image", "image", (4, 6, 3))
+
+
 def test_a_text_is_no_map_and_stays_a_text(twist_side):
     import nep
 
@@ -220,7 +236,7 @@ def twist_side(monkeypatch):
     def chosen(name):
         if name.startswith("no_msgs"):
             raise NepError(f"there is no type '{name}'; install it")
-        return twist if name == "test_msgs/Twist" else codec_for(name)
+        return twist if name == "test_msgs/Twist" else codec_for(name.replace("test_msgs/Picture", "image"))
 
     twist = Codec("twist", 0, encode, decode, dict, lambda payload: payload)
     backend = replace(
