@@ -46,6 +46,7 @@ class Matches:
         self._followed: dict[bytes, Any] = {}
         self._found: dict[bytes, frozenset[bytes]] = {}
         self._told = b""
+        self._has_news = False
         self._confirmed: dict[bytes, frozenset[tuple[bytes, bytes]]] = {}
         self._sample_class = topics.sample_class(_TYPE)
         self._writer = topics.state_writer(_TOPIC, _TYPE)
@@ -61,6 +62,7 @@ class Matches:
         """It is closed."""
         self._followed.pop(gid, None)
         self._found.pop(gid, None)
+        self._has_news = True
 
     def look(self) -> None:
         """Tell what has changed since the last look."""
@@ -68,11 +70,15 @@ class Matches:
             if entity.take_status():
                 found = matched_gids(entity)
                 self._found[gid] = frozenset(each for each in found if not self._is_own(each))
+                self._has_news = True
+        if not self._has_news:
+            return
+        self._has_news = False
         pairs = sorted(own + other for own, found in self._found.items() for other in found)
         told = b"".join((self._gid, *pairs[:_MOST_PAIRS]))
         if told != self._told:
-            self._told = told
             self._writer.write(sample_of(self._sample_class, self._types.encode(_TYPE, {"data": told})))
+            self._told = told
 
     def _is_own(self, gid: bytes) -> bool:
         return gid[:PREFIX_BYTES] == self._gid[:PREFIX_BYTES]

@@ -404,15 +404,12 @@ class Participant:
                     return
                 for _reader, condition, read in list(self._reads.values()):
                     if condition.is_triggered():
-                        try:
-                            read()
-                        except Exception:
-                            _logger.exception("what came over ROS 2 cannot be read")
-                self.matches.look()
+                        _tried(read)
+                _tried(self.matches.look)
                 if self._has_news:
                     self._has_news = False
                     for member in list(self._members.values()):
-                        member.local.look()
+                        _tried(member.local.look)
                 self.changed.notify_all()
 
     def _ends(self) -> bool:
@@ -441,6 +438,14 @@ class Participant:
             for entity in (self._waitset, self._guard, self.entity, self._domain):
                 if entity is not None:
                     _delete(entity)
+
+
+def _tried(step: Callable[[], None]) -> None:
+    """A step of the participant's thread, which goes on whatever comes from others."""
+    try:
+        step()
+    except Exception:
+        _logger.exception("what came over ROS 2 cannot be read")
 
 
 def _read_states(reader: Any, ready: Any, hear: Callable[[bytes], None]) -> None:  # noqa: ANN401 - see above
