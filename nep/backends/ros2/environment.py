@@ -11,14 +11,15 @@ from typing import Literal
 from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
 
-__all__ = ["configuration", "distribution", "domain", "is_loopback_only"]
+__all__ = ["PARTICIPANTS_MAX", "configuration", "distribution", "domain", "is_loopback_only"]
 
 _DOMAINS = 233
 """Ports of larger domains do not exist."""
 _EVERYWHERE = frozenset({"SUBNET", "SYSTEM_DEFAULT"})
 _RANGES = frozenset({"", "OFF", "LOCALHOST", *_EVERYWHERE})
-_PARTICIPANTS = 32
-"""So many programs of a computer are looked for where multicast does not work."""
+PARTICIPANTS_MAX = 100
+"""So many programs of a computer may be in a domain, and are looked for where multicast does not work."""
+_PARTICIPANTS = PARTICIPANTS_MAX - 1
 _SIZES = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
 """Large messages need few packets, 8 MB a seventh of the time."""
 _INTERNAL = (

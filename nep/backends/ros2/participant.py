@@ -17,7 +17,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec
-from nep.backends.ros2.environment import configuration, is_loopback_only
+from nep.backends.ros2.environment import PARTICIPANTS_MAX, configuration, is_loopback_only
 from nep.backends.ros2.library import Dds, dds, keep_to_loopback
 from nep.backends.ros2.matches import Matches
 from nep.backends.ros2.message_types import MessageTypes, message_types
@@ -146,10 +146,13 @@ class Participant:
         try:
             self._begin()
         except self.dds.core.DDSException as error:
+            if self._domain is not None:
+                _delete(self._domain)
             raise NepError(
-                _("Cyclone DDS cannot begin: {error}; look at CYCLONEDDS_URI and the network").format(
-                    error=error
-                )
+                _(
+                    "Cyclone DDS cannot begin: {error}; look at CYCLONEDDS_URI and the network, and whether "
+                    "{most} programs are in the domain already"
+                ).format(error=error, most=PARTICIPANTS_MAX)
             ) from error
         self._began_at = time.monotonic()
         self._thread = threading.Thread(target=self._run, name="nep-ros2", daemon=True)
@@ -157,8 +160,10 @@ class Participant:
 
     def _begin(self) -> None:
         core, builtin = self.dds.core, self.dds.builtin
+        self._domain: Any = None
         settings = configuration(os.environ)
-        self._domain = None if settings is None else self._own_domain(settings)
+        if settings is not None:
+            self._domain = self._own_domain(settings)
         self.entity = self.dds.domain.DomainParticipant(
             self.number, self.qos(policy(self.dds).Userdata(user_data({"enclave": "/"})))
         )

@@ -6,7 +6,6 @@ import hashlib
 import os
 import signal
 import socket
-import struct
 import threading
 from pathlib import Path
 
@@ -17,8 +16,9 @@ import nep
 from nep.backends.ros2 import MessageTypes, message_types
 from nep.backends.ros2.library import dds
 from nep.backends.ros2.names import user_data_of
-from nep.backends.ros2.topics import DdsTopics
+from nep.backends.ros2.topics import DdsTopics, sample_of
 from tests.nep.backends.ros2_programs import (  # noqa: F401 - fixtures
+    Bytes,
     Make,
     a_domain_for_each_test,
     all_are_patient,
@@ -286,28 +286,6 @@ def test_ros_2_node_list_reads_the_nodes_and_what_belongs_to_them(make: Make) ->
     assert info.at == len(info.data)
 
 
-class Bytes:
-    """CDR that is read by hand."""
-
-    def __init__(self, data: bytes) -> None:
-        self.data, self.at = data, 0
-
-    def take(self, form: str) -> object:
-        if form == "I":
-            self.at += -self.at % 4
-        (value,) = struct.unpack_from(f"<{form}", self.data, self.at)
-        self.at += struct.calcsize(form)
-        return value
-
-    def text(self) -> str:
-        text = self.take(f"{self.take('I')}s")
-        assert isinstance(text, bytes)
-        return text.removesuffix(b"\0").decode()
-
-    def gids(self) -> list[object]:
-        return [self.take("16s") for _ in range(int(str(self.take("I"))))]
-
-
 # ---- who may be met
 
 
@@ -344,6 +322,20 @@ def test_sockets_hear_loopback_alone_unless_it_is_said(
     assert len(found) >= 3
     heard = {host for host, device in found.values() if device != b"lo"}
     assert (heard <= {"127.0.0.1"}) is not is_open
+
+
+def test_a_program_for_which_there_is_no_room_is_told() -> None:
+    """In a program of its own: Cyclone DDS leaves its sockets behind."""
+    code = """
+    from nep.backends.ros2 import environment
+    environment._PARTICIPANTS = 0
+    try:
+        node.new_pub('t')
+    except nep.NepError as error:
+        say(error)
+    """
+    with nep_program(code) as other:
+        assert other.line().endswith("whether 100 programs are in the domain already")
 
 
 def test_who_is_off_meets_nobody(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -458,6 +450,34 @@ def test_bytes_that_are_no_message_are_refused_and_change_nothing(make: Make) ->
     assert isinstance(got, dict)
     assert got["linear"]["x"] == 1.0
     assert twist.listen() == (False, {})
+
+
+def test_what_strangers_tell_of_matches_changes_nothing(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+    node = make("a")
+    pub, sub = node.new_pub("t"), node.new_sub("t")
+    own = pub._transport._writer.guid.bytes
+    library, types, kind = dds(), message_types(), "std_msgs/msg/UInt8MultiArray"
+    participant = library.domain.DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+    topics = DdsTopics(library, types, participant)
+    writer, stranger = topics.state_writer("nep_matches", kind), bytes(range(16))
+    matches = node._transport._participant.matches
+    eventually(lambda: bool(writer.get_matched_subscriptions()))
+    mine = own[:12] + b"1234"
+    for data in (
+        b"",
+        b"x" * 15,
+        stranger + b"x" * 31,
+        mine + stranger + own,
+        bytes(10**6),
+        stranger * 2 + own,
+    ):
+        writer.write(sample_of(topics.sample_class(kind), types.encode(kind, {"data": data})))
+    eventually(lambda: matches.is_confirmed(own, stranger, stranger))
+    assert not matches.is_confirmed(own, b"another one" + bytes(5), stranger)
+    participant.__del__()
+    pub.publish(1)
+    assert sub.listen(timeout_s=60.0) == (True, 1)
+    assert caplog.text == ""
 
 
 def test_a_zero_byte_has_no_place_in_a_text(make: Make) -> None:

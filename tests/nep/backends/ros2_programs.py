@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,6 +15,7 @@ from nep.backends.ros2.environment import configuration
 from tests.nep.programs import GREETINGS_S, Program, eventually, running
 
 __all__ = [
+    "Bytes",
     "Make",
     "a_domain_for_each_test",
     "all_are_patient",
@@ -84,3 +86,25 @@ def killed_soon() -> dict[str, str]:
     settings = configuration({})
     assert settings is not None
     return {"CYCLONEDDS_URI": settings.replace("<Discovery>", "<Discovery><LeaseDuration>1s</LeaseDuration>")}
+
+
+class Bytes:
+    """CDR that is read by hand."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data, self.at = data, 0
+
+    def take(self, form: str) -> object:
+        if form == "I":
+            self.at += -self.at % 4
+        (value,) = struct.unpack_from(f"<{form}", self.data, self.at)
+        self.at += struct.calcsize(form)
+        return value
+
+    def text(self) -> str:
+        text = self.take(f"{self.take('I')}s")
+        assert isinstance(text, bytes)
+        return text.removesuffix(b"\0").decode()
+
+    def gids(self) -> list[object]:
+        return [self.take("16s") for _ in range(int(str(self.take("I"))))]
