@@ -42,7 +42,6 @@ EARNED = {
     "nep.public": "a seam: imported at the first use of a name of `nep`, all of them at once",
     "nep.cli.doctor": "one of a list: the commands of nep",
     "nep.cli.interrupts": "imported before all else of a command, under the guard of its caller",
-    "nep.nodes.abilities": "what nodes ask of back ends, beside a long module",
     "app.core.run.edits_since_run": "pure, and tested alone",
     "app.core.run.run_warnings": "pure, and tested alone",
     "app.core.run.trial": "pure, and tested alone",
