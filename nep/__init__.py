@@ -15,6 +15,8 @@ TYPE_CHECKING = False
 """As `typing` has it, whose import would take ten times as long as this module."""
 
 if TYPE_CHECKING:
+    from nep import geometry as geometry
+    from nep import sensor as sensor
     from nep.public import *  # noqa: F403 - the names are told once, there
     from nep.version import __version__ as __version__
 

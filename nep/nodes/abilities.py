@@ -30,9 +30,8 @@ def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | 
     return True
 
 
-def codec_with(backend: Backend, msg_type: str, image: ImageFormat | None) -> Codec:
-    """The codec of a publisher, whose pictures are sent as `image` says. Raises `ValueError`."""
-    codec = backend.codec_for(msg_type)
+def codec_with(codec: Codec, image: ImageFormat | None) -> Codec:
+    """The codec of a publisher whose pictures are sent as `image` says. Raises `ValueError`."""
     if image is None:
         return codec
     if not isinstance(image, ImageFormat):

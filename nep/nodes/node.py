@@ -38,6 +38,7 @@ from nep.nodes.log_handler import LogHandler, handler_of
 from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
 from nep.nodes.timer import Timer
+from nep.nodes.typed import MsgType, codec_of, name_of, new_subscriber, sink_of
 from nep.nodes.work import Callback, Work
 from nep.patterns.parameters.owned import MSG_TYPE, Parameters, place_of
 from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
@@ -164,7 +165,7 @@ class Node(ServiceNode):
     def new_pub(
         self,
         topic: str,
-        msg_type: str = "json",
+        msg_type: MsgType = "json",
         configuration: Configuration | None = None,
         *,
         latched: bool = False,
@@ -175,6 +176,7 @@ class Node(ServiceNode):
     ) -> Publisher:
         """A publisher. The first message reaches every subscriber that was there before this returned.
 
+        `msg_type`: a name, or a dataclass or TypedDict, whose instances are published (docs/types.md).
         `latched`: whoever subscribes later gets the last message at once. `history`: it gets so many of the
         last ones, up to 1000 and 64 MB, in order and before those that follow. `batch`: messages published
         within 20 microseconds of each other may go out together, 100 microseconds later at most (the last
@@ -189,8 +191,8 @@ class Node(ServiceNode):
         spec = PublisherSpec(
             id_from(self._key, number),
             _own_topic(topic),
-            text("msg_type", msg_type),
-            codec_with(self._backend, msg_type, image),
+            name_of(msg_type),
+            codec_with(codec_of(self._backend, msg_type), image),
             flag("latched", latched) or kept > 0,
             connected,
             self._wait_s,
@@ -209,7 +211,7 @@ class Node(ServiceNode):
     def new_sub(
         self,
         topic: str,
-        msg_type: str = "json",
+        msg_type: MsgType = "json",
         configuration: Configuration | None = None,
         *,
         keep: Keep = "all",
@@ -220,6 +222,7 @@ class Node(ServiceNode):
     ) -> Subscriber:
         """A subscriber. What is published after this returned arrives, from every registered publisher.
 
+        With a dataclass or TypedDict as `msg_type` its payloads are instances of that.
         A level of `topic` that is `*` is any level, `**` any number of them: "/robot/*/camera". Publishers
         of all topics that match are heard, also those that come later, and a message has its own topic;
         without `wildcards`, and in direct connections, the topic of just this name.
@@ -232,22 +235,22 @@ class Node(ServiceNode):
         spec = SubscriberSpec(
             id_from(self._key, number),
             _own_topic(topic),
-            text("msg_type", msg_type),
+            name_of(msg_type),
             for_messages(self._configured(configuration)),
             self._wait_s,
             one_of("keep", keep, ("all", "latest")),
             at_least("max_messages", max_messages, 1),
-            sink=None if sink is None else function("sink", sink),
+            sink=sink_of(msg_type, sink),
             number=number,
             qos=quality_for(self._backend, qos),
             is_pattern=flag("wildcards", wildcards) and is_pattern_for(self._backend, topic, configuration),
         )
-        return self._subscribed(self._open_transport().subscriber(spec), spec)
+        return self._subscribed(self._open_transport().subscriber(spec), spec, msg_type)
 
     def new_callback(
         self,
         topic: str,
-        msg_type: str,
+        msg_type: MsgType,
         callback: Callable[[Any], object],
         configuration: Configuration | None = None,
         *,
@@ -271,7 +274,7 @@ class Node(ServiceNode):
         spec = SubscriberSpec(
             id_from(self._key, number),
             _own_topic(topic),
-            text("msg_type", msg_type),
+            name_of(msg_type),
             for_messages(self._configured(configuration)),
             self._wait_s,
             one_of("keep", keep, ("all", "latest")),
@@ -281,7 +284,7 @@ class Node(ServiceNode):
             is_pattern=is_pattern_for(self._backend, topic, configuration),
         )
         incoming = transport.subscriber(spec)
-        subscriber = self._subscribed(incoming, spec)
+        subscriber = self._subscribed(incoming, spec, msg_type)
         self._work.add_callback(Callback(subscriber, incoming, callback, with_message))
         return subscriber
 
@@ -333,8 +336,10 @@ class Node(ServiceNode):
             )
         return configuration
 
-    def _subscribed(self, transport: SubscriberTransport, spec: SubscriberSpec) -> Subscriber:
-        subscriber = Subscriber(transport, spec, self._forget)
+    def _subscribed(
+        self, transport: SubscriberTransport, spec: SubscriberSpec, msg_type: MsgType
+    ) -> Subscriber:
+        subscriber = new_subscriber(transport, spec, self._forget, msg_type)
         with self._lock:
             self._subscribers.add(subscriber)
         return subscriber

@@ -54,7 +54,7 @@ class Publisher:
         self._is_forked = False
         self._transport = transport
         self._spec = spec
-        self._nulls = JsonEncoder(spec.topic) if spec.codec.name == "json" else None
+        self._nulls = JsonEncoder(spec.topic, encode=spec.codec.encode) if spec.codec.name == "json" else None
         self._encode = spec.codec.encode if self._nulls is None else self._nulls.encode
         self._unsendable = Unsendable(spec.topic, spec.codec.encode, transport.report)
         self._is_latched = spec.is_latched

@@ -29,6 +29,9 @@ _logger = logging.getLogger("nep")
 class Subscriber:
     """Receives from one topic, in order. Iterating yields `Message`s until it is closed, also `async for`."""
 
+    is_typed = False
+    """Whether its payloads are instances of a type of its own (`nep.nodes.typed`)."""
+
     def __init__(
         self,
         transport: SubscriberTransport,
@@ -102,6 +105,10 @@ class Subscriber:
                 return True, self.decoded(message) if self._problem else message.payload
             except DecodeError as error:
                 self._tell(error)
+        return self._listen_on(block_mode, timeout_s)
+
+    def _listen_on(self, block_mode: bool, timeout_s: float | None) -> tuple[bool, object]:
+        """When nothing was read already."""
         limit = None if block_mode and timeout_s is None else timeout_s or 0.0
         deadline = time.monotonic() + limit if limit else None
         while True:
@@ -180,6 +187,10 @@ class Subscriber:
 
     def _closed(self) -> ClosedError:
         return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
+
+    def typed(self, message: Message) -> Message:
+        """A message that its transport handed out, as this subscriber hands it out."""
+        return message
 
     def decoded(self, message: Message) -> object:
         """The payload of a message that it got; a problem is logged rarely and shown in the graph.

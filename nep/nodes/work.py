@@ -220,8 +220,11 @@ class Work:
             if found is None:
                 return NOTHING
             message = found
+        subscriber = callback.subscriber
+        if subscriber.is_typed:
+            message = subscriber.typed(message)
         try:
-            payload = callback.subscriber.decoded(message)
+            payload = subscriber.decoded(message)
         except DecodeError:
             return NOTHING  # it is logged and an alert
         return message if callback.with_message else payload

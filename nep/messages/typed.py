@@ -1,0 +1,353 @@
+"""Typed messages: dataclasses and TypedDicts, carried as the map of their fields, and checked on both sides.
+
+| type of a field                     | in JSON                                                          |
+|-------------------------------------|------------------------------------------------------------------|
+| `float`                             | a number; `null` is NaN, because that is how JSON carries it     |
+| `int`, `str`, `bool`, `None`        | itself; `int` has 64 bits                                        |
+| `list[T]`, `tuple[T, ...]`, `tuple[A, B]` | a list; numpy's arrays are published, too                  |
+| `dict[str, T]`                      | a map                                                            |
+| a dataclass, a TypedDict            | a map of its fields                                              |
+| `A | B`, `Optional[T]`              | the first of them that fits                                      |
+| `Literal`, an `Enum`                | the value                                                        |
+| `datetime`, `date`, `time`          | text as ISO 8601 has it                                          |
+| `Any`, `object`                     | whatever it is                                                   |
+
+What a message has beside the fields is ignored, so that fields can be added later; fields that it does not
+have take their defaults. Fields that begin with `_` are the program's own: they are not sent.
+"""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
+from enum import Enum
+from functools import cache
+from typing import Any
+
+from nep.errors import DecodeError, EncodeError, WrongTypeError, did_you_mean
+from nep.i18n import _
+from nep.messages.codecs import JSON, Codec, codec_for
+from nep.messages.message import UNDECODED, Message, MessageKind, new_message
+from nep.messages.shapes import (
+    ANYTHING,
+    SCALARS,
+    Misfit,
+    ValueShape,
+    enum_shape,
+    list_shape,
+    literal_shape,
+    map_shape,
+    missing,
+    tuple_shape,
+    union_shape,
+    wrong,
+)
+from nep.system.arguments import text
+from nep.text import escaped, shortened
+
+__all__ = ["MessageType", "TypedReader", "message_type", "typed_codec"]
+
+_LONGEST = 100
+"""Letters of a name in a sentence."""
+_MARKS = frozenset({"Required", "NotRequired", "ReadOnly"})
+
+
+@dataclass(frozen=True)
+class MessageType:
+    """A type of messages: its name in the graph, and its form. `kind` is what payloads are instances of."""
+
+    name: str
+    shape: ValueShape
+    kind: type
+
+
+@cache
+def message_type(declared: type) -> MessageType:
+    """The type of messages that a dataclass or a TypedDict declares.
+
+    Its name is the class's attribute `MSG_TYPE`, else the name of the class. Raises `ValueError` for another
+    class, and when a field is of a type that has no form in JSON.
+    """
+    is_map = _is_typed_dict(declared)
+    if not is_map and not is_dataclass(declared):
+        raise WrongTypeError(
+            _(
+                "msg_type is the class '{name}', which is neither a dataclass nor a TypedDict; put "
+                "'@dataclass' before it"
+            ).format(name=_named(declared))
+        )
+    name = text("MSG_TYPE", getattr(declared, "MSG_TYPE", declared.__name__))
+    if codec_for(name) is not JSON:
+        raise ValueError(
+            _("the messages of '{type}' are called '{name}', which are no maps; set MSG_TYPE in it").format(
+                type=declared.__name__, name=name
+            )
+        )
+    return MessageType(name, _shape(declared, "", {}), dict if is_map else declared)
+
+
+# ---- publishing and reading
+
+
+def typed_codec(declared: MessageType, base: Codec) -> Codec:
+    """Encodes instances of the type as `base` does the map of their fields."""
+    write, kind = declared.shape.write, Mapping if declared.kind is dict else declared.kind
+
+    def check(payload: object) -> None:
+        if not isinstance(payload, kind):
+            raise EncodeError(
+                declared.name,
+                type(payload).__name__,
+                _("publish {wanted}").format(wanted=declared.shape.says),
+            )
+
+    def encode(payload: object) -> Any:  # noqa: ANN401 - an `Encoded`
+        check(payload)
+        try:
+            return base.encode(write(payload))
+        except Misfit as misfit:
+            place, reason = misfit.place, misfit.sentence
+        except RecursionError:
+            place, reason = "", _("it holds itself, or too many levels")
+        raise EncodeError(declared.name, type(payload).__name__, reason, place)
+
+    return replace(base, encode=encode, check=check)
+
+
+class TypedReader:
+    """Makes messages whose payloads are instances of a type, of those that a back end hands out."""
+
+    def __init__(self, declared: MessageType) -> None:
+        self._declared = declared
+        self._kinds: tuple[MessageKind, MessageKind] | None = None
+
+    def typed(self, message: Message) -> Message:
+        """The same message; its payload is decoded when it is first asked for. Others may have `message`."""
+        source, kinds = message.kind, self._kinds
+        if kinds is None or kinds[0] is not source:
+            kinds = self._kinds = (source, source._replace(decode=self._decoder(source.decode)))
+        made = new_message(Message)
+        made.kind = kinds[1]
+        made.raw = message.raw
+        made.stamp_ns = message.stamp_ns
+        made.seq = message.seq
+        made.publisher = message.publisher
+        made.extension = message.extension
+        made.decoded = UNDECODED
+        return made
+
+    def _decoder(
+        self, decode: Callable[[bytes | memoryview, Mapping[str, object]], object]
+    ) -> Callable[[bytes | memoryview, Mapping[str, object]], object]:
+        name, shape = self._declared.name, self._declared.shape
+
+        def typed(data: bytes | memoryview, extension: Mapping[str, object]) -> object:
+            plain = decode(data, extension)
+            try:
+                return shape.read(plain)
+            except Misfit as misfit:
+                reason = misfit.sentence
+            except RecursionError:
+                reason = _("it has too many levels")
+            raise DecodeError(name, memoryview(data).nbytes, reason)
+
+        return typed
+
+
+# ---- one shape for each type
+
+
+def _shape(hint: Any, where: str, known: dict[object, ValueShape]) -> ValueShape:  # noqa: ANN401 - any annotation
+    """The shape of an annotation; `where` is the field that has it. Raises `ValueError`."""
+    hint = _bare(hint)
+    if hint in SCALARS:
+        return SCALARS[hint]
+    if isinstance(hint, type) and typing.get_origin(hint) is None:
+        return _shape_of_class(hint, where, known)
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is typing.Literal:
+        return _formed(literal_shape(arguments), hint, where)
+    if origin in {typing.Union, types.UnionType}:
+        return union_shape([_shape(each, where, known) for each in arguments])
+    if origin in {list, Sequence, Iterable}:
+        return list_shape(_shape(arguments[0], where, known), list)
+    if origin is tuple:
+        if arguments[1:] == (...,):
+            return list_shape(_shape(arguments[0], where, known), tuple)
+        return tuple_shape([_shape(each, where, known) for each in arguments])
+    if origin in {dict, Mapping} and arguments[0] is str:
+        return map_shape(_shape(arguments[1], where, known))
+    raise _no_form(hint, where)
+
+
+def _shape_of_class(hint: type, where: str, known: dict[object, ValueShape]) -> ValueShape:
+    if hint in known:
+        return known[hint]
+    if is_dataclass(hint) or _is_typed_dict(hint):
+        shape = known[hint] = ValueShape(hint.__name__)
+        (_fill_map if _is_typed_dict(hint) else _fill_dataclass)(shape, hint, known)
+        return shape
+    if issubclass(hint, Enum):
+        return _formed(enum_shape(hint), hint, where)
+    if hint in {list, tuple}:
+        return list_shape(ANYTHING, hint)
+    if hint is dict:
+        return map_shape(ANYTHING)
+    raise _no_form(hint, where)
+
+
+def _bare(hint: Any) -> Any:  # noqa: ANN401 - any annotation
+    """Without what tells nothing of the values: `Annotated`, `NewType`, `NotRequired`, names of types."""
+    while True:
+        origin = typing.get_origin(hint)
+        if origin is typing.Annotated or _mark_of(hint):
+            hint = typing.get_args(hint)[0]
+        elif hasattr(hint, "__supertype__"):
+            hint = hint.__supertype__
+        elif type(hint).__name__ == "TypeAliasType":
+            hint = hint.__value__
+        else:
+            return hint
+
+
+def _mark_of(hint: Any) -> str:  # noqa: ANN401 - any annotation
+    """`Required` and the like; they may be those of typing_extensions."""
+    name = getattr(typing.get_origin(hint), "_name", None)
+    return name if name in _MARKS else ""
+
+
+def _is_typed_dict(hint: object) -> bool:
+    """Also one of typing_extensions."""
+    return isinstance(hint, type) and issubclass(hint, dict) and hasattr(hint, "__required_keys__")
+
+
+def _formed(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
+    if shape is None:
+        raise _no_form(hint, where)
+    return shape
+
+
+def _no_form(hint: object, where: str) -> ValueError:
+    return ValueError(
+        _(
+            "{where} is a '{type}', which typed messages cannot carry; docs/types.md lists what they can"
+        ).format(where=where, type=_named(hint))
+    )
+
+
+def _named(hint: object) -> str:
+    name = hint.__name__ if isinstance(hint, type) and typing.get_origin(hint) is None else str(hint)
+    return shortened(name, _LONGEST)
+
+
+def _hints(declared: type) -> dict[str, Any]:
+    try:
+        return typing.get_type_hints(declared, include_extras=True)
+    except (NameError, TypeError, AttributeError, SyntaxError) as error:
+        raise ValueError(
+            _("the types in '{name}' cannot be read: {error}; define them outside of functions").format(
+                name=declared.__name__, error=error
+            )
+        ) from error
+
+
+# ---- fields
+
+
+def _read_fields(
+    value: object, entries: Sequence[tuple[str, ValueShape, bool]], whole: ValueShape
+) -> dict[str, Any]:
+    """What a map has of the fields. Raises `Misfit` for what it must have and has not."""
+    if not isinstance(value, Mapping):
+        raise wrong(value, _("a map of the fields of '{name}'").format(name=whole.name))
+    made: dict[str, Any] = {}
+    name = ""
+    try:
+        for name, shape, is_required in entries:
+            if name in value:
+                made[name] = shape.read(value[name])
+            elif is_required:
+                raise missing(shape)
+    except Misfit as misfit:
+        raise misfit.inside(name) from misfit.__cause__
+    return made
+
+
+def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
+    hints = _hints(declared)
+    entries: list[tuple[str, ValueShape, bool]] = []
+    written: list[tuple[str, ValueShape]] = []
+    for each in fields(declared):
+        where = f"{declared.__name__}.{each.name}"
+        is_required = each.init and each.default is MISSING and each.default_factory is MISSING
+        if not each.name.startswith("_"):
+            its = _shape(hints[each.name], where, known)
+            written.append((each.name, its))
+            if each.init:
+                entries.append((each.name, its, is_required))
+        elif is_required:
+            raise ValueError(_("{where} is not sent; give it a default").format(where=where))
+
+    def read(value: object) -> object:
+        return _made(declared, _read_fields(value, entries, shape))
+
+    def write(value: object) -> dict[str, Any]:
+        if not isinstance(value, declared):
+            raise wrong(value, shape.says)
+        made: dict[str, Any] = {}
+        for name, its in written:
+            try:
+                made[name] = its.write(getattr(value, name))
+            except Misfit as misfit:
+                raise misfit.inside(name) from misfit.__cause__
+        return made
+
+    shape.read, shape.write = read, write
+
+
+def _made(declared: type, given: Mapping[str, object]) -> object:
+    try:
+        return declared(**given)
+    except Exception as error:
+        raise Misfit(  # `__post_init__` is the program's own
+            _("is refused by '{name}': {error}").format(
+                name=declared.__name__, error=escaped(shortened(str(error), 2 * _LONGEST))
+            )
+        ) from error
+
+
+def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
+    hints = _hints(declared)
+    required: frozenset[str] = getattr(declared, "__required_keys__", frozenset())
+    entries: list[tuple[str, ValueShape, bool]] = []
+    for name, hint in hints.items():
+        mark = _mark_of(hint)  # what the class says of them is wrong where annotations are text
+        is_required = mark == "Required" or (name in required and mark != "NotRequired")
+        entries.append((name, _shape(hint, f"{declared.__name__}.{name}", known), is_required))
+    shapes = {name: (its, is_required) for name, its, is_required in entries}
+
+    def write(value: object) -> dict[str, Any]:
+        if not isinstance(value, Mapping):
+            raise wrong(value, shape.says)
+        made: dict[str, Any] = {}
+        name: object = ""
+        try:
+            for name, part in value.items():
+                if name not in shapes:
+                    raise Misfit(
+                        _("is no field of '{name}'; {did_you_mean}").format(
+                            name=declared.__name__, did_you_mean=did_you_mean(str(name), tuple(shapes))
+                        )
+                    )
+                made[str(name)] = shapes[str(name)][0].write(part)
+            for name, (its, is_required) in shapes.items():
+                if is_required and name not in made:
+                    raise missing(its)
+        except Misfit as misfit:
+            raise misfit.inside(name) from misfit.__cause__
+        return made
+
+    shape.read = lambda value: _read_fields(value, entries, shape)
+    shape.write = write

@@ -1,0 +1,99 @@
+"""Typed messages of nodes: `msg_type` may be a dataclass or a TypedDict wherever it may be a name.
+
+What a type declares is looked at in `nep.messages.typed`, which is imported when the first one is given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from nep.backends.base import Backend, Sink, SubscriberSpec, SubscriberTransport
+from nep.messages.codecs import Codec
+from nep.messages.message import Message
+from nep.nodes.arguments import function, seconds
+from nep.nodes.subscriber import Subscriber
+from nep.system.arguments import text
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from nep.messages import typed
+else:
+    typed = lazy_module("nep.messages.typed")
+
+__all__ = ["MsgType", "TypedSubscriber", "codec_of", "name_of", "new_subscriber", "sink_of"]
+
+MsgType = str | type
+"""A name, or a dataclass or TypedDict whose instances are the payloads."""
+
+
+def name_of(msg_type: object) -> str:
+    """The name under which it is registered. Raises `ValueError`."""
+    return typed.message_type(msg_type).name if isinstance(msg_type, type) else text("msg_type", msg_type)
+
+
+def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
+    """The codec of a publisher."""
+    if not isinstance(msg_type, type):
+        return backend.codec_for(msg_type)
+    declared = typed.message_type(msg_type)
+    return typed.typed_codec(declared, backend.codec_for(declared.name))
+
+
+def sink_of(msg_type: MsgType, sink: Sink | None) -> Sink | None:
+    """A subscriber's sink: it is given messages with typed payloads. Raises `ValueError`."""
+    if sink is None or not isinstance(msg_type, type):
+        return None if sink is None else function("sink", sink)
+    give, reader = function("sink", sink), typed.TypedReader(typed.message_type(msg_type))
+    return lambda messages: give([reader.typed(each) for each in messages])
+
+
+class TypedSubscriber(Subscriber):
+    """Its messages have instances of a type as their payloads; `listen` gives None when nothing came."""
+
+    is_typed = True
+
+    def __init__(
+        self,
+        transport: SubscriberTransport,
+        spec: SubscriberSpec,
+        on_close: Callable[[Subscriber], object],
+        msg_type: type,
+    ) -> None:
+        super().__init__(transport, spec, on_close)
+        self._reader = typed.TypedReader(typed.message_type(msg_type))
+        self._empty = _nothing
+
+    def typed(self, message: Message) -> Message:
+        """See `Subscriber.typed`."""
+        return self._reader.typed(message)
+
+    def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
+        """See `Subscriber.listen`."""
+        seconds("timeout_s", timeout_s)
+        return self._listen_on(block_mode, timeout_s)
+
+    def receive(self, timeout_s: float | None = None) -> Message | None:
+        """See `Subscriber.receive`."""
+        message = super().receive(timeout_s)
+        return None if message is None else self._reader.typed(message)
+
+    def _poll_first(self) -> Message | None:
+        message = super()._poll_first()
+        return None if message is None else self._reader.typed(message)
+
+
+def _nothing() -> object:
+    return None
+
+
+def new_subscriber(
+    transport: SubscriberTransport,
+    spec: SubscriberSpec,
+    on_close: Callable[[Subscriber], object],
+    msg_type: MsgType,
+) -> Subscriber:
+    """A subscriber of this type."""
+    if isinstance(msg_type, type):
+        return TypedSubscriber(transport, spec, on_close, msg_type)
+    return Subscriber(transport, spec, on_close)

@@ -1,0 +1,167 @@
+"""What sensors measure, with the fields that ROS gives them, for typed messages (docs/types.md).
+
+SI units. Where ROS says that a value which is not measured is NaN, that can be given; over JSON it travels as
+`null` and is NaN again. `nep.sensor` is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from nep.geometry import Header, Quaternion, Vector3
+
+__all__ = [
+    "BatteryState",
+    "Imu",
+    "JointState",
+    "LaserScan",
+    "NavSatFix",
+    "NavSatStatus",
+    "Range",
+    "Temperature",
+]
+
+
+def _matrix() -> list[float]:
+    """Three rows of three, all zero: not known."""
+    return [0.0] * 9
+
+
+@dataclass
+class JointState:
+    """Of joints, by their names: where they are, how fast, and with which force. Lists may be left empty."""
+
+    MSG_TYPE: ClassVar[str] = "sensor_msgs/JointState"
+
+    header: Header = field(default_factory=Header)
+    name: list[str] = field(default_factory=list)
+    position: list[float] = field(default_factory=list)
+    velocity: list[float] = field(default_factory=list)
+    effort: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Imu:
+    """How something is turned, turns, and is accelerated. A covariance that begins with -1: not measured."""
+
+    MSG_TYPE: ClassVar[str] = "sensor_msgs/Imu"
+
+    header: Header = field(default_factory=Header)
+    orientation: Quaternion = field(default_factory=Quaternion)
+    orientation_covariance: list[float] = field(default_factory=_matrix)
+    angular_velocity: Vector3 = field(default_factory=Vector3)
+    angular_velocity_covariance: list[float] = field(default_factory=_matrix)
+    linear_acceleration: Vector3 = field(default_factory=Vector3)
+    linear_acceleration_covariance: list[float] = field(default_factory=_matrix)
+
+
+@dataclass
+class LaserScan:
+    """Distances in one plane, from `angle_min` to `angle_max`, against the clock."""
+
+    MSG_TYPE: ClassVar[str] = "sensor_msgs/LaserScan"
+
+    header: Header = field(default_factory=Header)
+    angle_min: float = 0.0
+    angle_max: float = 0.0
+    angle_increment: float = 0.0
+    time_increment: float = 0.0
+    scan_time: float = 0.0
+    range_min: float = 0.0
+    range_max: float = 0.0
+    ranges: list[float] = field(default_factory=list)
+    intensities: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Range:
+    """One distance."""
+
+    MSG_TYPE: ClassVar[str] = "sensor_msgs/Range"
+    ULTRASOUND: ClassVar[int] = 0
+    INFRARED: ClassVar[int] = 1
+
+    header: Header = field(default_factory=Header)
+    radiation_type: int = ULTRASOUND
+    field_of_view: float = 0.0
+    min_range: float = 0.0
+    max_range: float = 0.0
+    range: float = 0.0
+
+
+@dataclass
+class BatteryState:
+    """A battery. `percentage` is from 0 to 1; `current` is below 0 while it is emptied."""
+
+    MSG_TYPE: ClassVar[str] = "sensor_msgs/BatteryState"
+    POWER_SUPPLY_STATUS_UNKNOWN: ClassVar[int] = 0
+    POWER_SUPPLY_STATUS_CHARGING: ClassVar[int] = 1
+    POWER_SUPPLY_STATUS_DISCHARGING: ClassVar[int] = 2
+    POWER_SUPPLY_STATUS_NOT_CHARGING: ClassVar[int] = 3
+    POWER_SUPPLY_STATUS_FULL: ClassVar[int] = 4
+
+    header: Header = field(default_factory=Header)
+    voltage: float = 0.0
+    temperature: float = 0.0
+    current: float = 0.0
+    charge: float = 0.0
+    capacity: float = 0.0
+    design_capacity: float = 0.0
+    percentage: float = 0.0
+    power_supply_status: int = POWER_SUPPLY_STATUS_UNKNOWN
+    power_supply_health: int = 0
+    power_supply_technology: int = 0
+    present: bool = False
+    cell_voltage: list[float] = field(default_factory=list)
+    cell_temperature: list[float] = field(default_factory=list)
+    location: str = ""
+    serial_number: str = ""
+
+
+@dataclass
+class NavSatStatus:
+    """Whether satellites tell where it is, and those of which system."""
+
+    MSG_TYPE: ClassVar[str] = "sensor_msgs/NavSatStatus"
+    STATUS_NO_FIX: ClassVar[int] = -1
+    STATUS_FIX: ClassVar[int] = 0
+    STATUS_SBAS_FIX: ClassVar[int] = 1
+    STATUS_GBAS_FIX: ClassVar[int] = 2
+    SERVICE_GPS: ClassVar[int] = 1
+    SERVICE_GLONASS: ClassVar[int] = 2
+    SERVICE_COMPASS: ClassVar[int] = 4
+    SERVICE_GALILEO: ClassVar[int] = 8
+
+    status: int = STATUS_FIX
+    service: int = 0
+
+
+@dataclass
+class NavSatFix:
+    """A place on Earth: degrees of WGS 84, and metres above its ellipsoid."""
+
+    MSG_TYPE: ClassVar[str] = "sensor_msgs/NavSatFix"
+    COVARIANCE_TYPE_UNKNOWN: ClassVar[int] = 0
+    COVARIANCE_TYPE_APPROXIMATED: ClassVar[int] = 1
+    COVARIANCE_TYPE_DIAGONAL_KNOWN: ClassVar[int] = 2
+    COVARIANCE_TYPE_KNOWN: ClassVar[int] = 3
+
+    header: Header = field(default_factory=Header)
+    status: NavSatStatus = field(default_factory=NavSatStatus)
+    latitude: float = 0.0
+    longitude: float = 0.0
+    altitude: float = 0.0
+    position_covariance: list[float] = field(default_factory=_matrix)
+    position_covariance_type: int = COVARIANCE_TYPE_UNKNOWN
+
+
+@dataclass
+class Temperature:
+    """In degrees Celsius; a variance of 0 is not known."""
+
+    MSG_TYPE: ClassVar[str] = "sensor_msgs/Temperature"
+
+    header: Header = field(default_factory=Header)
+    temperature: float = 0.0
+    variance: float = 0.0

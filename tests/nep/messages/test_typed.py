@@ -1,0 +1,548 @@
+"""Typed messages: what fits, what does not and where, and the types that are there already."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import InitVar, dataclass, field, fields, is_dataclass
+from datetime import date, datetime, time, timedelta, timezone
+from enum import Enum, IntEnum, IntFlag
+from typing import Annotated, Any, ClassVar, Literal, NewType, Optional, TypedDict
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import nep
+import nep.geometry
+import nep.sensor
+from nep.geometry import Header, Point, Pose, PoseStamped, Quaternion, Time, Twist, Vector3
+from nep.messages.codecs import CODECS, JSON
+from nep.messages.message import Message
+from nep.messages.typed import TypedReader, message_type, typed_codec
+
+
+class Colour(Enum):
+    RED = "red"
+    ONE = 1
+
+
+class Level(IntEnum):
+    LOW = 1
+    HIGH = 2
+
+
+class Rights(IntFlag):
+    READ = 1
+    WRITE = 2
+
+
+Metres = NewType("Metres", float)
+
+
+@dataclass
+class Part:
+    number: int = 0
+    word: str = "x"
+
+
+class Loose(TypedDict, total=False):
+    a: int
+
+
+class Strict(Loose):
+    b: str
+
+
+@dataclass(frozen=True)
+class Everything:
+    MSG_TYPE: ClassVar[str] = "test/everything"
+
+    f: float
+    i: int
+    s: str
+    b: bool
+    floats: list[float]
+    parts: tuple[Part, ...]
+    pair: tuple[int, str]
+    by_name: dict[str, Part]
+    maybe: Part | None
+    old_maybe: Optional[int]  # noqa: UP045 - that is what it tests
+    either: int | str
+    word: Literal["a", "b", 1, None]  # noqa: PYI061 - that is what it tests
+    colour: Colour
+    level: Level
+    rights: Rights
+    at: datetime
+    day: date
+    clock: time
+    marked: Annotated[Metres, "m"]
+    strict: Strict
+    anything: Any
+    nothing: None
+    sequence: Sequence[bool]
+    bare: list  # type: ignore[type-arg]
+
+
+@dataclass
+class Reading:
+    value: float | None = 1.0
+
+
+@dataclass
+class Share:
+    of_one: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.of_one <= 1.0:
+            raise ValueError("it is not from 0 to 1")
+
+
+@dataclass
+class Shares:
+    shares: list[Share]
+
+
+@dataclass
+class Tree:
+    children: list[Tree] = field(default_factory=list)
+    parent: Tree | None = None
+
+
+def sent(payload: object) -> Any:
+    """What a typed publisher sends, as JSON has it."""
+    return json.loads(bytes(typed_codec(message_type(type(payload)), JSON).encode(payload).data))
+
+
+def read(declared: type, plain: object, codec: str = "json") -> Any:
+    """What a typed subscriber reads."""
+    return read_bytes(declared, CODECS[codec].encode(plain).data, codec)
+
+
+def read_bytes(declared: type, data: bytes | memoryview, codec: str = "json") -> Any:
+    return TypedReader(message_type(declared)).typed(Message("t", data, codec, codec)).payload
+
+
+def refused(declared: type, plain: object) -> str:
+    with pytest.raises(nep.DecodeError) as caught:
+        read(declared, plain)
+    return caught.value.reason
+
+
+def unsent(payload: object, declared: type | None = None) -> tuple[str, str]:
+    codec = typed_codec(message_type(declared or type(payload)), JSON)
+    with pytest.raises(nep.EncodeError) as caught:
+        codec.encode(payload)
+    return caught.value.reason, caught.value.place
+
+
+# ---- what goes there and comes back
+
+_words = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
+_whole = st.integers(-(1 << 63), (1 << 64) - 1)
+_numbers = st.floats(allow_nan=False, allow_infinity=False)
+_parts = st.builds(Part, _whole, _words)
+_zones = st.one_of(st.none(), st.integers(-23, 23).map(lambda hours: timezone(timedelta(hours=hours))))
+_everything = st.builds(
+    Everything,
+    _numbers, _whole, _words, st.booleans(),
+    st.lists(_numbers, max_size=4),
+    st.lists(_parts, max_size=3).map(tuple),
+    st.tuples(_whole, _words),
+    st.dictionaries(_words, _parts, max_size=3),
+    st.one_of(st.none(), _parts),
+    st.one_of(st.none(), _whole),
+    st.one_of(_whole, _words),
+    st.sampled_from(["a", "b", 1, None]),
+    st.sampled_from(list(Colour)), st.sampled_from(list(Level)), st.integers(0, 3).map(Rights),
+    st.datetimes(timezones=_zones), st.dates(), st.times(),
+    _numbers.map(Metres),
+    st.one_of(
+        st.fixed_dictionaries({"b": _words}), st.fixed_dictionaries({"a": _whole, "b": _words})
+    ),
+    st.recursive(st.one_of(st.none(), st.booleans(), _words), lambda each: st.lists(each, max_size=3)),
+    st.none(),
+    st.lists(st.booleans(), max_size=3),
+    st.lists(_words, max_size=3),
+)  # fmt: skip
+
+
+@given(_everything)
+@settings(max_examples=150, deadline=None)
+def test_what_is_sent_is_what_is_read(payload: Everything) -> None:
+    encoded = typed_codec(message_type(Everything), JSON).encode(payload)
+    came = read_bytes(Everything, encoded.data)
+    assert came == payload
+    assert [type(getattr(came, each.name)) for each in fields(came)] == [
+        type(getattr(payload, each.name)) for each in fields(payload)
+    ]
+
+
+@given(st.recursive(
+    st.one_of(st.none(), st.booleans(), _whole, st.floats(), _words),
+    lambda each: st.one_of(
+        st.lists(each, max_size=4),
+        st.dictionaries(st.sampled_from([each.name for each in fields(Everything)]), each, max_size=12),
+    ),
+))  # fmt: skip
+@settings(max_examples=300, deadline=None)
+def test_whatever_comes_is_an_instance_or_an_error(plain: object) -> None:
+    for declared in (Everything, PoseStamped, Part, Tree):
+        try:
+            assert isinstance(read(declared, plain), declared)
+        except nep.DecodeError:
+            continue
+
+
+@pytest.mark.parametrize("codec", ["json", "msgpack"])
+def test_what_other_programs_send_is_read(codec: str) -> None:
+    plain = {"position": {"x": 1, "y": 2.5}, "later": [1], "orientation": {"w": 0, "v": 1}}
+    assert read(Pose, plain, codec) == Pose(Point(1.0, 2.5, 0.0), Quaternion(0.0, 0.0, 0.0, 0.0))
+
+
+def test_what_is_sent_has_the_names_of_its_fields() -> None:
+    assert sent(Twist(Vector3(1), Vector3(z=2))) == {
+        "linear": {"x": 1.0, "y": 0.0, "z": 0.0},
+        "angular": {"x": 0.0, "y": 0.0, "z": 2.0},
+    }
+
+
+def test_numbers_and_arrays_of_numpy_are_sent() -> None:
+    state = nep.sensor.JointState(position=np.arange(3), velocity=np.ones(2, "float32"), name=("a", "b"))
+    assert (sent(state)["position"], sent(state)["velocity"]) == ([0.0, 1.0, 2.0], [1.0, 1.0])
+    assert sent(Part(np.int64(3))) == {"number": 3, "word": "x"}
+    assert sent(Vector3(np.float32(0.5), np.array(2.0), np.int8(1))) == {"x": 0.5, "y": 2.0, "z": 1.0}
+
+
+def test_a_list_that_is_read_is_nobody_else_s() -> None:
+    message = Message("t", b'{"position":[1.0]}', "json", "json")
+    reader = TypedReader(message_type(nep.sensor.JointState))
+    first, second = reader.typed(message).payload, reader.typed(message).payload
+    first.position.append(2.0)
+    assert second.position == [1.0]
+    assert message.payload == {"position": [1.0]}
+
+
+def test_nan_comes_as_null_and_is_nan_again() -> None:
+    assert math.isnan(read(Vector3, {"x": None}).x)
+    assert sent(Vector3(math.nan, math.inf)) == {"x": None, "y": None, "z": 0.0}
+    assert read_bytes(Vector3, b'{"x": NaN, "y": -Infinity}').y == -math.inf
+
+
+def test_null_is_none_before_it_is_nan() -> None:
+    assert read(Reading, {"value": None}).value is None
+    assert read(Reading, {}).value == 1.0
+
+
+def test_moments_as_other_languages_write_them() -> None:
+    @dataclass
+    class Seen:
+        at: datetime
+
+    assert read(Seen, {"at": "2026-01-31T12:00:00.500Z"}).at.utcoffset() == timedelta(0)
+    moment = datetime(2026, 1, 31, tzinfo=timezone.utc)
+    assert read(Seen, {"at": moment}, "msgpack").at == moment
+    assert refused(Seen, {"at": "noon"}).startswith("at is 'noon'; give text such as '2026")
+
+
+def test_a_type_may_hold_itself() -> None:
+    tree = Tree([Tree(), Tree([Tree()])])
+    assert read(Tree, sent(tree)) == tree
+    tree.parent = tree
+    assert unsent(tree) == ("it holds itself, or too many levels", "")
+    deep = b'{"children":[' * 500 + b"]}" * 500
+    with pytest.raises(nep.DecodeError):
+        read_bytes(Tree, deep * 4)
+
+
+def test_what_is_private_is_not_sent_and_what_is_made_is_not_read() -> None:
+    @dataclass
+    class Square:
+        side: float
+        area: float = field(init=False)
+        _cache: object = None
+
+        def __post_init__(self) -> None:
+            self.area = self.side**2
+
+    square = Square(2.0)
+    square._cache = object()
+    assert sent(square) == {"side": 2.0, "area": 4.0}
+    assert read(Square, {"side": 3, "area": 1, "_cache": 1}) == Square(3.0)
+
+
+# ---- what does not fit, and where
+
+
+@pytest.mark.parametrize(
+    ("declared", "plain", "reason"),
+    [
+        (PoseStamped, {"pose": {"position": {"x": "1"}}}, "pose.position.x is a 'str'; give a 'float'"),
+        (PoseStamped, {"pose": {"position": [1]}},
+         "pose.position is a 'list'; give a map of the fields of 'Point'"),
+        (Pose, [], "it is a 'list'; give a map of the fields of 'Pose'"),
+        (Pose, None, "it is a 'NoneType'; give a map of the fields of 'Pose'"),
+        (Vector3, {"x": True}, "x is a 'bool'; give a 'float'"),
+        (Part, {"number": 1.0}, "number is a 'float'; give a 'int'"),
+        (Part, {"number": True}, "number is a 'bool'; give a 'int'"),
+        (Part, {"word": None}, "word is a 'NoneType'; give a 'str'"),
+        (Tree, {"children": [{}, {"children": [{}, 3]}]},
+         "children[1].children[1] is a 'int'; give a map of the fields of 'Tree'"),
+        (nep.sensor.JointState, {"name": ["a", 1]}, "name[1] is a 'int'; give a 'str'"),
+        (nep.sensor.JointState, {"name": "ab"}, "name is a 'str'; give a 'list'"),
+        (nep.sensor.JointState, {"position": [1, 2.0, False]}, "position[2] is a 'bool'; give a 'float'"),
+        (Strict, {"a": 1}, "b is missing; give a 'str'"),
+        (Strict, {"b": "", "a": None}, "a is a 'NoneType'; give a 'int'"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_told_with_its_place(declared: type, plain: object, reason: str) -> None:
+    assert refused(declared, plain) == reason
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("pair", [1], "pair has 1 values; give 2 values"),
+        ("pair", [1, 2], "pair[1] is a 'int'; give a 'str'"),
+        ("by_name", {"k": {"number": ""}}, "by_name.k.number is a 'str'; give a 'int'"),
+        ("maybe", {"number": ""}, "maybe.number is a 'str'; give a 'int'"),
+        ("maybe", 3, "maybe is a 'int'; give a 'Part' or None"),
+        ("either", 1.5, "either is a 'float'; give a 'int' or a 'str'"),
+        ("word", "c", "word is 'c'; give 'a', 'b', 1 or None"),
+        ("word", True, "word is True; give 'a', 'b', 1 or None"),
+        ("word", 1.0, "word is 1.0; give 'a', 'b', 1 or None"),
+        ("colour", "blue", "colour is 'blue'; give 'red' or 1"),
+        ("colour", True, "colour is True; give 'red' or 1"),
+        ("colour", [], "colour is []; give 'red' or 1"),
+        ("rights", -1.5, "rights is -1.5; give a 'Rights'"),
+        ("day", "2026-02-30", "day is '2026-02-30'; give text such as '2026-01-31'"),
+        ("nothing", 0, "nothing is a 'int'; give None"),
+        ("strict", {}, "strict.b is missing; give a 'str'"),
+    ],
+)
+def test_what_is_wrong_in_one_field(name: str, value: object, reason: str) -> None:
+    good = _good()
+    assert isinstance(read(Everything, good), Everything)
+    assert refused(Everything, {**good, name: value}) == reason
+    del good[name]
+    assert refused(Everything, good).startswith(f"{name} is missing; give ")
+
+
+def _good() -> dict[str, Any]:
+    return {
+        "f": 1, "i": 1, "s": "", "b": False, "floats": [], "parts": [], "pair": [1, ""], "by_name": {},
+        "maybe": None, "old_maybe": None, "either": 1, "word": None, "colour": 1, "level": 2, "rights": 3,
+        "at": "2026-01-31T12:00:00+00:00", "day": "2026-01-31", "clock": "12:00:00", "marked": 0,
+        "strict": {"b": ""}, "anything": {}, "nothing": None, "sequence": [], "bare": [1, "a"],
+    }  # fmt: skip
+
+
+def test_what_a_class_refuses_does_not_fit() -> None:
+    assert refused(Shares, {"shares": [{"of_one": 0}, {"of_one": 2}]}) == (
+        "shares[1] is refused by 'Share': it is not from 0 to 1"
+    )
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason", "place"),
+    [
+        (PoseStamped(pose=Pose(Point("1"))), "pose.position.x is a 'str'; give a 'float'", "pose.position.x"),
+        (PoseStamped(header=Header(Time(1.5))), "header.stamp.sec is a 'float'; give a 'int'",
+         "header.stamp.sec"),
+        (Pose(position=Vector3()), "position is a 'Vector3'; give a 'Point'", "position"),
+        (Pose(position={"x": 1}), "position is a 'dict'; give a 'Point'", "position"),
+        (Part(1 << 64), "number is beyond 64 bits; give a 'int'", "number"),
+        (Part(-(1 << 63) - 1), "number is beyond 64 bits; give a 'int'", "number"),
+        (Part(word="\ud800"), "word holds half of a surrogate pair; give whole letters", "word"),
+        (Vector3(10**400), "x is too large; give a 'float'", "x"),
+        (Vector3(y=True), "y is a 'bool'; give a 'float'", "y"),
+        (Vector3(y=None), "y is a 'NoneType'; give a 'float'", "y"),
+        (Vector3(y=np.zeros(2)), "y is a 'ndarray'; give a 'float'", "y"),
+        (nep.sensor.JointState(name=["a", b"b"]), "name[1] is a 'bytes'; give a 'str'", "name[1]"),
+        (nep.sensor.JointState(position={1.0}), "position is a 'set'; give a 'list'", "position"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_sent_is_told_with_its_place(payload: object, reason: str, place: str) -> None:
+    assert unsent(payload) == (reason, place)
+
+
+def test_a_dict_is_checked_too() -> None:
+    encode = typed_codec(message_type(Strict), JSON).encode
+    assert json.loads(bytes(encode({"b": "x", "a": 3}).data)) == {"b": "x", "a": 3}
+    assert unsent({"b": "x", "aa": 1}, Strict) == ("aa is no field of 'Strict'; did you mean 'a'?", "aa")
+    assert unsent({"a": 1}, Strict) == ("b is missing; give a 'str'", "b")
+    assert unsent({"b": 1}, Strict) == ("b is a 'int'; give a 'str'", "b")
+    assert unsent([], Strict) == ("publish a 'Strict'", "")
+    assert unsent({1: 1}, Strict)[1] == "1"
+
+
+# ---- which types there are
+
+
+def test_names_in_the_graph() -> None:
+    assert [message_type(each).name for each in (Part, Everything, Strict, Twist)] == [
+        "Part", "test/everything", "Strict", "geometry_msgs/Twist",
+    ]  # fmt: skip
+
+
+@dataclass
+class Bytes:
+    inner: list[bytes]
+
+
+@dataclass
+class Keys:
+    inner: dict[int, str]
+
+
+@dataclass
+class Sets:
+    inner: set[int]
+
+
+@dataclass
+class BytesEnum:
+    inner: Literal[b"a"]
+
+
+@dataclass
+class Unknown:
+    inner: NowhereToBeFound  # noqa: F821 - that is what it tests
+
+
+@dataclass
+class Private:
+    _inner: int
+
+
+@dataclass
+class Image:
+    MSG_TYPE: ClassVar[str] = "image"
+
+
+@dataclass
+class Empty:
+    MSG_TYPE: ClassVar[str] = ""
+
+
+@dataclass
+class Numbered:
+    MSG_TYPE: ClassVar[Any] = 3
+
+
+class Plain:
+    pass
+
+
+@pytest.mark.parametrize(
+    ("declared", "sentence"),
+    [
+        (Bytes, "Bytes.inner is a 'bytes', which typed messages cannot carry; docs/types.md lists"),
+        (Keys, "Keys.inner is a 'dict[int, str]', which typed messages cannot carry"),
+        (Sets, "Sets.inner is a 'set[int]', which"),
+        (BytesEnum, "BytesEnum.inner is a "),
+        (Unknown, "the types in 'Unknown' cannot be read: name 'NowhereToBeFound' is not defined"),
+        (Private, "Private._inner is not sent; give it a default"),
+        (Image, "the messages of 'Image' are called 'image', which are no maps; set MSG_TYPE in it"),
+        (Empty, "MSG_TYPE is empty"),
+        (Numbered, "MSG_TYPE is a 'int'; give a 'str'"),
+        (Plain, "msg_type is the class 'Plain', which is neither a dataclass nor a TypedDict"),
+        (int, "msg_type is the class 'int'"),
+        (dict, "msg_type is the class 'dict'"),
+        (Colour, "msg_type is the class 'Colour'"),
+    ],
+)
+def test_a_type_that_cannot_be_is_refused_at_the_call(declared: type, sentence: str) -> None:
+    with nep.node("n", "memory", master="typed-refused") as node:
+        for make in (node.new_pub, node.new_sub):
+            with pytest.raises(ValueError, match=r"\A" + sentence.replace("[", r"\[")) as caught:
+                make("t", declared)
+            assert str(caught.value).startswith(sentence)
+        assert not node.graph().topics
+
+
+def test_what_is_given_to_the_constructor_alone_makes_it_unfit() -> None:
+    @dataclass
+    class Needs:
+        other: InitVar[int]
+        kept: int = 0
+
+    assert "is refused by 'Needs'" in refused(Needs, {"other": 1})
+
+
+# ---- the types that are there already
+
+_ROS = {
+    each.MSG_TYPE: each
+    for module in (nep.geometry, nep.sensor)
+    for each in vars(module).values()
+    if isinstance(each, type) and is_dataclass(each)
+}
+
+
+@pytest.mark.parametrize("name", sorted(_ROS))
+def test_fields_are_those_of_ros(name: str) -> None:
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    of_ros = store.types[name.replace("/", "/msg/")]
+    ours = _ROS[name]
+    assert [each.name for each in fields(ours)] == [
+        each.name for each in fields(of_ros) if each.name.strip("_").islower() and "__" not in each.name
+    ]
+    constants = {key: value for key, value in vars(ours).items() if key.isupper() and key != "MSG_TYPE"}
+    assert constants == {key: getattr(of_ros, key) for key in constants}
+
+
+@pytest.mark.parametrize("name", sorted(_ROS))
+def test_the_defaults_are_sent_and_read(name: str) -> None:
+    assert read(_ROS[name], sent(_ROS[name]())) == _ROS[name]()
+    assert read(_ROS[name], {}) == _ROS[name]()
+
+
+def test_there_are_all_of_them() -> None:
+    assert len(_ROS) == 17
+    assert set(nep.geometry.__all__ + nep.sensor.__all__) == {each.__name__ for each in _ROS.values()}
+
+
+_angles = st.floats(-math.pi, math.pi)
+
+
+@given(_angles, st.floats(-1.57, 1.57), _angles)
+@settings(max_examples=300, deadline=None)
+def test_angles_come_back(roll: float, pitch: float, yaw: float) -> None:
+    turned = Quaternion.from_euler(roll, pitch, yaw)
+    again = Quaternion.from_euler(*turned.to_euler())
+    same = turned.x * again.x + turned.y * again.y + turned.z * again.z + turned.w * again.w
+    assert abs(same) == pytest.approx(1.0, abs=1e-9)  # q and -q are the same rotation
+    assert all(-math.pi <= angle <= math.pi for angle in turned.to_euler())
+
+
+@given(_angles, st.sampled_from([-math.pi / 2, math.pi / 2]), _angles)
+@settings(max_examples=200, deadline=None)
+def test_straight_up_and_down_the_rotation_is_the_same(roll: float, pitch: float, yaw: float) -> None:
+    turned = Quaternion.from_euler(roll, pitch, yaw)
+    again = Quaternion.from_euler(*turned.to_euler())
+    same = turned.x * again.x + turned.y * again.y + turned.z * again.z + turned.w * again.w
+    assert abs(same) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_known_rotations() -> None:
+    half = math.sqrt(0.5)
+    assert Quaternion() == Quaternion.from_euler()
+    turned = Quaternion.from_euler(yaw=math.pi / 2)
+    assert (turned.x, turned.y, turned.z, turned.w) == pytest.approx((0.0, 0.0, half, half))
+    turned = Quaternion.from_euler(roll=math.pi / 2)
+    assert (turned.x, turned.y, turned.z, turned.w) == pytest.approx((half, 0.0, 0.0, half))
+    assert Quaternion(0, 0, 3, 3).to_euler() == pytest.approx((0.0, 0.0, math.pi / 2))
+    for bad in (Quaternion(0, 0, 0, 0), Quaternion(w=math.nan), Quaternion(x=math.inf)):
+        with pytest.raises(ValueError, match="is no rotation; its length must be above 0 and finite"):
+            bad.to_euler()
+
+
+@pytest.mark.parametrize("stamp_ns", [0, 1, -1, 1_700_000_000_123_456_789, (1 << 63) - 1])
+def test_times_keep_their_nanoseconds(stamp_ns: int) -> None:
+    moment = Time.from_ns(stamp_ns)
+    assert moment.to_ns() == stamp_ns
+    assert 0 <= moment.nanosec < 1_000_000_000
