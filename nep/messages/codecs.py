@@ -240,6 +240,10 @@ class JsonEncoder:
     ) -> None:
         self.count = 0
         self._encode = encode
+        is_typed = encode is not JSON.encode
+        self._step = (
+            "readers of its type get NaN" if is_typed else "publish None there, or use the type 'msgpack'"
+        )
         self._topic = topic
         self._clock = clock
         self._told_at = -math.inf
@@ -261,10 +265,11 @@ class JsonEncoder:
                 self._told_at = now
                 _logger.warning(
                     "'%s' sends NaN or infinity as null, because JSON has neither: at %s, message %d of "
-                    "this kind; publish None there, or use the type 'msgpack'",
+                    "this kind; %s",
                     self._topic,
                     where or "its only value",
                     self.count,
+                    self._step,
                 )
         return made
 

@@ -18,9 +18,10 @@ have take their defaults. Fields that begin with `_` are the program's own: they
 
 from __future__ import annotations
 
+import inspect
 import types
 import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
 from enum import Enum
 from functools import cache
@@ -289,6 +290,7 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
                 entries.append((each.name, its, is_required))
         elif is_required:
             raise ValueError(_("{where} is not sent; give it a default").format(where=where))
+    _check_constructor(declared, {name for name, _its, _is_required in entries})
 
     def read(value: object) -> object:
         return _made(declared, _read_fields(value, entries, shape))
@@ -305,6 +307,18 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
         return made
 
     shape.read, shape.write = read, write
+
+
+def _check_constructor(declared: type, given: Collection[str]) -> None:
+    """Raises `ValueError` when no instance can be made of the fields alone."""
+    for each in inspect.signature(declared).parameters.values():
+        is_open = each.kind in {each.VAR_POSITIONAL, each.VAR_KEYWORD} or each.default is not each.empty
+        if not is_open and (each.name not in given or each.kind is each.POSITIONAL_ONLY):
+            raise ValueError(
+                _("{where} is needed to make one, and is no field that is sent; give it a default").format(
+                    where=f"{declared.__name__}.{each.name}"
+                )
+            )
 
 
 def _made(declared: type, given: Mapping[str, object]) -> object:
