@@ -26,8 +26,8 @@ class Time:
 
     MSG_TYPE: ClassVar[str] = "builtin_interfaces/Time"
 
-    sec: int = 0
-    nanosec: int = 0
+    sec: int = field(default=0, metadata={"nep.other_name": "secs"})  # as ROS 1 calls them
+    nanosec: int = field(default=0, metadata={"nep.other_name": "nsecs"})
 
     @classmethod
     def now(cls) -> Self:

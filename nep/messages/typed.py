@@ -25,7 +25,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
 from enum import Enum
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from nep.errors import DecodeError, EncodeError, WrongTypeError, did_you_mean
 from nep.i18n import _
@@ -48,7 +48,10 @@ from nep.messages.shapes import (
 from nep.system.arguments import text
 from nep.text import escaped, shortened
 
-__all__ = ["MessageType", "TypedReader", "message_type", "typed_codec"]
+__all__ = ["OTHER_NAME", "MessageType", "TypedReader", "message_type", "typed_codec"]
+
+OTHER_NAME = "nep.other_name"
+"""In a field's metadata: the name that it has in messages of other programs, which is read, too."""
 
 _LONGEST = 100
 """Letters of a name in a sentence."""
@@ -257,18 +260,27 @@ def _hints(declared: type) -> dict[str, Any]:
 # ---- fields
 
 
-def _read_fields(
-    value: object, entries: Sequence[tuple[str, ValueShape, bool]], whole: ValueShape
-) -> dict[str, Any]:
+class _Entry(NamedTuple):
+    """A field that is read."""
+
+    name: str
+    other_name: str
+    shape: ValueShape
+    is_required: bool
+
+
+def _read_fields(value: object, entries: Sequence[_Entry], whole: ValueShape) -> dict[str, Any]:
     """What a map has of the fields. Raises `Misfit` for what it must have and has not."""
     if not isinstance(value, Mapping):
         raise wrong(value, _("a map of the fields of '{name}'").format(name=whole.name))
     made: dict[str, Any] = {}
     name = ""
     try:
-        for name, shape, is_required in entries:
+        for name, other_name, shape, is_required in entries:
             if name in value:
                 made[name] = shape.read(value[name])
+            elif other_name in value:
+                made[name] = shape.read(value[other_name])
             elif is_required:
                 raise missing(shape)
     except Misfit as misfit:
@@ -278,7 +290,7 @@ def _read_fields(
 
 def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
     hints = _hints(declared)
-    entries: list[tuple[str, ValueShape, bool]] = []
+    entries: list[_Entry] = []
     written: list[tuple[str, ValueShape]] = []
     for each in fields(declared):
         where = f"{declared.__name__}.{each.name}"
@@ -287,10 +299,11 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
             its = _shape(hints[each.name], where, known)
             written.append((each.name, its))
             if each.init:
-                entries.append((each.name, its, is_required))
+                other_name = each.metadata.get(OTHER_NAME, each.name)
+                entries.append(_Entry(each.name, other_name, its, is_required))
         elif is_required:
             raise ValueError(_("{where} is not sent; give it a default").format(where=where))
-    _check_constructor(declared, {name for name, _its, _is_required in entries})
+    _check_constructor(declared, {each.name for each in entries})
 
     def read(value: object) -> object:
         return _made(declared, _read_fields(value, entries, shape))
@@ -335,12 +348,13 @@ def _made(declared: type, given: Mapping[str, object]) -> object:
 def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
     hints = _hints(declared)
     required: frozenset[str] = getattr(declared, "__required_keys__", frozenset())
-    entries: list[tuple[str, ValueShape, bool]] = []
+    entries: list[_Entry] = []
     for name, hint in hints.items():
         mark = _mark_of(hint)  # what the class says of them is wrong where annotations are text
         is_required = mark == "Required" or (name in required and mark != "NotRequired")
-        entries.append((name, _shape(hint, f"{declared.__name__}.{name}", known), is_required))
-    shapes = {name: (its, is_required) for name, its, is_required in entries}
+        shape_of_it = _shape(hint, f"{declared.__name__}.{name}", known)
+        entries.append(_Entry(name, name, shape_of_it, is_required))
+    shapes = {each.name: (each.shape, each.is_required) for each in entries}
 
     def write(value: object) -> dict[str, Any]:
         if not isinstance(value, Mapping):

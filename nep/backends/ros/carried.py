@@ -128,12 +128,18 @@ def ros_codec(definition: Definition) -> Codec:
 
 
 def _stamped(payload: object) -> object:
-    """A map with the time of now where its header has none."""
+    """A map with the time of now where its header has none; ROS 2's names of a time become ROS 1's."""
     if not isinstance(payload, Mapping):
         return payload
     header = payload.get("header", {})
-    if not isinstance(header, Mapping) or "stamp" in header:
+    if not isinstance(header, Mapping):
         return payload
+    if "stamp" in header:
+        stamp = header["stamp"]
+        if not isinstance(stamp, Mapping) or stamp.keys() != {"sec", "nanosec"}:
+            return payload
+        named = {"secs": stamp["sec"], "nsecs": stamp["nanosec"]}
+        return {**payload, "header": {**header, "stamp": named}}
     secs, nsecs = divmod(time.time_ns(), 1_000_000_000)
     return {**payload, "header": {**header, "stamp": {"secs": secs, "nsecs": nsecs}}}
 
