@@ -67,13 +67,21 @@ class ValueShape:
     what JSON has, `write` the other way round; both raise `Misfit`.
     """
 
-    __slots__ = ("_say", "as_it_is", "name", "read", "write")
+    __slots__ = ("_say", "as_it_is", "forms", "name", "read", "write")
 
     read: Callable[[Any], Any]
     write: Callable[[Any], Any]
 
-    def __init__(self, name: str, as_it_is: type | None = None, say: Callable[[], str] | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        as_it_is: type | None = None,
+        forms: Iterable[type] = (),
+        say: Callable[[], str] | None = None,
+    ) -> None:
         self.name = name
+        self.forms = frozenset(forms) if as_it_is is None else frozenset({as_it_is})
+        """What its values are in JSON, as types of Python; none: anything."""
         self.as_it_is = as_it_is
         """Values of just this type are read as they are."""
         self._say = say
@@ -193,7 +201,7 @@ def _bool() -> ValueShape:
 
 
 def _none() -> ValueShape:
-    shape = ValueShape("None", say=lambda: "None")
+    shape = ValueShape("None", forms={type(None)}, say=lambda: "None")
 
     def both(value: object) -> None:
         if value is not None:
@@ -214,7 +222,7 @@ def _anything() -> ValueShape:
 
 
 def _moment(kind: type[datetime | date | time]) -> ValueShape:
-    shape = ValueShape(kind.__name__)
+    shape = ValueShape(kind.__name__, forms={str})
 
     def is_one(value: object) -> bool:
         return isinstance(value, kind) and (kind is not date or not isinstance(value, datetime))
@@ -274,9 +282,12 @@ def _is_same(value: object, allowed: object) -> bool:
 
 def literal_shape(values: Sequence[object]) -> ValueShape | None:
     """One of these; None when one of them has no form."""
-    if not all(each is None or isinstance(each, str | int) for each in values):
+    if not all(
+        (each is None or isinstance(each, str | int)) and not isinstance(each, Enum) for each in values
+    ):
         return None
-    shape = ValueShape("Literal", say=lambda: listed([repr(each) for each in values], "or"))
+    forms = map(type, values)
+    shape = ValueShape("Literal", forms=forms, say=lambda: listed([repr(each) for each in values], "or"))
 
     def both(value: object) -> object:
         for each in values:
@@ -293,7 +304,7 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
     members = list(kind)
     if not all(isinstance(each.value, str | int | float | None) for each in members):
         return None
-    shape = ValueShape(kind.__name__)
+    shape = ValueShape(kind.__name__, forms=(type(each.value) for each in members))
     is_flag = issubclass(kind, Flag)
 
     def read(value: object) -> object:
@@ -317,13 +328,22 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
     return shape
 
 
-def union_shape(shapes: Sequence[ValueShape]) -> ValueShape:
-    """The first of these that fits; None before all others."""
+def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
+    """The first of these that fits; None before all others, because null is that before it is NaN.
+
+    None when two of them are the same in JSON: nobody could tell which one was meant.
+    """
+    forms = [form for each in shapes for form in each.forms]
+    if len(forms) > len(set(forms)):
+        return None
     none = SCALARS[None]
     others = [each for each in shapes if each.name != none.name]
+    others.sort(key=lambda each: float in each.forms)  # which takes whole numbers, too
     nones = [none] if len(others) < len(shapes) else []
-    ordered = [*nones, *others]  # null is None before it is NaN
-    shape = ValueShape("Union", say=lambda: listed([each.says for each in (*others, *nones)], "or"))
+    ordered = [*nones, *others]
+    shape = ValueShape(
+        "Union", forms=forms, say=lambda: listed([each.says for each in (*others, *nones)], "or")
+    )
 
     def first(value: object, ways: Sequence[Callable[[Any], Any]]) -> object:
         misfit = None
@@ -365,7 +385,7 @@ def _items(value: object, says: str) -> list[Any] | tuple[Any, ...]:
 
 def list_shape(item: ValueShape, kind: type) -> ValueShape:
     """Any number of `item`; `kind` is list or tuple."""
-    shape = ValueShape(kind.__name__)
+    shape = ValueShape(kind.__name__, forms={list})
     exact = {item.as_it_is} - {None}
 
     def read(value: object) -> object:
@@ -386,7 +406,7 @@ def list_shape(item: ValueShape, kind: type) -> ValueShape:
 
 def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
     """Just these, in their order."""
-    shape = ValueShape("tuple", say=lambda: _("{count} values").format(count=len(items)))
+    shape = ValueShape("tuple", forms={list}, say=lambda: _("{count} values").format(count=len(items)))
 
     def each(value: object, ways: Sequence[Callable[[Any], Any]]) -> list[Any]:
         values = _items(value, shape.says)
@@ -404,7 +424,7 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
 
 def map_shape(item: ValueShape) -> ValueShape:
     """Names, and an `item` for each."""
-    shape = ValueShape("dict")
+    shape = ValueShape("dict", forms={dict})
     word = SCALARS[str]
 
     def each(value: object, way: Callable[[Any], Any]) -> dict[str, Any]:

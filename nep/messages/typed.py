@@ -166,6 +166,10 @@ class TypedReader:
 def _shape(hint: Any, where: str, known: dict[object, ValueShape]) -> ValueShape:  # noqa: ANN401 - any annotation
     """The shape of an annotation; `where` is the field that has it. Raises `ValueError`."""
     hint = _bare(hint)
+    try:
+        hash(hint)
+    except TypeError:
+        raise _no_form(hint, where) from None
     if hint in SCALARS:
         return SCALARS[hint]
     if isinstance(hint, type) and typing.get_origin(hint) is None:
@@ -174,7 +178,7 @@ def _shape(hint: Any, where: str, known: dict[object, ValueShape]) -> ValueShape
     if origin is typing.Literal:
         return _formed(literal_shape(arguments), hint, where)
     if origin in {typing.Union, types.UnionType}:
-        return union_shape([_shape(each, where, known) for each in arguments])
+        return _told_apart(union_shape([_shape(each, where, known) for each in arguments]), hint, where)
     if origin in {list, Sequence, Iterable}:
         return list_shape(_shape(arguments[0], where, known), list)
     if origin is tuple:
@@ -190,7 +194,7 @@ def _shape_of_class(hint: type, where: str, known: dict[object, ValueShape]) -> 
     if hint in known:
         return known[hint]
     if is_dataclass(hint) or _is_typed_dict(hint):
-        shape = known[hint] = ValueShape(hint.__name__)
+        shape = known[hint] = ValueShape(hint.__name__, forms={dict})
         (_fill_map if _is_typed_dict(hint) else _fill_dataclass)(shape, hint, known)
         return shape
     if issubclass(hint, Enum):
@@ -230,6 +234,16 @@ def _is_typed_dict(hint: object) -> bool:
 def _formed(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
     if shape is None:
         raise _no_form(hint, where)
+    return shape
+
+
+def _told_apart(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
+    if shape is None:
+        raise ValueError(
+            _(
+                "{where} is a '{type}', of which two are the same in JSON; use one of them, or two fields"
+            ).format(where=where, type=_named(hint))
+        )
     return shape
 
 
