@@ -89,7 +89,15 @@ def message_type(declared: type) -> MessageType:
                 type=declared.__name__, name=name
             )
         )
-    return MessageType(name, _shape(declared, "", {}), dict if is_map else declared)
+    try:
+        shape = _shape(declared, declared.__name__, {})
+    except RecursionError:
+        raise ValueError(
+            _("the types in '{name}' have too many levels; put a dataclass between them").format(
+                name=declared.__name__
+            )
+        ) from None
+    return MessageType(name, shape, dict if is_map else declared)
 
 
 # ---- publishing and reading

@@ -264,8 +264,8 @@ class Node(ServiceNode):
         `keep` and `max_messages` as for `new_sub`: with `keep="latest"` a callback that is slower than the
         topic gets the newest message each time and never falls behind. `with_message`: it is given the
         `Message`, which has the payload, topic, stamp_ns, seq and publisher. A message that cannot be decoded
-        is skipped, logged, and an alert in the graph, either way. Wildcards in `topic` as for `new_sub`.
-        `qos` as for `new_pub`. Raises as `new_pub` does.
+        is skipped, logged, and an alert in the graph, either way. `msg_type` and wildcards in `topic` as for
+        `new_sub`, `qos` as for `new_pub`. Raises as `new_pub` does.
         """
         transport = self._open_transport()
         function("callback", callback)

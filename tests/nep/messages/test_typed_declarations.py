@@ -1,0 +1,179 @@
+"""Types that can be messages, and those that are refused where a publisher or subscriber is made."""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import InitVar, dataclass
+from datetime import datetime
+from enum import Enum, IntEnum
+from typing import Any, ClassVar, Literal, TypedDict
+
+import pytest
+
+import nep
+from nep.geometry import Twist
+from nep.messages.typed import message_type
+
+
+class Colour(Enum):
+    RED = "red"
+
+
+class Level(IntEnum):
+    LOW = 1
+
+
+class Strict(TypedDict):
+    b: str
+
+
+@dataclass
+class Part:
+    number: int = 0
+
+
+@dataclass
+class Base:
+    MSG_TYPE: ClassVar[str] = "test/Base"
+
+
+@dataclass
+class Derived(Base):
+    b: int = 2
+
+
+def test_names_in_the_graph() -> None:
+    assert [message_type(each).name for each in (Part, Derived, Strict, Twist)] == [
+        "Part", "test/Base", "Strict", "geometry_msgs/Twist",
+    ]  # fmt: skip
+
+
+@dataclass
+class Bytes:
+    inner: list[bytes]
+
+
+@dataclass
+class Keys:
+    inner: dict[int, str]
+
+
+@dataclass
+class Sets:
+    inner: set[int]
+
+
+@dataclass
+class BytesEnum:
+    inner: Literal[b"a"]
+
+
+@dataclass
+class EnumWord:
+    inner: Literal[Level.LOW]
+
+
+@dataclass
+class Unhashable:
+    inner: Literal[{}]  # type: ignore[valid-type]
+
+
+@dataclass
+class TwoMaps:
+    inner: Part | Strict | None
+
+
+@dataclass
+class TwoTexts:
+    inner: Literal["now"] | datetime
+
+
+@dataclass
+class TwoLists:
+    inner: list[int] | tuple[str, int]
+
+
+@dataclass
+class Unknown:
+    inner: NowhereToBeFound  # noqa: F821 - that is what it tests
+
+
+@dataclass
+class Private:
+    _inner: int
+
+
+@dataclass
+class Image:
+    MSG_TYPE: ClassVar[str] = "image"
+
+
+@dataclass
+class Empty:
+    MSG_TYPE: ClassVar[str] = ""
+
+
+@dataclass
+class Numbered:
+    MSG_TYPE: ClassVar[Any] = 3
+
+
+@dataclass
+class Needs:
+    other: InitVar[int]
+    kept: int = 0
+
+
+@dataclass(init=False)
+class OwnConstructor:
+    kept: int = 0
+
+    def __init__(self, another: int) -> None:
+        self.kept = another
+
+
+class Plain:
+    pass
+
+
+@pytest.mark.parametrize(
+    ("declared", "sentence"),
+    [
+        (Bytes, "Bytes.inner is a 'bytes', which typed messages cannot carry; docs/types.md lists"),
+        (Keys, "Keys.inner is a 'dict[int, str]', which typed messages cannot carry"),
+        (Sets, "Sets.inner is a 'set[int]', which"),
+        (BytesEnum, "BytesEnum.inner is a "),
+        (EnumWord, "EnumWord.inner is a "),
+        (Unhashable, "Unhashable.inner is a "),
+        (TwoMaps, "TwoMaps.inner is a 'tests.nep.messages.test_typed_declarations.Part |"),
+        (TwoTexts, "TwoTexts.inner is a "),
+        (TwoLists, "TwoLists.inner is a 'list[int] | tuple[str, int]', of which two are the same in JSON"),
+        (Unknown, "the types in 'Unknown' cannot be read: name 'NowhereToBeFound' is not defined"),
+        (Private, "Private._inner is not sent; give it a default"),
+        (Image, "the messages of 'Image' are called 'image', which are no maps; set MSG_TYPE in it"),
+        (Needs, "Needs.other is needed" if sys.version_info >= (3, 11) else "the types in 'Needs' cannot"),
+        (OwnConstructor, "OwnConstructor.another is needed to make one, and is no field that is sent"),
+        (Empty, "MSG_TYPE is empty"),
+        (Numbered, "MSG_TYPE is a 'int'; give a 'str'"),
+        (Plain, "msg_type is the class 'Plain', which is neither a dataclass nor a TypedDict"),
+        (int, "msg_type is the class 'int'"),
+        (dict, "msg_type is the class 'dict'"),
+        (Colour, "msg_type is the class 'Colour'"),
+    ],
+)
+def test_a_type_that_cannot_be_is_refused_at_the_call(declared: type, sentence: str) -> None:
+    with nep.node("n", "memory", master="typed-refused") as node:
+        for make in (node.new_pub, node.new_sub):
+            with pytest.raises(ValueError, match=re.escape(sentence)) as caught:
+                make("t", declared)
+            assert str(caught.value).startswith(sentence)
+        assert not node.graph().topics
+
+
+def test_types_of_too_many_levels_are_refused() -> None:
+    hint: Any = int
+    for _level in range(2000):
+        hint = list[hint]
+    with pytest.raises(ValueError, match="the types in 'Deep' have too many levels; put a dataclass"):
+        message_type(TypedDict("Deep", {"inner": hint}))
