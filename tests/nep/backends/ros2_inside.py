@@ -17,6 +17,7 @@ from nep.backends.ros2 import MessageTypes, message_types
 from nep.backends.ros2.library import dds
 from nep.backends.ros2.names import user_data_of
 from nep.backends.ros2.topics import DdsTopics, sample_of
+from nep.geometry import Header, Point, Pose, PoseStamped, Time
 from tests.nep.backends.ros2_programs import (  # noqa: F401 - fixtures
     Bytes,
     Make,
@@ -95,6 +96,18 @@ sys.stdin.read()
         assert (message.codec, message.msg_type) == ("cdr", "geometry_msgs/msg/Twist")
         assert scan.listen(timeout_s=60.0)[1]["ranges"] == [0.0, 1.0, 2.0]  # type: ignore[index]
         assert raw.listen(timeout_s=60.0)[1]["data"] == b"abcd"  # type: ignore[index]
+
+
+def test_dataclasses_with_ros_s_names_travel_as_ros_s_own_types(make: Make) -> None:
+    a, b = make("a"), make("b")
+    poses, maps = b.new_sub("p", PoseStamped), b.new_sub("p", "geometry_msgs/msg/PoseStamped")
+    pub = a.new_pub("p", PoseStamped)
+    pose = PoseStamped(Header(Time(5, 6), "map"), Pose(Point(1.0)))
+    pub.publish(pose)
+    assert poses.listen(timeout_s=60) == (True, pose)
+    plain = maps.listen(timeout_s=60)[1]
+    assert isinstance(plain, dict)
+    assert plain["header"] == {"stamp": {"sec": 5, "nanosec": 6}, "frame_id": "map"}
 
 
 def test_a_burst_and_8_mb_arrive_whole(make: Make) -> None:
