@@ -7,7 +7,7 @@
 | `list[T]`, `tuple[T, ...]`, `tuple[A, B]` | a list; numpy's arrays are published, too                  |
 | `dict[str, T]`                      | a map                                                            |
 | a dataclass, a TypedDict            | a map of its fields                                              |
-| `A | B`, `Optional[T]`              | the first of them that fits                                      |
+| `A | B`, `Optional[T]`              | what fits; two that are the same in JSON are refused             |
 | `Literal`, an `Enum`                | the value                                                        |
 | `datetime`, `date`, `time`          | text as ISO 8601 has it                                          |
 | `Any`, `object`                     | whatever it is                                                   |
@@ -236,7 +236,9 @@ def _mark_of(hint: Any) -> str:  # noqa: ANN401 - any annotation
 
 def _is_typed_dict(hint: object) -> bool:
     """Also one of typing_extensions."""
-    return isinstance(hint, type) and issubclass(hint, dict) and hasattr(hint, "__required_keys__")
+    if not isinstance(hint, type) or typing.get_origin(hint) is not None:  # `list[int]` is a class in 3.10
+        return False
+    return issubclass(hint, dict) and hasattr(hint, "__required_keys__")
 
 
 def _formed(shape: ValueShape | None, hint: object, where: str) -> ValueShape:

@@ -41,7 +41,7 @@ class ParameterHost(Protocol):
 
 def place_of(node_id: str) -> str:
     """The name of the service, and of the topic, of a node's parameters."""
-    return f"/nep/patterns/parameters/{node_id}"
+    return f"/nep/parameters/{node_id}"
 
 
 class Parameters:

@@ -9,7 +9,15 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 import nep
-from nep.bridges import Bridge, BridgeConfiguration, BridgeTopic, Route, RouteCounts, TopicEnd, side_of
+from nep.bridges import (
+    Bridge,
+    BridgeConfiguration,
+    BridgeTopic,
+    Route,
+    RouteCounts,
+    TopicEnd,
+    side_of,
+)
 from nep.masters.master import Master
 from tests.nep.programs import eventually
 

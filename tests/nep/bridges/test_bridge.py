@@ -17,7 +17,17 @@ from nep.messages.codecs import Codec, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import MessageKind
 from nep.protocol.graph_view import BRIDGES_TOPIC
-from tests.nep.bridges.joined import Net, bridged, configured, nets, route, settled, silent, taken, topic
+from tests.nep.bridges.joined import (
+    Net,
+    bridged,
+    configured,
+    nets,
+    route,
+    settled,
+    silent,
+    taken,
+    topic,
+)
 from tests.nep.programs import eventually
 
 PAIRS = [

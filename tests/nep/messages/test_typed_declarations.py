@@ -177,3 +177,13 @@ def test_types_of_too_many_levels_are_refused() -> None:
         hint = list[hint]
     with pytest.raises(ValueError, match="the types in 'Deep' have too many levels; put a dataclass"):
         message_type(TypedDict("Deep", {"inner": hint}))
+
+
+@pytest.mark.parametrize("given", [list[int], dict[str, int], Part(), Part | None, None, 3])
+def test_what_is_no_class_is_refused(given: Any) -> None:
+    with nep.node("n", "memory", master="typed-no-class") as node:
+        for make in (node.new_pub, node.new_sub):
+            with pytest.raises(ValueError, match="msg_type is "):
+                make("t", given)
+        with pytest.raises(ValueError, match="msg_type is "):
+            node.new_callback("t", given, print)
