@@ -57,7 +57,8 @@ class Misfit(Exception):  # noqa: N818 - never seen by a caller
     @property
     def sentence(self) -> str:
         """Where it is, and why."""
-        return f"{self.place or _('it')} {self.reason}"
+        place = self.place or _("it")
+        return f"{place} {self.reason}"
 
 
 class ValueShape:

@@ -203,6 +203,8 @@ class Work:
                 message = found
             if transport.ready:
                 has_more = True
+            if subscriber.is_typed:
+                message = subscriber.typed(message)
             try:
                 payload = subscriber.decoded(message)
             except DecodeError:
