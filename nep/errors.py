@@ -8,6 +8,9 @@
     ├── ServerGoneError         a server ended while it was called
     ├── ClosedError             the object was closed before
     ├── ParameterError          a parameter cannot have a value, or there is none
+    ├── NoValueError            a blackboard has nothing of this key
+    ├── BadKeyError             a key that a blackboard cannot have
+    ├── BadValueError           a value that a blackboard cannot have
     ├── BadTopicError           a topic name that the grammar refuses
     ├── BadNameError            a node's name that the grammar refuses
     ├── UnknownBackendError     no back end has this name
@@ -38,14 +41,17 @@ from nep.text import escaped, shortened
 __all__ = [
     "AddressInUseError",
     "BackendUnavailableError",
+    "BadKeyError",
     "BadNameError",
     "BadTopicError",
+    "BadValueError",
     "ClosedError",
     "DecodeError",
     "EncodeError",
     "MasterUnreachable",
     "NepError",
     "NoServerError",
+    "NoValueError",
     "ParameterError",
     "PluginsMissingError",
     "RecordingError",
@@ -133,6 +139,50 @@ class ParameterError(NepError, ValueError):
             )
             if value
             else _("the parameter '{name}': {reason}").format(name=name, reason=reason)
+        )
+
+
+class NoValueError(NepError, KeyError):
+    """A blackboard has nothing of `key`, or nothing that is young enough; `known` are keys that it has."""
+
+    def __init__(self, key: str, known: Sequence[str] = ()) -> None:
+        self.key = key
+        self.known = tuple(known)
+        near = nearest(key, self.known)
+        step = (
+            _("did you mean '{near}'?").format(near=near)
+            if near is not None
+            else _("'keys' tells what there is")
+        )
+        super().__init__(
+            _("the blackboard has no '{key}'; {step}").format(key=escaped(shortened(key, 200)), step=step)
+        )
+
+    def __str__(self) -> str:
+        return str(self.args[0])  # and not in quotes, as a `KeyError` has it
+
+
+class BadKeyError(NepError, ValueError):
+    """`key` cannot be the key of a blackboard, for `reason`."""
+
+    def __init__(self, key: str, reason: str) -> None:
+        self.key = key
+        self.reason = reason
+        super().__init__(
+            _("'{key}' cannot be a key; {reason}").format(key=escaped(shortened(key, 200)), reason=reason)
+        )
+
+
+class BadValueError(NepError, ValueError):
+    """A blackboard cannot keep the value of `key`, for `reason`."""
+
+    def __init__(self, key: str, reason: str) -> None:
+        self.key = key
+        self.reason = reason
+        super().__init__(
+            _("'{key}' cannot have this value; {reason}").format(
+                key=escaped(shortened(key, 200)), reason=reason
+            )
         )
 
 

@@ -296,6 +296,11 @@ class Node(ServiceNode):
         """Who spins looks again at what there is to do."""
         self._work.wake()
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether it was closed, or is the parent's in a child that was forked."""
+        return self._is_closed
+
     # ---- parameters
 
     @property

@@ -6,7 +6,9 @@ expressions of zenoh. A `*` inside a level, as in `a*b`, is a letter as any othe
 
 from __future__ import annotations
 
-__all__ = ["is_pattern", "matches"]
+from collections.abc import Sequence
+
+__all__ = ["is_pattern", "levels_match", "matches"]
 
 _ONE, _ANY = "*", "**"
 
@@ -18,9 +20,11 @@ def is_pattern(topic: str) -> bool:
 
 def matches(pattern: str, topic: str) -> bool:
     """Whether a topic matches. Takes no longer than both have levels, multiplied."""
-    if pattern == topic:
-        return True
-    parts, levels = pattern.split("/"), topic.split("/")
+    return pattern == topic or levels_match(pattern.split("/"), topic.split("/"))
+
+
+def levels_match(parts: Sequence[str], levels: Sequence[str]) -> bool:
+    """As `matches`, when both are split into levels already."""
     if _ANY not in parts and len(parts) != len(levels):
         return False
     at = _with_none(parts, {0})
@@ -37,7 +41,7 @@ def matches(pattern: str, topic: str) -> bool:
     return len(parts) in at
 
 
-def _with_none(parts: list[str], at: set[int]) -> set[int]:
+def _with_none(parts: Sequence[str], at: set[int]) -> set[int]:
     """These places in a pattern, and those behind each `**` there, which may be nothing."""
     found = set(at)
     for each, part in enumerate(parts):

@@ -1,0 +1,542 @@
+"""Blackboard: what is known of the world, from messages of perception, and how old it is."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from typing import TYPE_CHECKING, NamedTuple
+
+from nep.arguments import at_least, function, period, seconds
+from nep.backends.connection import Configuration
+from nep.blackboard.ages import beginning_of
+from nep.blackboard.entries import AgeBy, Cause, Entries, EntryChange, StoredEntry
+from nep.blackboard.keys import Key, key_matches, key_text, parse_key
+from nep.blackboard.values import copied, leaves
+from nep.blackboard.watch import BlackboardWatch, MessageReading, PerceivedValue
+from nep.errors import BadValueError, ClosedError, NepError, NoValueError, WaitTimeoutError
+from nep.i18n import _
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.nodes.timer import Timer
+from nep.protocol.topic_pattern import is_pattern
+from nep.protocol.wire import check_topic
+from nep.system import forks
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["MAX_BYTES", "MAX_KEYS", "Blackboard", "BlackboardChange", "BlackboardEntry", "OnChange"]
+
+MAX_KEYS = 100_000
+MAX_BYTES = 256 * 2**20
+_MOST_CHANGES = 10_000
+_SLICE_S = 0.1
+"""Waits are cut into slices of this length: to see that a node is closed, and for Ctrl+C on Windows."""
+_AT_ONCE_S = 1e-6
+_SOON_S = 0.001
+_NEAR_KEYS = 1_000
+_MISSING = object()
+
+
+@dataclass(frozen=True)
+class BlackboardEntry:
+    """A value as it was when it was asked for.
+
+    `age_by`: "stamp" when the age counts from when the publisher sent it, "arrival" when from when it came,
+    because it has no stamp or its publisher's clock and ours do not agree. `source` is the topic that it
+    came from, empty for what was `put`; `robot` who perceived it, when the message says so. `left_s`: so
+    long until it is forgotten, infinite when it is not.
+    """
+
+    key: str
+    value: object
+    age_s: float
+    age_by: AgeBy
+    source: str
+    robot: str
+    stamp_ns: int | None
+    left_s: float
+
+
+@dataclass(frozen=True)
+class BlackboardChange:
+    """What happened to a key: `cause` is "new" or "changed"; or it is gone.
+
+    Then it is "expired", "removed", "dropped" because there was no room, or "replaced" by a value above or
+    below it; `entry` is the last there was. `is_gone` says that it is gone.
+    """
+
+    entry: BlackboardEntry
+    cause: Cause
+
+    @property
+    def key(self) -> str:
+        """Whose value changed."""
+        return self.entry.key
+
+    @property
+    def value(self) -> object:
+        """The new value; None when it is gone."""
+        return None if self.is_gone else self.entry.value
+
+    @property
+    def is_gone(self) -> bool:
+        """Whether the key has no value any more."""
+        return self.cause not in {"new", "changed"}
+
+
+OnChange = Callable[[BlackboardChange], object]
+
+
+class _Observer(NamedTuple):
+    pattern: Key
+    callback: OnChange
+
+
+class Blackboard:
+    """The newest value of each key, from the topics that it watches and from `put`. From any thread.
+
+    What it watches is kept at once, in a thread of the node's; nobody needs to spin, but for `on_change`.
+    `max_keys` and `max_bytes` (about so much memory): beyond them the values that were told longest ago are
+    dropped, and counted. Values are copies: changing one changes nothing here. `clock` tells seconds that
+    never go back, `wall_clock_ns` nanoseconds since 1970. Without a node nothing can be watched.
+    """
+
+    def __init__(
+        self,
+        node: Node | None = None,
+        *,
+        max_keys: int = MAX_KEYS,
+        max_bytes: int = MAX_BYTES,
+        clock: Callable[[], float] = time.monotonic,
+        wall_clock_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
+        self._node = node
+        self._clock = function("clock", clock)
+        self._wall_clock_ns = function("wall_clock_ns", wall_clock_ns)
+        self._max_bytes = at_least("max_bytes", max_bytes, 1)
+        self._entries = Entries(at_least("max_keys", max_keys, 1), self._max_bytes)
+        self._lock = threading.Lock()
+        self._news = threading.Condition(self._lock)
+        self._version = 0
+        self._is_closed = self._is_forked = False
+        self._watches: tuple[BlackboardWatch, ...] = ()
+        self._ignored: frozenset[int] = frozenset()
+        self._observers: tuple[_Observer, ...] = ()
+        self._pending: deque[tuple[_Observer, EntryChange]] = deque()
+        self._pending_bytes = 0
+        self._timer_at = math.inf
+        self.changes_dropped = 0
+        """Changes that no callback was given, because they came faster than somebody span."""
+        forks.watch(self)
+
+    # ---- where values come from
+
+    def watch(
+        self,
+        topic: str,
+        msg_type: str = "json",
+        configuration: Configuration | None = None,
+        *,
+        key: str | None = None,
+        fields: Sequence[str] | Mapping[str, str] | None = None,
+        each: str = "",
+        lives_s: float | None = None,
+    ) -> BlackboardWatch:
+        """Keep what comes on a topic, or on all that match: a map's values each by its key.
+
+        `key`: where they go; a name in braces is a field of the message, `human.{id}`. When it is None
+        perceptions of RIZE's go to the root (`touched.head`), and others where the topic's name says.
+        `fields`: keep these only, or these under other names. `each`: the field that has a list of such
+        messages. `lives_s`: a value that was not told again for so long is forgotten; None keeps it. Raises
+        as `Node.new_sub` does, and `BadKeyError`.
+        """
+        node = self._node
+        if node is None:
+            raise NepError(_("this blackboard has no node; make it with 'nep.Blackboard(node)'"))
+        lives = _life(lives_s)
+        watch = BlackboardWatch(
+            topic,
+            MessageReading(key, fields, each),
+            lambda message, found: self._keep(message, found, lives),
+            is_pattern=is_pattern(check_topic(topic)),
+        )
+        with self._news:
+            self._check_open()
+            self._watches = (*self._watches, watch)
+        try:
+            watch.attach(node.new_sub(topic, msg_type, configuration, sink=watch.take))
+        except BaseException:
+            with self._news:
+                self._watches = tuple(other for other in self._watches if other is not watch)
+            raise
+        return watch
+
+    def ignore(self, publisher: int) -> None:
+        """Keep no messages of the publisher with this id."""
+        with self._news:
+            self._ignored |= {publisher}
+
+    def put(self, key: str | tuple[str, ...], value: object, *, lives_s: float | None = None) -> None:
+        """Keep a value; a map's values each by its own key, beside those that are there already.
+
+        Raises `BadKeyError`, `BadValueError`.
+        """
+        names, lives = parse_key(key), _life(lives_s)
+        with self._news:
+            now = self._clock()
+            entries = [
+                self._entry(each, leaf, now, lives) for each, leaf in leaves(_own(names, value), names)
+            ]
+        self._put(entries)
+
+    def remove(self, key: str | tuple[str, ...]) -> int:
+        """Forget a key and those below it; how many there were."""
+        names = parse_key(key)
+        with self._news:
+            self._expire()
+            gone = self._entries.remove(names)
+            self._note(gone)
+        self._schedule()
+        return len(gone)
+
+    def _keep(self, message: Message, found: Sequence[PerceivedValue], lives: float) -> None:
+        """Raises `NepError` for the last one that could not be kept; the others are."""
+        if message.publisher in self._ignored:
+            return
+        since, age_by = beginning_of(message, self._clock(), self._wall_clock_ns())
+        problem: NepError | None = None
+        entries: list[StoredEntry] = []
+        for each in found:
+            try:
+                key = parse_key(each.key)
+                entries.append(
+                    StoredEntry(
+                        key,
+                        _own(key, each.value),
+                        since,
+                        age_by,
+                        since + lives,
+                        message.stamp_ns,
+                        message.publisher,
+                        message.topic,
+                        each.robot,
+                    )
+                )
+            except NepError as error:
+                problem = error
+        self._put(entries)
+        if problem is not None:
+            raise problem
+
+    def _entry(self, key: Key, value: object, now: float, lives: float) -> StoredEntry:
+        return StoredEntry(parse_key(key), value, now, expires=now + lives)
+
+    def _put(self, entries: Sequence[StoredEntry]) -> None:
+        """Raises `BadValueError` for the last one that takes too much room; the others are kept."""
+        problem: BadValueError | None = None
+        with self._news:
+            now = self._expire()
+            for entry in entries:
+                is_empty = isinstance(entry.value, dict) and not entry.value
+                if is_empty and self._entries.has_below(entry.key):
+                    continue  # nothing is new
+                try:
+                    self._note(self._entries.put(entry, now))
+                except BadValueError as error:
+                    problem = error
+            self._version += 1
+            self._news.notify_all()
+        self._schedule()
+        if problem is not None:
+            raise problem
+
+    # ---- reading
+
+    def get(
+        self, key: str | tuple[str, ...], default: object = None, *, max_age_s: float | None = None
+    ) -> object:
+        """The value of a key, or a map of those below it; `default` when there is none so young."""
+        found = self._found(parse_key(key), seconds("max_age_s", max_age_s))
+        return default if found is _MISSING else found
+
+    def __getitem__(self, key: str | tuple[str, ...]) -> object:
+        """As `get`. Raises `NoValueError`."""
+        names = parse_key(key)
+        found = self._found(names, None)
+        if found is _MISSING:
+            with self._news:
+                known = [key_text(each.key) for each in islice(self._entries.matching(("**",)), _NEAR_KEYS)]
+            raise NoValueError(key_text(names), known)
+        return found
+
+    def __setitem__(self, key: str | tuple[str, ...], value: object) -> None:
+        self.put(key, value)
+
+    def __contains__(self, key: object) -> bool:
+        return isinstance(key, str | tuple) and self._found(parse_key(key), None) is not _MISSING
+
+    def __len__(self) -> int:
+        with self._news:
+            self._expire()
+            return len(self._entries)
+
+    def age_s(self, key: str | tuple[str, ...]) -> float:
+        """How old the value of a key is, or the youngest below it; infinite when there is none."""
+        names = parse_key(key)
+        with self._news:
+            now = self._expire()
+            return min((each.age_s(now) for each in self._entries.below(names)), default=math.inf)
+
+    def entry(self, key: str | tuple[str, ...]) -> BlackboardEntry | None:
+        """The value of just this key, with all that is known of it; None when there is none."""
+        names = parse_key(key)
+        with self._news:
+            now = self._expire()
+            found = self._entries.get(names)
+        return None if found is None else _public(found, now)
+
+    def keys(self, pattern: str = "**") -> list[str]:
+        """The keys that match, sorted: `*` is any one name, `**` any number of them: `human.*.position`."""
+        names = parse_key(pattern)
+        with self._news:
+            self._expire()
+            found = list(self._entries.matching(names))
+        return sorted(key_text(each.key) for each in found)
+
+    def snapshot(self, pattern: str = "**") -> dict[str, BlackboardEntry]:
+        """All whose keys match, by key, as they were at one moment."""
+        names = parse_key(pattern)
+        with self._news:
+            now = self._expire()
+            found = list(self._entries.matching(names))
+        return {
+            each.key: each for each in sorted((_public(each, now) for each in found), key=lambda e: e.key)
+        }
+
+    def _found(self, key: Key, max_age_s: float | None) -> object:
+        most = math.inf if max_age_s is None else max_age_s
+        with self._news:
+            now = self._expire()
+            found = [each for each in self._entries.below(key) if each.age_s(now) <= most]
+        if not found:
+            return _MISSING
+        return _composed(found, key)
+
+    @property
+    def bytes(self) -> int:
+        """About so much memory do its values take."""
+        return self._entries.bytes
+
+    @property
+    def dropped(self) -> int:
+        """Values that were dropped because there was no room."""
+        return self._entries.dropped
+
+    @property
+    def outdated(self) -> int:
+        """Values that were older than what was there already, or had lived already when they came."""
+        return self._entries.outdated
+
+    # ---- waiting and being told
+
+    def wait_for(
+        self,
+        key: str | tuple[str, ...],
+        condition: Callable[[object], object] | None = None,
+        timeout_s: float | None = None,
+    ) -> object:
+        """The value of a key as soon as there is one for which `condition(value)` is true.
+
+        `condition` is asked in this thread, whenever something is told; a value that lasts for less than
+        that may be missed. Raises `WaitTimeoutError`, and `ClosedError` when the board or its node is closed.
+        """
+        names, limit_s = parse_key(key), seconds("timeout_s", timeout_s)
+        if condition is not None:
+            function("condition", condition)
+        deadline = math.inf if limit_s is None else time.monotonic() + limit_s
+        while True:
+            version = self._version
+            found = self._found(names, None)
+            if found is not _MISSING and (condition is None or condition(found)):
+                return found
+            self._check_open()
+            left = min(_SLICE_S, deadline - time.monotonic())
+            if left <= 0.0:
+                raise WaitTimeoutError(key_text(names), limit_s or 0.0)
+            with self._news:
+                if self._version == version:
+                    self._news.wait(left)
+
+    def on_change(self, pattern: str, callback: OnChange) -> Callable[[], None]:
+        """Call `callback` with each `BlackboardChange` of a key that matches, in the thread that spins.
+
+        It is called when a value becomes another one, or is gone, not when it is told again. What it raises
+        comes out of `spin`; the other changes come with the next one. Returns a function that ends it.
+        Without a node, `deliver` calls the callbacks.
+        """
+        observer = _Observer(parse_key(pattern), function("callback", callback))
+        with self._news:
+            self._observers = (*self._observers, observer)
+
+        def end() -> None:
+            with self._news:
+                self._observers = tuple(each for each in self._observers if each is not observer)
+
+        self._schedule()
+        return end
+
+    def deliver(self) -> int:
+        """Call the callbacks of what changed, in this thread, as `Node.spin` does; how many calls."""
+        with self._news:
+            self._expire()
+            waiting = len(self._pending)
+        calls = 0
+        try:
+            while calls < waiting:
+                with self._news:
+                    if not self._pending:
+                        break
+                    observer, change = self._pending.popleft()
+                    self._pending_bytes -= change.entry.bytes
+                    is_there = any(each is observer for each in self._observers)
+                    now = self._clock()
+                calls += 1
+                if is_there:
+                    observer.callback(BlackboardChange(_public(change.entry, now), change.cause))
+        finally:
+            self._schedule()
+        return calls
+
+    def _expire(self) -> float:
+        """What time it is, with what is over by then forgotten. The lock is held."""
+        now = self._clock()
+        if self._entries.next_end <= now:
+            gone = self._entries.expire(now)
+            if gone:
+                self._note(gone)
+        return now
+
+    def _note(self, changes: Sequence[EntryChange]) -> None:
+        """Keep changes for callbacks. The lock is held."""
+        for change in changes:
+            for observer in self._observers:
+                if key_matches(observer.pattern, change.entry.key):
+                    self._pending.append((observer, change))
+                    self._pending_bytes += change.entry.bytes
+            while len(self._pending) > _MOST_CHANGES or self._pending_bytes > 2 * self._max_bytes:
+                _observer, oldest = self._pending.popleft()
+                self._pending_bytes -= oldest.entry.bytes
+                self.changes_dropped += 1
+
+    def _schedule(self) -> None:
+        """Have whoever spins the node call the callbacks: now, or when something ends."""
+        node = self._node
+        with self._news:
+            if node is None or not self._observers or self._is_closed:
+                return
+            now = self._clock()
+            due = now if self._pending else self._entries.next_end
+            if math.isinf(due) or self._timer_at <= due:
+                return
+            self._timer_at = due
+            wait_s = _AT_ONCE_S if self._pending else max(_SOON_S, due - now)
+        made: list[Timer] = []
+
+        def call() -> None:
+            for timer in made:  # empty, if another thread was fast: then it is due again at once
+                timer.cancel()
+                with self._news:
+                    self._timer_at = math.inf
+                self.deliver()
+
+        with suppress(ClosedError):
+            made.append(node.new_timer(wait_s, call))
+
+    # ---- the end
+
+    def _check_open(self) -> None:
+        is_open = not self._is_closed and (self._node is None or not self._node.is_closed)
+        if self._is_forked or not is_open:
+            raise ClosedError(_("the blackboard"), is_forked=self._is_forked)
+
+    def close(self) -> None:
+        """Watch no more, and end what waits; values stay, and can be read and put. May be called twice."""
+        with self._news:
+            self._is_closed = True
+            watches, self._watches, self._observers = self._watches, (), ()
+            self._pending.clear()
+            self._pending_bytes = 0
+            self._version += 1
+            self._news.notify_all()
+        for watch in watches:
+            watch.close()
+
+    def forked(self) -> None:
+        """In a child that was forked: values stay as they were. See `nep.system.forks`."""
+        self._is_closed = self._is_forked = True
+        if self._lock.locked():  # by a thread that is not here: it may have changed a half
+            self._entries = self._entries.rebuilt()
+        self._lock = threading.Lock()
+        self._news = threading.Condition(self._lock)
+        self._observers = ()
+        self._pending = deque()
+        for watch in self._watches:
+            watch.forked()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Blackboard({len(self._entries)} keys)"
+
+
+def _life(lives_s: object) -> float:
+    """Infinite for None. Raises `ValueError` for what is no time above 0."""
+    found = seconds("lives_s", lives_s)
+    return math.inf if found is None else period("lives_s", found)
+
+
+def _own(key: Key, value: object) -> object:
+    try:
+        return copied(value)
+    except (ValueError, RecursionError) as error:
+        raise BadValueError(key_text(key), _("it is too deep, or holds itself")) from error
+
+
+def _public(entry: StoredEntry, now: float) -> BlackboardEntry:
+    return BlackboardEntry(
+        key_text(entry.key),
+        copied(entry.value),
+        entry.age_s(now),
+        entry.age_by,
+        entry.source,
+        entry.robot,
+        entry.stamp_ns,
+        max(0.0, entry.expires - now),
+    )
+
+
+def _composed(found: Sequence[StoredEntry], key: Key) -> object:
+    """The value of the key itself, or a map of what is below it."""
+    if found[0].key == key:
+        return copied(found[0].value)
+    whole: dict[str, object] = {}
+    for entry in found:
+        *names, last = entry.key[len(key) :]
+        at = whole
+        for name in names:
+            after = at.setdefault(name, {})
+            if isinstance(after, dict):  # as it always is: no value stands above another
+                at = after
+        at[last] = copied(entry.value)
+    return whole

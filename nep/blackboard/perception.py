@@ -1,0 +1,59 @@
+"""Messages of perception as RIZE's programs send them, mostly on `/blackboard`. Pure.
+
+`{"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"}`: values are a probability, or whether it
+is so. Older programs send `"input": "add"` alone; some put quotes into names and values, `{"'happy'": "1"}`;
+by rosbridge all of it is a text in the field `data`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import orjson
+
+__all__ = ["Perception", "perception_in"]
+
+_QUOTES = "'\""
+
+
+class Perception(NamedTuple):
+    """`primitive` is what was perceived, `values` what of it; `robot` by whom, empty when nobody says."""
+
+    primitive: str
+    values: Mapping[str, object]
+    robot: str
+
+
+def perception_in(payload: object) -> Perception | None:
+    """The perception that a message is; None for any other message."""
+    if isinstance(payload, Mapping) and len(payload) == 1 and isinstance(payload.get("data"), str):
+        try:
+            payload = orjson.loads(payload["data"])
+        except orjson.JSONDecodeError:
+            return None
+    if not isinstance(payload, Mapping):
+        return None
+    primitive, given, robot = (payload.get(name) for name in ("primitive", "input", "robot"))
+    if not isinstance(primitive, str) or not primitive:
+        return None
+    if isinstance(given, str) and given and payload.get("node") == "perception":
+        given = {given: 1}
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+        return None
+    values = {name.strip(_QUOTES): _meant(value) for name, value in given.items()}
+    return Perception(primitive, values, robot if isinstance(robot, str) else "")
+
+
+def _meant(value: object) -> object:
+    """A number that was sent as a text is one."""
+    if not isinstance(value, str):
+        return value
+    try:
+        found = float(value.strip(_QUOTES))
+    except ValueError:
+        return value
+    if not math.isfinite(found):
+        return value
+    return int(found) if found.is_integer() and "." not in value else found

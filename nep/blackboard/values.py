@@ -1,0 +1,88 @@
+"""Values of a blackboard: copies, so that nobody changes them in place, and the bytes they take. Pure."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Mapping
+
+from nep.blackboard.keys import MOST_LEVELS, Key
+
+__all__ = ["copied", "is_same", "leaves", "size_of"]
+
+_DEEPEST = 100
+_PLAIN = frozenset({int, float, bool, type(None)})
+_NUMBER_BYTES = 40
+_ITEM_BYTES = 8
+
+
+def copied(value: object, depth: int = _DEEPEST) -> object:
+    """`value` with lists and maps of its own. Raises `ValueError` when it is too deep, or holds itself."""
+    if isinstance(value, list | tuple):
+        if _has_only_numbers(value):
+            return list(value)
+        return [copied(each, _below(depth)) for each in value]
+    if isinstance(value, Mapping):
+        return {key: copied(each, _below(depth)) for key, each in value.items()}
+    return bytes(value) if isinstance(value, bytearray | memoryview) else value
+
+
+def _below(depth: int) -> int:
+    if depth <= 0:
+        raise ValueError(f"{_DEEPEST}")
+    return depth - 1
+
+
+def _has_only_numbers(value: list[object] | tuple[object, ...]) -> bool:
+    return _PLAIN.issuperset(map(type, value))
+
+
+def size_of(value: object) -> int:
+    """About so many bytes of memory."""
+    size, waiting = 0, [value]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, list | tuple):
+            size += sys.getsizeof(each)
+            if _has_only_numbers(each):
+                size += _NUMBER_BYTES * len(each)
+            else:
+                waiting += each
+        elif isinstance(each, Mapping):
+            size += sys.getsizeof(each)
+            waiting += each
+            waiting += each.values()
+        else:
+            found = getattr(each, "nbytes", None)  # an array may be a view, which is small by itself
+            size += found if isinstance(found, int) else sys.getsizeof(each, _ITEM_BYTES)
+    return size
+
+
+def is_same(one: object, other: object) -> bool:
+    """Whether nothing changed: also NaN for NaN; 1, 1.0 and True are three values."""
+    if one is other:
+        return True
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, float) and isinstance(other, float) and math.isnan(one) and math.isnan(other):
+        return True
+    try:
+        return bool(one == other)
+    except Exception:  # noqa: BLE001 - arrays have no one answer, and values may be of any class
+        return False
+
+
+def leaves(value: object, key: Key = ()) -> Iterator[tuple[Key, object]]:
+    """What a map holds, each with its key; anything else, and an empty map, is one value.
+
+    A map whose keys are no texts or whole numbers, or that goes down too far for keys, is one value, too.
+    """
+    if not isinstance(value, Mapping) or not value or len(key) >= MOST_LEVELS or not _has_names(value):
+        yield key, value
+        return
+    for name, each in value.items():
+        yield from leaves(each, (*key, str(name)))
+
+
+def _has_names(value: Mapping[object, object]) -> bool:
+    return all(isinstance(name, str) or type(name) is int for name in value)

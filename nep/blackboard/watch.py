@@ -1,0 +1,208 @@
+"""BlackboardWatch: a topic whose messages are kept on a blackboard. Made by `Blackboard.watch`."""
+
+from __future__ import annotations
+
+import logging
+import re
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from nep.blackboard.keys import Key, key_of_topic, key_text, parse_key
+from nep.blackboard.perception import perception_in
+from nep.blackboard.values import leaves
+from nep.errors import DecodeError, NepError, WrongTypeError
+from nep.i18n import _
+from nep.messages.message import Message
+from nep.nodes.subscriber import Subscriber
+from nep.system.log_rarely import is_logged
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["BlackboardWatch", "MessageReading", "PerceivedValue", "is_change_message"]
+
+_logger = logging.getLogger("nep.blackboard")
+_HOLE = re.compile(r"\{([^{}]+)\}")
+_MISSING = object()
+
+
+class PerceivedValue(NamedTuple):
+    """A value that a message has, its key, and which robot perceived it, when it says so."""
+
+    key: Key
+    value: object
+    robot: str
+
+
+class MessageReading:
+    """How the messages of a topic become values. Pure.
+
+    `key`: where they go; None: perceptions of RIZE's to the root, others to the topic's name. Names in
+    braces are fields of the message, `human.{id}`. `fields`: those of its fields that are kept, and their
+    names on the board. `each`: the field that has a list of such messages.
+    """
+
+    def __init__(
+        self,
+        key: str | tuple[str, ...] | None = None,
+        fields: Sequence[str] | Mapping[str, str] | None = None,
+        each: str = "",
+    ) -> None:
+        self._key = None if key is None else parse_key(key)
+        self._has_holes = any(_HOLE.search(name) for name in self._key or ())
+        self._each = parse_key(each) if each else ()
+        if isinstance(fields, str):
+            raise WrongTypeError(_("fields is a text; give a list of names"))
+        pairs = fields.items() if isinstance(fields, Mapping) else [(name, name) for name in fields or ()]
+        self._fields = None if fields is None else [(parse_key(one), parse_key(two)) for one, two in pairs]
+
+    def items(self, payload: object) -> Sequence[object]:
+        """What there is to be read one by one. Raises `NepError` when the field that has them is none."""
+        if self._each:
+            found = _field(payload, self._each)
+            if not isinstance(found, list | tuple):
+                raise NepError(_("it has no list in the field '{field}'").format(field=key_text(self._each)))
+            return found
+        return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)
+
+    def findings(self, topic: str, item: object) -> Iterator[PerceivedValue]:
+        """All that an item has. Raises `NepError` when it has no place on the board."""
+        seen = None if self._fields is not None else perception_in(item)
+        if seen is not None:
+            beginning = () if self._key is None else self._filled(item)
+            for key, value in leaves(seen.values, (*beginning, *parse_key(seen.primitive))):
+                yield PerceivedValue(key, value, seen.robot)
+            return
+        beginning = key_of_topic(topic) if self._key is None else self._filled(item)
+        robot = item.get("robot") if isinstance(item, Mapping) else None
+        said = robot if isinstance(robot, str) else ""
+        for at, value in self._chosen(item):
+            for key, leaf in leaves(value, (*beginning, *at)):
+                yield PerceivedValue(key, leaf, said)
+
+    def _chosen(self, item: object) -> Iterator[tuple[Key, object]]:
+        if self._fields is None:
+            yield (), item
+            return
+        for field, name in self._fields:
+            value = _field(item, field)
+            if value is not _MISSING:
+                yield name, value
+
+    def _filled(self, item: object) -> Key:
+        if not self._has_holes:
+            return self._key or ()
+        return tuple(_HOLE.sub(lambda found: _name_in(item, found[1]), name) for name in self._key or ())
+
+
+def _field(item: object, path: Key) -> object:
+    for name in path:
+        if not isinstance(item, Mapping) or name not in item:
+            return _MISSING
+        item = item[name]
+    return item
+
+
+def _name_in(item: object, field: str) -> str:
+    """The field's value as a name. Raises `NepError`."""
+    value = item.get(field) if isinstance(item, Mapping) else None
+    if isinstance(value, bool) or not isinstance(value, str | int) or value == "":
+        raise NepError(_("it has no name or number in the field '{field}'").format(field=field))
+    return str(value)
+
+
+def is_change_message(payload: object) -> bool:
+    """Whether a blackboard told it of itself: by a wildcard it would be heard, and told of, for ever."""
+    return isinstance(payload, Mapping) and "blackboard" in payload and "cause" in payload
+
+
+class BlackboardWatch:
+    """Counts what came. May be used from any thread; a context manager."""
+
+    def __init__(
+        self,
+        topic: str,
+        reading: MessageReading,
+        keep: Callable[[Message, Sequence[PerceivedValue]], None],
+        *,
+        is_pattern: bool,
+    ) -> None:
+        self.topic = topic
+        self.received = 0
+        """Messages that came and could be read."""
+        self.refused = 0
+        """Messages that could not be read, or were not kept, as a whole or in part; why is logged."""
+        self.problem = ""
+        """Why the last one was refused; empty when it was not."""
+        self._reading = reading
+        self._keep = keep
+        self._is_pattern = is_pattern
+        self._subscriber: Subscriber | None = None
+        self._is_closed = False
+        self._lock = threading.Lock()
+
+    def attach(self, subscriber: Subscriber) -> None:
+        """Its messages are these."""
+        with self._lock:
+            self._subscriber = subscriber
+            is_closed = self._is_closed
+        if is_closed:
+            subscriber.close()
+
+    def take(self, messages: Sequence[Message]) -> None:
+        """Keep them. In the thread of the node's sinks."""
+        for message in messages:
+            if self._is_closed:
+                return
+            try:
+                self._take(message)
+            except Exception as error:  # noqa: BLE001 - one message must not cost the others
+                self._refuse(message, error)
+
+    def _take(self, message: Message) -> None:
+        subscriber = self._subscriber
+        # The first messages may come before the subscriber is known.
+        payload = message.payload if subscriber is None else subscriber.decoded(message)
+        if self._is_pattern and is_change_message(payload):
+            return
+        self.received += 1
+        problem: NepError | None = None
+        for item in self._reading.items(payload):
+            try:
+                self._keep(message, tuple(self._reading.findings(message.topic, item)))
+            except NepError as error:
+                problem = error  # the other items are kept
+        if problem is not None:
+            raise problem
+        self.problem = ""
+
+    def _refuse(self, message: Message, error: Exception) -> None:
+        self.refused += 1
+        self.problem = str(error)
+        if not isinstance(error, DecodeError) and is_logged(self.refused):
+            _logger.warning(
+                "a message on '%s' is not kept as a whole (%d so far): %s", message.topic, self.refused, error
+            )
+
+    def close(self) -> None:
+        """Keep no more messages; what came stays. May be called twice."""
+        with self._lock:
+            self._is_closed = True
+            subscriber = self._subscriber
+        if subscriber is not None:
+            subscriber.close()
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_closed = True
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"BlackboardWatch({self.topic!r}, received={self.received}, refused={self.refused})"

@@ -1,0 +1,217 @@
+"""What messages become on a blackboard, and from when their age counts. No node."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import nep
+from nep.blackboard.ages import beginning_of
+from nep.blackboard.keys import key_text
+from nep.blackboard.perception import perception_in
+from nep.blackboard.watch import MessageReading
+from nep.messages.message import Message, kind_of
+
+
+def read(reading: MessageReading, payload: object, topic: str = "/perception/humans") -> dict[str, object]:
+    return {
+        key_text(found.key): found.value
+        for item in reading.items(payload)
+        for found in reading.findings(topic, item)
+    }
+
+
+@pytest.mark.parametrize(
+    ("payload", "values", "robot"),
+    [
+        (
+            {"primitive": "touched", "input": {"head": 1, "left_hand": 0}, "robot": "Pepper"},
+            {"head": 1, "left_hand": 0},
+            "Pepper",
+        ),
+        ({"primitive": "touched", "input": {"head": True}}, {"head": True}, ""),
+        ({"primitive": "touched", "input": {}, "robot": 5}, {}, ""),
+        ({"primitive": "emotion", "input": {"'happy'": "1"}}, {"happy": 1}, ""),
+        ({"primitive": "emotion", "input": {'"sad"': "0.5"}}, {"sad": 0.5}, ""),
+        (
+            {"primitive": "x", "input": {"a": "nan", "b": "text", "c": None}},
+            {"a": "nan", "b": "text", "c": None},
+            "",
+        ),
+        ({"node": "perception", "primitive": "speech", "input": "add", "parameters": {}}, {"add": 1}, ""),
+        ({"data": '{"primitive":"touched","input":{"head":1}}'}, {"head": 1}, ""),
+    ],
+)
+def test_perceptions_of_rize(payload: object, values: object, robot: str) -> None:
+    found = perception_in(payload)
+    assert found is not None
+    assert (found.values, found.robot) == (values, robot)
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        None,
+        5,
+        [],
+        "touched",
+        {},
+        {"primitive": "say", "input": "hello", "options": "none"},  # a command
+        {"primitive": "", "input": {"a": 1}},
+        {"primitive": 5, "input": {"a": 1}},
+        {"primitive": "a", "input": {5: 1}},
+        {"primitive": "a", "input": [1]},
+        {"data": "no json"},
+        {"data": 5},
+    ],
+)
+def test_what_is_no_perception(payload: object) -> None:
+    assert perception_in(payload) is None
+
+
+def test_a_perception_goes_to_the_root_or_below_a_key() -> None:
+    seen = {"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"}
+    assert read(MessageReading(), seen) == {"touched.head": 1}
+    assert read(MessageReading("{robot}"), seen) == {"Pepper.touched.head": 1}
+    assert read(MessageReading(fields=["robot"]), seen) == {"perception.humans.robot": "Pepper"}
+    assert read(MessageReading(), {**seen, "primitive": "a.b"}) == {"a.b.head": 1}
+
+
+def test_maps_go_where_the_topic_or_the_key_says() -> None:
+    payload = {"1": {"position": [1, 2], "face": {}}, "count": 1}
+    assert read(MessageReading(), payload) == {
+        "perception.humans.1.position": [1, 2],
+        "perception.humans.1.face": {},
+        "perception.humans.count": 1,
+    }
+    assert read(MessageReading("human"), payload)["human.1.position"] == [1, 2]
+    assert read(MessageReading("human"), [1, 2]) == {"human": [1, 2]}
+    assert read(MessageReading(), 5, "/") == {"topic": 5}
+
+
+def test_fields_that_are_kept_and_renamed() -> None:
+    payload = {"pose": {"x": 1, "y": 2}, "name": "Ada", "rest": [0]}
+    assert read(MessageReading("h", ["pose.x", "name", "none"]), payload) == {"h.pose.x": 1, "h.name": "Ada"}
+    assert read(MessageReading("h", {"pose": "at", "name": "is.called"}), payload) == {
+        "h.at.x": 1,
+        "h.at.y": 2,
+        "h.is.called": "Ada",
+    }
+    assert read(MessageReading("h", []), payload) == {}
+    assert read(MessageReading("h", ["x"]), [1]) == {}
+    with pytest.raises(ValueError, match="fields is a text"):
+        MessageReading("h", "name")
+    with pytest.raises(nep.BadKeyError):
+        MessageReading("h", [""])
+    with pytest.raises(nep.BadKeyError):
+        MessageReading("")
+
+
+def test_names_that_are_fields_of_the_message() -> None:
+    reading = MessageReading("human.{id}", ["position"])
+    assert read(reading, {"id": 7, "position": 1}) == {"human.7.position": 1}
+    assert read(reading, [{"id": "a.b", "position": 1}, {"id": 2, "position": 2}]) == {
+        r"human.a\.b.position": 1,
+        "human.2.position": 2,
+    }
+    assert read(MessageReading("x-{a}-{b}"), {"a": 1, "b": "c"}) == {"x-1-c.a": 1, "x-1-c.b": "c"}
+    listed = {"humans": [{"id": 1, "position": 1}], "stamp": 5}
+    assert read(MessageReading("human.{id}", ["position"], "humans"), listed) == {"human.1.position": 1}
+    for wrong in ({"id": None}, {"id": True}, {"id": ""}, {"id": 1.5}, {"id": []}, {}, 5, [5]):
+        with pytest.raises(nep.NepError, match="no name or number in the field 'id'"):
+            read(reading, wrong)
+    for wrong in ({"humans": 5}, {}, None, []):
+        with pytest.raises(nep.NepError, match="no list in the field 'humans'"):
+            read(MessageReading("human.{id}", None, "humans"), wrong)
+
+
+NOW, WALL_NS = 50.0, 1_800_000_000_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("on_the_way_s", "is_latched", "age_s", "by"),
+    [
+        (0.5, False, 0.5, "stamp"),
+        (0.0, False, 0.0, "stamp"),
+        (-0.05, False, 0.0, "stamp"),  # clocks that are nearly the same
+        (-0.2, False, 0.0, "arrival"),  # of the future
+        (-1e6, True, 0.0, "arrival"),
+        (9.0, False, 9.0, "stamp"),
+        (11.0, False, 0.0, "arrival"),  # a clock that goes late
+        (3600.0, True, 3600.0, "stamp"),  # it was kept for us
+        (None, False, 0.0, "arrival"),  # the original wire has no stamps
+    ],
+)
+def test_from_when_an_age_counts(on_the_way_s: float | None, is_latched: bool, age_s: float, by: str) -> None:
+    stamp_ns = None if on_the_way_s is None else WALL_NS - int(on_the_way_s * 1e9)
+    message = Message("/x", b"1", "json", "json", stamp_ns=stamp_ns)
+    message.kind = kind_of("/x", "json", "json", is_latched=is_latched)
+    since, said = beginning_of(message, NOW, WALL_NS)
+    assert NOW - since == pytest.approx(age_s)
+    assert said == by
+
+
+class Walls:
+    """A wall clock that is set, beside one that goes on."""
+
+    def __init__(self) -> None:
+        self.now, self.wall_ns = 100.0, WALL_NS
+
+    def message(self, payload: bytes, publisher: int, age_s: float) -> Message:
+        made = Message(
+            "/x", payload, "json", "json", stamp_ns=self.wall_ns - int(age_s * 1e9), publisher=publisher
+        )
+        made.kind = kind_of("/x", "json", "json", is_latched=True)
+        return made
+
+
+def kept(board: nep.Blackboard, message: Message, lives_s: float = math.inf) -> None:
+    reading = MessageReading("v")
+    found = tuple(reading.findings(message.topic, message.payload))
+    board._keep(message, found, lives_s)
+
+
+def test_an_older_message_of_another_writer_does_not_win() -> None:
+    walls = Walls()
+    board = nep.Blackboard(clock=lambda: walls.now, wall_clock_ns=lambda: walls.wall_ns)
+    kept(board, walls.message(b"1", 1, 2.0))
+    kept(board, walls.message(b"2", 2, 60.0))
+    assert (board["v"], board.outdated) == (1, 1)
+    kept(board, walls.message(b"3", 2, 1.0))
+    assert board["v"] == 3
+    kept(board, walls.message(b"4", 2, 30.0))
+    assert board["v"] == 4, "its own messages come in order, whatever its clock does"
+    assert board.age_s("v") == pytest.approx(30.0)
+    board.put("v", 5)
+    kept(board, walls.message(b"6", 1, 0.5))
+    assert board["v"] == 6, "what was put has no stamp to compare"
+
+
+def test_our_wall_clock_jumps_and_ages_do_not() -> None:
+    walls = Walls()
+    board = nep.Blackboard(clock=lambda: walls.now, wall_clock_ns=lambda: walls.wall_ns)
+    kept(board, walls.message(b"1", 1, 2.0))
+    walls.wall_ns -= 3600 * 10**9
+    walls.now += 1.0
+    assert board.age_s("v") == pytest.approx(3.0)
+    message = walls.message(b"2", 1, -3600.0)
+    kept(board, message)
+    entry = board.entry("v")
+    assert entry is not None
+    assert (entry.value, entry.age_s, entry.age_by) == (2, 0.0, "arrival")
+    assert entry.stamp_ns == message.stamp_ns
+    walls.now -= 1000.0
+    kept(board, walls.message(b"3", 2, 1.0))
+    assert board["v"] == 3, "what is there is of the future now: it wins over nothing"
+
+
+def test_what_has_lived_already_is_not_shown() -> None:
+    walls = Walls()
+    board = nep.Blackboard(clock=lambda: walls.now, wall_clock_ns=lambda: walls.wall_ns)
+    kept(board, walls.message(b"1", 1, 3.0), lives_s=3.0)
+    assert ("v" in board, board.outdated) == (False, 1)
+    kept(board, walls.message(b"1", 1, 2.9), lives_s=3.0)
+    assert "v" in board
+    walls.now += 0.2
+    assert "v" not in board
