@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from typer.models import CommandInfo
 
-from nep.cli import bridge, doctor, log, masters, nodes, parameters, services, topics
+from nep.cli import blackboard, bridge, doctor, log, masters, nodes, parameters, services, topics
 from nep.cli.screen import say_error, write
 from nep.cli.typer_words import TranslatedCommand, TranslatedGroup
 from nep.errors import NepError
@@ -43,6 +43,7 @@ app.add_typer(nodes.app, name="node")
 app.add_typer(topics.app, name="topic")
 app.add_typer(services.app, name="service")
 app.add_typer(parameters.app, name="param")
+app.add_typer(blackboard.app, name="blackboard")
 
 
 @app.callback()

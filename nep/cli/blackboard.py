@@ -1,0 +1,215 @@
+"""`nep blackboard`: run a blackboard that other programs ask, and look into one."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Mapping, Sequence
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from nep.cli.complete import complete_topic
+from nep.cli.options import JsonOption, MasterOption, checked_time
+from nep.cli.screen import UNKNOWN, TextColumn, duration, say, show_json, show_table
+from nep.cli.typer_words import TranslatedGroup
+from nep.cli.values import presented
+from nep.errors import NepError, NoServerError, RequestRefusedError, ServiceError
+from nep.i18n import _, lazy
+from nep.nodes.node import Node
+from nep.system.lazy_import import lazy_module
+from nep.text import escaped
+
+if TYPE_CHECKING:
+    from nep.blackboard import board as boards
+    from nep.blackboard import server as servers
+else:
+    boards, servers = lazy_module("nep.blackboard.board"), lazy_module("nep.blackboard.server")
+
+_DEFAULT_TOPIC = "/blackboard"
+"""Where programs of RIZE tell what they perceive."""
+_DEFAULT_NAME = "blackboard"
+_TIMEOUT_S = 5.0
+_RUN = "run"
+_COLUMNS = (
+    TextColumn(lazy("key"), style="bold", is_whole=True),
+    TextColumn(lazy("value"), style="green"),
+    TextColumn(lazy("age"), "right"),
+    TextColumn(lazy("by")),
+    TextColumn(lazy("from"), style="cyan"),
+    TextColumn(lazy("robot"), style="cyan"),
+)
+
+
+def _checked_life(given: float | None) -> float | None:
+    """`given` itself when something can live for so long. Raises `typer.BadParameter`."""
+    if given is not None and not given > 0.0:  # also what is not a number
+        raise typer.BadParameter(_("{given:g} is no life; give seconds, more than 0").format(given=given))
+    return given
+
+
+class _RunByItself(TranslatedGroup):
+    """`nep blackboard TOPIC` is `nep blackboard run TOPIC`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - see `TranslatedGroup`
+        """See `click.Command`."""
+        if not args or (args[0] not in self.commands and args[0] not in ctx.help_option_names):
+            args = [_RUN, *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=_RunByItself,
+    help=_("What is known of the world, and how old it is: run a blackboard, look into one."),
+)
+_NameOption = Annotated[
+    str,
+    typer.Option(
+        "--name",
+        metavar=_("NAME"),
+        help=_("How its services and its topic are called; {name} when nothing is said.").format(
+            name=_DEFAULT_NAME
+        ),
+        show_default=False,
+    ),
+]
+
+
+@app.command(_RUN)
+def run(
+    topics: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[KEY=]TOPIC",
+            help=_(
+                "What to keep, such as human=/perception/humans; {topic} when nothing is said. "
+                "Topics may have wildcards."
+            ).format(topic=_DEFAULT_TOPIC),
+            show_default=False,
+            autocompletion=complete_topic,
+        ),
+    ] = None,
+    name: _NameOption = _DEFAULT_NAME,
+    lives_s: Annotated[
+        float | None,
+        typer.Option(
+            "--lives",
+            metavar=_("SECONDS"),
+            help=_("Forget a value that was not told again for so long; else it is kept."),
+            show_default=False,
+            callback=_checked_life,
+        ),
+    ] = None,
+    max_keys: Annotated[
+        int | None,
+        typer.Option(
+            "--max-keys", min=1, metavar="N", help=_("Keep so many values at most."), show_default=False
+        ),
+    ] = None,
+    master: MasterOption = None,
+) -> None:
+    """Run a blackboard: it keeps the newest values of topics, and answers who asks. Ctrl+C ends it.
+
+    It tells changes on /blackboard/changes, and has the services blackboard/get, set and keys.
+    """
+    signal.signal(signal.SIGTERM, _end)
+    with (
+        Node(name.strip("/").replace("/", "-"), master=master) as node,
+        boards.Blackboard(node, max_keys=boards.MAX_KEYS if max_keys is None else max_keys) as board,
+        servers.BlackboardServer(node, board, name),
+    ):
+        for topic, key in map(_watched, topics or [_DEFAULT_TOPIC]):
+            board.watch(topic, key=key, lives_s=lives_s)
+        say(_("blackboard '{name}' keeps what comes; Ctrl+C ends it").format(name=name))
+        node.spin()
+
+
+@app.command("show")
+def show(
+    pattern: Annotated[
+        str,
+        typer.Argument(
+            metavar=_("PATTERN"),
+            help=_("Keys with wildcards, such as 'human.*.position'; all when nothing is said."),
+            show_default=False,
+        ),
+    ] = "**",
+    name: _NameOption = _DEFAULT_NAME,
+    timeout_s: Annotated[
+        float,
+        typer.Option(
+            "--timeout",
+            metavar=_("SECONDS"),
+            help=_("How long to wait for its answer; {seconds:g} when nothing is said.").format(
+                seconds=_TIMEOUT_S
+            ),
+            show_default=False,
+            callback=checked_time,
+        ),
+    ] = _TIMEOUT_S,
+    master: MasterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show what a blackboard has, with ages: by the publisher's stamp, or by when it came."""
+    with Node(f"nep-blackboard-show-{os.getpid()}", master=master) as node:
+        client = node.new_client(servers.service_of(name, "get"), timeout_s=timeout_s)
+        try:
+            answer = client.call({"pattern": pattern})
+        except NoServerError as error:
+            raise _no_blackboard(name) from error
+        except ServiceError as error:
+            raise RequestRefusedError(error.reason) from error
+    entries = _entries(answer)
+    if as_json:
+        show_json(entries)
+        return
+    if entries:
+        show_table(_COLUMNS, [_row(each) for each in entries])
+    else:
+        say(_("it has nothing that matches now"))
+    more = answer.get("more") if isinstance(answer, Mapping) else 0
+    if more:
+        say(_("and {count} more").format(count=more))
+
+
+def _watched(word: str) -> tuple[str, str | None]:
+    """The topic, and the key that is given for it."""
+    key, equals, topic = word.partition("=")
+    return (topic, key) if equals and "/" not in key else (word, None)
+
+
+def _no_blackboard(name: str) -> NepError:
+    return NepError(
+        _("no blackboard is called '{name}' here; start one with 'nep blackboard'").format(name=escaped(name))
+    )
+
+
+def _entries(answer: object) -> Sequence[Mapping[str, object]]:
+    """Raises `NepError` for an answer of something else."""
+    found = answer.get("entries") if isinstance(answer, Mapping) else None
+    if not isinstance(found, list) or not all(isinstance(each, Mapping) for each in found):
+        raise NepError(_("what answered is no blackboard; give another --name"))
+    return found
+
+
+def _row(entry: Mapping[str, object]) -> tuple[str, ...]:
+    age_s = entry.get("age_s")
+    return (
+        escaped(str(entry.get("key"))),
+        presented(entry.get("value"), whole=False),
+        _age(age_s) if isinstance(age_s, int | float) else UNKNOWN,
+        {"stamp": _("stamp"), "arrival": _("arrival")}.get(str(entry.get("age_by")), UNKNOWN),
+        escaped(str(entry.get("source") or UNKNOWN)),
+        escaped(str(entry.get("robot") or UNKNOWN)),
+    )
+
+
+def _age(age_s: float) -> str:
+    return f"{age_s:.1f} s" if age_s < 10 else duration(age_s)
+
+
+def _end(_signal: int, _frame: FrameType | None) -> None:
+    """A polite request to end: leave through the `with` that closes the node."""
+    sys.exit(0)

@@ -1,0 +1,130 @@
+"""`nep blackboard` as a person uses it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep.masters.master import Master
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+ENVIRONMENT = {"PYTHONPATH": str(REPOSITORY), "COLUMNS": "160"}
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "nep", "blackboard", *arguments],
+        capture_output=True,
+        encoding="utf-8",
+        timeout=60,
+        env={**os.environ, **ENVIRONMENT},
+        check=False,
+    )
+
+
+@contextmanager
+def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A blackboard that keeps what comes."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "nep", "blackboard", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        env={**os.environ, **ENVIRONMENT},
+    )
+    try:
+        assert process.stderr is not None
+        assert "keeps what comes" in process.stderr.readline()
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def test_it_keeps_topics_and_shows_them(master: Master) -> None:
+    with started("/blackboard", "human=/perception/humans", "/other/*") as process, nep.node("robot") as node:
+        board = node.new_client("blackboard/get", timeout_s=30.0)
+        node.new_pub("/blackboard").publish({"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"})
+        node.new_pub("/perception/humans").publish({"1": {"name": "Ada\x1b[2J"}})
+        node.new_pub("/other/one").publish(7)
+        sub = node.new_sub("/blackboard/changes")
+        keys = ["human.1.name", "other.one", "touched.head"]
+        while node.new_client("blackboard/keys", timeout_s=30.0).call({})["keys"] != keys:  # type: ignore[index]
+            assert sub.listen(timeout_s=30.0)[0]
+        shown = run("show")
+        assert shown.returncode == 0
+        head, _line, *rows = shown.stdout.splitlines()
+        assert head.split() == ["key", "value", "age", "by", "from", "robot"]
+        assert [row.split()[0] for row in rows if row] == keys
+        assert rows[2].split()[-3:] == ["stamp", "/blackboard", "Pepper"]
+        assert "\x1b" not in shown.stdout
+        (entry,) = json.loads(run("show", "touched.*", "--json").stdout)
+        assert (entry["key"], entry["value"], entry["age_by"]) == ("touched.head", 1, "stamp")
+        none = run("show", "nothing.*")
+        assert (none.returncode, none.stdout) == (0, "")
+        assert "nothing that matches" in none.stderr
+        refused = run("show", "")
+        assert refused.returncode == 1
+        assert "'' cannot be a key" in refused.stderr
+        assert board.call({"key": "touched.head"})["value"] == 1  # type: ignore[index]
+        if sys.platform != "win32":
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(60.0) == 0
+
+
+def test_names_and_lives(master: Master) -> None:
+    with started("--name", "home", "--lives", "0.05", "--max-keys", "5"), nep.node("robot") as node:
+        told = node.new_sub("/home/changes")
+        node.new_pub("/blackboard").publish({"primitive": "word", "input": {"hello": 1}})
+        causes = [told.listen(timeout_s=30.0)[1]["cause"] for _number in range(2)]  # type: ignore[index]
+        assert causes == ["new", "expired"]
+        assert json.loads(run("show", "--name", "home", "--json").stdout) == []
+
+
+def test_what_is_wrong_is_a_sentence(master: Master) -> None:
+    nobody = run("show", "--name", "nobody", "--timeout", "0.2")
+    assert (nobody.returncode, nobody.stdout) == (1, "")
+    assert "no blackboard is called 'nobody' here; start one with 'nep blackboard'" in nobody.stderr
+    for words in (("a b",), ("run", ""), ("=/x",), ("--name", "")):
+        done = run(*words)
+        assert done.returncode == 1, words
+        assert done.stderr.startswith("nep: "), words
+        assert "Traceback" not in done.stderr
+    for words in (
+        ("--lives", "-1"),
+        ("--lives", "0"),
+        ("--lives", "nan"),
+        ("--max-keys", "0"),
+        ("--nonsense",),
+    ):
+        assert run(*words).returncode == 2, words
+    with nep.node("robot") as node:
+        node.new_server("odd/get", lambda _request: {"entries": [5]}, threads=1)
+        odd = run("show", "--name", "odd")
+        assert odd.returncode == 1
+        assert "what answered is no blackboard" in odd.stderr
+
+
+def test_without_a_master() -> None:
+    done = run("--master", "127.0.0.1:1")
+    assert done.returncode == 1
+    assert "no master answers" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a program of Windows cannot be sent Ctrl+C alone")
+def test_ctrl_c_ends_it(master: Master) -> None:
+    with started() as process:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60.0) == 130
+        assert process.stderr is not None
+        assert "Traceback" not in process.stderr.read()
