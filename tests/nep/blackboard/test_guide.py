@@ -1,0 +1,46 @@
+"""docs/blackboard.md: its programs run and print what it says, and what it names is there."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+import nep
+from nep.masters.master import Master
+from tests.nep.programs import ROOT, running
+
+_GUIDE = (ROOT / "docs" / "blackboard.md").read_text(encoding="utf-8")
+_SAID = re.compile(r"It prints `([^`]+)`")
+
+
+def _programs() -> dict[str, tuple[str, list[str]]]:
+    """By the head of its section: a program, and the lines that it is said to print."""
+    found = {}
+    for section in _GUIDE.split("\n## ")[1:]:
+        before, fence, after = section.partition("```python\n")
+        if fence:
+            program, _fence, text = after.partition("\n```\n\n")
+            said = _SAID.match(text)
+            lines = [said[1]] if said else [line.strip() for line in text.split("\n\n")[1].splitlines()]
+            found[before.partition("\n")[0]] = (program, lines)
+    return found
+
+
+@pytest.mark.parametrize("head", sorted(_programs()))
+def test_the_program_prints_what_is_said(master: Master, head: str) -> None:
+    program, said = _programs()[head]
+    with running(program, NEP_MASTER=master.address) as example:
+        printed, errors = example.end()
+    assert errors == ""
+    assert printed.splitlines() == said
+
+
+def test_each_program_is_tried() -> None:
+    assert len(_programs()) == _GUIDE.count("```python") == 4
+
+
+def test_what_the_tables_name_is_there() -> None:
+    names = set(re.findall(r"`board\.(\w+)", _GUIDE))
+    assert {"watch", "put", "get", "age_s", "on_change"} <= names
+    assert [name for name in names if not hasattr(nep.Blackboard(), name)] == []
