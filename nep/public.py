@@ -3,10 +3,6 @@
 from nep.backends.connection import Configuration as Configuration
 from nep.backends.connection import Direct as Direct
 from nep.backends.connection import Hybrid as Hybrid
-from nep.blackboard.board import Blackboard as Blackboard
-from nep.blackboard.board import BlackboardChange as BlackboardChange
-from nep.blackboard.board import BlackboardEntry as BlackboardEntry
-from nep.blackboard.watch import BlackboardWatch as BlackboardWatch
 from nep.errors import AddressInUseError as AddressInUseError
 from nep.errors import BackendUnavailableError as BackendUnavailableError
 from nep.errors import BadKeyError as BadKeyError
@@ -48,6 +44,10 @@ from nep.patterns.services.client import Client as Client
 from nep.patterns.services.server import Server as Server
 from nep.patterns.services.survey import Respondent as Respondent
 from nep.patterns.services.survey import Surveyor as Surveyor
+from nep.programs.blackboard.board import Blackboard as Blackboard
+from nep.programs.blackboard.board import BlackboardChange as BlackboardChange
+from nep.programs.blackboard.board import BlackboardEntry as BlackboardEntry
+from nep.programs.blackboard.watch import BlackboardWatch as BlackboardWatch
 from nep.protocol.graph_view import Alert as Alert
 from nep.protocol.graph_view import ClientInfo as ClientInfo
 from nep.protocol.graph_view import GraphView as GraphView

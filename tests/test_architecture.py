@@ -39,8 +39,8 @@ SMALL_LINES = 60
 # Small modules that one other module alone imports, and what each earns its file by (docs/adr/0020-rooms.md).
 EARNED = {
     "app.core.robots.awaited": "pure, and tested alone",
-    "nep.blackboard.ages": "pure, and tested alone",
-    "nep.blackboard.perception": "pure, and tested alone",
+    "nep.programs.blackboard.ages": "pure, and tested alone",
+    "nep.programs.blackboard.perception": "pure, and tested alone",
     "nep.cli.doctor": "one of a list: the commands of nep",
     "nep.cli.interrupts": "imported before all else of a command, under the guard of its caller",
     "app.core.run.edits_since_run": "pure, and tested alone",

@@ -23,10 +23,13 @@ from nep.system.lazy_import import lazy_module
 from nep.text import escaped
 
 if TYPE_CHECKING:
-    from nep.blackboard import board as boards
-    from nep.blackboard import server as servers
+    from nep.programs.blackboard import board as boards
+    from nep.programs.blackboard import server as servers
 else:
-    boards, servers = lazy_module("nep.blackboard.board"), lazy_module("nep.blackboard.server")
+    boards, servers = (
+        lazy_module("nep.programs.blackboard.board"),
+        lazy_module("nep.programs.blackboard.server"),
+    )
 
 _DEFAULT_TOPIC = "/blackboard"
 """Where programs of RIZE tell what they perceive."""

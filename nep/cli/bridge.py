@@ -19,15 +19,15 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from nep.bridges.bridge import Bridge, check_installed
-from nep.bridges.configuration import BridgeConfiguration, direction_named, join_line
-from nep.bridges.route import Route, RouteCounts
-from nep.bridges.toml_file import EXAMPLE, read_configuration
 from nep.cli.options import JsonOption
 from nep.cli.screen import UNKNOWN, cells, console, padded, rate, say, show_json, write
 from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.masters.rates import Meter
+from nep.programs.bridges.bridge import Bridge, check_installed
+from nep.programs.bridges.configuration import BridgeConfiguration, direction_named, join_line
+from nep.programs.bridges.route import Route, RouteCounts
+from nep.programs.bridges.toml_file import EXAMPLE, read_configuration
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:

@@ -42,7 +42,7 @@ class NodeEntry:
 
     @property
     def is_bridge(self) -> bool:
-        """Whether it joins this network with another: see `nep.bridges`."""
+        """Whether it joins this network with another: see `nep.programs.bridges`."""
         return BRIDGES_TOPIC in self.publishes
 
 

@@ -13,7 +13,7 @@ from tests.nep.programs import eventually, running
 
 BRIDGE = """
 import sys
-from nep.bridges import Bridge, BridgeConfiguration, BridgeTopic, TopicEnd, side_of
+from nep.programs.bridges import Bridge, BridgeConfiguration, BridgeTopic, TopicEnd, side_of
 def topic(name, direction, msg_type=""):
     return BridgeTopic(TopicEnd(name), TopicEnd(name, msg_type), direction)
 topics = (

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import pytest
 
 import nep
-from nep.blackboard.keys import key_text, parse_key
+from nep.programs.blackboard.keys import key_text, parse_key
 
 
 class Clock:

@@ -7,11 +7,11 @@ import math
 import pytest
 
 import nep
-from nep.blackboard.ages import beginning_of
-from nep.blackboard.keys import key_text
-from nep.blackboard.perception import perception_in
-from nep.blackboard.watch import MessageReading
 from nep.messages.message import Message, kind_of
+from nep.programs.blackboard.ages import beginning_of
+from nep.programs.blackboard.keys import key_text
+from nep.programs.blackboard.perception import perception_in
+from nep.programs.blackboard.watch import MessageReading
 
 
 def read(reading: MessageReading, payload: object, topic: str = "/perception/humans") -> dict[str, object]:

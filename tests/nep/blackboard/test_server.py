@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 import nep
-from nep.blackboard.server import BlackboardServer
 from nep.masters.master import Master
+from nep.programs.blackboard.server import BlackboardServer
 from tests.nep.programs import eventually
 
 _names = count()

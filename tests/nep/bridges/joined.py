@@ -9,7 +9,8 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 import nep
-from nep.bridges import (
+from nep.masters.master import Master
+from nep.programs.bridges import (
     Bridge,
     BridgeConfiguration,
     BridgeTopic,
@@ -18,7 +19,6 @@ from nep.bridges import (
     TopicEnd,
     side_of,
 )
-from nep.masters.master import Master
 from tests.nep.programs import eventually
 
 if TYPE_CHECKING:

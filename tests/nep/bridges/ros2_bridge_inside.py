@@ -7,7 +7,7 @@ import os
 import pytest
 
 import nep
-from nep.bridges import Bridge, BridgeConfiguration, BridgeTopic, TopicEnd, side_of
+from nep.programs.bridges import Bridge, BridgeConfiguration, BridgeTopic, TopicEnd, side_of
 from tests.nep.bridges.joined import nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually, running
 

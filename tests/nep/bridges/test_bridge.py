@@ -9,13 +9,13 @@ import pytest
 
 from nep.backends import memory
 from nep.backends.base import backend_named
-from nep.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
-from nep.bridges.configuration import check_apart
 from nep.errors import EncodeError, NepError
 from nep.masters.master import Master
 from nep.messages.codecs import Codec, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import MessageKind
+from nep.programs.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
+from nep.programs.bridges.configuration import check_apart
 from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import (
     Net,
@@ -342,7 +342,7 @@ def test_what_is_latched_stays_latched_for_who_comes_later(pair):
 
 
 def test_each_publisher_s_latched_message_is_kept_and_goes_with_it(monkeypatch):
-    monkeypatch.setattr("nep.bridges.route._GONE_S", 0.0)
+    monkeypatch.setattr("nep.programs.bridges.route._GONE_S", 0.0)
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/robots")) as bridge:
         pubs = [a.node(f"robot{n}").new_pub("/robots", latched=True) for n in range(3)]
         for number, pub in enumerate(pubs):
@@ -426,7 +426,7 @@ def test_a_topic_that_is_named_is_not_matched_again():
 
 
 def test_what_a_pattern_found_is_let_go_when_nobody_publishes_it_and_found_again(monkeypatch):
-    monkeypatch.setattr("nep.bridges.bridge.IDLE_S", 0.0)
+    monkeypatch.setattr("nep.programs.bridges.bridge.IDLE_S", 0.0)
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/r/*", "/s/*"), topic("/named")) as bridge:
         on_a, on_b = a.node("a"), b.node("b")
         hears = on_b.new_sub("/s/x")
@@ -444,7 +444,7 @@ def test_what_a_pattern_found_is_let_go_when_nobody_publishes_it_and_found_again
 
 
 def test_patterns_have_a_bound(monkeypatch, caplog):
-    monkeypatch.setattr("nep.bridges.bridge.ROUTES_MOST", 2)
+    monkeypatch.setattr("nep.programs.bridges.bridge.ROUTES_MOST", 2)
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/**", "/all/**")) as bridge:
         node = a.node("a")
         for number in range(4):
@@ -483,7 +483,7 @@ def test_a_network_that_is_not_there_is_waited_for_and_said_and_the_rest_works(c
 
 
 def test_more_than_there_is_room_for_is_dropped_and_counted(monkeypatch):
-    monkeypatch.setattr("nep.bridges.route.HELD_MESSAGES", 10)
+    monkeypatch.setattr("nep.programs.bridges.route.HELD_MESSAGES", 10)
     with Master("127.0.0.1:0", learn_s=0.0) as first:
         address = first.address
     with nets("memory") as (a,):

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nep.backends import memory
-from nep.bridges import BridgeConfiguration, TopicEnd, join_line, read_configuration, side_of
-from nep.bridges.toml_file import EXAMPLE, read_text
 from nep.errors import NepError
+from nep.programs.bridges import BridgeConfiguration, TopicEnd, join_line, read_configuration, side_of
+from nep.programs.bridges.toml_file import EXAMPLE, read_text
 
 SIDES = '[a]\nbackend = "zeromq"\n[b]\nbackend = "zenoh"\n'
 ONE = '[[topics]]\na = "/t"\n'
@@ -131,7 +131,7 @@ def test_words_of_a_back_end_for_quality_are_known(monkeypatch):
     from dataclasses import replace
 
     told = replace(memory.BACKEND, qos=("reliable", "sensor"))
-    monkeypatch.setattr("nep.bridges.configuration.backend_named", lambda _name: told)
+    monkeypatch.setattr("nep.programs.bridges.configuration.backend_named", lambda _name: told)
     sides = SIDES.replace('"zenoh"\n', '"zenoh"\nmaster = "other"\n')
     assert read(sides + ONE + 'b_qos = "sensor"\n').topics[0].b.qos == "sensor"
     assert "there is no quality 'sensors'; did you mean 'sensor'?" in error(

@@ -9,11 +9,11 @@ from dataclasses import replace
 import pytest
 
 from nep.backends import memory
-from nep.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
-from nep.bridges.other_bridges import OtherBridge, OtherBridges
-from nep.bridges.trail import ECHO_S, HOPS_MOST, TRAIL_KEY, Echoes, Trail, read_trail
 from nep.errors import WireError
 from nep.messages.message import arrived
+from nep.programs.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
+from nep.programs.bridges.other_bridges import OtherBridge, OtherBridges
+from nep.programs.bridges.trail import ECHO_S, HOPS_MOST, TRAIL_KEY, Echoes, Trail, read_trail
 from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import bridged, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
@@ -242,8 +242,8 @@ def test_two_bridges_over_a_network_without_signs_end_too(nameless_side):
 def test_where_nothing_keeps_trails_one_of_two_bridges_lets_go_until_the_other_has_ended(monkeypatch, caplog):
     import nep
 
-    monkeypatch.setattr("nep.bridges.other_bridges._FORGOTTEN_S", 3.0)
-    monkeypatch.setattr("nep.bridges.side.HEARTBEAT_S", 0.5)
+    monkeypatch.setattr("nep.programs.bridges.other_bridges._FORGOTTEN_S", 3.0)
+    monkeypatch.setattr("nep.programs.bridges.side.HEARTBEAT_S", 0.5)
     backend = replace(memory.BACKEND, name="nameless", open=Nameless, has_extensions=False)
     monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: NAMED[name])
     NAMED["nameless"] = backend

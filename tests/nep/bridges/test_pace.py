@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from nep.bridges.pacer import Limit, Pacer
+from nep.programs.bridges.pacer import Limit, Pacer
 from tests.nep.bridges.joined import bridged, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
 

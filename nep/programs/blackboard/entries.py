@@ -13,10 +13,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from nep.blackboard.keys import Key, key_matches, key_text, literal_levels
-from nep.blackboard.values import is_same, size_of
 from nep.errors import BadValueError
 from nep.i18n import _
+from nep.programs.blackboard.keys import Key, key_matches, key_text, literal_levels
+from nep.programs.blackboard.values import is_same, size_of
 
 __all__ = ["AgeBy", "Cause", "Entries", "EntryChange", "StoredEntry"]
 

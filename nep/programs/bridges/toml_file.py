@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from nep.backends.base import Backend, backend_named
-from nep.bridges.configuration import (
+from nep.errors import NepError, did_you_mean
+from nep.i18n import _
+from nep.nodes.arguments import text as checked_type
+from nep.programs.bridges.configuration import (
     SIDES,
     BridgeConfiguration,
     BridgeTopic,
@@ -22,9 +25,6 @@ from nep.bridges.configuration import (
     direction_named,
     side_of,
 )
-from nep.errors import NepError, did_you_mean
-from nep.i18n import _
-from nep.nodes.arguments import text as checked_type
 from nep.text import escaped, shortened
 
 if sys.version_info >= (3, 11):

@@ -1,6 +1,6 @@
 """What a bridge shall join: the values, the names of topics on the other side, and the short form of a line.
 
-The form in a file is read by `nep.bridges.toml_file`.
+The form in a file is read by `nep.programs.bridges.toml_file`.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _NAME_MOST = 60
 
 @dataclass(frozen=True)
 class SideConfiguration:
-    """One of the two networks. `network` is its name for all bridges: see `nep.bridges.trail`.
+    """One of the two networks. `network` is its name for all bridges: see `nep.programs.bridges.trail`.
 
     Nodes are made with `backend` and `master`.
     """

@@ -5,8 +5,8 @@ carries one topic one way at the pace of `pacer`. `trail` keeps a message from c
 know who joins the same networks, and `topic_types` as what messages are subscribed and published.
 """
 
-from nep.bridges.bridge import Bridge
-from nep.bridges.configuration import (
+from nep.programs.bridges.bridge import Bridge
+from nep.programs.bridges.configuration import (
     BridgeConfiguration,
     BridgeTopic,
     SideConfiguration,
@@ -14,8 +14,8 @@ from nep.bridges.configuration import (
     join_line,
     side_of,
 )
-from nep.bridges.route import Route, RouteCounts
-from nep.bridges.toml_file import read_configuration
+from nep.programs.bridges.route import Route, RouteCounts
+from nep.programs.bridges.toml_file import read_configuration
 
 __all__ = [
     "Bridge",

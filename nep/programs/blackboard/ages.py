@@ -7,8 +7,8 @@ whatever becomes of it later changes no age.
 
 from __future__ import annotations
 
-from nep.blackboard.entries import AgeBy
 from nep.messages.message import Message
+from nep.programs.blackboard.entries import AgeBy
 
 __all__ = ["AHEAD_S", "BEHIND_S", "beginning_of"]
 

@@ -8,13 +8,13 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from nep.blackboard.keys import Key, key_of_topic, key_text, parse_key
-from nep.blackboard.perception import perception_in
-from nep.blackboard.values import leaves
 from nep.errors import DecodeError, NepError, WrongTypeError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
+from nep.programs.blackboard.keys import Key, key_of_topic, key_text, parse_key
+from nep.programs.blackboard.perception import perception_in
+from nep.programs.blackboard.values import leaves
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BlackboardWatch", "MessageReading", "PerceivedValue", "is_change_message"]
 
-_logger = logging.getLogger("nep.blackboard")
+_logger = logging.getLogger("nep.programs.blackboard")
 _HOLE = re.compile(r"\{([^{}]+)\}")
 _MISSING = object()
 

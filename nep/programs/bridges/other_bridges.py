@@ -12,7 +12,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from nep.bridges.configuration import SIDES, SideName
+from nep.programs.bridges.configuration import SIDES, SideName
 
 __all__ = ["HEARTBEAT_S", "OtherBridge", "OtherBridges", "Way"]
 

@@ -11,22 +11,22 @@ from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from nep.bridges.configuration import (
+from nep.errors import DecodeError, NepError
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.programs.bridges.configuration import (
     SIDES,
     BridgeConfiguration,
     BridgeTopic,
     SideName,
     checked_topic_names,
 )
-from nep.bridges.other_bridges import OtherBridges, Way
-from nep.bridges.pacer import Pacer
-from nep.bridges.route import Route, RouteEnd
-from nep.bridges.side import BridgeSide
-from nep.bridges.topic_types import type_in
-from nep.bridges.trail import Echoes
-from nep.errors import DecodeError, NepError
-from nep.messages.message import Message
-from nep.nodes.node import Node
+from nep.programs.bridges.other_bridges import OtherBridges, Way
+from nep.programs.bridges.pacer import Pacer
+from nep.programs.bridges.route import Route, RouteEnd
+from nep.programs.bridges.side import BridgeSide
+from nep.programs.bridges.topic_types import type_in
+from nep.programs.bridges.trail import Echoes
 from nep.protocol.graph_view import GraphView
 
 if TYPE_CHECKING:

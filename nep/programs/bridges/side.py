@@ -10,14 +10,14 @@ from contextlib import suppress
 from functools import partial
 from typing import Protocol
 
-from nep.bridges.configuration import SideConfiguration, SideName
-from nep.bridges.other_bridges import HEARTBEAT_S
-from nep.bridges.route import Route
 from nep.errors import ClosedError, NepError
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
+from nep.programs.bridges.configuration import SideConfiguration, SideName
+from nep.programs.bridges.other_bridges import HEARTBEAT_S
+from nep.programs.bridges.route import Route
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
 
 __all__ = ["BridgeSide"]

@@ -6,7 +6,7 @@ import math
 import sys
 from collections.abc import Iterator, Mapping
 
-from nep.blackboard.keys import MOST_LEVELS, Key
+from nep.programs.blackboard.keys import MOST_LEVELS, Key
 
 __all__ = ["copied", "is_same", "leaves", "size_of"]
 

@@ -8,10 +8,6 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 from nep.backends.base import Backend
-from nep.bridges.configuration import SideName
-from nep.bridges.pacer import Limit, Pacer
-from nep.bridges.topic_types import Form, default_type, type_for, type_in
-from nep.bridges.trail import TRAIL_KEY, Echoes, Trail, read_trail
 from nep.errors import ClosedError, EncodeError, NepError
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
@@ -19,6 +15,10 @@ from nep.messages.queue import Inbox
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
+from nep.programs.bridges.configuration import SideName
+from nep.programs.bridges.pacer import Limit, Pacer
+from nep.programs.bridges.topic_types import Form, default_type, type_for, type_in
+from nep.programs.bridges.trail import TRAIL_KEY, Echoes, Trail, read_trail
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
 

@@ -12,21 +12,21 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
-from nep.arguments import at_least, function, period, seconds
 from nep.backends.connection import Configuration
-from nep.blackboard.ages import beginning_of
-from nep.blackboard.entries import AgeBy, Cause, Entries, EntryChange, StoredEntry
-from nep.blackboard.keys import Key, key_matches, key_text, parse_key
-from nep.blackboard.values import copied, leaves
-from nep.blackboard.watch import BlackboardWatch, MessageReading, PerceivedValue
 from nep.errors import BadValueError, ClosedError, NepError, NoValueError, WaitTimeoutError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.timer import Timer
+from nep.programs.blackboard.ages import beginning_of
+from nep.programs.blackboard.entries import AgeBy, Cause, Entries, EntryChange, StoredEntry
+from nep.programs.blackboard.keys import Key, key_matches, key_text, parse_key
+from nep.programs.blackboard.values import copied, leaves
+from nep.programs.blackboard.watch import BlackboardWatch, MessageReading, PerceivedValue
 from nep.protocol.topic_pattern import is_pattern
 from nep.protocol.wire import check_topic
 from nep.system import forks
+from nep.system.arguments import at_least, function, period, seconds
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 
 import orjson
 
-from nep.arguments import seconds
-from nep.blackboard.board import Blackboard, BlackboardChange, BlackboardEntry
 from nep.errors import BadKeyError, NepError
 from nep.i18n import _
 from nep.nodes.node import Node
+from nep.programs.blackboard.board import Blackboard, BlackboardChange, BlackboardEntry
+from nep.system.arguments import seconds
 
 if TYPE_CHECKING:
     from typing_extensions import Self
