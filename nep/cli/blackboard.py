@@ -72,9 +72,7 @@ _NameOption = Annotated[
     typer.Option(
         "--name",
         metavar=_("NAME"),
-        help=_("How its services and its topic are called; {name} when nothing is said.").format(
-            name=_DEFAULT_NAME
-        ),
+        help=_("How its services and its topic are called; 'blackboard' when nothing is said."),
         show_default=False,
     ),
 ]
@@ -87,9 +85,9 @@ def run(
         typer.Argument(
             metavar="[KEY=]TOPIC",
             help=_(
-                "What to keep, such as human=/perception/humans; {topic} when nothing is said. "
+                "What to keep, such as human=/perception/humans; '/blackboard' when nothing is said. "
                 "Topics may have wildcards."
-            ).format(topic=_DEFAULT_TOPIC),
+            ),
             show_default=False,
             autocompletion=complete_topic,
         ),
@@ -174,7 +172,7 @@ def show(
         say(_("it has nothing that matches now"))
     more = answer.get("more") if isinstance(answer, Mapping) else 0
     if more:
-        say(_("and {count} more").format(count=more))
+        say(_("and {count} more values").format(count=more))
 
 
 def _watched(word: str) -> tuple[str, str | None]:

@@ -146,9 +146,10 @@ def _check_reach(configuration: BridgeConfiguration) -> None:
     for side in (configuration.a, configuration.b):
         if side.backend.is_in_process:
             raise NepError(
-                _("nodes of '{name}' meet within one program only; join them there by nep.Bridge").format(
-                    name=side.backend.name
-                )
+                _(
+                    "nodes of '{name}' meet within one program only; join them there by "
+                    "nep.programs.bridges.Bridge"
+                ).format(name=side.backend.name)
             )
 
 
