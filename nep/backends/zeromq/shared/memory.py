@@ -193,10 +193,13 @@ class Loan:
         self._port = port  # the memory lasts as long as the port that it is lent by
         self._sample = sample
         self.address = int(sample.payload_ptr) + _HEAD
-        array = (ctypes.c_uint8 * size).from_address(self.address)
-        array.loan = self  # type: ignore[attr-defined] # whoever has the buffer keeps it
-        self.buffer = memoryview(array).cast("B")
-        """Writable, of the payload's size."""
+
+    @property
+    def buffer(self) -> memoryview:
+        """Writable, of the payload's size. Whoever has it keeps the loan."""
+        array = (ctypes.c_uint8 * self.size).from_address(self.address)
+        array.loan = self  # type: ignore[attr-defined]
+        return memoryview(array).cast("B")
 
     def send(self, number: int) -> None:
         """Hand the payload to all readers. It must not be changed from now on."""

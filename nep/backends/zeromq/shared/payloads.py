@@ -58,13 +58,18 @@ class SharedPayloads:
         loan = self._loan_of(data, size, now)
         return None if loan is None else _NUMBER.pack(self._writer.send(loan))
 
-    def _is_ready(self, size: int, seen: Iterable[int], now: float) -> bool:
+    def _has_slots(self, size: int) -> bool:
+        """Whether there are slots for payloads of this size. New memory nobody has opened yet."""
         generation = self._writer.generation
-        if not self._writer.prepare(size):
-            return False
+        is_there = self._writer.prepare(size)
         if generation != self._writer.generation:
             self.readers.clear()
             self._offered.clear()
+        return is_there
+
+    def _is_ready(self, size: int, seen: Iterable[int], now: float) -> bool:
+        if not self._has_slots(size):
+            return False
         for each in seen:
             times, at = self._offered.get(each, (0, float("-inf")))
             if each not in self.readers and times < _OFFERS and now >= at + _AGAIN_S:
@@ -87,7 +92,7 @@ class SharedPayloads:
 
     def lend(self, size: int) -> memoryview | None:
         """Memory for a payload of this size, to be written, then published; None where nobody shares it."""
-        if not self.readers or size < SHARED_BYTES or not self._writer.prepare(size):
+        if not self.readers or size < SHARED_BYTES or not self._has_slots(size) or not self.readers:
             return None
         loan = self._writer.loan(size)
         return None if loan is None else loan.buffer
