@@ -435,6 +435,8 @@ def test_who_does_not_ask_for_it_does_not_import_zenoh() -> None:
 def test_a_forked_child_is_told_and_ends_and_holds_nothing(place: str, make: Make) -> None:
     code = f"""
     import os, sys, nep
+    def say(it):  # whole lines at once: parent and child have one output
+        os.write(1, (str(it) + "\\n").encode())
     node = nep.node("parent", "zenoh", master={place!r})
     sub, pub = node.new_sub("t"), node.new_pub("t")
     child = os.fork()
@@ -443,11 +445,11 @@ def test_a_forked_child_is_told_and_ends_and_holds_nothing(place: str, make: Mak
             try:
                 bad()
             except nep.NepError as error:
-                print(error, flush=True)
+                say(error)
         sys.stdin.readline()
         sys.exit(7)
     pub.publish("fine")
-    print(sub.listen(timeout_s=30.0)[1], flush=True)
+    say(sub.listen(timeout_s=30.0)[1])
     sys.stdin.readline()
     os.kill(os.getpid(), 9)
     """
