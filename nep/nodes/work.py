@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import threading
 from collections.abc import Callable
 from itertools import chain
@@ -15,8 +13,9 @@ from nep.i18n import _
 from nep.nodes.subscriber import SLICE_S, Subscriber
 from nep.nodes.timer import Timer, next_due
 from nep.patterns.services.owned import OwnedServices
+from nep.system.arguments import is_coroutine_function
 
-__all__ = ["NOTHING", "Callback", "Work", "is_coroutine_function"]
+__all__ = ["NOTHING", "Callback", "Work"]
 
 NOTHING = object()
 """There is no message for a callback."""
@@ -269,12 +268,3 @@ class Work:
             self.check_not_forked()
         finally:
             self.begin_anew()
-
-
-def is_coroutine_function(call: object) -> bool:
-    """Whether calling it makes a coroutine, as far as can be seen before."""
-    while isinstance(call, functools.partial):
-        call = call.func
-    return inspect.iscoroutinefunction(call) or (
-        callable(call) and inspect.iscoroutinefunction(call.__call__)
-    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
 from collections.abc import Callable, Sequence
 from typing import TypeVar, cast
@@ -10,7 +12,19 @@ from nep.errors import WrongTypeError
 from nep.i18n import _, listed
 from nep.text import control_in, escaped, shortened
 
-__all__ = ["at_least", "flag", "function", "limit", "one_of", "period", "seconds", "text", "within"]
+__all__ = [
+    "at_least",
+    "flag",
+    "function",
+    "is_coroutine_function",
+    "limit",
+    "one_of",
+    "period",
+    "plain_function",
+    "seconds",
+    "text",
+    "within",
+]
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
@@ -125,6 +139,26 @@ def function(name: str, value: F) -> F:
     if not callable(value):
         raise WrongTypeError(_("{name} is a '{kind}'; give a function").format(name=name, kind=_kind(value)))
     return value
+
+
+def plain_function(name: str, value: F) -> F:
+    """The same, where nobody would await what a coroutine function gives. Raises `ValueError`."""
+    if is_coroutine_function(function(name, value)):
+        raise ValueError(
+            _("{name} is a coroutine function, which nobody awaits here; give a plain function").format(
+                name=name
+            )
+        )
+    return value
+
+
+def is_coroutine_function(call: object) -> bool:
+    """Whether calling it makes a coroutine, as far as can be seen before."""
+    while isinstance(call, functools.partial):
+        call = call.func
+    return inspect.iscoroutinefunction(call) or (
+        callable(call) and inspect.iscoroutinefunction(call.__call__)
+    )
 
 
 def _kind(value: object) -> str:

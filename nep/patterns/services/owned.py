@@ -17,7 +17,7 @@ from nep.patterns.services.client import Client
 from nep.patterns.services.server import Callback, Server
 from nep.patterns.services.survey import Respondent, Surveyor
 from nep.protocol.service_wire import check_service, check_survey
-from nep.system.arguments import at_least, function, seconds, text
+from nep.system.arguments import at_least, plain_function, seconds, text
 
 __all__ = ["OwnedServices"]
 
@@ -78,7 +78,7 @@ class OwnedServices:
         msg_type: str = "json",
     ) -> S:
         if callback is not None:
-            function("callback", callback)
+            plain_function("callback", callback)
         at_least("threads", threads, 0)
         if threads and callback is None:
             raise ValueError(_("threads need a callback to run; give one"))

@@ -26,7 +26,7 @@ from nep.programs.blackboard.watch import BlackboardWatch, MessageReading, Perce
 from nep.protocol.topic_pattern import is_pattern
 from nep.protocol.wire import check_topic
 from nep.system import forks
-from nep.system.arguments import at_least, function, period, seconds
+from nep.system.arguments import at_least, function, period, plain_function, seconds
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -381,7 +381,7 @@ class Blackboard:
         comes out of `spin`; the other changes come with the next one. Returns a function that ends it.
         Without a node, `deliver` calls the callbacks.
         """
-        observer = _Observer(parse_key(pattern), function("callback", callback))
+        observer = _Observer(parse_key(pattern), plain_function("callback", callback))
         with self._news:
             self._observers = (*self._observers, observer)
 

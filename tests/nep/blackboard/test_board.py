@@ -474,3 +474,10 @@ def test_a_board_that_is_forgotten_is_freed(clock: Clock) -> None:
     del board
     gc.collect()
     assert seen() is None
+
+
+def test_a_coroutine_function_is_refused_where_nobody_awaits_it() -> None:
+    async def changed(_change: object) -> None: ...
+
+    with pytest.raises(ValueError, match="callback is a coroutine function, which nobody awaits here"):
+        nep.Blackboard().on_change("*", changed)

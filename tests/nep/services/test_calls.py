@@ -573,3 +573,15 @@ def test_calls_beyond_the_bound_are_refused_at_the_call(make: Make) -> None:
         client.call_async({})
     with pytest.raises(nep.NepError, match="1000 calls of '/nobody' are under way"):
         client.call_async({})
+
+
+def test_a_coroutine_function_is_refused_where_nobody_awaits_it(master: Master) -> None:
+    async def answer(request: object) -> object:
+        return request
+
+    with nep.node("server", master=master.address) as node:
+        for make in (node.new_server, node.new_respondent):
+            with pytest.raises(
+                ValueError, match="callback is a coroutine function, which nobody awaits here"
+            ):
+                make("a", answer)
