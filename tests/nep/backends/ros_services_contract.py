@@ -7,12 +7,12 @@ no longer, and two servers of one name in one program.
 from __future__ import annotations
 
 import pytest
-from tests.nep.patterns.services import test_calls as contract
-from tests.nep.patterns.services.test_calls import spin
 
 import nep
 from tests.nep.backends.ros_contract import Make, _nothing_is_left, make, ros
 from tests.nep.programs import eventually
+from tests.nep.services import test_calls as contract
+from tests.nep.services.test_calls import spin
 
 __all__ = ["_nothing_is_left", "make", "ros", "spin"]
 

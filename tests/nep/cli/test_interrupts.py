@@ -120,7 +120,9 @@ def test_every_name_of_the_package_is_there_and_is_the_one_that_checkers_see():
         if isinstance(statement, ast.ImportFrom)
         for each in statement.names
     }
-    assert seen == {("*", "nep.public"), ("__version__", "nep.version")}
+    assert seen == {
+        ("*", "nep.public"), ("__version__", "nep.version"), ("geometry", "nep"), ("sensor", "nep"),
+    }  # fmt: skip
     names = {name for name in vars(public) if not name.startswith("_")}
     assert names | {"__version__"} == set(nep.__all__)
     assert "Node" in names
