@@ -84,6 +84,17 @@ def _addresses(endpoints: set[str]) -> tuple[set[object], set[object]]:
 
 
 def _close_sockets(exact: set[object], ports: set[object]) -> None:
+    # With a default time-out (rospy sets one) Python would make each socket that is looked at non-blocking,
+    # and that is shared with the parent: who waits there in `accept` would get an error.
+    usual = socket.getdefaulttimeout()
+    socket.setdefaulttimeout(None)
+    try:
+        _close_those_at(exact, ports)
+    finally:
+        socket.setdefaulttimeout(usual)
+
+
+def _close_those_at(exact: set[object], ports: set[object]) -> None:
     for name in os.listdir(_FOLDER):  # noqa: PTH208 - numbers
         with contextlib.suppress(OSError, ValueError):  # the list's own descriptor is gone by now
             number = int(name)

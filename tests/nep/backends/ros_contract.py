@@ -315,20 +315,6 @@ def test_closing_ends_waits_and_is_said(make: Make) -> None:
         node.new_sub("topic")
 
 
-def test_dataclasses_with_ros_s_names_travel_as_ros_s_own_types(make: Make) -> None:
-    a, b = make("a"), make("b")
-    twists, maps, poses = b.new_sub("/t", Twist), b.new_sub("/t"), b.new_sub("/p", PoseStamped)
-    pub, stamped = a.new_pub("/t", Twist), a.new_pub("/p", PoseStamped)
-    pub.publish(Twist(Vector3(0.5), Vector3(z=math.inf)))
-    assert twists.listen(timeout_s=30.0) == (True, Twist(Vector3(0.5), Vector3(z=math.inf)))
-    assert maps.listen(timeout_s=30.0) == (True, TWIST)
-    pose = PoseStamped(Header(Time(5, 6), "map"), Pose(Point(1.0)))
-    stamped.publish(pose)
-    assert poses.listen(timeout_s=30.0) == (True, pose)
-    pub.publish(Twist("fast"))
-    assert pub.problem.endswith("linear is a 'str'; give a 'Vector3'")
-
-
 def test_another_master_is_refused_in_a_sentence(make: Make, tmp_path: Path) -> None:
     make("a").new_pub("topic")
     with (
@@ -363,3 +349,17 @@ def test_a_forked_child_says_that_it_cannot_and_leaves_the_parent_alone(make: Ma
     os.waitpid(child, 0)
     pub.publish(1)
     assert sub.listen(timeout_s=30.0) == (True, 1)
+
+
+def test_dataclasses_with_ros_s_names_travel_as_ros_s_own_types(make: Make) -> None:
+    a, b = make("a"), make("b")
+    twists, maps, poses = b.new_sub("/t", Twist), b.new_sub("/t"), b.new_sub("/p", PoseStamped)
+    pub, stamped = a.new_pub("/t", Twist), a.new_pub("/p", PoseStamped)
+    pub.publish(Twist(Vector3(0.5), Vector3(z=math.inf)))
+    assert twists.listen(timeout_s=30.0) == (True, Twist(Vector3(0.5), Vector3(z=math.inf)))
+    assert maps.listen(timeout_s=30.0) == (True, TWIST)
+    pose = PoseStamped(Header(Time(5, 6), "map"), Pose(Point(1.0)))
+    stamped.publish(pose)
+    assert poses.listen(timeout_s=30.0) == (True, pose)
+    pub.publish(Twist("fast"))
+    assert pub.problem.endswith("linear is a 'str'; give a 'Vector3'")

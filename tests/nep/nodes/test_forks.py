@@ -315,3 +315,27 @@ print("all", flush=True)
     with running(code) as program:
         assert program.line() == "all"
         assert program.end()[1] == ""
+
+
+def test_sockets_that_the_parent_waits_in_stay_as_they_are(master: Master) -> None:
+    """Also with a default time-out, as rospy sets one: blocking or not is shared with the child."""
+    code = (
+        CHILD
+        + """
+import fcntl, socket
+node = nep.node("parent")
+node.new_pub("topic")
+listening = socket.socket()
+listening.bind(("127.0.0.1", 0))
+listening.listen()
+socket.setdefaulttimeout(60.0)
+def own():
+    assert socket.getdefaulttimeout() == 60.0
+assert child(own) == 0
+print(bool(fcntl.fcntl(listening.fileno(), fcntl.F_GETFL) & os.O_NONBLOCK))
+node.close()
+"""
+    )
+    with running(code, NEP_MASTER=master.address) as program:
+        assert program.line() == "False"
+        assert program.end() == ("", "")
