@@ -101,21 +101,24 @@ class BridgeSide:
         while not self._is_closing:
             self._wanted.clear()
             now = time.monotonic()
-            is_due = now >= self._look_at or (now >= self._look_at - _LOOK_S + _SOON_S and self._needs(owner))
+            deciding = self._deciding(owner)
+            is_due = now >= self._look_at or (bool(deciding) and now >= self._look_at - _LOOK_S + _SOON_S)
             if is_due:
                 self._look(owner)
                 self._look_at = time.monotonic() + _LOOK_S
             if self.view is not None:
-                self._look_after(owner, self.view, is_due=is_due)
+                self._look_after(owner, self.view, deciding, is_due=is_due)
                 if is_due and owner.speaks_on(self, self.view):
                     self._meet(owner)
                     self._tell({**owner.status(), "side": self.name})
-            self._wanted.wait(max(0.0, self._look_at - time.monotonic()))
+            is_soon = self.view is not None and self._deciding(owner)
+            look_at = self._look_at - (_LOOK_S - _SOON_S if is_soon else 0.0)
+            self._wanted.wait(max(0.0, look_at - time.monotonic()))
 
-    def _needs(self, owner: BridgeOfSide) -> bool:
-        """Whether a type is to be decided: by who is there now, not a second ago."""
+    def _deciding(self, owner: BridgeOfSide) -> list[Route]:
+        """Whose type is to be decided: by who is there now, so after another look."""
         routes = (each for each in owner.routes if each.end.side == self.name)
-        return any(each.needs_type and self.name not in each.troubles for each in routes)
+        return [each for each in routes if each.needs_type and self.name not in each.troubles]
 
     def _look(self, owner: BridgeOfSide) -> None:
         """Ask who is there; say when nobody answers, and when somebody does again."""
@@ -145,8 +148,13 @@ class BridgeSide:
             if route.origin.side == self.name:
                 route.close_gone(view, time.monotonic())
 
-    def _look_after(self, owner: BridgeOfSide, view: GraphView, *, is_due: bool) -> None:
-        """Make what routes need here. What could not be made is tried again with the next look."""
+    def _look_after(
+        self, owner: BridgeOfSide, view: GraphView, deciding: Sequence[Route], *, is_due: bool
+    ) -> None:
+        """Make what routes need here. What could not be made is tried again with the next look.
+
+        `deciding`: those whose first message came before the look, when that is due; others wait for another.
+        """
         for route in owner.routes:
             if self._is_closing:
                 return
@@ -154,8 +162,13 @@ class BridgeSide:
                 continue
             if route.origin.side == self.name:
                 self._try(route, partial(route.subscribe, self.node, view, owner.own_nodes))
-            elif route.needs_publisher:
+            elif route.needs_publisher and (
+                not route.needs_type or (is_due and self._may_decide(route, deciding))
+            ):
                 self._try(route, partial(route.open_publishers, self.node, view, owner.own_nodes))
+
+    def _may_decide(self, route: Route, deciding: Sequence[Route]) -> bool:
+        return route in deciding or self.name in route.troubles
 
     def _try(self, route: Route, make: Callable[[], None]) -> None:
         """One route that cannot be served does not stop the others; it is tried again."""

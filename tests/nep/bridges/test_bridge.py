@@ -114,7 +114,10 @@ def test_a_type_of_its_own_stays_that_type():
         assert sub.receive(30.0).msg_type == "robot/description"
 
 
-def test_a_topic_that_others_publish_there_keeps_its_one_type():
+@pytest.mark.parametrize("soon_s", [0.05, 0.5])
+def test_a_topic_that_others_publish_there_keeps_its_one_type(monkeypatch, soon_s):
+    """However lately the bridge has looked who is there: the type is decided by a look after the message."""
+    monkeypatch.setattr("nep.programs.bridges.side._SOON_S", soon_s)
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")) as bridge:
         on_b = b.node("b")
         own, sub = on_b.new_pub("/t", "robot/state"), on_b.new_sub("/t", "robot/state")
