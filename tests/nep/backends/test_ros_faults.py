@@ -118,14 +118,15 @@ def test_ctrl_c_ends_a_program_that_spins_and_unregisters_it(ros: str) -> None:
 
 
 TOO_MUCH = """
-import nep, resource, sys
+import nep, sys
 node = nep.node("speaker", "ros")
 pub = node.new_pub("much", "bytes")
 print(pub.subscribers)
 sys.stdin.readline()
 for n in range(400):
     pub.publish(n.to_bytes(2, "little") + bytes(2_000_000))
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)
+# Not getrusage: that begins with what the program had that started this one, a large worker of the tests.
+print(next(int(line.split()[1]) // 1024 for line in open("/proc/self/status") if line.startswith("VmHWM")))
 print([each.sentence for each in node.graph().alerts])
 sys.stdin.readline()
 print(pub._transport._drops.count)
@@ -151,7 +152,7 @@ def test_a_subscriber_that_hangs_costs_bounded_memory_and_drops_are_counted(ros:
             assert speaker.line() == "1"
             hearer.stop()
             speaker.say("")
-            speaker.line()  # its memory, which the allocator gives back when it likes; drops are exact
+            assert int(speaker.line()) < 650, "MB; there are 800 to send"
             assert "subscribers are too slow for it" in speaker.line()
             hearer.signal(signal.SIGCONT)
             hearer.say("")
