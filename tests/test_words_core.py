@@ -37,10 +37,18 @@ from app.robots.driver.tasks import still_moving
 from app.robots.identity import may_move, said_of_stop
 from app.run import stop_lines
 from nep import errors as nep_errors
-from nep.doctor import Facts, findings
-from nep.doctor.facts import ClockFact, FileFact, FolderFact, PackageFact, PortFact, ProcessFact, ProgramFact
 from nep.i18n import _
 from nep.nodes.log_handler import LogHandler
+from nep.programs.doctor import Facts, findings
+from nep.programs.doctor.facts import (
+    ClockFact,
+    FileFact,
+    FolderFact,
+    PackageFact,
+    PortFact,
+    ProcessFact,
+    ProgramFact,
+)
 from nep.protocol.encoding import decode_answer, decode_request
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 from nep.system.terminal import Terminal

@@ -12,9 +12,9 @@ from nep.system.lazy_import import lazy_module
 from nep.text import escaped
 
 if TYPE_CHECKING:
-    from nep import doctor as doctors
+    from nep.programs import doctor as doctors
 else:  # the other commands need not wait for it
-    doctors = lazy_module("nep.doctor")
+    doctors = lazy_module("nep.programs.doctor")
 
 _STYLES = {"error": "bold red", "warning": "bold yellow", "info": "dim", "ok": "green"}
 _SIGNS = dict(zip(_STYLES, "✗!·✓", strict=True))

@@ -23,12 +23,12 @@ from nep.system.lazy_import import lazy_module
 from nep.system.terminal import Terminal, log_to
 
 if TYPE_CHECKING:
-    from nep import doctor
-    from nep.doctor import collect
-    from nep.gateway import attachment
+    from nep.programs import doctor
+    from nep.programs.doctor import collect
+    from nep.programs.gateway import attachment
 else:  # the other commands need not wait for them
-    doctor, collect = lazy_module("nep.doctor"), lazy_module("nep.doctor.collect")
-    attachment = lazy_module("nep.gateway.attachment")
+    doctor, collect = lazy_module("nep.programs.doctor"), lazy_module("nep.programs.doctor.collect")
+    attachment = lazy_module("nep.programs.gateway.attachment")
 
 
 _ListenOption = Annotated[

@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from nep.gateway.attachment import GatewayAttachment
 from nep.masters.master import Master
+from nep.programs.gateway.attachment import GatewayAttachment
 
 pytestmark = [pytest.mark.ports]
 

@@ -17,8 +17,8 @@ from app.core.robots import robot_link as link_module
 from app.robots.description.description import topic_of
 from app.robots.description.inputs import Choice, Parameter
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
-from nep.doctor import Finding
 from nep.messages.message import Message
+from nep.programs.doctor import Finding
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 

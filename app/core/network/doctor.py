@@ -12,9 +12,9 @@ from nep.i18n import _
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    from nep import doctor
+    from nep.programs import doctor
 else:
-    doctor = lazy_module("nep.doctor")
+    doctor = lazy_module("nep.programs.doctor")
 
 JOIN_S = 4.0
 

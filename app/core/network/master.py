@@ -16,9 +16,9 @@ from nep.protocol.graph_view import GraphView
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    from nep import doctor
+    from nep.programs import doctor
 else:
-    doctor = lazy_module("nep.doctor")
+    doctor = lazy_module("nep.programs.doctor")
 
 LEARNING_S = 1.5
 """How long a master that has just started may not know everybody yet (it learns for one second)."""

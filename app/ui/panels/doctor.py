@@ -12,11 +12,11 @@ from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.widgets import Chip, EmptyState, IconButton
 from app.ui.widgets.cards import AlertRow
 from app.ui.widgets.lists.scroll_areas import PanelRows
-from nep.doctor import report
 from nep.i18n import _, lazy
+from nep.programs.doctor import report
 
 if TYPE_CHECKING:
-    from nep.doctor import Finding
+    from nep.programs.doctor import Finding
 
 STATUS = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
 BAD = frozenset({"error", "warning"})

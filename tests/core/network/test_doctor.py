@@ -6,7 +6,7 @@ import socket
 import threading
 
 from app.core.network.doctor import Doctor, doctor_of
-from nep.doctor import Finding
+from nep.programs.doctor import Finding
 
 FINE = Finding("master", "ok", "A master runs.")
 

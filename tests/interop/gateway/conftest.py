@@ -9,8 +9,8 @@ import threading
 import pytest
 import zmq
 
-from nep.gateway.gateway import Gateway
-from nep.gateway.processes import SystemProcesses
+from nep.programs.gateway.gateway import Gateway
+from nep.programs.gateway.processes import SystemProcesses
 
 LONG_MS = 30_000
 

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from nep.gateway.gateway import Gateway
-from nep.gateway.processes import SystemProcesses
+from nep.programs.gateway.gateway import Gateway
+from nep.programs.gateway.processes import SystemProcesses
 
 pytestmark = [
     pytest.mark.ports,

@@ -11,8 +11,8 @@ import zmq
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from nep.gateway.framing import FrameError, Shape
-from nep.gateway.requests import Request, RequestError, read_request
+from nep.programs.gateway.framing import FrameError, Shape
+from nep.programs.gateway.requests import Request, RequestError, read_request
 
 pytestmark = [pytest.mark.ports]
 

@@ -9,7 +9,7 @@ import socket
 import pytest
 import zmq
 
-from nep.gateway.request_server import Ports
+from nep.programs.gateway.request_server import Ports
 
 pytestmark = [pytest.mark.ports]
 

@@ -193,8 +193,8 @@ def test_a_gateway_without_files_refuses_originals_and_goes_on(tmp_path: Path) -
         + """
 from pathlib import Path
 import json, zmq
-from nep.gateway.attachment import GatewayAttachment
-from nep.gateway.request_server import Ports
+from nep.programs.gateway.attachment import GatewayAttachment
+from nep.programs.gateway.request_server import Ports
 attached = GatewayAttachment(Path(sys.argv[1]) / "ports.json", Ports(int(sys.argv[2]), 0, 0))
 def ask(topic):
     said = {"node": "n", "topic": topic, "mode": "many2many", "socket": "publisher", "msg_type": "json"}

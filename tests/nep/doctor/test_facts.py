@@ -15,8 +15,8 @@ import typer
 
 import nep
 from nep.cli.doctor import doctor
-from nep.doctor import collect_facts, installs, processes, start_obstacle
-from nep.doctor.collect import loopback_problem
+from nep.programs.doctor import collect_facts, installs, processes, start_obstacle
+from nep.programs.doctor.collect import loopback_problem
 from tests.nep.programs import running
 
 REPOSITORY = Path(__file__).resolve().parents[3]

@@ -6,9 +6,17 @@ from dataclasses import replace
 
 import pytest
 
-from nep.doctor import Facts, findings, report, to_plain, worst
-from nep.doctor.facts import ClockFact, FileFact, FolderFact, PackageFact, PortFact, ProcessFact, ProgramFact
-from nep.doctor.installs import Install
+from nep.programs.doctor import Facts, findings, report, to_plain, worst
+from nep.programs.doctor.facts import (
+    ClockFact,
+    FileFact,
+    FolderFact,
+    PackageFact,
+    PortFact,
+    ProcessFact,
+    ProgramFact,
+)
+from nep.programs.doctor.installs import Install
 from nep.protocol.graph_view import Alert, GraphView, NodeInfo
 
 NOW = 1_800_000_000.0

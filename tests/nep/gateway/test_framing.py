@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nep.gateway.framing import (
+from nep.programs.gateway.framing import (
     FrameError,
     Shape,
     codec_of,

@@ -5,10 +5,10 @@ import os
 
 import pytest
 
-from nep.gateway.graph_registrar import GraphRegistrar
-from nep.gateway.processes import load_of
-from nep.gateway.programs import OriginalProgram, TopicLink
 from nep.masters.graph import Graph
+from nep.programs.gateway.graph_registrar import GraphRegistrar
+from nep.programs.gateway.processes import load_of
+from nep.programs.gateway.programs import OriginalProgram, TopicLink
 from nep.protocol.requests import Look
 from nep.system.cpu import CpuLoad
 

@@ -5,8 +5,8 @@ import threading
 
 import pytest
 
-from nep.gateway.inbox import NativeInbox
 from nep.messages.message import Message
+from nep.programs.gateway.inbox import NativeInbox
 
 
 @pytest.fixture

@@ -3,10 +3,10 @@ from __future__ import annotations
 import pytest
 
 import nep
-from nep.gateway.attachment import NativeNetwork
-from nep.gateway.graph_registrar import GraphRegistrar
-from nep.gateway.inbox import NativeInbox
 from nep.messages.message import Message
+from nep.programs.gateway.attachment import NativeNetwork
+from nep.programs.gateway.graph_registrar import GraphRegistrar
+from nep.programs.gateway.inbox import NativeInbox
 from tests.nep.bad_pictures import BOMBS
 
 LONG_S = 30

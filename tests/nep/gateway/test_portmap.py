@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from nep.gateway.portmap import FIRST_PORT, LAST_PORT, PortMap, Registration, TopicLine, default_file
+from nep.programs.gateway.portmap import FIRST_PORT, LAST_PORT, PortMap, Registration, TopicLine, default_file
 
 JSON_A = TopicLine("t", "prefixed", "json", "many2many")
 JSON_B = TopicLine("t", "bare", "json", "many2many")

@@ -5,7 +5,7 @@ import socket
 import subprocess
 import sys
 
-from nep.gateway.processes import SystemProcesses
+from nep.programs.gateway.processes import SystemProcesses
 
 PROCESSES = SystemProcesses()
 

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from nep.gateway.portmap import PortMap, Registration, TopicLine
-from nep.gateway.programs import ProgramTable, TopicLink
-from nep.gateway.proxy_pair import endpoints_of
+from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
+from nep.programs.gateway.programs import ProgramTable, TopicLink
+from nep.programs.gateway.proxy_pair import endpoints_of
 
 LINE = TopicLine("t", "prefixed", "json", "many2many")
 

@@ -9,8 +9,8 @@ from typing import TypeAlias
 import pytest
 import zmq
 
-from nep.gateway.portmap import TopicLine
-from nep.gateway.proxy_pair import MOST_KEPT_BYTES, ProxyPair
+from nep.programs.gateway.portmap import TopicLine
+from nep.programs.gateway.proxy_pair import MOST_KEPT_BYTES, ProxyPair
 
 LONG_MS = 30_000
 Socket: TypeAlias = zmq.Socket[bytes]

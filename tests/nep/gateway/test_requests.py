@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nep.gateway.requests import Member, RequestError, broadcast, grant, read_request, refuse
+from nep.programs.gateway.requests import Member, RequestError, broadcast, grant, read_request, refuse
 
 ASKED = {
     "node": "n1",

@@ -11,17 +11,17 @@ import pytest
 import zmq
 
 from nep.backends.zeromq.rpc import RpcClient
-from nep.gateway.attachment import NativeNetwork
-from nep.gateway.framing import PORT_A
-from nep.gateway.graph_registrar import GraphRegistrar
-from nep.gateway.portmap import PortMap, Registration, TopicLine
-from nep.gateway.programs import OriginalProgram, ProgramTable, TopicLink
-from nep.gateway.requests import RequestError, read_request
 from nep.masters.bad_requests import BadRequests
 from nep.masters.graph import Graph
 from nep.masters.registry import Registry
 from nep.masters.router import MasterRouter
 from nep.masters.snapshot import GraphViewer
+from nep.programs.gateway.attachment import NativeNetwork
+from nep.programs.gateway.framing import PORT_A
+from nep.programs.gateway.graph_registrar import GraphRegistrar
+from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
+from nep.programs.gateway.programs import OriginalProgram, ProgramTable, TopicLink
+from nep.programs.gateway.requests import RequestError, read_request
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.protocol.requests import (

@@ -26,9 +26,9 @@ from app.core.robots.voices import RobotVoices
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.robots.description.model import Robot
-from nep.doctor import Finding
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
+from nep.programs.doctor import Finding
 from tests.ui import sample_data
 from tests.ui.fakes.images import Images
 from tests.ui.fakes.network import Network

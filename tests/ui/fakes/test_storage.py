@@ -13,7 +13,7 @@ from app.core.documents.document import Document
 from app.core.documents.journal import Journal
 from app.core.network.doctor import Doctor
 from app.core.storage.settings import RECENT_LIMIT, Settings
-from nep.doctor import Finding
+from nep.programs.doctor import Finding
 from tests.blocks.samples import block, started, text, workspace, write
 from tests.ui.fakes import session, storage
 

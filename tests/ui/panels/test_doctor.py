@@ -6,7 +6,7 @@ from PySide6.QtGui import QGuiApplication
 
 from app.core.network.master import MasterState
 from app.ui.panels.doctor import PANEL, DoctorPanel
-from nep.doctor import Finding
+from nep.programs.doctor import Finding
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
 from tests.ui.sample_data import FOUND

@@ -104,7 +104,7 @@ def test_the_steps_find_every_panel() -> None:
 
 def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: Path) -> None:
     """What the first paint needs: a line more here is time that every start takes."""
-    late = ["PySide6.QtWebEngineCore", "PySide6.QtNetwork", "cv2", "numpy", "psutil", "nep.doctor"]
+    late = ["PySide6.QtWebEngineCore", "PySide6.QtNetwork", "cv2", "numpy", "psutil", "nep.programs.doctor"]
     late += ["app.ui.blockly.view", "app.ui.panels.console.panel", "importlib.metadata"]
     program = (
         "import sys\n"

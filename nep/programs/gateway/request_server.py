@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import zmq
 
-from nep.gateway.framing import PORT_A, PORT_B
-from nep.gateway.relay import AlertSink
-from nep.gateway.requests import (
+from nep.i18n import _
+from nep.programs.gateway.framing import PORT_A, PORT_B
+from nep.programs.gateway.relay import AlertSink
+from nep.programs.gateway.requests import (
     LOOPBACK,
     Member,
     Request,
@@ -20,9 +21,8 @@ from nep.gateway.requests import (
     read_request,
     refuse,
 )
-from nep.i18n import _
 
-_logger = logging.getLogger("nep.gateway")
+_logger = logging.getLogger("nep.programs.gateway")
 _LARGEST_BYTES = 2**24
 """ZeroMQ ends a connection that sends more at once. Requests have a few hundred bytes."""
 

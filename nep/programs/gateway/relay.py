@@ -8,11 +8,11 @@ from typing import Protocol
 
 import zmq
 
-from nep.gateway.framing import FrameError, lost_numbers
-from nep.gateway.portmap import TopicLine
-from nep.gateway.proxy_pair import ProxyPair
-from nep.gateway.requests import Role
 from nep.i18n import _, ngettext
+from nep.programs.gateway.framing import FrameError, lost_numbers
+from nep.programs.gateway.portmap import TopicLine
+from nep.programs.gateway.proxy_pair import ProxyPair
+from nep.programs.gateway.requests import Role
 
 _BATCH = 200
 """Frames taken from one line before the others have their turn."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from hashlib import blake2b
 
 from nep.errors import BadTopicError
-from nep.gateway.processes import load_of
-from nep.gateway.programs import OriginalProgram, TopicLink
-from nep.gateway.relay import Key
+from nep.programs.gateway.processes import load_of
+from nep.programs.gateway.programs import OriginalProgram, TopicLink
+from nep.programs.gateway.relay import Key
 from nep.protocol.requests import (
     Join,
     Leave,

@@ -15,13 +15,21 @@ from typing import TYPE_CHECKING
 import zmq
 
 import nep.errors
-from nep.doctor import installs, processes
-from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact, PortFact, ProgramFact
-from nep.doctor.finding import Finding
-from nep.doctor.network import loopback, masters
-from nep.gateway.portmap import default_file
 from nep.i18n import _, lazy
 from nep.nodes.node import Node
+from nep.programs.doctor import installs, processes
+from nep.programs.doctor.facts import (
+    ClockFact,
+    Facts,
+    FileFact,
+    FolderFact,
+    PackageFact,
+    PortFact,
+    ProgramFact,
+)
+from nep.programs.doctor.finding import Finding
+from nep.programs.doctor.network import loopback, masters
+from nep.programs.gateway.portmap import default_file
 from nep.protocol.graph_view import GraphView
 from nep.system import descriptors
 from nep.system.addresses import host_of, master_address

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from typing import Literal
 
-from nep.doctor.facts import Facts, FolderFact
-from nep.doctor.finding import Finding, Severity
-from nep.doctor.network import clocks, loopback, master_alerts, masters, originals, ports
 from nep.i18n import _
+from nep.programs.doctor.facts import Facts, FolderFact
+from nep.programs.doctor.finding import Finding, Severity
+from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, originals, ports
 
 __all__ = ["findings", "report", "to_plain", "worst"]
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
-from nep.doctor.facts import ProcessFact
+from nep.programs.doctor.facts import ProcessFact
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:

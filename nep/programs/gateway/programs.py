@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from nep.gateway.portmap import PortMap, Registration, TopicLine
-from nep.gateway.processes import Processes
-from nep.gateway.proxy_pair import Endpoint, ProxyPair
-from nep.gateway.requests import Member, Role
+from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
+from nep.programs.gateway.processes import Processes
+from nep.programs.gateway.proxy_pair import Endpoint, ProxyPair
+from nep.programs.gateway.requests import Member, Role
 
 _SAME_PROCESS_S = 5.0
 _COMING_S = 10.0

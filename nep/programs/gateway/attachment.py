@@ -11,14 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from nep.errors import BadTopicError, ClosedError, DecodeError, EncodeError, NepError, WaitTimeoutError
-from nep.gateway.gateway import Gateway
-from nep.gateway.graph_registrar import GraphRegistrar
-from nep.gateway.inbox import NativeInbox
-from nep.gateway.portmap import default_file
-from nep.gateway.processes import SystemProcesses
-from nep.gateway.programs import OriginalProgram
-from nep.gateway.relay import Key
-from nep.gateway.request_server import Ports
 from nep.i18n import _, ngettext
 from nep.masters.master import Master
 from nep.messages import image_codec
@@ -27,6 +19,14 @@ from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
+from nep.programs.gateway.gateway import Gateway
+from nep.programs.gateway.graph_registrar import GraphRegistrar
+from nep.programs.gateway.inbox import NativeInbox
+from nep.programs.gateway.portmap import default_file
+from nep.programs.gateway.processes import SystemProcesses
+from nep.programs.gateway.programs import OriginalProgram
+from nep.programs.gateway.relay import Key
+from nep.programs.gateway.request_server import Ports
 from nep.protocol.graph_view import Alert, GraphView
 from nep.protocol.requests import Reply, ReportAlerts, Request
 from nep.system.descriptors import allow_many

@@ -4,10 +4,10 @@
 and is a function of them alone.
 """
 
-from nep.doctor.collect import collect_facts, start_obstacle
-from nep.doctor.diagnosis import findings, report, to_plain, worst
-from nep.doctor.facts import Facts
-from nep.doctor.finding import Finding, Severity
+from nep.programs.doctor.collect import collect_facts, start_obstacle
+from nep.programs.doctor.diagnosis import findings, report, to_plain, worst
+from nep.programs.doctor.facts import Facts
+from nep.programs.doctor.finding import Finding, Severity
 
 __all__ = [
     "Facts",

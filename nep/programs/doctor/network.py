@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nep.doctor.facts import Facts, PortFact, ProcessFact
-from nep.doctor.finding import Finding, ago
 from nep.i18n import _, ngettext, number
+from nep.programs.doctor.facts import Facts, PortFact, ProcessFact
+from nep.programs.doctor.finding import Finding, ago
 from nep.system.addresses import host_of, is_loopback
 
 __all__ = ["clocks", "loopback", "master_alerts", "masters", "originals", "ports"]

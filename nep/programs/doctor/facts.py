@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from nep.doctor.installs import Install
+from nep.programs.doctor.installs import Install
 from nep.protocol.graph_view import GraphView
 
 __all__ = [

@@ -10,16 +10,16 @@ from typing import Protocol
 
 import zmq
 
-from nep.gateway.inbox import NativeInbox
-from nep.gateway.portmap import PortMap, Registration, TopicLine
-from nep.gateway.processes import Processes
-from nep.gateway.programs import OriginalProgram, ProgramTable
-from nep.gateway.proxy_pair import ProxyPair, is_free, port_to_tell
-from nep.gateway.relay import AlertSink, NativeSide, Relay
-from nep.gateway.request_server import Ports, RequestServer
-from nep.gateway.requests import LOOPBACK, Request, RequestError, Role
 from nep.i18n import _
 from nep.messages.message import Message
+from nep.programs.gateway.inbox import NativeInbox
+from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
+from nep.programs.gateway.processes import Processes
+from nep.programs.gateway.programs import OriginalProgram, ProgramTable
+from nep.programs.gateway.proxy_pair import ProxyPair, is_free, port_to_tell
+from nep.programs.gateway.relay import AlertSink, NativeSide, Relay
+from nep.programs.gateway.request_server import Ports, RequestServer
+from nep.programs.gateway.requests import LOOPBACK, Request, RequestError, Role
 from nep.system.descriptors import SPARE, has_room
 from nep.system.forks import give_up, watch
 
@@ -30,7 +30,7 @@ _PAIR_FILES = 20
 _PAUSE_S = 0.2
 _PROGRAMS_MAX = 2000
 """So many programs and topics are remembered: everything asked is written to the file again."""
-_logger = logging.getLogger("nep.gateway")
+_logger = logging.getLogger("nep.programs.gateway")
 
 
 class GatewayNetwork(NativeSide, AlertSink, Protocol):

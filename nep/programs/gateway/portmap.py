@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import get_args
 
-from nep.gateway.framing import Framing
-from nep.gateway.requests import Mode
+from nep.programs.gateway.framing import Framing
+from nep.programs.gateway.requests import Mode
 from nep.system.replace_file import replace_file
 from nep.text import escaped
 

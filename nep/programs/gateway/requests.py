@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from nep.gateway.framing import PORT_B, Framing, codec_of, framing_of
+from nep.programs.gateway.framing import PORT_B, Framing, codec_of, framing_of
 
 Mode = Literal["many2many", "one2many", "many2one"]
 Role = Literal["publisher", "subscriber"]

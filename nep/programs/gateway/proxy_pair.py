@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import zmq
 from zmq.utils.monitor import parse_monitor_message
 
-from nep.gateway.framing import Shape, shield_csharp, shield_javascript
-from nep.gateway.portmap import TopicLine
-from nep.gateway.requests import LOOPBACK, Role
+from nep.programs.gateway.framing import Shape, shield_csharp, shield_javascript
+from nep.programs.gateway.portmap import TopicLine
+from nep.programs.gateway.requests import LOOPBACK, Role
 
 _OPENED = zmq.EVENT_ACCEPTED | zmq.EVENT_CONNECTED
 _CLOSED = zmq.EVENT_DISCONNECTED
