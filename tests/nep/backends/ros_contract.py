@@ -24,7 +24,7 @@ from nep.geometry import Header, Point, Pose, PoseStamped, Time, Twist, Vector3
 from tests.nep.backends import test_contract as contract
 from tests.nep.backends import test_contract_async as contract_async
 from tests.nep.backends.ros_programs import ros_master
-from tests.nep.backends.test_contract import Make
+from tests.nep.meeting import Make
 
 pytestmark = [  # rospy's own ways
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),

@@ -6,7 +6,6 @@ import os
 import re
 import threading
 from collections.abc import Callable, Iterator
-from itertools import count
 
 import numpy as np
 import pytest
@@ -14,14 +13,12 @@ import pytest
 import nep
 from nep.masters.master import Master
 from nep.protocol.graph_view import GraphView
+from tests.nep.meeting import BACKENDS, Make, meeting, place_for
 from tests.nep.programs import eventually
-
-_names = count()
-
 
 _has_ros2 = bool(os.environ.get("NEP_TEST_ROS2"))
 """tests/nep/backends/test_ros2.py sets it in a network of its own, and runs this file there."""
-_back_ends = ["ros2"] if _has_ros2 else ["memory", "zeromq", "nanomsg", "zenoh"]
+_back_ends = ["ros2"] if _has_ros2 else list(BACKENDS)
 _DOMAIN = "5"
 _topics = ["test", "/a/b"] if _has_ros2 else ["test", "/a/b", "ü"]
 """ROS 2 has no names with other letters."""
@@ -41,26 +38,9 @@ def _somebody_who_knows_the_domain() -> Iterator[None]:
 @pytest.fixture(params=_back_ends)
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Callable[[str], nep.Node]]:
     """Makes nodes that can meet; closes them."""
-    made: list[nep.Node] = []
-    where = master.address
-    if request.param == "memory":
-        where = f"contract-{next(_names)}"
-    elif request.param == "zenoh":
-        where = f"local/contract-{os.getpid()}-{next(_names)}"
-    elif _has_ros2:
-        where = _DOMAIN
-
-    def new(name: str) -> nep.Node:
-        node = nep.node(name, request.param, master=where)
-        made.append(node)
-        return node
-
-    yield new
-    for node in made:
-        node.close()
-
-
-Make = Callable[[str], nep.Node]
+    where = _DOMAIN if _has_ros2 else place_for(request.param, master.address)
+    with meeting(request.param, where) as new:
+        yield new
 
 
 def names(view: GraphView) -> set[str]:

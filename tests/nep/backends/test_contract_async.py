@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import os
 import sys
 import threading
-from collections.abc import Callable, Coroutine, Iterator
-from itertools import count
+from collections.abc import Coroutine
 from typing import Any
 
 import pytest
@@ -16,30 +14,8 @@ import pytest
 import nep
 from nep.masters.master import Master
 from nep.nodes.loop_wait import give_way, loop_wait
+from tests.nep.meeting import Make
 from tests.nep.programs import eventually, running
-
-_names = count()
-Make = Callable[[str], nep.Node]
-
-
-@pytest.fixture(params=["memory", "zeromq", "nanomsg", "zenoh"])
-def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them."""
-    made: list[nep.Node] = []
-    where = master.address
-    if request.param == "memory":
-        where = f"async-{next(_names)}"
-    elif request.param == "zenoh":
-        where = f"local/async-{os.getpid()}-{next(_names)}"
-
-    def new(name: str) -> nep.Node:
-        node = nep.node(name, request.param, master=where)
-        made.append(node)
-        return node
-
-    yield new
-    for node in made:
-        node.close()
 
 
 @pytest.fixture(autouse=True)

@@ -5,35 +5,25 @@ from __future__ import annotations
 import asyncio
 import errno
 import functools
-import os
 import selectors
 import sys
 import threading
 from collections.abc import Iterator
-from itertools import count
 
 import pytest
 
 import nep
 from nep.masters.master import Master
 from nep.nodes import shared_wait
+from tests.nep.meeting import BACKENDS, place_for
 from tests.nep.programs import eventually, running
-
-BACKENDS = ("memory", "zeromq", "nanomsg", "zenoh")
-_names = count()
 
 
 class Nodes:
     """Makes nodes of any back end that can meet; they are closed at the end."""
 
     def __init__(self, master: Master) -> None:
-        number = next(_names)
-        self._places = {
-            "memory": f"executor-{number}",
-            "zenoh": f"local/executor-{os.getpid()}-{number}",
-            "zeromq": master.address,
-            "nanomsg": master.address,
-        }
+        self._places = {each: place_for(each, master.address) for each in BACKENDS}
         self.made: list[nep.Node] = []
 
     def __call__(self, name: str, backend: str) -> nep.Node:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import threading
-from collections.abc import Callable, Iterator
-from itertools import count
 
 import numpy as np
 import pytest
@@ -17,30 +14,8 @@ from nep.masters.master import Master
 from nep.messages.history import HISTORY_BYTES, History
 from nep.protocol.requests import PublisherRecord, RemotePublisher
 from nep.protocol.wire import Header
+from tests.nep.meeting import Make
 from tests.nep.programs import eventually, running
-
-_names = count()
-Make = Callable[[str], nep.Node]
-
-
-@pytest.fixture(params=["memory", "zeromq", "nanomsg", "zenoh"])
-def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them."""
-    made: list[nep.Node] = []
-    where = master.address
-    if request.param == "memory":
-        where = f"history-{next(_names)}"
-    elif request.param == "zenoh":
-        where = f"local/history-{os.getpid()}-{next(_names)}"
-
-    def new(name: str) -> nep.Node:
-        node = nep.node(name, request.param, master=where)
-        made.append(node)
-        return node
-
-    yield new
-    for node in made:
-        node.close()
 
 
 def read(sub: nep.Subscriber, most: int) -> list[object]:

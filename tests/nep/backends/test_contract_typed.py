@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
-import os
 import queue
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import count
 from typing import TypedDict
 
 import pytest
@@ -17,10 +15,8 @@ import nep
 from nep.geometry import Pose, PoseStamped, Quaternion, Twist, Vector3
 from nep.masters.master import Master
 from nep.sensor import LaserScan
+from tests.nep.meeting import Make
 from tests.nep.programs import eventually, running
-
-_names = count()
-Make = Callable[[str], nep.Node]
 
 
 @dataclass
@@ -31,26 +27,6 @@ class Count:
 
 class Named(TypedDict):
     name: str
-
-
-@pytest.fixture(params=["memory", "zeromq", "nanomsg", "zenoh"])
-def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them."""
-    made: list[nep.Node] = []
-    where = master.address
-    if request.param == "memory":
-        where = f"typed-{next(_names)}"
-    elif request.param == "zenoh":
-        where = f"local/typed-{os.getpid()}-{next(_names)}"
-
-    def new(name: str) -> nep.Node:
-        node = nep.node(name, request.param, master=where)
-        made.append(node)
-        return node
-
-    yield new
-    for node in made:
-        node.close()
 
 
 def test_typed_and_untyped_programs_understand_each_other(make: Make) -> None:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import count
 
 import pytest
 
@@ -30,30 +27,8 @@ from nep.protocol.requests import (
     node_id_from,
 )
 from nep.protocol.topic_pattern import is_pattern, matches
+from tests.nep.meeting import Make, place_for
 from tests.nep.programs import eventually, running
-
-_names = count()
-Make = Callable[[str], nep.Node]
-
-
-@pytest.fixture(params=["memory", "zeromq", "nanomsg", "zenoh"])
-def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them."""
-    made: list[nep.Node] = []
-    where = master.address
-    if request.param == "memory":
-        where = f"wildcards-{next(_names)}"
-    elif request.param == "zenoh":
-        where = f"local/wildcards-{os.getpid()}-{next(_names)}"
-
-    def new(name: str) -> nep.Node:
-        node = nep.node(name, request.param, master=where)
-        made.append(node)
-        return node
-
-    yield new
-    for node in made:
-        node.close()
 
 
 def read(sub: nep.Subscriber, most: int) -> list[tuple[str, object]]:
@@ -263,7 +238,7 @@ def test_a_direct_connection_takes_the_name_as_it_is() -> None:
 
 @pytest.mark.parametrize("backend", ["zeromq", "zenoh"])
 def test_publishers_that_are_killed_come_back(master: Master, backend: str) -> None:
-    place = master.address if backend == "zeromq" else f"local/wildcards-{os.getpid()}-{next(_names)}"
+    place = place_for(backend, master.address)
     code = """
     import sys, nep
     pub = nep.node("a", sys.argv[1], master=sys.argv[2]).new_pub("r/" + sys.argv[3])

@@ -4,38 +4,15 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from itertools import count
+from collections.abc import Iterator, Mapping
 
 import pytest
 
 import nep
 from nep.masters.master import Master
 from nep.patterns.parameters.owned import place_of
+from tests.nep.meeting import Make
 from tests.nep.programs import eventually, running
-
-_names = count()
-Make = Callable[[str], nep.Node]
-
-
-@pytest.fixture(params=["memory", "zeromq", "nanomsg", "zenoh"])
-def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them."""
-    made: list[nep.Node] = []
-    where = master.address
-    if request.param == "memory":
-        where = f"parameters-{next(_names)}"
-    elif request.param == "zenoh":
-        where = f"local/parameters-{os.getpid()}-{next(_names)}"
-
-    def new(name: str) -> nep.Node:
-        node = nep.node(name, request.param, master=where)
-        made.append(node)
-        return node
-
-    yield new
-    for node in made:
-        node.close()
 
 
 @pytest.fixture
