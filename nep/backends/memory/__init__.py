@@ -12,10 +12,11 @@ import time
 from collections import deque
 from collections.abc import Sequence
 
-from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport, Wakes
+from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
 from nep.backends.memory.services import MemoryClient, MemoryServer, MemoryServices, ServiceHub
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec
+from nep.backends.waking import WakingSubscriber
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.encoded import Encoded
@@ -175,10 +176,11 @@ class MemoryPublisher:
                 self.hub.ask(requests.RemovePublisher(self._transport.node.id, self.spec.id, self.count))
 
 
-class MemorySubscriber:
+class MemorySubscriber(WakingSubscriber):
     """A subscriber: its inbox, or its sink."""
 
     def __init__(self, transport: MemoryTransport, hub: _Hub, spec: SubscriberSpec) -> None:
+        super().__init__(transport.changed)
         self._transport = transport
         self.hub = hub
         batch = 0 if spec.sink is None else _BATCH_BYTES
@@ -188,8 +190,6 @@ class MemorySubscriber:
         self.received = self.lost = self.refused = 0
         self.problem = ""
         self.is_closed = False
-        self.fd = -1
-        self._waiting: tuple[Wakes, ...] = ()
 
     def put(self, message: Message) -> None:
         """Called by publishers."""
@@ -197,22 +197,12 @@ class MemorySubscriber:
             dropped = self.inbox.put(message)
             self.received += 1 - dropped
             self.lost += dropped
-            self._transport.changed.notify_all()
-            for each in self._waiting:
-                each.wake()
+            self.tell_waiting()
 
-    def enter_wait(self, waker: Wakes) -> bool:
-        """Before waiting. See `SubscriberTransport.enter_wait`."""
-        with self._transport.changed:
-            if self.is_closed or len(self.inbox):
-                return False
-            self._waiting = (*self._waiting, waker)
-            return True
-
-    def leave_wait(self, waker: Wakes) -> None:
-        """After waiting."""
-        with self._transport.changed:
-            self._waiting = tuple(each for each in self._waiting if each is not waker)
+    @property
+    def has_input(self) -> bool:
+        """See `WakingSubscriber.has_input`."""
+        return self.is_closed or len(self.inbox) > 0
 
     def poll(self) -> Message | None:
         """The next message if one is there."""
@@ -251,8 +241,8 @@ class MemorySubscriber:
             self._transport.forget(self)
             self.hub.ask(requests.RemoveSubscriber(self._transport.node.id, self.spec.id))
         self._transport.wake()
-        for each in self._waiting:
-            each.wake()
+        with self._changed:
+            self.tell_waiting()
 
 
 class MemoryTransport:

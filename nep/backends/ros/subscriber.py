@@ -11,10 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from nep.backends.base import SubscriberSpec, Wakes
+from nep.backends.base import SubscriberSpec
 from nep.backends.ros.carried import STAMP, Unpacker, installed, is_ros_type, unpacker
 from nep.backends.ros.graph import publisher_id
 from nep.backends.ros.process import RosProcess, RosShutdownError
+from nep.backends.waking import WakingSubscriber
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import DecodeError, NepError, WireError
 from nep.i18n import _
@@ -71,12 +72,13 @@ def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy has no types
     return stream.getvalue()
 
 
-class RospySubscriber:
+class RospySubscriber(WakingSubscriber):
     """Takes messages of any type, so that one of a wrong type becomes a problem instead of silence."""
 
     def __init__(self, owner: RospyOwner, process: RosProcess, spec: SubscriberSpec, max_bytes: int) -> None:
         if is_ros_type(spec.msg_type):
             installed(spec.msg_type)
+        super().__init__(owner.changed)
         self.spec = spec
         self.process = process
         self.topic = process.resolved(spec.topic)
@@ -86,8 +88,6 @@ class RospySubscriber:
         self.lost: int | None = None
         self.refusals = Refusals()
         self.is_closed = False
-        self.fd = -1
-        self._waiting: tuple[Wakes, ...] = ()
         self._owner = owner
         self._told = ""
         self._sources: dict[tuple[str, ...], _Source] = {}
@@ -133,18 +133,12 @@ class RospySubscriber:
             self.received += 1 - dropped
             if dropped:
                 self.lost = (self.lost or 0) + dropped
-            self._tell_waiting()
-
-    def _tell_waiting(self) -> None:
-        """Something is there, or will not be any more. With the owner's lock held."""
-        self._owner.changed.notify_all()
-        for each in self._waiting:
-            each.wake()
+            self.tell_waiting()
 
     def _rospy_ends(self) -> None:
         """Nothing will come any more: `poll` says so."""
         with self._owner.changed:
-            self._tell_waiting()
+            self.tell_waiting()
         self._owner.wake()
 
     def _source_of(self, header: Mapping[str, str]) -> _Source:
@@ -207,18 +201,10 @@ class RospySubscriber:
 
     # ---- reading
 
-    def enter_wait(self, waker: Wakes) -> bool:
-        """Before waiting. See `SubscriberTransport.enter_wait`."""
-        with self._owner.changed:
-            if self.is_closed or self.process.is_over or self.inbox.messages:
-                return False
-            self._waiting = (*self._waiting, waker)
-            return True
-
-    def leave_wait(self, waker: Wakes) -> None:
-        """After waiting."""
-        with self._owner.changed:
-            self._waiting = tuple(each for each in self._waiting if each is not waker)
+    @property
+    def has_input(self) -> bool:
+        """See `WakingSubscriber.has_input`."""
+        return self.is_closed or self.process.is_over or len(self.inbox) > 0
 
     def poll(self) -> Message | None:
         """The next message if one is there. Raises `RosShutdownError` when none can come any more."""
@@ -252,7 +238,7 @@ class RospySubscriber:
             if self.is_closed:
                 return
             self.is_closed = True
-            self._tell_waiting()
+            self.tell_waiting()
             self.process.subscribed[self.topic] -= 1
         self.process.at_shutdown.discard(self._rospy_ends)
         self._owner.forget(self)

@@ -15,13 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from nep.backends.base import SubscriberSpec, SubscriberTransport, Wakes
+from nep.backends.base import SubscriberSpec, SubscriberTransport
 from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.names import dds_topic, dds_type
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import told_of, wait_for_others
 from nep.backends.ros2.quality import depth_of, qualities
 from nep.backends.ros2.type_mapping import mapping_for
+from nep.backends.waking import WakingSubscriber
 from nep.errors import WireError
 from nep.messages.message import Message, MessageKind, arrived
 from nep.messages.queue import Inbox
@@ -73,17 +74,16 @@ class _Source:
     newest_ns: int = -1
 
 
-class Ros2Subscriber:
+class Ros2Subscriber(WakingSubscriber):
     """See the module. Raises `BadTopicError`, `NepError`."""
 
     def __init__(self, transport: ReaderOwner, participant: Participant, spec: SubscriberSpec) -> None:
+        super().__init__(transport.changed)
         self.spec = spec
         self.ready: deque[Message] = deque()
         self.received = self.refused = 0
         self.problem = ""
         self.is_closed = False
-        self.fd = -1
-        self._waiting: tuple[Wakes, ...] = ()
         batch = 0 if spec.sink is None else _BATCH_BYTES
         self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
         self._dropped = 0
@@ -198,28 +198,14 @@ class Ros2Subscriber:
                 dropped = self.inbox.put(message)
                 self.received += 1 - dropped
                 self._dropped += dropped
-            self._tell_waiting()
-
-    def _tell_waiting(self) -> None:
-        """Something is there, or will not be any more. With the transport's lock held."""
-        self._transport.changed.notify_all()
-        for each in self._waiting:
-            each.wake()
+            self.tell_waiting()
 
     # ---- messages go
 
-    def enter_wait(self, waker: Wakes) -> bool:
-        """Before waiting. See `SubscriberTransport.enter_wait`."""
-        with self._transport.changed:
-            if self.is_closed or self.inbox.messages:
-                return False
-            self._waiting = (*self._waiting, waker)
-            return True
-
-    def leave_wait(self, waker: Wakes) -> None:
-        """After waiting."""
-        with self._transport.changed:
-            self._waiting = tuple(each for each in self._waiting if each is not waker)
+    @property
+    def has_input(self) -> bool:
+        """See `WakingSubscriber.has_input`."""
+        return self.is_closed or len(self.inbox) > 0
 
     def poll(self) -> Message | None:
         """The next message if one is there."""
@@ -287,6 +273,6 @@ class Ros2Subscriber:
                 self._participant.withdraw(self._transport.node.id, "reader", reader)
             self._readers.clear()
         with self._transport.changed:
-            self._tell_waiting()
+            self.tell_waiting()
         self._transport.forget(self)
         self._transport.wake()

@@ -24,7 +24,7 @@ class Poured(Protocol):
 
     @property
     def has_input(self) -> bool:
-        """Whether a message waits. With `Inboxes.changed` held."""
+        """Whether a message waits, or it is closed. With `Inboxes.changed` held."""
 
     @property
     def sink(self) -> Sink | None:
@@ -50,9 +50,7 @@ class Inboxes:
         with self.changed:
             before = self._wakes
             self.changed.wait_for(
-                lambda: (
-                    self._wakes != before or any(each.has_input or each.is_closed for each in subscribers)
-                ),
+                lambda: self._wakes != before or any(each.has_input for each in subscribers),
                 timeout_s,
             )
 

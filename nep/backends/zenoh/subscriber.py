@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from nep.backends.base import Sink, SubscriberSpec, Wakes
+from nep.backends.base import Sink, SubscriberSpec
+from nep.backends.waking import WakingSubscriber
 from nep.backends.zenoh.early import EarlyMessages
 from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zenoh.keys import topic_of
@@ -39,18 +40,17 @@ class _Ear(NamedTuple):
     parser: CarefulParser
 
 
-class ZenohSubscriber:
+class ZenohSubscriber(WakingSubscriber):
     """A subscriber: its inbox, or its sink. `on_close` takes it off the network, once and without a lock."""
 
     def __init__(
         self, spec: SubscriberSpec, inboxes: Inboxes, on_close: Callable[[ZenohSubscriber], None]
     ) -> None:
+        super().__init__(inboxes.changed)
         batch = 0 if spec.sink is None else _BATCH_BYTES
         self.spec = spec
         self.ready: deque[Message] = deque()
         self.is_closed = False
-        self.fd = -1
-        self._waiting: tuple[Wakes, ...] = ()
         self._inboxes = inboxes
         self._on_close = on_close
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
@@ -98,29 +98,10 @@ class ZenohSubscriber:
         self._inboxes.wait((self,), timeout_s)
         return self.poll()
 
-    def enter_wait(self, waker: Wakes) -> bool:
-        """Before waiting. See `SubscriberTransport.enter_wait`."""
-        with self._inboxes.changed:
-            if self.is_closed or self.has_input:
-                return False
-            self._waiting = (*self._waiting, waker)
-            return True
-
-    def leave_wait(self, waker: Wakes) -> None:
-        """After waiting."""
-        with self._inboxes.changed:
-            self._waiting = tuple(each for each in self._waiting if each is not waker)
-
-    def _tell_waiting(self) -> None:
-        """Something is there, or will not be any more. With the lock of the inboxes held."""
-        self._inboxes.changed.notify_all()
-        for each in self._waiting:
-            each.wake()
-
     @property
     def has_input(self) -> bool:
-        """Whether a message waits."""
-        return len(self._inbox) > 0
+        """See `WakingSubscriber.has_input`."""
+        return self.is_closed or len(self._inbox) > 0
 
     @property
     def sink(self) -> Sink | None:
@@ -206,7 +187,7 @@ class ZenohSubscriber:
     def _hear(self, message: Message | None) -> None:
         if message is not None:
             self._sources.dropped(self._inbox.put(message))
-            self._tell_waiting()
+            self.tell_waiting()
 
     def _take_early(self, publisher: int) -> None:
         for ear, rest in self._early.take(publisher):
@@ -255,7 +236,7 @@ class ZenohSubscriber:
                 return
             self.is_closed = True
             self._inbox.take_all()
-            self._tell_waiting()
+            self.tell_waiting()
         self._inboxes.stop_pouring(self)
         self._on_close(self)
 

@@ -14,7 +14,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-from nep.backends.base import SubscriberSpec, Wakes
+from nep.backends.base import SubscriberSpec
+from nep.backends.waking import WakingSubscriber
 from nep.backends.zeromq.io_thread import IoThread
 from nep.backends.zeromq.subscriber import NativeReadable, NativeSubscriber
 from nep.errors import NepError
@@ -31,7 +32,7 @@ _MEMBERS_MAX = 2_000
 """So many topics one subscriber hears: whoever reaches the master can publish any number."""
 
 
-class PatternSubscriber:
+class PatternSubscriber(WakingSubscriber):
     """See the module. `new_readable` makes a member's socket, `io` serves it, `on_close` unregisters.
 
     The methods for publishers are called by the link to the master.
@@ -44,10 +45,10 @@ class PatternSubscriber:
         spec: SubscriberSpec,
         on_close: Callable[[int], None],
     ) -> None:
+        super().__init__(threading.Condition())
         self.spec = spec
         self.is_closed = False
         self.ready: deque[Message] = deque()
-        self.fd = -1
         self._new_readable = new_readable
         self._io = io
         self._on_close = on_close
@@ -59,9 +60,7 @@ class PatternSubscriber:
         self._dropped = 0
         self._problem = self._lack = ""
         self._failures = 0
-        self._waiting: tuple[Wakes, ...] = ()
         self._making = threading.RLock()
-        self._changed = threading.Condition()
 
     # ---- what the reader sees
 
@@ -76,18 +75,10 @@ class PatternSubscriber:
             self._changed.wait_for(lambda: self.is_closed or len(self._inbox), timeout_s)
             return None if self.is_closed else self._inbox.take()
 
-    def enter_wait(self, waker: Wakes) -> bool:
-        """Before waiting. See `SubscriberTransport.enter_wait`."""
-        with self._changed:
-            if self.is_closed or len(self._inbox):
-                return False
-            self._waiting = (*self._waiting, waker)
-            return True
-
-    def leave_wait(self, waker: Wakes) -> None:
-        """After waiting."""
-        with self._changed:
-            self._waiting = tuple(each for each in self._waiting if each is not waker)
+    @property
+    def has_input(self) -> bool:
+        """See `WakingSubscriber.has_input`."""
+        return self.is_closed or len(self._inbox) > 0
 
     def _came(self, messages: Sequence[Message]) -> None:
         """In the thread that serves members."""
@@ -97,12 +88,7 @@ class PatternSubscriber:
         with self._changed:
             if not self.is_closed:
                 self._dropped += sum(map(self._inbox.put, messages))
-                self._tell_waiting()
-
-    def _tell_waiting(self) -> None:
-        self._changed.notify_all()
-        for each in self._waiting:
-            each.wake()
+                self.tell_waiting()
 
     # ---- what it tells
 
@@ -222,7 +208,7 @@ class PatternSubscriber:
                 return
             self.is_closed = True
             self._inbox.take_all()
-            self._tell_waiting()
+            self.tell_waiting()
             members = list(self._members.values())
         self._on_close(self.spec.id)
         for member in members:
