@@ -1,6 +1,6 @@
 """The benchmarks, one after the other.
 
-    python tools/bench.py                       all of them but soak, ways and film
+    python tools/bench.py                       all of them but nep_tail, nep_ros, soak, ways and film
     python tools/bench.py nep_rate -- ARGS      one; what comes after -- goes to it
 
 Exit code 1 when a run does not count because the computer was busy. See `bench/README.md`.
@@ -29,8 +29,8 @@ NAMES = (
     "blocks_editor",
     "studio_tabs",
 )
-ASKED = ("soak", "ways", "film")
-"""These run only when they are asked for: they take a quarter of an hour, or time nothing."""
+ASKED = ("nep_tail", "nep_ros", "soak", "ways", "film")
+"""These run only when they are asked for: they take long, need ROS 1, or time nothing."""
 
 
 def main() -> int:
