@@ -77,13 +77,18 @@ def test_a_server_that_is_stopped_keeps_its_calls(client) -> None:
         assert future.result(LONG_S) == {"pid": program.process.pid}
 
 
+@pytest.mark.parametrize("is_late", [False, True], ids=["before it is unlisted", "after that"])
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_a_server_that_is_stopped_while_it_is_called_is_replaced_by_another(master: Master, client) -> None:
+def test_a_server_that_is_stopped_while_it_is_called_is_replaced_by_another(
+    master: Master, client, is_late: bool
+) -> None:
     with running(SERVER) as program, nep.node("other") as other:
         assert program.line() == "ready"
         waiting = client.call_async("hang", timeout_s=None)
         assert program.line() == "asked"
         program.stop()
+        if is_late:
+            eventually(lambda: not master.view().services["/x"].servers)
         other.new_server("/x", lambda request: ["other", request], threads=1)
         eventually(lambda: len(master.view().services["/x"].servers) == 1)  # it was unlisted
         assert client.call(1) == ["other", 1]

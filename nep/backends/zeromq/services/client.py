@@ -130,6 +130,9 @@ class SocketClient:
         """Its server's endpoint, when no master tells of servers."""
         self._servers: dict[int, str] = {0: endpoint} if endpoint else {}
         self._current: int | None = None
+        self._unlisted: int | None = None
+        """A server that is not listed any more and was kept, because there is no other and it may only be
+        suspended."""
         self._leave_at = math.inf
         """When the connection to a server that is not listed any more is given up, if new calls wait."""
         self._tries = 0
@@ -230,6 +233,11 @@ class SocketClient:
             for remote in remotes:
                 if remote.publisher.endpoints:
                     self._servers[remote.publisher.id] = remote.publisher.endpoints[0]
+                    if remote.publisher.id == self._unlisted:
+                        self._unlisted = None
+            if self._unlisted is not None and len(self._servers) > 1:
+                self._servers.pop(self._unlisted, None)
+                self._unlisted = None
             self._try_at = 0.0
         self._soon(self)
 
@@ -238,6 +246,8 @@ class SocketClient:
         with self._lock:
             if is_closed or server != self._current or not self.is_connected or len(self._servers) > 1:
                 self._servers.pop(server, None)
+            else:
+                self._unlisted = server
         self._soon(self)
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
@@ -246,9 +256,9 @@ class SocketClient:
             each.publisher.id: each.publisher.endpoints[0] for each in remotes if each.publisher.endpoints
         }
         with self._lock:
-            current = self._current
+            current, self._unlisted = self._current, None
             if not listed and current in self._servers and self.is_connected:
-                listed = {current: self._servers[current]}
+                listed, self._unlisted = {current: self._servers[current]}, current
             self._servers = listed
             self._try_at = 0.0
         self._soon(self)
