@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from nep.backends.connection import Configuration
 from nep.errors import PluginsMissingError, UnknownBackendError
@@ -30,6 +30,8 @@ __all__ = [
     "Backend",
     "PublisherSpec",
     "PublisherTransport",
+    "PublishesQuickly",
+    "QuickPublish",
     "Sink",
     "SubscriberSpec",
     "SubscriberTransport",
@@ -94,6 +96,35 @@ class Wakes(Protocol):
 
     def wake(self) -> None:
         """There may be something to do. From any thread, also under locks; does not wait."""
+
+
+class QuickPublish(NamedTuple):
+    """What is asked of a transport that `PublishesQuickly`.
+
+    Payloads of the type `kind` are bytes that are sent as they are, and `ordinary` makes the bytes of others;
+    what it raises for, and all that is published while `owner` is closed or nobody listens, is given to
+    `slowly`. `look` is called first with a payload whose bytes have `null` in them, unless it is None.
+    """
+
+    owner: Closes
+    kind: type | None
+    ordinary: Callable[[Any], bytes]
+    look: Callable[[Any], object] | None
+    slowly: Callable[[Any], object]
+
+
+class Closes(Protocol):
+    """Somebody who may be closed."""
+
+    is_closed: bool
+
+
+@runtime_checkable
+class PublishesQuickly(Protocol):
+    """What a `PublisherTransport` may have besides."""
+
+    def quick_publish(self, asked: QuickPublish) -> Callable[[Any], None]:
+        """A function that publishes, with as few calls on the way as can be. It never blocks."""
 
 
 class PublisherTransport(Protocol):

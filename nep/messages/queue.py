@@ -48,6 +48,17 @@ class Inbox:
         self._bytes -= message.size_bytes
         return message
 
+    def move(self, into: deque[Message], most: int, most_bytes: int) -> None:
+        """Move the oldest messages, `most` of them at most and no more when they are `most_bytes`."""
+        messages = self.messages
+        while messages and most > 0 and most_bytes > 0:
+            message = messages.popleft()
+            into.append(message)
+            size = message.size_bytes
+            self._bytes -= size
+            most_bytes -= size
+            most -= 1
+
     def take_all(self, most_bytes: int | None = None) -> list[Message]:
         """All messages, oldest first; no more when they are `most_bytes` together."""
         if most_bytes is None or self._bytes <= most_bytes:

@@ -14,10 +14,10 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from nep.backends.base import PublisherSpec, PublisherTransport
+from nep.backends.base import PublisherSpec, PublisherTransport, PublishesQuickly, QuickPublish
 from nep.errors import ClosedError, EncodeError, WireError
 from nep.i18n import _
-from nep.messages.codecs import JsonEncoder
+from nep.messages.codecs import JsonEncoder, ordinary
 from nep.messages.encoded import Encoded, encoded
 from nep.nodes.arguments import limit
 from nep.protocol.wire import extension_part
@@ -58,7 +58,10 @@ class Publisher:
         self._encode = spec.codec.encode if self._nulls is None else self._nulls.encode
         self._unsendable = Unsendable(spec.topic, spec.codec.encode, transport.report)
         self._is_latched = spec.is_latched
-        self._is_closed = False
+        self.is_closed = False
+        """Whether it, or its node, was closed."""
+        if isinstance(transport, PublishesQuickly) and (encode := ordinary(spec.codec)) is not None:
+            self._quickly(transport, encode)
 
     @property
     def topic(self) -> str:
@@ -113,7 +116,7 @@ class Publisher:
         in the graph until one can. So nothing depends on whether somebody listens: with no subscriber a
         payload is encoded only now and then, to see whether it could be sent, unless it is latched.
         """
-        if self._is_closed or not (self._transport.is_heard or self._is_latched):
+        if self.is_closed or not (self._transport.is_heard or self._is_latched):
             self._skip(payload)
             return
         try:
@@ -127,9 +130,17 @@ class Publisher:
         else:
             self._transport.send(made)
 
+    def _quickly(self, transport: PublishesQuickly, encode: Callable[[Any], bytes]) -> None:
+        """Let `publish` be a function of the transport: what is not ordinary comes back to the method."""
+        look = None if self._nulls is None else self._nulls.look
+        kind = bytes if self._spec.codec.name == "bytes" else None
+        quick = transport.quick_publish(QuickPublish(self, kind, encode, look, self.publish))
+        quick.__doc__ = Publisher.publish.__doc__
+        setattr(self, "publish", quick)  # noqa: B010 - mypy takes a method for what cannot be replaced
+
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
         """Send bytes that are encoded already. Raises as `publish` does."""
-        if self._is_closed or not (self._transport.is_heard or self._is_latched):
+        if self.is_closed or not (self._transport.is_heard or self._is_latched):
             self._skip(Encoded(data, extension))
         else:
             self._send(encoded((data, extension)))
@@ -162,7 +173,7 @@ class Publisher:
 
     def _skip(self, payload: object) -> None:
         """Count a message that nobody wants; now and then see whether it could be sent."""
-        if self._is_closed:
+        if self.is_closed:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
         self._check(payload)
         if self._unsendable.try_out(payload):
@@ -175,7 +186,7 @@ class Publisher:
         copied at all; else it is an ordinary array. After it is published it is the readers': take a new one
         for the next message. Needs numpy. Raises `ClosedError`.
         """
-        if self._is_closed:
+        if self.is_closed:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
         import numpy as np  # noqa: PLC0415 - optional and heavy
 
@@ -191,8 +202,8 @@ class Publisher:
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
         limit("timeout_s", timeout_s)
-        if not self._is_closed:
-            self._is_closed = True
+        if not self.is_closed:
+            self.is_closed = True
             try:
                 self._transport.close(timeout_s)
             finally:
@@ -201,11 +212,11 @@ class Publisher:
 
     def node_closes(self) -> None:
         """Its node closes it, with all others."""
-        self._is_closed = True
+        self.is_closed = True
 
     def forked(self) -> None:
         """In a child that was forked. See `nep.system.forks`."""
-        self._is_closed = self._is_forked = True
+        self.is_closed = self._is_forked = True
 
     def __enter__(self) -> Self:
         return self

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from nep.backends.base import SubscriberSpec, SubscriberTransport
 from nep.errors import ClosedError, DecodeError
 from nep.messages.codecs import codec_for
-from nep.messages.message import Message
+from nep.messages.message import UNDECODED, Message
 from nep.nodes.arguments import seconds
 from nep.nodes.async_reading import AsyncMessages, AsyncReader
 from nep.system.log_rarely import is_logged
@@ -102,7 +102,11 @@ class Subscriber:
             except IndexError:  # another thread took the last one
                 break
             try:
-                return True, self.decoded(message) if self._problem else message.payload
+                if self._problem:
+                    return True, self.decoded(message)
+                if message.decoded is UNDECODED:  # nobody else has it: what it says need not be kept
+                    return True, message.kind.decode(message.raw, message.extension)
+                return True, message.decoded
             except DecodeError as error:
                 self._tell(error)
         return self._listen_on(block_mode, timeout_s)
@@ -206,6 +210,16 @@ class Subscriber:
             self._problem = ""
             self._transport.report("")
         return payload
+
+    def taken(self, message: Message) -> object:
+        """What `decoded` gives, of a message that nobody else gets: what it says need not be kept."""
+        if self._problem or message.decoded is not UNDECODED:
+            return self.decoded(message)
+        try:
+            return message.kind.decode(message.raw, message.extension)
+        except DecodeError as error:
+            self._tell(error)
+            raise
 
     def _tell(self, error: DecodeError) -> None:
         """A message cannot be read: tell the graph, and log it rarely."""

@@ -68,6 +68,10 @@ class TypedSubscriber(Subscriber):
         """See `Subscriber.typed`."""
         return self._reader.typed(message)
 
+    def taken(self, message: Message) -> object:
+        """See `Subscriber.taken`."""
+        return self.decoded(self._reader.typed(message))
+
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
         """See `Subscriber.listen`."""
         seconds("timeout_s", timeout_s)

@@ -174,6 +174,42 @@ class Work:
             has_run = self.run_servers() or has_run
         return self._run_callbacks() or has_run
 
+    def _run_on(self, until: float) -> bool:
+        """What `run` does, and for the only callback there is more than one message, until this time.
+
+        With several callbacks each gets one message and then the next one has its turn.
+        """
+        callbacks = self.callbacks
+        if len(callbacks) != 1 or self.services.has_servers or self._coroutine:
+            return self.run()
+        has_run = self._run_timers() if self.timers else False
+        if self.timers:
+            until = min(until, next_due(self.timers))
+        subscriber, transport, call, with_message = callbacks[0]
+        if with_message:
+            return self._run_callbacks() or has_run
+        ready, clock, is_stopped = transport.ready, self.clock, self._is_stopped.is_set
+        taken, is_brisk = subscriber.taken, has_run
+        while not is_stopped() and callbacks is self.callbacks:
+            try:
+                message = ready.popleft()
+            except IndexError:
+                found = None if transport.is_closed else transport.poll()
+                if found is None:
+                    return is_brisk
+                message = found
+            try:
+                payload = taken(message)
+            except DecodeError:
+                continue  # it is logged and an alert
+            call(payload)
+            if not ready:
+                return is_brisk
+            is_brisk = True  # several came together: there may be more
+            if clock() >= until:
+                break
+        return True
+
     def run_servers(self) -> bool:
         """One call for each server that has one; whether there was any."""
         return self.services.run(self._is_stopped)
@@ -259,7 +295,7 @@ class Work:
                 left = SLICE_S if deadline is None else min(SLICE_S, deadline - self.clock())
                 if left <= 0.0:
                     return
-                if self.run():
+                if self._run_on(self.clock() + left):
                     continue
                 if self.timers:
                     left = min(left, self.due_s)

@@ -10,15 +10,15 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import cast
+from typing import Any, NoReturn, cast
 
 import zmq
 
-from nep.backends.base import PublisherSpec
+from nep.backends.base import PublisherSpec, QuickPublish
 from nep.backends.zeromq.bindings import SMALL, Bindings
 from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog
 from nep.backends.zeromq.io_thread import Rest, Served
-from nep.backends.zeromq.pending_batch import MOST, SMALL_BYTES, SOON_NS, WAIT_NS, PendingBatch
+from nep.backends.zeromq.pending_batch import SMALL_BYTES, PendingBatch
 from nep.backends.zeromq.shared.memory import SHARED_BYTES, begin_sharing, can_share
 from nep.backends.zeromq.shared.payloads import SharedPayloads
 from nep.backends.zeromq.sockets import Part, Refusals, Socket, send_mark, sendable, wait_until
@@ -59,6 +59,10 @@ _SERVE_S = 0.02
 _BYE_AGAIN_S = 0.05
 
 
+def _only_bytes(payload: object) -> NoReturn:
+    raise TypeError(payload)
+
+
 class GreetedPublisher:
     """A publisher to which those subscribers say hello that the master lists; `changed` guards all of it."""
 
@@ -92,6 +96,10 @@ class GreetedPublisher:
 class NativePublisher(GreetedPublisher):
     """Owns `socket`, an XPUB that is bound or connected already."""
 
+    is_closed = False
+    is_heard = False
+    """Whether anybody reads, with or without a hello."""
+
     def __init__(
         self,
         socket: Socket,
@@ -104,8 +112,6 @@ class NativePublisher(GreetedPublisher):
         """Messages that were sent or skipped."""
         self.subscribers = 0
         """How many said hello and have not gone."""
-        self.is_heard = False
-        """Whether anybody reads, with or without a hello."""
         self._on_close = on_close
         self._serve_soon = serve_soon
         self._socket = socket
@@ -113,22 +119,21 @@ class NativePublisher(GreetedPublisher):
         self._bindings = Bindings(socket, may_be_local=spec.codec.name in SMALL)
         # Without pyzmq's layer for routing ids and groups, which takes half of the time.
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
-        self._bytes = 0
-        self._settled_bytes = 0
+        self._bytes = self._settled_bytes = 0
         """So many of them are counted in the windows of those who read."""
         self._settle_at = 0
         """From so many on a message is not simply sent to all."""
         self._backlog = Backlog()
         self._last_stamp_ns: int | None = None
-        self._problem = ""
+        self.problem = ""
+        """What is wrong with the newest payload; empty when nothing is."""
         self._subscriptions = Subscriptions(spec.topic, spec.id)
         if can_share() and not spec.history:
             self._subscriptions.shared = SharedPayloads(spec.id, self._offer)
         self._apart = self._subscriptions.apart
         self._history: History[tuple[Part, ...]] = History(spec.history)
-        self._looked_ns = 0
+        self._looked_ns = self._served = 0
         self._io_comes = False
-        self._served = 0
         self._batch = PendingBatch(may_wait=spec.may_batch and not spec.is_latched)
         self._id = spec.id
         self._topic = topic_part(spec.topic)
@@ -138,14 +143,14 @@ class NativePublisher(GreetedPublisher):
         # `with` is three times faster on the lock itself than on the condition over it.
         self._lock = threading.Lock()
         super().__init__(threading.Condition(self._lock), self._subscriptions.seen)
-        self._is_closed = False
         self.fd = int(socket.getsockopt(zmq.FD))
-        self.send = self._sender()
+        bytes_only = QuickPublish(self, bytes, _only_bytes, None, self.send_now)
+        self._send_bytes = self._batch.publishing(bytes_only, self, self._lock)
 
     @property
     def count(self) -> int:
         """Messages published so far."""
-        return self._count + len(self._batch.payloads)
+        return self._count + len(self._batch.waiting)
 
     # ---- who listens
 
@@ -158,7 +163,7 @@ class NativePublisher(GreetedPublisher):
         """The statistics for a renewal."""
         with self._changed:
             return PublisherCount(
-                self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
+                self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self.problem
             )
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
@@ -194,53 +199,33 @@ class NativePublisher(GreetedPublisher):
 
     def report(self, problem: str) -> None:
         """The publisher's trouble with a payload, for the next renewal."""
-        self._problem = problem
+        self.problem = problem
 
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self._lock:
-            self._flush()
+            self.flush()
             self._count += 1
             self._last_stamp_ns = time.time_ns()
 
-    def _sender(self) -> Callable[[Encoded], None]:
-        """What `send` is: as a closure, because most of a small message's way is in here."""
-        batch, lock, publisher = self._batch, self._lock, self
-        payloads, put, put_stamp = batch.payloads, batch.payloads.append, batch.stamps_ns.append
-        ends_ns = 0
+    def send(self, encoded: Encoded) -> None:
+        """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed.
 
-        def send(encoded: Encoded) -> None:
-            """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed.
+        Raises `WireError` for an extension that has no form on the wire.
+        """
+        data, beside = encoded
+        if beside is None and type(data) is bytes:
+            self._send_bytes(data)
+        else:
+            self._send_now(data, beside)
 
-            Raises `WireError` for an extension that has no form on the wire.
-            """
-            nonlocal ends_ns
-            data, beside = encoded
-            stamp_ns = _time_ns()
-            if (
-                stamp_ns < batch.until_ns
-                and beside is None
-                and type(data) is bytes
-                and len(data) < SMALL_BYTES
-            ):
-                with lock:
-                    if batch.is_allowed:
-                        put(data)
-                        put_stamp(stamp_ns)
-                        count = len(payloads)
-                        if count == MOST:
-                            publisher._flush()
-                            batch.has_gone_full = True
-                            return
-                        if count == 1:
-                            ends_ns = stamp_ns + WAIT_NS
-                            publisher._flush_soon()
-                        until_ns = stamp_ns + SOON_NS
-                        batch.until_ns = until_ns if until_ns < ends_ns else ends_ns  # noqa: FURB136 - in half the time of min
-                        return
-            publisher._send_now(data, beside)
+    def quick_publish(self, asked: QuickPublish) -> Callable[[Any], None]:
+        """See `nep.backends.base.PublishesQuickly`."""
+        return self._batch.publishing(asked, self, self._lock)
 
-        return send
+    def send_now(self, data: bytes) -> None:
+        """Send it, and what waits before it."""
+        self._send_now(data, None)
 
     def _send_now(self, given: bytes | memoryview, beside: Mapping[str, object] | None) -> None:
         """Send it, and what waits before it."""
@@ -254,9 +239,9 @@ class NativePublisher(GreetedPublisher):
             extension = extension_part(beside) if beside else None
         size = len(data)
         with self._lock:
-            if self._is_closed:
+            if self.is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self._flush()
+            self.flush()
             if self._flags:
                 self._greet_before(size)
             self._count = seq = self._count + 1
@@ -290,9 +275,9 @@ class NativePublisher(GreetedPublisher):
         data = sendable(given) if shared is None or not shared.readers else None
         size = given.nbytes if isinstance(given, memoryview) else len(given)
         with self._lock:
-            if self._is_closed:
+            if self.is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self._flush()
+            self.flush()
             if self._flags:
                 self._greet_before(size)
             number = shared.place(given, self._seen, time.monotonic()) if shared and not self._apart else None
@@ -308,7 +293,7 @@ class NativePublisher(GreetedPublisher):
         """See `PublisherTransport.lend`."""
         shared = self._subscriptions.shared
         with self._lock:
-            return None if shared is None or self._is_closed else shared.lend(size_bytes)
+            return None if shared is None or self.is_closed else shared.lend(size_bytes)
 
     def _offer(self, subscriber: int, generation: int) -> None:
         """Let a subscriber open the shared memory of this generation. With the lock held."""
@@ -331,38 +316,52 @@ class NativePublisher(GreetedPublisher):
         send(pack_quickly(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id), _SNDMORE)
         send(data, 0, size < _NO_COPY_BYTES)
 
-    def _flush_soon(self) -> None:
+    def flush_soon(self) -> None:
         """Let the node's thread send what waits then. With the lock held."""
         if not self._batch.is_looked_after:
             self._batch.is_looked_after = self._io_comes = True
             self._serve_soon(self)
 
-    def _flush(self) -> None:
+    def flush(self) -> None:
         """Send the messages that wait, with the lock held. They count from now on."""
-        if not self._batch.payloads:
+        batch = self._batch
+        if batch.is_leaving or not batch.waiting:
             return
-        payloads, stamps_ns = self._batch.take()
-        self._last_stamp_ns = stamp_ns = stamps_ns[-1]
-        count = len(payloads)
-        if count > 1 and self._batch.is_allowed and self._bytes + count * _ONE_PART_BYTES < self._settle_at:
-            part = batch_part(self._topic, self._form, self._count + 1, self._id, stamps_ns, payloads)
-            self._count += count
-            self._bytes += sum(map(len, payloads))
-            self._send(part)
-        else:
-            for stamp_ns, data in zip(stamps_ns, payloads, strict=True):
-                self._last_stamp_ns = stamp_ns
-                self._count += 1
-                self._bytes += len(data)
-                self._send_all(data, None, len(data))
-        self._look(stamp_ns)
+        batch.is_leaving = True  # what comes meanwhile does not overtake what is being sent
+        try:
+            self._send_batches(batch)
+        finally:
+            batch.is_leaving = False
+
+    def _send_batches(self, batch: PendingBatch) -> None:
+        while batch.waiting:
+            taken = batch.take()
+            self._last_stamp_ns = stamp_ns = taken[-1][1]
+            count = len(taken)
+            if count > 1 and batch.is_allowed and self._bytes + count * _ONE_PART_BYTES < self._settle_at:
+                payloads, stamps_ns = zip(*taken, strict=True)
+                part = batch_part(self._topic, self._form, self._count + 1, self._id, stamps_ns, payloads)
+                self._count += count
+                self._bytes += sum(map(len, payloads))
+                self._send(part)
+            else:
+                self._send_each(taken)
+            self._look(stamp_ns)
+
+    def _send_each(self, taken: Iterable[tuple[bytes, int]]) -> None:
+        """Those that waited, one by one. With the lock held."""
+        for data, stamp_ns in taken:
+            self._last_stamp_ns = stamp_ns
+            self._count += 1
+            self._bytes += len(data)
+            self._send_all(data, None, len(data))
 
     def _send_all(self, data: Part, extension: bytes | None, size: int, number: bytes | None = None) -> None:
         """Send what has flags, or when it is time to see what was read, with the lock held.
 
         `number` is what those get instead of `data` who read it in shared memory.
         """
-        self._flush()
+        self.flush()
         tail = self._tail(data, extension, size, 0)
         shared = None if number is None else self._tail(number, extension, len(number), SHARED)
         self._history.add(tail, size)
@@ -444,7 +443,7 @@ class NativePublisher(GreetedPublisher):
 
     def _send_parts(self, first: bytes, tail: tuple[Part, ...]) -> None:
         """Send with the lock held. XPUB never blocks: it drops for subscribers whose queue is full."""
-        self._flush()
+        self.flush()
         send = self._send
         send(first, _SNDMORE)
         for part in tail[:-1]:
@@ -456,17 +455,17 @@ class NativePublisher(GreetedPublisher):
     def serve(self, now: float) -> Rest:
         """Send what waits long enough, and read subscriptions."""
         with self._lock:
-            if not self._is_closed or self._seen:
+            if not self.is_closed or self._seen:
                 self._read_subscriptions()
             again_s = self._batch.look_again_s(_time_ns())
             if not again_s:
-                self._flush()
+                self.flush()
                 again_s = self._batch.goes_on_s
             if again_s:
                 return Rest(due=now + again_s)
             count, self._served = self._served, self._count
             # As long as somebody publishes without looking, this thread looks again and again.
-            self._io_comes = self._io_comes and count != self._count and not self._is_closed
+            self._io_comes = self._io_comes and count != self._count and not self.is_closed
             return Rest(due=now + _SERVE_S) if self._io_comes else Rest()
 
     def _read_subscriptions(self) -> None:
@@ -511,8 +510,8 @@ class NativePublisher(GreetedPublisher):
     def say_bye(self) -> None:
         """Nothing is published any more; every subscriber disconnects when it has read everything."""
         with self._changed:
-            self._is_closed = True
-            self._flush()
+            self.is_closed = True
+            self.flush()
             self._bye()
 
     def finish(self, deadline: float) -> None:
@@ -537,7 +536,7 @@ class NativePublisher(GreetedPublisher):
     def release(self) -> None:
         """Close the socket; the node's thread has let go of it."""
         with self._changed:
-            self._is_closed = True
+            self.is_closed = True
             if self._subscriptions.shared is not None:
                 self._subscriptions.shared.close()
             self._socket.close(0)

@@ -179,6 +179,8 @@ class SocketSubscriber(Generic[R]):
         self.ready: deque[Message] = deque()
         """What was read ahead, in front of the inbox; anybody may take from its left without the lock."""
         self._ahead = _ReadAhead(spec.max_messages)
+        self._moves = spec.max_messages >= 10 * _AHEAD_MOST
+        """Whether a few messages more than that may wait for the reader."""
         self._read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0
@@ -403,6 +405,9 @@ class SocketSubscriber(Generic[R]):
             return self._bounded(self.ready.popleft())
         if not self._keeps_all:
             self._fill()
+        elif self._moves and self._inbox.messages:
+            self._inbox.move(self.ready, _AHEAD_MOST, _AHEAD_BYTES)
+            return self.ready.popleft()
         return self._inbox.take()
 
     def _bounded(self, message: Message | None) -> Message | None:
