@@ -23,7 +23,7 @@ import selectors
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NamedTuple, Protocol
 
@@ -49,6 +49,7 @@ _SOCKET_FILES = 4
 """A socket, its port, its local name, and a connection."""
 _IDLE_WAKERS = 8
 _LOOKS, _LOOK_S = 10, 0.01
+_Ready = tuple[selectors.SelectorKey, int]
 _ROUNDED_S = 0.001
 _ROUNDING = getattr(selectors, "EpollSelector", ())
 _SELECT_MOST = 1024
@@ -168,10 +169,10 @@ class IoThread:
 
     def _turn(self) -> None:
         timeout_s = self._timeout()
-        if timeout_s and timeout_s < _ROUNDED_S:
-            timeout_s = _waited(self._selector, timeout_s)
-        ready = self._selector.select(timeout_s)
-        self._waker.clear()
+        ready = _ready(self._selector, timeout_s)
+        # Each system call lets another thread go on, and waits for it: so none without need.
+        if any(key.data is None for key, _events in ready):
+            self._waker.clear()
         self._obey()
         for key, _events in ready:
             if isinstance(key.data, tuple) and key.data[0] in self._served:
@@ -275,12 +276,18 @@ def _events(rest: Rest) -> int:
     return (0 if rest.is_quiet else selectors.EVENT_READ) | (selectors.EVENT_WRITE if rest.sends else 0)
 
 
-def _waited(selector: selectors.BaseSelector, timeout_s: float) -> float:
-    """Wait where epoll alone would wait for a whole millisecond; how long is left to wait."""
-    if isinstance(selector, _ROUNDING) and selector.fileno() < _SELECT_MOST:
-        select.select((selector.fileno(),), (), (), timeout_s)
-        return 0.0
-    return timeout_s
+def _ready(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequence[_Ready]:
+    """Those that are ready within this time, also where epoll alone would wait for a whole millisecond."""
+    if (
+        timeout_s
+        and timeout_s < _ROUNDED_S
+        and isinstance(selector, _ROUNDING)
+        and selector.fileno() < _SELECT_MOST
+    ):
+        if not select.select((selector.fileno(),), (), (), timeout_s)[0]:
+            return ()
+        timeout_s = 0.0
+    return selector.select(timeout_s)
 
 
 class SharedContext:
