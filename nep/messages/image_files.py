@@ -277,7 +277,9 @@ class _Png(_Reader):
         kinds: set[bytes] = set()
         orientation, at = 1, 8
         for _piece in range(MOST_PIECES):
-            kind, end = bytes(self.data[at + 4 : at + 8]), min(self.size, at + 12 + self.number(at, 4))
+            kind, end = bytes(self.data[at + 4 : at + 8]), at + 12 + self.number(at, 4)
+            if end > self.size:  # OpenCV takes memory for as much as a chunk tells: 4 GB for a few bytes
+                raise self.broken(_("it ends too early"))
             if kind == b"IHDR" and kind in kinds:
                 raise self.broken(_("it has two heads"))
             if kind in _NEEDED:

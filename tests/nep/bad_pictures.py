@@ -85,6 +85,9 @@ BOMBS = {
     "png with two heads": png(8, 8, b"\0", head(SIDE, SIDE)),
     "png whose head is hidden": png(SIDE, SIDE, b"\0", first=chunk(b"CgBI", bytes(4)) + head(8, 8)),
     "png of a depth that is none": png(8, 8, b"\0", depth=3, colour=2),
+    "png of a chunk of gigabytes": png(8, 8, b"\0").replace(
+        struct.pack(">I", len(zlib.compress(b"\0"))) + b"IDAT", b"\xdb\0\0\0IDAT"
+    ),
     "png of endless chunks": PNG + head(8, 8) + chunk(b"tEXt", b"") * 100_001,
     "jpeg of many pixels": jpeg(frame(65_000, 65_000), scan()),
     "jpeg of many pixels in refinements": jpeg(frame(10_000, 10_000, 0xC2), scan()),

@@ -241,9 +241,7 @@ SENT = (
 )
 @settings(max_examples=400, deadline=None)
 def test_whatever_is_sent_as_a_picture_is_one_or_a_sentence(data, extension, fit) -> None:
-    with patch.object(
-        image_files, "MOST_PIXELS", 1_000_000
-    ):  # one byte makes 100 million, which take seconds
+    with patch.object(image_files, "MOST_PIXELS", 1_000_000):  # one byte makes 100 million: seconds
         look_at_a_picture(data, extension, fit)
 
 
