@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from nep.errors import WireError
 from nep.i18n import _
+from nep.masters.clocks import Clocks
 from nep.masters.leases import LEASE_S, Leases, RawRenewal
 from nep.masters.pattern_index import ALL_PATTERNS_MAX, PATTERNS_MAX
 from nep.masters.registry import (
@@ -110,9 +111,13 @@ def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
 class Graph:
     """See the module. Not thread-safe: it belongs to the master's thread."""
 
-    def __init__(self, epoch: int, now: float, learn_s: float = 1.0, lease_s: float = LEASE_S) -> None:
+    def __init__(
+        self, epoch: int, now: float, learn_s: float = 1.0, lease_s: float = LEASE_S, computer: str = ""
+    ) -> None:
         self.epoch = epoch
         self._registry = Registry()
+        self.clocks = Clocks(self._registry, computer)
+        """Those of the nodes; `computer` is the master's."""
         self._viewer = GraphViewer(self._registry)
         self._leases = Leases(self._registry, lease_s)
         self._learnt_at = now + learn_s
@@ -403,8 +408,10 @@ class Graph:
         member = self._member_at(said.node_id, sender)
         if member is None or said.epoch != self.epoch:
             return None
-        is_registered = self._registry.renew(member, said.publishers, said.subscribers, now, said.cpu_ratio)
-        return member if is_registered else None
+        if not self._registry.renew(member, said.publishers, said.subscribers, now, said.cpu_ratio):
+            return None
+        self.clocks.note(member, said.clock, now)
+        return member
 
     def _member_at(self, node_id: str, sender: str) -> RegisteredNode | None:
         """A node, if this connection speaks for it."""
@@ -420,6 +427,7 @@ class Graph:
             tuple(map(vars, request.publishers)),
             tuple(map(vars, request.subscribers)),
             request.cpu_ratio,
+            request.clock,
         )
         member = self._renewed_member(said, now, sender)
         if member is None:
@@ -436,7 +444,8 @@ class Graph:
             if self._registry.topic_revision(topic) > request.revision
         )
         last_seqs, next_s = self._registry.last_seqs(member), self._leases.renew(member, now)
-        return Renewed(self.epoch, self.revision, False, changed, last_seqs, next_s=next_s)
+        clocks = self.clocks.differences(member, now)
+        return Renewed(self.epoch, self.revision, False, changed, last_seqs, next_s=next_s, clocks=clocks)
 
     def _unlist_publisher(self, member: RegisteredNode, publisher: int, out: list[Outgoing]) -> None:
         """Take out a publisher that has not said that it closes."""

@@ -103,6 +103,7 @@ class RawRenewal(NamedTuple):
     publishers: Counts
     subscribers: Counts
     cpu_ratio: float | None
+    clock: tuple[int, ...] | None = None
 
 
 def is_renewal(body: bytes) -> bool:
@@ -127,6 +128,7 @@ def read_renewal(body: bytes) -> RawRenewal | None:
             what.get("publishers", ()),
             what.get("subscribers", ()),
             what.get("cpu_ratio"),
+            _clock_in(what.get("clock")),
         )
     except (ValueError, LookupError, TypeError, AttributeError):
         return None
@@ -137,6 +139,15 @@ def read_renewal(body: bytes) -> RawRenewal | None:
     return said if is_usual else None
 
 
+def _clock_in(told: Any) -> tuple[int, ...] | None:  # noqa: ANN401 - what came from the wire
+    """A node's word on its clock. Raises `ValueError` when it is unusual."""
+    if told is None:
+        return None
+    if type(told) not in {list, tuple} or not all(type(each) is int for each in told):
+        raise ValueError(told)
+    return tuple(told)
+
+
 def renewed_body(
     call: int,
     epoch: int,
@@ -144,6 +155,9 @@ def renewed_body(
     last_seqs: Mapping[int, int],
     hosts: tuple[str, ...],
     next_s: float = RENEW_S,
+    *,
+    times: tuple[int, ...] = (),
+    clocks: Mapping[str, tuple[int, int]] | None = None,
 ) -> bytes:
     """The body of a `Renewed` with which nothing has changed."""
     what: dict[str, object] = {"epoch": epoch, "revision": revision, "last_seqs": last_seqs}
@@ -151,4 +165,8 @@ def renewed_body(
         what["hosts"] = hosts
     if next_s != RENEW_S:
         what["next_s"] = next_s
+    if times:
+        what["times"] = times
+    if clocks:
+        what["clocks"] = clocks
     return pack_saturated({"is": "renewed", "re": call, "what": what})

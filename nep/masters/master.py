@@ -20,6 +20,7 @@ from nep.masters.server import MasterServer
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import Listen, Look, Refused, Reply, Request, Seen
 from nep.system.addresses import master_address
+from nep.system.computer import computer_id
 from nep.system.forks import give_up, watch
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class Master:
 
     def start(self) -> Self:
         """Bind, start what is attached, answer. Returns itself."""
-        graph = Graph(self.epoch, time.monotonic(), self._learn_s, self._lease_s)
+        graph = Graph(self.epoch, time.monotonic(), self._learn_s, self._lease_s, computer_id())
         listeners = [attachment.changed for attachment in self._attachments]
         server = MasterServer(self.address, graph, listeners, self._owner)
         self.address = server.address

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from nep.errors import NepError, WireError
 from nep.i18n import _
@@ -36,6 +36,7 @@ __all__ = [
     "ALWAYS_ROOM",
     "RECORDS_MAX",
     "Counts",
+    "NodeClock",
     "RegisteredNode",
     "RegisteredPublisher",
     "RegisteredSubscriber",
@@ -96,6 +97,17 @@ class RegisteredSubscriber:
     problem: str = ""
 
 
+class NodeClock(NamedTuple):
+    """A node's clock: what to add for the master's, how surely (ns), and when it told so.
+
+    That is None for nodes that have the master's clock: it cannot drift from itself.
+    """
+
+    offset_ns: int
+    uncertainty_ns: int
+    told_at: float | None
+
+
 @dataclass
 class RegisteredNode:
     """A node with all that it has. `hung`: it did not answer publishers of the nodes with these ids.
@@ -116,6 +128,9 @@ class RegisteredNode:
     heard: dict[int, RegisteredPublisher] = field(default_factory=dict)
     """Whom its subscribers can connect to, as of the revision `heard_at`. See `Registry.heard_by`."""
     heard_at: int = -1
+    far: tuple[RegisteredNode, ...] = ()
+    """Whose they are, as far as these are not known to be on the same computer."""
+    clock: NodeClock | None = None
 
 
 class Registry:
@@ -188,7 +203,7 @@ class Registry:
 
     def remote(self, member: RegisteredNode, record: PublisherRecord) -> RemotePublisher:
         """A publisher as subscribers have to know it."""
-        return RemotePublisher(record, member.node.id, member.node.name)
+        return RemotePublisher(record, member.node.id, member.node.name, member.node.computer)
 
     def topic_revision(self, topic: str) -> int:
         """The revision at which the publishers of this topic changed last."""
@@ -205,7 +220,15 @@ class Registry:
                 for known, other in self._publishing.get(topic, {}).items()
                 if other.publishers[known].record.endpoints
             }
+            owners = {owner.node.id: owner for owner in map(self.publisher_owners.get, member.heard) if owner}
+            own = member.node.computer
+            member.far = tuple(each for each in owners.values() if not own or each.node.computer != own)
         return member.heard
+
+    def far_from(self, member: RegisteredNode) -> tuple[RegisteredNode, ...]:
+        """Other computers' nodes that can be connected to on the topics that this one subscribes to."""
+        self.heard_by(member)
+        return member.far
 
     def last_seqs(self, member: RegisteredNode) -> dict[int, int]:
         """Publisher id → newest message, for all that can be connected to on this node's topics."""
@@ -480,6 +503,7 @@ def _check_node(node: NodeRecord) -> None:
     _check_word("language", node.language, 50)
     _check_word("generation", node.generation, 50)
     _check_word("key", node.key, 200)
+    _check_word("computer", node.computer, 64)
     if node.pid is not None and not 0 <= node.pid <= _PID_MAX:
         raise WireError(_("{pid} is no number of a process").format(pid=node.pid))
     if not 0 <= node.since_ns <= COUNT_MAX:

@@ -23,7 +23,17 @@ from nep.masters.process import Owner
 from nep.masters.router import MasterRouter
 from nep.protocol.encoding import AnswerEncoder, ReceivedRequest, collecting_later, decode_request
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import Done, Listen, Look, Refused, Reply, ReportAlerts, Request
+from nep.protocol.requests import (
+    Done,
+    Listen,
+    Look,
+    Refused,
+    Renew,
+    Renewed,
+    Reply,
+    ReportAlerts,
+    Request,
+)
 from nep.system.addresses import endpoint_of
 from nep.system.forks import watch
 from nep.system.log_rarely import is_logged
@@ -76,7 +86,8 @@ class MasterServer:
         self._calls = 0
         self._encoder = AnswerEncoder()
         self._bad = BadRequests()
-        self._renewals: list[tuple[bytes, bytes]] = []
+        self._renewals: list[tuple[bytes, bytes, int]] = []
+        """Those that are not answered yet: whose, what, and when it came (ns since 1970)."""
         self._tell_at = 0.0
         self._is_open = False
         self._closing = self._is_forked = False
@@ -231,7 +242,7 @@ class MasterServer:
                 _logger.exception("the master could not read a request")
                 return
             if len(body) == 1 and is_renewal(body[0]):
-                self._renewals.append((sender, body[0]))
+                self._renewals.append((sender, body[0], time.time_ns()))
             else:
                 self._answer_renewals()  # they came before
                 self._serve(sender, body, self._port.peer())
@@ -239,32 +250,44 @@ class MasterServer:
     def _answer_renewals(self) -> None:
         """All of them, then all answers: so the network's thread is woken once, too."""
         renewals, self._renewals = self._renewals, []
-        answers = [self._renew_safely(sender, body) for sender, body in renewals]
-        for (sender, body), answer in zip(renewals, answers, strict=True):
+        answers = [self._renew_safely(*renewal) for renewal in renewals]
+        for (sender, body, _came_ns), answer in zip(renewals, answers, strict=True):
             if answer is None:
                 self._serve(sender, [body], "")
             elif not self._port.send(sender, answer):
                 self._send(self._graph.drop(self._speaking_at(_name_of(sender))))
 
-    def _renew_safely(self, sender: bytes, body: bytes) -> bytes | None:
+    def _renew_safely(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
         """As `_renew_quickly`; what fails takes the usual way, which answers it."""
         try:
-            return self._renew_quickly(sender, body)
+            return self._renew_quickly(sender, body, came_ns)
         except Exception as error:  # noqa: BLE001 - logged; the others are renewed
             self._failed(error, "a renewal")
             return None
 
-    def _renew_quickly(self, sender: bytes, body: bytes) -> bytes | None:
+    def _renew_quickly(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
         """The answer to a usual renewal; None when it is something else."""
         said = read_renewal(body)
         if said is None:
             return None
         graph = self._graph
-        last_seqs = graph.renew_quickly(said, time.monotonic(), _name_of(sender))
+        now = time.monotonic()
+        last_seqs = graph.renew_quickly(said, now, _name_of(sender))
         if last_seqs is None:
             return None
-        hosts, next_s = self._listening.hosts, graph.members[said.node_id].renew_s
-        return renewed_body(said.call, graph.epoch, graph.revision, last_seqs, hosts, next_s)
+        member = graph.members[said.node_id]
+        clocks = graph.clocks.differences(member, now)
+        times = () if said.clock is None else graph.clocks.times(member, came_ns)
+        return renewed_body(
+            said.call,
+            graph.epoch,
+            graph.revision,
+            last_seqs,
+            self._listening.hosts,
+            member.renew_s,
+            times=times,
+            clocks=clocks,
+        )
 
     def _serve(self, sender: bytes, body: list[bytes], peer: str) -> None:
         asked = decode_request(body[-1] if len(body) == 1 else b"")
@@ -288,7 +311,10 @@ class MasterServer:
             else:
                 now, is_foreign = time.monotonic(), bool(sender)
                 with collecting_later() if isinstance(request, Look) else nullcontext():
+                    came_ns = time.time_ns()
                     outgoing = self._graph.apply(request, asked.call, now, sender, is_foreign=is_foreign)
+                    if isinstance(request, Renew) and request.clock is not None:
+                        outgoing = self._timed(outgoing, came_ns)
                     self._send(outgoing)
                 return _reason_in(outgoing)
         except Exception as error:  # noqa: BLE001 - logged; one request must never end the master
@@ -296,6 +322,15 @@ class MasterServer:
             outgoing = (Outgoing(sender, self._refused(), asked.call),)
         self._send(outgoing)
         return request if isinstance(request, str) else ""
+
+    def _timed(self, outgoing: Sequence[Outgoing], came_ns: int) -> tuple[Outgoing, ...]:
+        """Answers to a renewal that came at this time of this computer's clock, with both times."""
+        return tuple(
+            each._replace(answer=replace(each.answer, times=self._graph.clocks.times(member, came_ns)))
+            if isinstance(each.answer, Renewed) and (member := self._graph.node_at(each.to)) is not None
+            else each
+            for each in outgoing
+        )
 
     def _listen(self, request: Listen) -> Reply:
         try:

@@ -75,7 +75,7 @@ class GraphViewer:
 
 
 def _node_info(member: RegisteredNode) -> NodeInfo:
-    node = member.node
+    node, clock = member.node, member.clock
     every_field: dict[str, object] = {
         "id": node.id,
         "name": node.name,
@@ -85,6 +85,8 @@ def _node_info(member: RegisteredNode) -> NodeInfo:
         "generation": node.generation,
         "since_ns": node.since_ns,
         "cpu_ratio": member.cpu_ratio,
+        "clock_offset_ns": None if clock is None else clock.offset_ns,
+        "clock_uncertainty_ns": None if clock is None else clock.uncertainty_ns,
     }
     return make_frozen(NodeInfo, every_field)
 

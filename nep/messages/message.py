@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
 
+from nep.messages.clocks import NOT_COMPARED, PublisherClock
 from nep.messages.codecs import CODECS
 from nep.messages.codecs import codec as codec_named
 
@@ -26,13 +28,21 @@ class MessageKind(NamedTuple):
     msg_type: str
     is_latched: bool
     decode: Callable[[bytes | memoryview, Mapping[str, object]], object]
+    clock: PublisherClock = NOT_COMPARED
 
 
-def kind_of(topic: str, codec: str, msg_type: str, *, is_latched: bool = False) -> MessageKind:
+def kind_of(
+    topic: str,
+    codec: str,
+    msg_type: str,
+    *,
+    is_latched: bool = False,
+    clock: PublisherClock = NOT_COMPARED,
+) -> MessageKind:
     """The `MessageKind` with these. The codec may be one that there is not: then decoding says so."""
     known = CODECS.get(codec)
     decode = partial(_no_codec, codec) if known is None else known.decode
-    return MessageKind(topic, codec, msg_type, is_latched, decode)
+    return MessageKind(topic, codec, msg_type, is_latched, decode, clock)
 
 
 def _no_codec(name: str, data: bytes | memoryview, extension: Mapping[str, object]) -> object:
@@ -52,16 +62,20 @@ class Message:
     `publisher`  the publisher's id; None from the original wire
     `extension`  what travels beside the payload (an image's shape and encoding), else empty
     `is_latched` True when the publisher kept it for subscribers that come late
+    `latency_s`  how long after its publication this program looked at it (s), by this computer's clock
+    `latency_uncertainty_s`  how surely that is known (s)
     """
 
     # Few, and what can wait is made on first use: hundreds of thousands are made a second.
-    __slots__ = ("decoded", "extension", "kind", "publisher", "raw", "seq", "stamp_ns")
+    __slots__ = ("decoded", "extension", "kind", "publisher", "raw", "seen_ns", "seq", "stamp_ns")
 
     raw: bytes | memoryview
     kind: MessageKind
     decoded: object
     extension: Mapping[str, object]
     publisher: int | None
+    seen_ns: int
+    """When `latency_s` was asked for first, by this computer's clock; not set before."""
     seq: int | None
     stamp_ns: int | None
 
@@ -117,6 +131,32 @@ class Message:
         if payload is UNDECODED:
             payload = self.decoded = self.kind.decode(self.raw, self.extension)
         return payload
+
+    @property
+    def latency_s(self) -> float | None:
+        """Seconds from its publication until this was asked for first; None when it has no time.
+
+        Ask as soon as a message comes. Between two computers it is corrected by how their clocks differ, as
+        far as that is known: `latency_uncertainty_s` tells. So it may be a little below 0.
+        """
+        if self.stamp_ns is None:
+            return None
+        try:
+            seen_ns = self.seen_ns
+        except AttributeError:
+            seen_ns = self.seen_ns = time.time_ns()
+        known = self.kind.clock.difference
+        return (seen_ns - self.stamp_ns - (0 if known is None else known.add_ns)) / 1e9
+
+    @property
+    def latency_uncertainty_s(self) -> float | None:
+        """By how many seconds `latency_s` may be wrong, to both sides, because clocks of computers differ.
+
+        0.0 on one computer, where there is one clock. None when nobody has compared the two clocks (yet):
+        then `latency_s` is not corrected, and may be wrong by any time.
+        """
+        known = self.kind.clock.seconds()
+        return None if self.stamp_ns is None or known is None else known[1]
 
     @property
     def size_bytes(self) -> int:

@@ -148,6 +148,8 @@ class TypedReader:
         made.publisher = message.publisher
         made.extension = message.extension
         made.decoded = UNDECODED
+        if hasattr(message, "seen_ns"):
+            made.seen_ns = message.seen_ns
         return made
 
     def _decoder(

@@ -50,6 +50,7 @@ from nep.protocol.service_wire import PREFIX
 from nep.protocol.wire import check_node_name, check_topic
 from nep.system import forks
 from nep.system.addresses import checked_host
+from nep.system.computer import computer_id
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -112,6 +113,7 @@ class Node(ServiceNode):
             generation=generation,
             since_ns=time.time_ns(),
             key=key,
+            computer=computer_id(),
         )
         self._transport: Transport = self._backend.open(record)
         self._services = OwnedServices(self._transport, self._backend, self._wait_s, self._new_id, self._wake)

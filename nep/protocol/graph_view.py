@@ -36,7 +36,9 @@ class NodeInfo:
     """A program, or a part of one. `generation` is "native", "gateway", or the original NEP's "A", "B".
 
     `cpu_ratio` is the share of one core that its process used between its last two renewals (0.5 is half a
-    core), None until known; nodes of one process have the same.
+    core), None until known; nodes of one process have the same. `clock_offset_ns`: what to add to its
+    computer's clock for the master's, known to `clock_uncertainty_ns` to both sides; 0 and 0 on the
+    master's own computer, None until known.
     """
 
     id: str
@@ -47,6 +49,8 @@ class NodeInfo:
     generation: str
     since_ns: int
     cpu_ratio: float | None = None
+    clock_offset_ns: int | None = None
+    clock_uncertainty_ns: int | None = None
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,8 @@ def as_count(value: int) -> int:
 class NodeRecord:
     """A node as it presents itself. `since_ns` is its own clock when it was made.
 
-    `key` is known to the node and its masters only and proves its id: see `is_proven`.
+    `key` is known to the node and its masters only and proves its id: see `is_proven`. Nodes with the same
+    `computer` read the same clock; "" if that is not known.
     """
 
     id: str
@@ -43,6 +44,7 @@ class NodeRecord:
     generation: str = "native"
     since_ns: int = 0
     key: str = field(default="", repr=False)
+    computer: str = ""
 
 
 @dataclass(frozen=True)
@@ -126,11 +128,15 @@ class SubscriberCount:
 
 @dataclass(frozen=True)
 class RemotePublisher:
-    """A publisher with the node that it belongs to: what a subscriber needs to connect."""
+    """A publisher with the node that it belongs to: what a subscriber needs to connect.
+
+    `computer` is the node's: see `NodeRecord`.
+    """
 
     publisher: PublisherRecord
     node_id: str
     node_name: str
+    computer: str = ""
 
 
 @dataclass(frozen=True)
@@ -205,6 +211,8 @@ class Renew:
     """A node lives; its statistics. `revision` is the one of the last `Renewed` or `Joined` that it got.
 
     `cpu_ratio`: the share of one core that its program used since the last renewal; None if it is not known.
+    `clock`: what to add to its clock for the master's and how surely (ns), empty as long as it does not know;
+    None from nodes that do not compare clocks.
     """
 
     node_id: str
@@ -213,6 +221,7 @@ class Renew:
     publishers: tuple[PublisherCount, ...] = ()
     subscribers: tuple[SubscriberCount, ...] = ()
     cpu_ratio: float | None = None
+    clock: tuple[int, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -327,6 +336,10 @@ class Renewed(_FromMaster):
     `topics` are those of the node's subscribers that changed since its revision; `last_seqs` are the newest
     messages of the publishers it subscribes to, as of their last renewal. The next renewal is due in `next_s`
     seconds: the master lets the nodes of a large graph renew less often.
+
+    `times` are when the renewal was received and answered, by the master's clock (ns since 1970); nothing
+    for nodes with the same clock. `clocks`: by the id of a node on another computer that the node hears,
+    what to add to its times for the node's own clock, and how surely that is known (ns).
     """
 
     again: bool = False
@@ -334,6 +347,8 @@ class Renewed(_FromMaster):
     last_seqs: Mapping[int, int] = field(default_factory=dict)
     hosts: tuple[str, ...] = ()
     next_s: float = RENEW_S
+    times: tuple[int, ...] = ()
+    clocks: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from nep.backends.services import CallQueue, ClientSpec, ServerSpec
 from nep.backends.waking import WakingSubscriber
 from nep.errors import NepError
 from nep.i18n import _
+from nep.messages.clocks import OWN_CLOCK
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
 from nep.messages.message import Message, arrived, kind_of
@@ -108,7 +109,9 @@ class MemoryPublisher:
         self.spec = spec
         self.count = 0
         self.bytes = 0
-        self._kind = kind_of(spec.topic, spec.codec.name, spec.msg_type, is_latched=spec.is_latched)
+        self._kind = kind_of(
+            spec.topic, spec.codec.name, spec.msg_type, is_latched=spec.is_latched, clock=OWN_CLOCK
+        )
         self.last_stamp_ns: int | None = None
         self.problem = ""
         self.history: History[Message] = History(spec.history)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from nep.errors import WireError
+from nep.messages.clocks import SAME_CLOCK, ClockDifference, PublisherClock
 from nep.messages.message import MessageKind, kind_of
 from nep.protocol.requests import RemotePublisher
+from nep.system.addresses import is_loopback
+from nep.system.computer import computer_id
 
 __all__ = ["UNLISTED_MAX", "HeardPublisher", "HeardPublishers"]
 
@@ -32,6 +36,8 @@ class HeardPublisher:
     shared_form: int = 0
     """The same of its last message in shared memory."""
     kind: MessageKind = _UNKNOWN
+    clock: PublisherClock = field(default_factory=PublisherClock)
+    """That of its computer; its messages ask it."""
     remote: RemotePublisher | None = None
     endpoint: str = ""
     refused: str = ""
@@ -58,6 +64,7 @@ class HeardPublishers:
         self.lost = 0
         self.by_id: dict[int, HeardPublisher] = {}
         """All of them. Only to be looked at."""
+        self._clocks: Mapping[str, ClockDifference] = {}
         self._unlisted: dict[int, None] = {}
         """Those that no master lists, the oldest first."""
 
@@ -75,8 +82,19 @@ class HeardPublishers:
         """The source of a publisher that the master lists, made when it is new."""
         source = self.get(remote.publisher.id)
         source.remote = remote
+        source.clock.difference = self._difference(remote)
         self._unlisted.pop(remote.publisher.id, None)
         return source
+
+    def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
+        """By node, how the clocks of other computers differ from this one's: no others are known."""
+        self._clocks = clocks
+        for source in self.by_id.values():
+            if source.remote is not None:
+                source.clock.difference = self._difference(source.remote)
+
+    def _difference(self, remote: RemotePublisher) -> ClockDifference | None:
+        return SAME_CLOCK if _is_here(remote) else self._clocks.get(remote.node_id)
 
     def find(self, publisher: int) -> HeardPublisher | None:
         """The source of this id, if there is one."""
@@ -202,3 +220,15 @@ class HeardPublishers:
             and each != remote.publisher.id
             and source.remote.node_name == remote.node_name
         ]
+
+
+def _is_here(remote: RemotePublisher) -> bool:
+    """Whether a publisher is on this very computer.
+
+    Older programs do not say where they are: then how they are reached tells.
+    """
+    own = computer_id()
+    if own and remote.computer:
+        return own == remote.computer
+    endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
+    return endpoint.startswith("ipc://") or is_loopback(endpoint.partition("://")[2])

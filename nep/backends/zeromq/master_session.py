@@ -9,15 +9,18 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Protocol
 
 from nep.backends.zeromq.bindings import in_reach, may_stay
+from nep.backends.zeromq.clock_samples import ClockSamples, Moment
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.rpc import PendingCall, RpcClient
 from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards
+from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
     AddressInUseError,
     ClosedError,
@@ -26,6 +29,7 @@ from nep.errors import (
     TooManyFilesError,
 )
 from nep.i18n import _
+from nep.messages.clocks import ClockDifference, is_clock
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     RENEW_S,
@@ -164,6 +168,9 @@ class MasterSession:
         self._name.look(time.monotonic())
         self._moved_to = self.hosts
         self._load = CpuLoad()
+        self._clock = ClockSamples()
+        self._read_at = self._clock.now()
+        self._clocks: Mapping[str, ClockDifference] = {}
         self.fd = self._calls.fd
 
     @property
@@ -303,7 +310,9 @@ class MasterSession:
 
     def serve(self, now: float) -> Rest:
         """Read answers; renew when it is time, and at once when a master has come back."""
-        for answer in self._calls.read():
+        answers = self._calls.read()
+        self._read_at = self._clock.now() if answers else self._read_at
+        for answer in answers:
             self._obey(answer.what, now)
             if answer.then is not None and not isinstance(answer.what, Push):
                 answer.then(answer.what)
@@ -378,6 +387,9 @@ class MasterSession:
     def _renew(self) -> None:
         if self._epoch == 0:
             return
+        offset = self._clock.offset()
+        if offset is None:
+            self._correct({})  # also when this computer's clock was set just now
         with self._lock:
             publishers = [
                 publisher for each, (_, publisher) in self._publishers.items() if each in self._confirmed
@@ -392,8 +404,19 @@ class MasterSession:
                 tuple(publisher.counts() for publisher in publishers),
                 tuple(subscriber.counts() for subscriber in subscribers),
                 self._load.ratio(),
+                offset or (),
             )
-            self._calls.tell(request)
+            self._calls.tell(request, then=partial(self._timed, self._clock.now()))
+
+    def _timed(self, sent: Moment, answer: Reply) -> None:
+        """A renewal that was sent at `sent` is answered: compare this computer's clock with the master's."""
+        if not isinstance(answer, Renewed) or answer.epoch != self._epoch or not answer.times:
+            return
+        was_known = self._clock.offset() is not None
+        if len(answer.times) != 2:
+            self._calls.refusals.add(_("the times of a renewal are two"))
+        elif self._clock.add(sent, *answer.times, self._read_at) and not was_known:
+            self._pace.due_at = self._read_at.steady_ns / 1e9  # others wait for it
 
     def _renewed(self, answer: Renewed, now: float) -> None:
         if answer.again:
@@ -404,8 +427,28 @@ class MasterSession:
         for topic in answer.topics:
             for subscriber in self._subscribers_of(topic.topic):
                 subscriber.reconcile(self._in_reach(topic.publishers))
+        self._correct(self._differences_in(answer))
         for _record, each in self._all_subscribers():
             each.tick(now, answer.last_seqs.items())
+
+    def _differences_in(self, answer: Renewed) -> Mapping[str, ClockDifference]:
+        known_at_ns = time.monotonic_ns()
+        found = {
+            node_id: ClockDifference(*told, known_at_ns)
+            for node_id, told in answer.clocks.items()
+            if len(told) == 2 and is_clock(told[0] // 2, told[1] // 2)
+        }
+        if len(found) < len(answer.clocks):
+            self._calls.refusals.add(_("a clock differs as no clock can"))
+        return found
+
+    def _correct(self, clocks: Mapping[str, ClockDifference]) -> None:
+        """Tell subscribers how other computers' clocks differ, when there is anything to tell."""
+        if clocks or self._clocks:
+            self._clocks = clocks
+            for _record, each in self._all_subscribers():
+                if isinstance(each, NativeSubscriber | PatternSubscriber):  # answers of servers have no times
+                    each.correct(clocks)
 
     def _join(self, now: float) -> None:
         """Register everything again, once at a time."""
@@ -424,6 +467,7 @@ class MasterSession:
         if not isinstance(reply, Found):
             return
         self._epoch, self._revision = reply.epoch, reply.revision
+        self._clock.forget()  # the master may be on another computer now
         self._join_again_at = 0.0
         with self._lock:
             self._confirmed = items & (self._publishers.keys() | self._subscribers.keys())

@@ -11,7 +11,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from nep.backends.base import SubscriberSpec
@@ -19,6 +19,7 @@ from nep.backends.waking import WakingSubscriber
 from nep.backends.zeromq.io_thread import IoThread
 from nep.backends.zeromq.subscriber import NativeReadable, NativeSubscriber
 from nep.errors import NepError
+from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
 from nep.messages.queue import MAX_MESSAGES, Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
@@ -187,6 +188,11 @@ class PatternSubscriber(WakingSubscriber):
     def topics(self) -> tuple[str, ...]:
         """Those that it has a member for."""
         return tuple(self._members)
+
+    def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
+        """How the clocks of other computers differ from this one's, by node."""
+        for member in list(self._members.values()):
+            member.correct(clocks)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Once a second: see `NativeSubscriber.tick`. A topic that nobody publishes any more is left."""

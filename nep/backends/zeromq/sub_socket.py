@@ -168,7 +168,13 @@ class CarefulParser:
                 return None
         source = self._sources.get(header.publisher)
         msg_type = self._msg_type if source.remote is None else source.remote.publisher.msg_type
-        source.kind = kind_of(self._name, codec.name, msg_type, is_latched=bool(header.flags & LATCHED))
+        source.kind = kind_of(
+            self._name,
+            codec.name,
+            msg_type,
+            is_latched=bool(header.flags & LATCHED),
+            clock=source.clock,
+        )
         # `kind` goes with both forms: what has another codec is read carefully again.
         plain = 0 if header.flags & EXTENSION else form_of(header.codec, header.flags & ~SHARED)
         if header.flags & SHARED:

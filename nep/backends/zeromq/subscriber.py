@@ -20,7 +20,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Generic, Protocol, TypeVar
 
@@ -31,6 +31,7 @@ from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals, wait_until
 from nep.backends.zeromq.sub_socket import Into
+from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
@@ -533,6 +534,11 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._readable.sources.closing(publisher, final, time.monotonic())
             elif source is not None:
                 source.is_lapsed = True
+
+    def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
+        """By node, how the clocks of other computers differ from this one's: no others are known."""
+        with self._turn():
+            self._readable.sources.correct(clocks)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Once a second: leave publishers that have closed without a bye; reconcile losses.

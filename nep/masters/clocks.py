@@ -1,0 +1,64 @@
+"""Clocks: how far the clocks of nodes on other computers are from the master's, as their renewals tell."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from nep.masters.registry import NodeClock, RegisteredNode, Registry
+from nep.messages.clocks import drift_ns, is_clock
+
+__all__ = ["Clocks", "Differences"]
+
+Differences = dict[str, tuple[int, int]]
+"""By node: what to add to its times for the clock of who asks, and how surely that is known (ns)."""
+
+
+class Clocks:
+    """For the nodes of `registry`; `computer` is the master's own, "" if that is not known.
+
+    `now` is in seconds of a clock that does not jump.
+    """
+
+    def __init__(self, registry: Registry, computer: str) -> None:
+        self._registry = registry
+        self._computer = computer
+
+    def is_here(self, member: RegisteredNode) -> bool:
+        """Whether the node has the master's own clock."""
+        return bool(self._computer) and member.node.computer == self._computer
+
+    def note(self, member: RegisteredNode, told: tuple[int, ...] | None, now: float) -> None:
+        """A node's word on its clock: None if it has none, empty when it does not know yet.
+
+        What no clock can be counts as not known.
+        """
+        if told is not None and self.is_here(member):
+            member.clock = NodeClock(0, 0, None)
+        elif told is not None and len(told) == 2 and is_clock(*told):
+            member.clock = NodeClock(*told, now)
+        else:
+            member.clock = None
+
+    def differences(self, member: RegisteredNode, now: float) -> Differences:
+        """For all nodes on other computers whose publishers this one can hear, as far as they are known."""
+        own = member.clock
+        if own is None:
+            return {}
+        found: Differences = {}
+        for other in self._registry.far_from(member):
+            if other.clock is not None:
+                uncertainty_ns = _uncertainty_ns(own, now) + _uncertainty_ns(other.clock, now)
+                found[other.node.id] = other.clock.offset_ns - own.offset_ns, uncertainty_ns
+        return found
+
+    def times(
+        self, member: RegisteredNode, received_ns: int, wall: Callable[[], int] | None = None
+    ) -> tuple[int, ...]:
+        """When its renewal was received and is answered; nothing for who has the same clock."""
+        return () if self.is_here(member) else (received_ns, (wall or time.time_ns)())
+
+
+def _uncertainty_ns(clock: NodeClock, now: float) -> int:
+    aged = 0 if clock.told_at is None else drift_ns((now - clock.told_at) * 1e9)
+    return clock.uncertainty_ns + aged

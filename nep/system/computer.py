@@ -1,0 +1,63 @@
+"""Which computer this is: programs with the same answer read the same clock."""
+
+from __future__ import annotations
+
+import ctypes
+import platform
+import sys
+from collections.abc import Callable, Mapping
+from functools import cache
+from hashlib import sha256
+from importlib import import_module
+from pathlib import Path
+
+__all__ = ["computer_id"]
+
+_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+
+
+@cache
+def computer_id() -> str:
+    """16 hexadecimal digits: the same for programs of one running system, others elsewhere; "" if not known.
+
+    Containers of one computer share its clock and have the same; a virtual machine has a clock of its own.
+    The digits are made from what the system calls itself, which stays here.
+    """
+    name = clock_name()
+    return sha256(f"nep clock {name}".encode("utf-8", "replace")).hexdigest()[:16] if name else ""
+
+
+def clock_name() -> str:
+    """What this system calls itself; "" when it does not say."""
+    ask = _NAMES.get(sys.platform)
+    try:
+        return "" if ask is None else ask()
+    except (OSError, ValueError, AttributeError):
+        return ""
+
+
+def _boot_id() -> str:
+    """Linux: another one after each start, the same in all containers."""
+    return _BOOT_ID.read_text("ascii").strip()
+
+
+def _boot_session() -> str:
+    """MacOS: another word after each start."""
+    answer, size = ctypes.create_string_buffer(64), ctypes.c_size_t(64)
+    ask = ctypes.CDLL(None).sysctlbyname
+    failed = ask(b"kern.bootsessionuuid", answer, ctypes.byref(size), None, ctypes.c_size_t(0))
+    return "" if failed else answer.value.decode("ascii")
+
+
+def _machine_guid() -> str:
+    """Windows: the same after each start. Copies of a machine differ by their names."""
+    winreg = import_module("winreg")
+    with winreg.OpenKey(winreg.HKEY_LOCAL_MACHINE, r"SOFTWARE\Microsoft\Cryptography") as key:
+        return f"{winreg.QueryValueEx(key, 'MachineGuid')[0]} {platform.node()}"
+
+
+_NAMES: Mapping[str, Callable[[], str]] = {
+    "linux": _boot_id,
+    "darwin": _boot_session,
+    "win32": _machine_guid,
+}

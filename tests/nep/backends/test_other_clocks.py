@@ -1,0 +1,150 @@
+"""Latency between two computers: programs of this one, of which one has another clock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import pytest
+
+import nep
+from nep.masters.master import Master
+from nep.messages.message import Message
+from nep.nodes.subscriber import Subscriber
+from tests.nep.programs import running
+
+ELSEWHERE = """
+    import select, sys, time
+    real_ns, shift_ns = time.time_ns, round(float(sys.argv[2]) * 1e9)
+    time.time_ns = lambda: real_ns() + shift_ns
+    from nep.system import computer
+    computer.clock_name = lambda: "another computer"
+    import nep
+    with nep.node("far", master=sys.argv[1]) as node:
+        pub = node.new_pub("/far")
+        print("ready")
+        while True:
+            pub.publish({"x": 1})
+            if select.select([sys.stdin], [], [], 0.02)[0]:
+                said = sys.stdin.readline().strip()
+                if not said:
+                    break
+                shift_ns = round(float(said) * 1e9)
+                print("set")
+"""
+NEAR = """
+    import sys, nep
+    with nep.node("near", master=sys.argv[1]) as node:
+        pub = node.new_pub("/near")
+        print("ready")
+        sys.stdin.readline()
+        pub.publish({"x": 1})
+        sys.stdin.readline()
+"""
+LONG_S = 30.0
+
+
+@dataclass(frozen=True)
+class Place:
+    x: float
+
+
+def heard(sub: Subscriber, is_wanted: Callable[[Message], bool]) -> Message:
+    """The next message that is as wanted; looked at as soon as it comes."""
+    until = time.monotonic() + LONG_S
+    while time.monotonic() < until:
+        message = sub.receive(1.0)
+        if message is not None and is_wanted(message):
+            return message
+    raise AssertionError("no such message came")
+
+
+def is_compared(message: Message) -> bool:
+    return message.latency_uncertainty_s is not None
+
+
+def is_near(message: Message) -> bool:
+    return is_compared(message) and message.latency_s is not None and abs(message.latency_s) < 1.0
+
+
+def check_corrected(message: Message, shift_s: float) -> None:
+    latency_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
+    assert latency_s is not None
+    assert uncertainty_s is not None
+    assert 0.0 < uncertainty_s < 0.5 < abs(shift_s)
+    assert -uncertainty_s <= latency_s < 1.0
+
+
+def test_another_computers_clock_is_compared_and_corrected() -> None:
+    shift_s = -86_400.0 * 400
+    with Master("127.0.0.1:0", learn_s=0.0) as master, nep.node("here", master=master.address) as node:
+        sub = node.new_sub("/far", keep="latest")
+        with running(ELSEWHERE, master.address, str(shift_s)) as program:
+            assert program.line() == "ready"
+            first = heard(sub, lambda message: True)
+            if not is_compared(first):
+                assert first.latency_s == pytest.approx(-shift_s, abs=5.0)
+            check_corrected(heard(sub, is_compared), shift_s)
+            far = next(each for each in node.graph().nodes.values() if each.name == "far")
+            assert far.clock_offset_ns == pytest.approx(-shift_s * 1e9, abs=0.5e9)
+            assert far.clock_uncertainty_ns is not None
+            assert far.clock_uncertainty_ns > 0
+            # Somebody sets the other clock: what was known is forgotten, and it is compared anew.
+            program.say("3.7")
+            assert program.line() == "set"
+            check_corrected(heard(sub, is_near), 3.7)
+
+
+def test_one_computer_has_one_clock() -> None:
+    with (
+        Master("127.0.0.1:0", learn_s=0.0) as master,
+        nep.node("here", master=master.address) as node,
+        running(NEAR, master.address) as program,
+    ):
+        assert program.line() == "ready"
+        sub = node.new_sub("/near")
+        program.say("now")
+        message = heard(sub, lambda message: True)
+        assert message.latency_uncertainty_s == 0.0
+        assert message.latency_s is not None
+        assert 0.0 <= message.latency_s < 10.0
+        assert message.latency_s == message.latency_s
+        assert message.stamp_ns is not None
+        assert message.seen_ns > message.stamp_ns
+
+
+def test_a_message_without_time_has_no_latency() -> None:
+    message = Message("t", b"1", "json", "json")
+    assert message.latency_s is None
+    assert message.latency_uncertainty_s is None
+
+
+def test_a_message_that_nobody_compared_says_so() -> None:
+    message = Message("t", b"1", "json", "json", stamp_ns=time.time_ns() - 10**9)
+    latency_s = message.latency_s
+    assert latency_s is not None
+    assert 1.0 <= latency_s < 60.0
+    assert message.latency_uncertainty_s is None
+    assert message.latency_s == latency_s, "it is that of the first look"
+
+
+def test_messages_in_one_process_have_one_clock() -> None:
+    with nep.node("memory", transport="memory") as node:
+        sub, pub = node.new_sub("m"), node.new_pub("m")
+        pub.publish({"x": 1})
+        message = sub.receive(5.0)
+        assert message is not None
+        assert message.latency_uncertainty_s == 0.0
+
+
+def test_typed_messages_have_the_same_latency() -> None:
+    with nep.node("memory", transport="memory") as node:
+        sub, pub = node.new_sub("m", Place), node.new_pub("m", Place)
+        pub.publish(Place(1.0))
+        message = sub.receive(5.0)
+        assert message is not None
+        assert message.payload == Place(1.0)
+        assert message.latency_uncertainty_s == 0.0
+        assert message.latency_s is not None
+        assert 0.0 <= message.latency_s < 10.0

@@ -1,0 +1,190 @@
+"""The master passes on how clocks differ: to whom it matters, and nothing that no clock can be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from nep.masters.graph import Graph
+from nep.masters.leases import RawRenewal, read_renewal, renewed_body
+from nep.messages.clocks import OFFSET_MAX_NS, UNCERTAINTY_MAX_NS
+from nep.messages.packing import pack
+from nep.protocol import encoding
+from nep.protocol.requests import (
+    Found,
+    Join,
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    Refused,
+    Renew,
+    Renewed,
+    SubscriberCount,
+    SubscriberRecord,
+)
+
+EPOCH = 5
+MASTERS = "c0"
+S = 1_000_000_000
+
+
+def graph_of(*computers: str) -> Graph:
+    """A node on each of these: the first hears the topics of all others."""
+    graph = Graph(EPOCH, 0.0, 0.0, computer=MASTERS)
+    for number, computer in enumerate(computers):
+        graph.apply(joining(number, computer, len(computers)), 1, 0.0, f"n{number}")
+    return graph
+
+
+def joining(number: int, computer: str, nodes: int) -> Join:
+    record = PublisherRecord(100 + number, f"t{number}", "json", "json", ("tcp://x:1",))
+    heard = tuple(SubscriberRecord(200 + each, f"t{each}", "json") for each in range(1, nodes))
+    return Join(
+        NodeRecord(f"n{number}", f"Node {number}", "host", 1, computer=computer),
+        0,
+        (record,),
+        heard if number == 0 else (),
+    )
+
+
+def renewal(graph: Graph, number: int, clock: tuple[int, ...] | None) -> Renew:
+    member = graph.members[f"n{number}"]
+    return Renew(
+        f"n{number}",
+        EPOCH,
+        graph.revision,
+        tuple(PublisherCount(each, 1, 1, 1) for each in member.publishers),
+        tuple(SubscriberCount(each, 1, 0) for each in member.subscribers),
+        clock=clock,
+    )
+
+
+def renewed(graph: Graph, number: int, clock: tuple[int, ...] | None, now: float = 1.0) -> Renewed:
+    (answer,) = graph.apply(renewal(graph, number, clock), 7, now, f"n{number}")
+    assert isinstance(answer.answer, Renewed)
+    return answer.answer
+
+
+def test_a_node_is_told_the_sum_of_both_ways() -> None:
+    graph = graph_of("c1", "c2")
+    assert renewed(graph, 1, (3 * S, 400)).clocks == {}
+    assert renewed(graph, 0, (S, 300)).clocks == {"n1": (2 * S, 700)}
+    assert graph.view().nodes["n1"].clock_offset_ns == 3 * S
+    assert graph.view().nodes["n1"].clock_uncertainty_ns == 400
+
+
+def test_nodes_of_the_masters_computer_need_not_ask() -> None:
+    graph = graph_of(MASTERS, "c2")
+    assert not graph.clocks.times(graph.members["n0"], 5)
+    assert graph.clocks.times(graph.members["n1"], 5, lambda: 6) == (5, 6)
+    renewed(graph, 1, (-S, 400))
+    assert renewed(graph, 0, ()).clocks == {"n1": (-S, 400)}
+    assert graph.view().nodes["n0"].clock_uncertainty_ns == 0
+
+
+def test_of_ones_own_computer_nothing_is_told() -> None:
+    graph = graph_of("c1", "c1", "")
+    renewed(graph, 1, (S, 400))
+    renewed(graph, 2, (2 * S, 400))
+    assert set(renewed(graph, 0, (S, 400)).clocks) == {"n2"}, "who does not say may be anywhere"
+
+
+def test_what_was_told_gets_less_sure() -> None:
+    graph = graph_of("c1", "c2")
+    renewed(graph, 1, (0, 400), now=1.0)
+    assert renewed(graph, 0, (0, 300), now=3.0).clocks == {"n1": (0, 700 + 100_000)}
+
+
+@pytest.mark.parametrize("clock", [None, ()])
+def test_a_node_that_does_not_know_is_not_told_and_others_are_not_told_of_it(
+    clock: tuple[int, ...] | None,
+) -> None:
+    graph = graph_of("c1", "c2")
+    renewed(graph, 1, (S, 400))
+    assert renewed(graph, 0, clock).clocks == {}
+    renewed(graph, 0, (S, 300))
+    renewed(graph, 1, clock)
+    assert renewed(graph, 0, (S, 300)).clocks == {}, "its clock may have been set"
+    assert graph.view().nodes["n1"].clock_offset_ns is None
+
+
+@pytest.mark.parametrize(
+    "clock",
+    [
+        (OFFSET_MAX_NS + 1, 5),
+        (-OFFSET_MAX_NS - 1, 5),
+        (2**64 - 1, 5),
+        (5, -1),
+        (5, UNCERTAINTY_MAX_NS + 1),
+        (5,),
+        (5, 5, 5),
+    ],
+)
+def test_what_no_clock_can_be_is_not_known(clock: tuple[int, ...]) -> None:
+    graph = graph_of("c1", "c2")
+    renewed(graph, 0, (0, 0))
+    assert not renewed(graph, 1, clock).again
+    assert graph.members["n1"].clock is None
+    assert renewed(graph, 0, (0, 0)).clocks == {}
+
+
+@pytest.mark.parametrize(
+    "clock", ["x", 5, [1.5, 2], [float("nan"), 1], [True, 1], [None, 1], {"a": 1}, [[1]]]
+)
+def test_what_is_no_clock_at_all_is_refused_and_named(clock: object) -> None:
+    graph = graph_of("c1", "c2")
+    what = encoding.write(renewal(graph, 0, None))
+    assert isinstance(what, dict)
+    body = pack({"do": "renew", "call": 7, "what": what | {"clock": clock}})
+    assert read_renewal(body) is None, "it goes the long way,"
+    asked = encoding.decode_request(body)
+    assert isinstance(asked.request, str)
+    assert "clock" in asked.request, "which names what is wrong"
+
+
+@pytest.mark.parametrize("clock", [None, (), (S, 300)])
+def test_the_quick_way_says_the_same(clock: tuple[int, ...] | None) -> None:
+    quick, long = graph_of("c1", "c2"), graph_of("c1", "c2")
+    for graph in (quick, long):
+        renewed(graph, 1, (3 * S, 400))
+    said = read_renewal(encoding.encode_request(renewal(quick, 0, clock), 7))
+    assert said is not None
+    assert said.clock == clock
+    body = quick_answer(quick, said, times=(1, 2))
+    assert encoding.decode_answer(body) == (7, replace(renewed(long, 0, clock), times=(1, 2)))
+
+
+def quick_answer(graph: Graph, said: RawRenewal, **more: Any) -> bytes:
+    last_seqs = graph.renew_quickly(said, 1.0, said.node_id)
+    assert last_seqs is not None
+    clocks = graph.clocks.differences(graph.members[said.node_id], 1.0)
+    return renewed_body(7, EPOCH, graph.revision, last_seqs, (), clocks=clocks, **more)
+
+
+def test_older_nodes_and_masters_see_what_they_always_saw() -> None:
+    graph = graph_of("", "")
+    said = read_renewal(encoding.encode_request(renewal(graph, 0, None), 7))
+    assert said is not None
+    assert said.clock is None
+    body = quick_answer(graph, said)
+    assert b"clock" not in body
+    assert b"times" not in body
+    assert b"clock" not in encoding.encode_request(renewal(graph, 0, None), 7)
+
+
+def test_a_subscriber_is_told_the_computer_of_a_publisher() -> None:
+    graph = graph_of("c1", "c2")
+    (answer,) = graph.apply(replace(joining(0, "c1", 2), epoch=EPOCH), 1, 0.0, "n0")
+    assert isinstance(answer.answer, Found)
+    assert [each.computer for each in answer.answer.publishers] == ["c2"]
+
+
+@pytest.mark.parametrize("computer", ["x" * 65, "a\nb"])
+def test_a_computer_that_is_none_is_refused(computer: str) -> None:
+    graph = Graph(EPOCH, 0.0, 0.0)
+    join = Join(NodeRecord("0123456789abcdef", "n", "h", 1, computer=computer))
+    (answer,) = graph.apply(join, 1, 0.0, "0123456789abcdef", is_foreign=True)
+    assert isinstance(answer.answer, Refused)
+    assert "computer" in answer.answer.reason
