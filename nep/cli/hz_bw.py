@@ -26,6 +26,9 @@ from nep.nodes.subscriber import Subscriber
 _EVERY_S = 1.0
 _SLICE_S = 0.1
 _NARROWEST = 12
+_MEAN_WIDTH, _AGE_WIDTH = 22, 16
+_COMPARED_AFTER = 3
+"""Reports: before that the master has not had the time."""
 
 TopicsArgument = Annotated[
     list[str],
@@ -95,9 +98,9 @@ def delay(
 ) -> None:
     """Show how old messages are when they arrive here. Ctrl+C ends it.
 
-    The age is this computer's clock less the publisher's when it published: between two computers it is wrong
-    by what their clocks differ, and may be below 0. Programs of the original NEP send no time. A message that
-    was kept for whoever subscribes later is as old as it is.
+    Between two computers it is corrected by how their clocks differ, which the master finds out within two
+    seconds, and how surely that is known is shown behind a ±. Programs of the original NEP send no time. A
+    message that was kept for whoever subscribes later is as old as it is.
     """
     _DelayReport(topics, window_s).run(count, timeout_s, master, as_json=as_json)
 
@@ -206,13 +209,15 @@ class _DelayReport(_Report):
         self._ages = {topic: AgeWindow(window_s) for topic in topics}
         self._windows = self._ages
         self._timeless: set[str] = set()
+        self._uncompared: dict[str, int] = {}
+        """Topics whose clocks are not compared, and since how many reports."""
 
     def _listen(self, node: Node, topic: str, msg_type: str) -> Subscriber:
         window = self._ages[topic]
 
         def take(message: Message) -> None:
-            age_s = None if message.stamp_ns is None else (time.time_ns() - message.stamp_ns) / 1e9
-            window.add_age(time.monotonic(), age_s, message.size_bytes)
+            age_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
+            window.add_age(time.monotonic(), age_s, message.size_bytes, uncertainty_s)
             if age_s is None and topic not in self._timeless:
                 self._timeless.add(topic)
                 say(_("messages of '{topic}' have no time; their age is not known").format(topic=topic))
@@ -226,7 +231,27 @@ class _DelayReport(_Report):
         found = window.delay(now) if isinstance(window, AgeWindow) else None
         if found is None:
             return None, (UNKNOWN,) * 4
-        return found, tuple(gap(each) for each in (found.mean_s, found.min_s, found.max_s, found.std_s))
+        uncertainty_s = found.uncertainty_s
+        ages = [age(each, uncertainty_s) for each in (found.mean_s, found.min_s, found.max_s)]
+        if uncertainty_s and found.mean_s >= 0:
+            ages[0] += f" ± {gap(uncertainty_s)}"
+        return found, (*ages, gap(found.std_s))
+
+    def _line(self, topic: str, figures: Sequence[str]) -> str:
+        wide = [figures[0].rjust(_MEAN_WIDTH), *(each.rjust(_AGE_WIDTH) for each in figures[1:3])]
+        return super()._line(topic, (*wide, *figures[3:]))
+
+    def _show(self, topic: str) -> None:
+        super()._show(topic)
+        found = self._ages[topic].delay(time.monotonic())
+        is_compared = found is None or found.uncertainty_s is not None
+        if is_compared:
+            self._uncompared.pop(topic, None)
+            return
+        self._uncompared[topic] = self._uncompared.get(topic, 0) + 1
+        if self._uncompared[topic] == _COMPARED_AFTER:
+            words = _("'{topic}': clocks of two computers, not corrected; ages are wrong by what they differ")
+            say(words.format(topic=topic))
 
 
 def _frequency_cells(window: RateWindow, now: float) -> tuple[Frequency | None, Sequence[str]]:
@@ -242,6 +267,13 @@ def _traffic_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Se
         return None, (UNKNOWN,) * 4
     sizes = (size(each) for each in (found.mean_bytes, found.min_bytes, found.max_bytes))
     return found, (size(found.bandwidth_Bps, "/s"), *sizes)
+
+
+def age(seconds: float, uncertainty_s: float | None) -> str:
+    """An age. One below 0, which only seems so because clocks are not known better, is under that."""
+    if uncertainty_s and -uncertainty_s <= seconds < 0:
+        return _("under {gap}").format(gap=gap(uncertainty_s))
+    return gap(seconds)
 
 
 def gap(seconds: float) -> str:

@@ -39,13 +39,17 @@ class Bandwidth:
 
 @dataclass(frozen=True)
 class Delay:
-    """How old messages are when they arrive: mean, least, greatest and standard deviation (s)."""
+    """How old messages are when they arrive: mean, least, greatest and standard deviation (s).
+
+    All may be wrong by `uncertainty_s`, to either side; None when nobody has compared the clocks.
+    """
 
     mean_s: float
     min_s: float
     max_s: float
     std_s: float
     messages: int
+    uncertainty_s: float | None = None
 
 
 class RateWindow:
@@ -99,16 +103,28 @@ class RateWindow:
 class AgeWindow(RateWindow):
     """How old the messages of one topic were that arrived within the last `seconds`. Works in any thread."""
 
-    def add_age(self, arrived: float, age_s: float | None, size_bytes: int) -> None:
-        """A message arrived (s, monotonic) and was so old (s); None, which is only counted, if nobody knows.
+    def __init__(self, seconds: float) -> None:
+        super().__init__(seconds)
+        self._uncertain_s: float | None = None
 
-        An age is below 0 when the publisher's clock is ahead.
+    def add_age(
+        self, arrived: float, age_s: float | None, size_bytes: int, uncertainty_s: float | None = None
+    ) -> None:
+        """A message arrived (s, monotonic) and was so old (s); None is only counted: nobody knows.
+
+        It may be wrong by `uncertainty_s`, None: by anything, and below 0 when the publisher's clock is ahead.
+        Ages from before and after the clocks were compared have nothing to do with each other: when that
+        changes, those from before are forgotten.
         """
-        if age_s is not None:
-            self.add(arrived, age_s, size_bytes)
+        if age_s is None:
+            with self._lock:
+                self.total += 1
             return
         with self._lock:
-            self.total += 1
+            if (self._uncertain_s is None) != (uncertainty_s is None):
+                self._kept.clear()
+            self._uncertain_s = uncertainty_s
+        self.add(arrived, age_s, size_bytes)
 
     def delay(self, now: float) -> Delay | None:
         """None as long as there is no message whose age is known."""
@@ -117,4 +133,4 @@ class AgeWindow(RateWindow):
             return None
         mean = sum(ages) / len(ages)
         deviation = math.sqrt(sum((age - mean) ** 2 for age in ages) / len(ages))
-        return Delay(mean, min(ages), max(ages), deviation, len(ages))
+        return Delay(mean, min(ages), max(ages), deviation, len(ages), self._uncertain_s)

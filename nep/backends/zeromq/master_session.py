@@ -15,7 +15,6 @@ from functools import partial
 from typing import Protocol
 
 from nep.backends.zeromq.bindings import in_reach, may_stay
-from nep.backends.zeromq.clock_samples import ClockSamples, Moment
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.rpc import PendingCall, RpcClient
@@ -30,6 +29,7 @@ from nep.errors import (
 )
 from nep.i18n import _
 from nep.messages.clocks import ClockDifference, is_clock
+from nep.protocol.clock_samples import ClockSamples, Moment
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     RENEW_S,

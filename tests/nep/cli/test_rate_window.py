@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 
 import pytest
 
 import nep
-from nep.cli.hz_bw import bw, gap, hz
+from nep.cli.hz_bw import _DelayReport, age, bw, gap, hz
 from nep.cli.rate_window import MOST, AgeWindow, Delay, RateWindow
 from nep.cli.screen import say
 from nep.errors import BadTopicError, WaitTimeoutError
@@ -147,3 +148,61 @@ def test_ages_are_told_of_what_arrived_lately():
         window.add_age(arrived, age_s, 1)
     assert window.delay(25.0) == Delay(0.0, -0.25, 0.25, 0.25, 2)
     assert window.total == 4
+
+
+def test_ages_from_before_the_clocks_were_compared_do_not_count():
+    window = AgeWindow(10.0)
+    window.add_age(1.0, 3600.0, 1)
+    window.add_age(2.0, 0.25, 1, 0.001)
+    window.add_age(3.0, 0.75, 1, 0.002)
+    assert window.delay(3.0) == Delay(0.5, 0.25, 0.75, 0.25, 2, 0.002)
+    window.add_age(4.0, None, 1)
+    window.add_age(5.0, -3600.0, 1)
+    assert window.delay(5.0) == Delay(-3600.0, -3600.0, -3600.0, 0.0, 1)
+    assert window.total == 5
+
+
+@pytest.mark.parametrize(
+    ("age_s", "uncertainty_s", "words"),
+    [
+        (0.0032, 0.0004, "3.2 ms"),
+        (-0.0001, 0.0004, "under 400 us"),
+        (-0.0004, 0.0004, "under 400 us"),
+        (-0.0005, 0.0004, "-500 us"),
+        (-0.0005, 0.0, "-500 us"),
+        (-3600.0, None, "-3.6e+03 s"),
+        (0.0, 0.0004, "0 us"),
+    ],
+)
+def test_an_age_below_zero_within_the_uncertainty_is_under_it(age_s, uncertainty_s, words):
+    assert age(age_s, uncertainty_s) == words
+
+
+class _Told:
+    """A report of one topic, without a master."""
+
+    def __init__(self, *ages):
+        self.report = _DelayReport(["t"], 10.0)
+        self.report._subscribers["t"] = self
+        for each in ages:
+            self.report._ages["t"].add_age(time.monotonic(), each[0], 1, each[1])
+
+    lost = 0
+
+
+def test_delays_are_shown_with_their_uncertainty(capsys):
+    _Told((0.0032, 0.0004)).report._show("t")
+    assert capsys.readouterr().out.split()[1:6] == ["3.2", "ms", "±", "400", "us"]
+    _Told((-0.0002, 0.0004)).report._show("t")
+    assert capsys.readouterr().out.split()[1:4] == ["under", "400", "us"]
+    _Told((0.0032, 0.0)).report._show("t")
+    shown = capsys.readouterr()
+    assert "±" not in shown.out
+    assert "corrected" not in shown.err
+
+
+def test_clocks_that_nobody_compared_are_named_once(capsys):
+    report = _Told((3600.0, None)).report
+    for _ in range(5):
+        report._show("t")
+    assert capsys.readouterr().err.count("clocks of two computers, not corrected") == 1

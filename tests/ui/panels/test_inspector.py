@@ -19,6 +19,7 @@ from app.ui.panels.inspector.footer import message_facts
 from app.ui.panels.inspector.panel import PANEL, InspectorPanel
 from app.ui.panels.inspector.tree_model import TreeNode
 from app.ui.panels.inspector.values import image_summary, plain_words
+from nep.messages.clocks import SAME_CLOCK, ClockDifference, PublisherClock
 from nep.messages.message import Message, kind_of
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
@@ -82,6 +83,25 @@ def test_a_latched_message_from_before_says_when_it_was_sent(panel, window) -> N
     assert message_facts(half_an_hour_ago, now).endswith("latched, sent 30 min ago")
     half_an_hour_ago.stamp_ns = now - 10**6
     assert "latency" in message_facts(half_an_hour_ago, now - 10**9), "it came while somebody looked"
+
+
+@pytest.mark.parametrize(
+    ("took_ns", "known", "words"),
+    [
+        (3_200_000, ClockDifference(10**12, 400_000), "latency 3.2 ms ± 0.4 ms"),
+        (-200_000, ClockDifference(10**12, 400_000), "latency under 0.4 ms"),
+        (3_200_000, ClockDifference(10**12, 900), "latency 3.2 ms ± 0.1 ms"),
+        (3_200_000, SAME_CLOCK, "latency 3.2 ms"),
+        (3_200_000, None, "latency 3.2 ms"),
+        (-3_600_000_000_000, None, "clocks of two computers, not corrected"),
+        (-3_600_000_000_000, ClockDifference(10**12, 400_000), "412 B"),
+    ],
+)
+def test_latency_of_another_computer_is_shown_as_surely_as_it_is_known(took_ns, known, words) -> None:
+    message = Message("/a", bytes(412), "bytes", "bytes", stamp_ns=10**18)
+    message.kind = kind_of("/a", "bytes", "bytes", clock=PublisherClock(known))
+    message.seen_ns = 10**18 + took_ns + (0 if known is None else known.add_ns)
+    assert message_facts(message).split("   ")[-1] == words
 
 
 def test_a_latched_message_from_before_shows_no_latency(panel, window) -> None:

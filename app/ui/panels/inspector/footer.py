@@ -19,11 +19,14 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 FACTS_S = 0.1  # nobody reads faster, and each time is painted
+_SHOWN_S = 0.0001
+"""Less than the last digit is not shown as nothing."""
 
 
 def message_facts(message: Message, since_ns: int = 0) -> str:
     """``seq 18 204   412 B   latency 0.6 ms``, just when it came; what is not known is left out.
 
+    Of another computer's message ``latency 3.2 ms ± 0.4 ms``, corrected by how the clocks differ.
     A latched message from before ``since_ns``, when somebody began to look, took no time on its way: it says
     how long ago it was sent.
     """
@@ -31,12 +34,26 @@ def message_facts(message: Message, since_ns: int = 0) -> str:
     if message.seq is not None:
         facts.insert(0, _("seq {number}").format(number=grouped(message.seq)))
     if message.stamp_ns is not None:
-        latency = (time.time_ns() - message.stamp_ns) / 1e9
         if message.is_latched and message.stamp_ns < since_ns:
-            facts.append(_("latched, sent {age} ago").format(age=age_words(latency)))
-        elif 0 <= latency < 3600:
-            facts.append(_("latency {latency}").format(latency=latency_words(latency)))
+            age_s = (time.time_ns() - message.stamp_ns) / 1e9
+            facts.append(_("latched, sent {age} ago").format(age=age_words(age_s)))
+        else:
+            facts += _latency_facts(message)
     return "   ".join(facts)
+
+
+def _latency_facts(message: Message) -> list[str]:
+    latency_s, uncertainty_s = message.latency_s or 0.0, message.latency_uncertainty_s
+    if uncertainty_s and -uncertainty_s <= latency_s < 0:
+        return [_("latency under {latency}").format(latency=latency_words(uncertainty_s))]
+    if not 0 <= latency_s < 3600:
+        return [] if uncertainty_s is not None else [_("clocks of two computers, not corrected")]
+    words = latency_words(latency_s)
+    if uncertainty_s:
+        words = _("{latency} ± {uncertainty}").format(
+            latency=words, uncertainty=latency_words(max(uncertainty_s, _SHOWN_S))
+        )
+    return [_("latency {latency}").format(latency=words)]
 
 
 class Legend(QWidget):

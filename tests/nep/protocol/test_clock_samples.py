@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nep.backends.zeromq.clock_samples import ClockSamples, Moment
 from nep.messages.clocks import OFFSET_MAX_NS, SAME_CLOCK, ClockDifference, PublisherClock, drift_ns
+from nep.protocol.clock_samples import ClockSamples, Moment
 
 MS = 1_000_000
 S = 1_000_000_000
