@@ -112,7 +112,7 @@ class AgeWindow(RateWindow):
     ) -> None:
         """A message arrived (s, monotonic) and was so old (s); None is only counted: nobody knows.
 
-        It may be wrong by `uncertainty_s`, None: by anything, and below 0 when the publisher's clock is ahead.
+        It may be wrong by `uncertainty_s`, None: by anything. Below 0 the publisher's clock is ahead.
         Ages from before and after the clocks were compared have nothing to do with each other: when that
         changes, those from before are forgotten.
         """
