@@ -1,10 +1,12 @@
-"""`nep param`: the parameters of a node: list, get, set, and all of them to a file and back."""
+"""`nep param`: the parameters of a node: list, get, set, watch, and all of them to a file and back."""
 
 from __future__ import annotations
 
+import itertools
 import os
+import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -12,15 +14,18 @@ import orjson
 import typer
 
 from nep.cli.complete import complete_node
-from nep.cli.options import JsonOption, MasterOption
+from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, say, show_json, show_table, write
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import json_of, presented
-from nep.errors import NepError
+from nep.errors import DecodeError, MasterUnreachable, NepError, WaitTimeoutError, did_you_mean
 from nep.i18n import _, lazy
+from nep.messages.message import Message
 from nep.nodes.node import Node
-from nep.patterns.parameters.remote import RemoteParameters
+from nep.nodes.subscriber import Subscriber
+from nep.patterns.parameters.owned import MSG_TYPE, place_of
+from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
 from nep.system.replace_file import replace_file
 from nep.text import escaped, shortened
 
@@ -36,6 +41,8 @@ _COLUMNS = (
     TextColumn(lazy("allowed")),
     TextColumn(lazy("description")),
 )
+_LOOK_S = 1.0
+"""So often it is seen whether the node is still there."""
 _NodeArgument = Annotated[
     str,
     typer.Argument(
@@ -96,6 +103,34 @@ def set_value(
         theirs.set(name, value if kinds.get(name) == "str" else _meant(value))
 
 
+@app.command("watch")
+def watch(
+    node: _NodeArgument,
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar=_("NAME"), help=_("Only this one; all when nothing is said."), show_default=False
+        ),
+    ] = None,
+    count: Annotated[
+        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N lines; 0 goes on."))
+    ] = 0,
+    timeout_s: TimeoutOption = None,
+    master: MasterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the parameters of a node now, and each again when it changes. Ctrl+C ends it."""
+    with Node(f"nep-param-{os.getpid()}", master=master) as own:
+        found = node_with_parameters(own.graph(), node)
+        with own.new_sub(place_of(found), MSG_TYPE) as subscriber:
+            changes = _changes(_states(own, subscriber, found, timeout_s), name)
+            for each, value in itertools.islice(changes, count or None):
+                if as_json:
+                    show_json({"name": each, "value": value})
+                else:
+                    write(f"{escaped(each)}: {presented(value, whole=True)}\n")
+
+
 @app.command("dump")
 def dump(
     node: _NodeArgument,
@@ -147,6 +182,57 @@ def load(
 def _parameters(node: str, master: str | None) -> Iterator[RemoteParameters]:
     with Node(f"nep-param-{os.getpid()}", master=master) as own, own.parameters_of(node) as theirs:
         yield theirs
+
+
+def _states(
+    own: Node, subscriber: Subscriber, node_id: str, timeout_s: float | None
+) -> Iterator[Mapping[str, object]]:
+    """Name → value, now and after each change. Raises `WaitTimeoutError`; `NepError` when the node goes."""
+    deadline = None if timeout_s is None else time.monotonic() + timeout_s
+    look_at = time.monotonic() + _LOOK_S
+    while True:
+        slice_s = _LOOK_S if deadline is None else min(_LOOK_S, max(0.0, deadline - time.monotonic()))
+        message = subscriber.receive(slice_s)
+        if message is not None:
+            values = _values(message)
+            if values is not None:
+                yield values
+            deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        elif deadline is not None and time.monotonic() >= deadline:
+            raise WaitTimeoutError(_("a change of the parameters"), timeout_s or 0.0)
+        if time.monotonic() >= look_at:
+            look_at = time.monotonic() + _LOOK_S
+            with suppress(MasterUnreachable):  # it is away: who is connected stays connected
+                if node_id not in own.graph().nodes:
+                    raise NepError(_("the node has gone; watch it anew when it is started again"))
+
+
+def _values(message: Message) -> Mapping[str, object] | None:
+    """Name → value, as the node tells them; None for anything else: anybody may publish there."""
+    try:
+        state = message.payload
+    except DecodeError:
+        return None
+    listed = state.get("parameters") if isinstance(state, Mapping) else None
+    if not isinstance(listed, list):
+        return None
+    maps = [each for each in listed if isinstance(each, Mapping)]
+    return {str(each.get("name")): each.get("value") for each in maps}
+
+
+def _changes(states: Iterator[Mapping[str, object]], name: str | None) -> Iterator[tuple[str, object]]:
+    """Names and values that are new or have changed. Raises `NepError` when there is none of this name."""
+    before: dict[str, object] = {}
+    for values in states:
+        if name is not None and not before and name not in values:
+            said = did_you_mean(name, tuple(values)) if values else _("there are none")
+            raise NepError(_("no parameter '{name}'; {said}").format(name=escaped(name), said=said))
+        for each, value in values.items():
+            is_same = each in before and json_of(before[each]) == json_of(value)  # 1 and 1.0 and True differ
+            if not is_same:
+                before[each] = value
+                if name in {None, each}:
+                    yield each, value
 
 
 def _meant(word: str) -> object:

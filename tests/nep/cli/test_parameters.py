@@ -13,6 +13,8 @@ import pytest
 
 import nep
 from nep.masters.master import Master
+from nep.patterns.parameters.owned import place_of
+from tests.nep.cli.test_command import LONG_S, Running
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 
@@ -82,3 +84,39 @@ def test_to_a_file_and_back(node: nep.Node, tmp_path: Path) -> None:
         file.write_text(text)
         assert run("load", "robot", str(file)).returncode == 1
     assert run("dump", "robot", str(tmp_path / "no" / "folder")).returncode == 1
+
+
+def test_watching_shows_what_is_and_each_change_once(node: nep.Node) -> None:
+    watching = Running("param", "watch", "robot")
+    try:
+        lines = iter(watching.process.stdout.readline, "")
+        assert [next(lines) for _each in range(3)] == ["speed: 0.5\n", 'mode: "walk"\n', 'serial: "7"\n']
+        node.parameters["speed"] = 0.5  # no change
+        with nep.node("stranger") as stranger, stranger.new_pub(place_of(node.id)) as loud:
+            loud.publish("no state")
+            loud.publish({"parameters": 1})
+            node.parameters["mode"] = "run"
+            assert next(lines) == 'mode: "run"\n'
+        node.parameters.declare("later", [1])
+        assert next(lines) == "later: [1]\n"
+        assert watching.interrupt()[0] == 130
+    finally:
+        watching.close()
+
+
+def test_watching_one_ends_when_its_node_does_or_in_time(node: nep.Node) -> None:
+    assert (
+        run("watch", "robot", "mode", "--json", "--count", "1").stdout == '{"name":"mode","value":"walk"}\n'
+    )
+    assert "no parameter 'mod'; did you mean 'mode'?" in run("watch", "robot", "mod").stderr
+    late = run("watch", "robot", "mode", "--timeout", "0.2")
+    assert (late.returncode, late.stdout) == (1, 'mode: "walk"\n')
+    assert "0.2 s" in late.stderr
+    watching = Running("param", "watch", "robot", "speed")
+    try:
+        assert watching.process.stdout.readline() == "speed: 0.5\n"
+        node.close()
+        assert "the node has gone; watch it anew" in watching.wait_says("gone")
+        assert watching.process.wait(LONG_S) == 1
+    finally:
+        watching.close()
