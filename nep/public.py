@@ -52,6 +52,7 @@ from nep.protocol.graph_view import Alert as Alert
 from nep.protocol.graph_view import ClientInfo as ClientInfo
 from nep.protocol.graph_view import GraphView as GraphView
 from nep.protocol.graph_view import NodeInfo as NodeInfo
+from nep.protocol.graph_view import PatternInfo as PatternInfo
 from nep.protocol.graph_view import PublisherInfo as PublisherInfo
 from nep.protocol.graph_view import ServerInfo as ServerInfo
 from nep.protocol.graph_view import ServiceInfo as ServiceInfo

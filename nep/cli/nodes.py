@@ -76,11 +76,12 @@ def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
 
 def _topics_of(graph: GraphView, node: NodeInfo) -> dict[str, list[str]]:
     topics = graph.topics.values()
+    heard = [each.name for each in topics if any(one.node_id == node.id for one in each.subscribers)]
+    wide = graph.patterns.values()
+    heard += [each.name for each in wide if any(one.node_id == node.id for one in each.subscribers)]
     return {
         "publishes": [each.name for each in topics if any(one.node_id == node.id for one in each.publishers)],
-        "subscribes": [
-            each.name for each in topics if any(one.node_id == node.id for one in each.subscribers)
-        ],
+        "subscribes": sorted(set(heard)),
     }
 
 

@@ -93,6 +93,9 @@ def find(msg_type: TypeArgument, master: MasterOption = None, as_json: JsonOptio
 def _found(topic: str, graph: GraphView) -> TopicInfo:
     """What is known of it. Raises `BadTopicError`, and `NepError` when nobody has it."""
     found = graph.topics.get(check_topic(topic))
+    if found is None and topic in graph.patterns:
+        said = _("'{topic}' has wildcards, so it is no topic; 'nep node list' shows who hears all that match")
+        raise NepError(said.format(topic=topic))
     if found is None:
         said = _("nobody publishes or subscribes '{topic}'; {meant}'nep topic list' shows all topics")
         raise NepError(said.format(topic=topic, meant=meant(topic, list(graph.topics))))

@@ -33,6 +33,9 @@ class PatternIndex(Generic[T]):
     def __len__(self) -> int:
         return sum(map(len, self._subscribers.values()))
 
+    def __contains__(self, pattern: object) -> bool:
+        return pattern in self._subscribers
+
     def add(self, pattern: str, subscriber: int, owner: T, published: Iterable[str]) -> None:
         """A subscriber comes; these topics are published."""
         if pattern not in self._subscribers:

@@ -12,6 +12,7 @@ from nep.protocol.graph_view import (
     ClientInfo,
     GraphView,
     NodeInfo,
+    PatternInfo,
     PublisherInfo,
     ServerInfo,
     ServiceInfo,
@@ -33,7 +34,9 @@ class GraphViewer:
 
     def __init__(self, registry: Registry) -> None:
         self._registry = registry
-        self._topics: dict[str, TopicInfo] = {}
+        self._topics: dict[str, TopicInfo | None] = {}
+        """None where subscribers have only wildcards of this name: it is no topic."""
+        self._patterns: dict[str, PatternInfo] = {}
         self._alerts: dict[str, tuple[Alert, ...]] = {}
 
     def view(self, epoch: int) -> GraphView:
@@ -45,26 +48,45 @@ class GraphViewer:
             (names if service_of(name) is None else served).append(name)
         for name in touched:
             self._topics.pop(name, None)
+            self._patterns.pop(name, None)
             self._alerts.pop(name, None)
         touched.clear()
         known = self._topics
         if len(known) > len(names) or not known.keys() <= set(names):
             for gone in known.keys() - set(names):
                 del known[gone]
+                self._patterns.pop(gone, None)
                 self._alerts.pop(gone, None)
         for name in names:
             if name not in known:
                 publishing, subscribing = registry.publishing(name), registry.subscribers_of(name)
-                known[name] = _look_at(name, publishing, subscribing)
+                known[name] = self._topic(name, publishing, subscribing)
                 is_told = any(each.problem for _member, each in subscribing)
                 is_told = is_told or any(each.problem for _member, each in publishing)
                 if len(publishing) > 1 or is_told:
                     self._alerts[name] = tuple(_topic_alerts(name, publishing, subscribing))
         nodes = {each.node.id: _node_info(each) for each in registry.members.values()}
-        topics = {name: known[name] for name in names}
+        topics = {name: topic for name in names if (topic := known[name]) is not None}
         services = {each.name: each for each in (_service(name, registry) for name in served)}
         alerts = (*self._all_alerts(), *_service_alerts(services, registry))
-        return GraphView(epoch, registry.revision, nodes, topics, alerts, services=services)
+        patterns = {name: self._patterns[name] for name in sorted(self._patterns)}
+        return GraphView(
+            epoch, registry.revision, nodes, topics, alerts, services=services, patterns=patterns
+        )
+
+    def _topic(
+        self,
+        name: str,
+        publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
+        subscribing: list[tuple[RegisteredNode, RegisteredSubscriber]],
+    ) -> TopicInfo | None:
+        """The topic without those whose wildcards it is, which are noted; None when nobody is left."""
+        if name in self._registry.patterns:
+            wide = [each for each in subscribing if each[1].record.pattern]
+            subscribing = [each for each in subscribing if not each[1].record.pattern]
+            heard = tuple(_subscriber_info(*each) for each in wide)
+            self._patterns[name] = PatternInfo(name, wide[0][1].record.msg_type, heard)
+        return _look_at(name, publishing, subscribing) if publishing or subscribing else None
 
     def _all_alerts(self) -> Iterator[Alert]:
         yield from self._registry.reported_alerts

@@ -162,6 +162,8 @@ class AnswerEncoder:
         }
         if view.services:  # which an older node does not look for
             rest["services"] = write(view.services)
+        if view.patterns:
+            rest["patterns"] = write(view.patterns)
         nodes = [self._part(f"n{key}", key, node) for key, node in view.nodes.items()]
         topics = [self._part(f"t{key}", key, topic) for key, topic in view.topics.items()]
         if len(self._parts) > 2 * (len(nodes) + len(topics)) + 100:

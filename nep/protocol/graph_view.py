@@ -11,6 +11,7 @@ __all__ = [
     "ClientInfo",
     "GraphView",
     "NodeInfo",
+    "PatternInfo",
     "PublisherInfo",
     "ServerInfo",
     "ServiceInfo",
@@ -99,6 +100,15 @@ class TopicInfo:
 
 
 @dataclass(frozen=True)
+class PatternInfo:
+    """Subscribers whose topic has wildcards, such as "/robot/*/camera": they hear many topics, it is none."""
+
+    name: str
+    msg_type: str
+    subscribers: tuple[SubscriberInfo, ...] = ()
+
+
+@dataclass(frozen=True)
 class ServerInfo:
     """A server. `calls` were answered, `errors` of them with an error; `bytes` is the size of the answers."""
 
@@ -146,6 +156,7 @@ class GraphView:
     alerts: tuple[Alert, ...] = ()
     listens: tuple[str, ...] = ()
     services: Mapping[str, ServiceInfo] = field(default_factory=dict)
+    patterns: Mapping[str, PatternInfo] = field(default_factory=dict)
 
     def to_plain(self) -> dict[str, object]:
         """The view as maps and lists, for the wire and for `--json`."""
@@ -157,4 +168,5 @@ class GraphView:
             "alerts": [asdict(alert) for alert in self.alerts],
             "listens": list(self.listens),
             "services": [asdict(service) for service in self.services.values()],
+            "patterns": [asdict(pattern) for pattern in self.patterns.values()],
         }

@@ -16,9 +16,10 @@ NATIVE = frozenset({"native", GATEWAY})
 class NodeEntry:
     """One node. What is not known is None or empty; a panel shows it blank.
 
-    ``publishes`` and ``subscribes`` are topics in the order of their names; a topic that a node subscribes
-    twice stands there once. ``cpu_ratio`` is the share of one core of its process. ``gone_s`` is None while
-    it is there, else the seconds since it vanished; then what it published stays, to be read.
+    ``publishes`` and ``subscribes`` are topics in the order of their names, also those with wildcards that it
+    subscribes; a topic that it subscribes twice stands there once. ``cpu_ratio`` is the share of one core of
+    its process. ``gone_s`` is None while it is there, else the seconds since it vanished; then what it
+    published stays, to be read.
     """
 
     id: str
@@ -139,7 +140,10 @@ def _topics_by_node(view: GraphView) -> tuple[Mapping[str, tuple[str, ...]], Map
             publishes.setdefault(publisher.node_id, {})[name] = None
         for subscriber in info.subscribers:
             subscribes.setdefault(subscriber.node_id, {})[name] = None
+    for name, wide in view.patterns.items():
+        for subscriber in wide.subscribers:
+            subscribes.setdefault(subscriber.node_id, {})[name] = None
     return (
         {id: tuple(names) for id, names in publishes.items()},
-        {id: tuple(names) for id, names in subscribes.items()},
+        {id: tuple(sorted(names)) for id, names in subscribes.items()},
     )

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from app.core.network.nodes import GONE_SHOWN_S, Nodes
-from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.protocol.graph_view import (
+    GraphView,
+    NodeInfo,
+    PatternInfo,
+    PublisherInfo,
+    SubscriberInfo,
+    TopicInfo,
+)
 
 
 def node(id: str, name: str = "", generation: str = "native", cpu: float | None = None) -> NodeInfo:
@@ -31,6 +40,18 @@ def test_a_node_has_what_it_publishes_and_subscribes_each_topic_once() -> None:
     assert (a.publishes, a.subscribes) == (("/c", "/z"), ("/c",))
     assert (b.publishes, b.subscribes) == ((), ("/z",))
     assert (a.host, a.pid, a.language, a.generation, a.since_ns) == ("lab", 7, "Python", "native", 5)
+
+
+def test_what_a_node_subscribes_by_wildcards_stands_with_its_topics() -> None:
+    nodes = Nodes()
+    seen = view(1, [node("a")], [topic("/z", subscribers="a")])
+    wide = PatternInfo(
+        "/robot/*/camera", "image", (SubscriberInfo(7, "a", 0, 0), SubscriberInfo(8, "b", 0, 0))
+    )
+    nodes.update(replace(seen, patterns={wide.name: wide}), 0)
+    found = nodes.get("a")
+    assert found is not None
+    assert found.subscribes == ("/robot/*/camera", "/z")
 
 
 def test_nodes_of_the_first_graph_are_not_new_later_ones_are_until_looked_at() -> None:

@@ -204,7 +204,7 @@ def test_closing_ends_who_waits_and_is_forgotten(make: Make) -> None:
     thread.join(30.0)
     assert ended == ["ended"]
     eventually(lambda: pub.subscribers == 0)
-    eventually(lambda: "a/*" not in other.graph().topics)
+    eventually(lambda: "a/*" not in other.graph().patterns)
 
 
 def test_bad_bytes_and_the_graph(make: Make) -> None:
@@ -215,8 +215,15 @@ def test_bad_bytes_and_the_graph(make: Make) -> None:
     pub.publish(1)
     assert sub.listen(timeout_s=30.0) == (True, 1)
     view = other.graph()
-    assert [each.id for each in view.topics["a/*"].subscribers] == [sub.id]
-    assert view.topics["a/*"].publishers == ()
+    assert [each.id for each in view.patterns["a/*"].subscribers] == [sub.id]
+    assert "a/*" not in view.topics
+    exact = other.new_sub("a/*", wildcards=False)
+    view = other.graph()
+    assert [each.id for each in view.topics["a/*"].subscribers] == [exact.id]
+    assert [each.id for each in view.patterns["a/*"].subscribers] == [sub.id]
+    sub.close()
+    eventually(lambda: not other.graph().patterns)
+    assert [each.id for each in other.graph().topics["a/*"].subscribers] == [exact.id]
 
 
 def test_a_back_end_without_says_so(make: Make) -> None:
@@ -264,7 +271,7 @@ def test_a_master_that_is_started_again_knows_it(master: Master) -> None:
         old.publish(1)
         assert read(sub, 1) == [("r/old", 1)]
         with Master(port, learn_s=1.0):
-            eventually(lambda: "r/*" in node.graph().topics)
+            eventually(lambda: "r/*" in node.graph().patterns)
             new = other.new_pub("r/new")
             assert new.subscribers == 1
             new.publish(2)

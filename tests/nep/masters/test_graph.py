@@ -305,6 +305,25 @@ def test_a_wrong_field_is_named() -> None:
     assert encoding.decode_request(body).request == "'Leave.node_id' is missing"
 
 
+def test_subscribers_with_wildcards_are_no_topic_and_travel(graph: Graph) -> None:
+    wide = SubscriberRecord(1, "/robot/*/camera", "image", pattern=True)
+    ask(graph, AddSubscriber(node("s"), wide))
+    ask(graph, AddPublisher(node("p"), publisher(2, "/robot/a/camera")))
+    seen = graph.view()
+    assert list(seen.topics) == ["/robot/a/camera"]
+    pattern = seen.patterns["/robot/*/camera"]
+    assert (pattern.msg_type, [each.node_id for each in pattern.subscribers]) == ("image", ["s"])
+    body = encoding.encode_answer(Seen(7, graph.revision, seen), 3)
+    assert encoding.decode_answer(body) == (3, Seen(7, graph.revision, seen))
+    assert seen.to_plain()["patterns"][0]["name"] == "/robot/*/camera"  # type: ignore[index]
+    ask(graph, AddPublisher(node("p"), publisher(3, "/robot/*/camera")))  # a name as any other
+    assert set(graph.view().topics) == {"/robot/a/camera", "/robot/*/camera"}
+    assert graph.view().topics["/robot/*/camera"].subscribers == ()
+    ask(graph, RemovePublisher("p", 3))
+    ask(graph, RemoveSubscriber("s", 1))
+    assert (list(graph.view().topics), graph.view().patterns) == (["/robot/a/camera"], {})
+
+
 def test_newer_peers_may_send_more() -> None:
     body = pack({"do": "leave", "call": 1, "what": {"node_id": "a", "mood": "fine"}})
     assert encoding.decode_request(body).request == Leave("a")
