@@ -37,9 +37,10 @@ from app.core.network.source import (
     Source,
     WatchFailed,
 )
-from app.core.network.topics import Topics
+from app.core.network.topics import Topic, Topics, split_key
 from app.core.network.traffic import Traffic
 from app.core.network.watches import Watch, Watches
+from app.core.networks.networks import NetworkEvent, Networks, by_network
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
@@ -97,6 +98,7 @@ class Session:
         make_source = source if source is not None else partial(LiveSource, always=LOGS)
         sinks = [self._checks.look, self._mailbox.post, self._offer]
         self.source: Source = make_source(self.address, sinks, self._mailbox.post_event)
+        self.networks = Networks(self.settings, sinks[1:], self._mailbox.post_event)
         modules = VIRTUAL_ROBOTS.values()
         processes = VirtualProcesses(modules, lambda: self.launcher.process_ids)
         self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)
@@ -130,8 +132,8 @@ class Session:
         self._next_check = 0.0
         self._learning = MasterChange()
 
-    def _offer(self, _topic: str, messages: Sequence[Message]) -> None:
-        self.images.offer(messages)
+    def _offer(self, topic: str, messages: Sequence[Message]) -> None:
+        self.images.offer(messages, topic)
 
     # -- what the window and its panels call -----------------------------------------------------------------
 
@@ -149,13 +151,27 @@ class Session:
     def start(self) -> None:
         """Start the threads; a master is started when none answers."""
         self.source.start()
+        self.networks.start()
         self.source.submit(NO_WATCH, self._make_stopper)
         if self._start_processes:
             self.launcher.ensure_master()
 
     def watch(self, topic: str) -> Watch:
-        """Look at a topic until the watch is closed: its messages arrive in `Topics`."""
+        """Look at a topic until the watch is closed: its messages arrive in `Topics`.
+
+        Here and in `topic` and `mark_seen` it is named as among the topics of all networks (`key_of`).
+        """
         return self._watches.open([topic])
+
+    def topic(self, key: str) -> Topic | None:
+        """The topic of that name, of whichever network; None when it is not known."""
+        return self.networks.topic(key) if split_key(key)[0] else self.topics.get(key)
+
+    def mark_seen(self, key: str) -> None:
+        """A person looked at a topic: it is not new any more."""
+        name, topic = split_key(key)
+        network = self.networks.get(name)
+        (network.topics if network is not None else self.topics).mark_seen(topic)
 
     def gives_up(self, document: Document) -> bool:
         """Whether a person gives up unsaved work that can't be kept; the first time an alert asks them."""
@@ -173,6 +189,7 @@ class Session:
         with self.guarded(lazy("let topics and nodes age")):
             self.topics.age(now, now_ns)
             self.nodes.age(now)
+            self.networks.age(now, now_ns)
         with self.guarded(lazy("follow the robots")):
             self._follow_robots()
         with self.guarded(lazy("let the robots be heard")):
@@ -235,6 +252,7 @@ class Session:
             ("end the pictures", self.images.close),
             ("end the doctor", self.doctor.close),
             ("leave the network", self.source.close),
+            ("leave other networks", self.networks.close),
             ("end what was started here", self.launcher.close),
             ("end the reach", self.remote_access.close),
         ]
@@ -245,12 +263,18 @@ class Session:
     # -- inside ----------------------------------------------------------------------------------------------
 
     def _begin_watch(self, topic: str) -> None:
+        if split_key(topic)[0]:
+            self.networks.watch(topic)
+            return
         self.source.watch(topic)
         known = self.topics.get(topic)
         if known is not None:
             known.watched = True
 
     def _end_watch(self, topic: str) -> None:
+        if split_key(topic)[0]:
+            self.networks.unwatch(topic)
+            return
         self.source.unwatch(topic)
         self.topics.unwatch(topic)
         self.fleet.unwatched(topic)
@@ -262,15 +286,19 @@ class Session:
         self.stopper = RobotStopper(node)
 
     def _on_messages(self, drained: Drained, now: float) -> None:
-        for topic, batch in drained.batches.items():
+        batches, others = by_network(drained.batches)
+        for topic, batch in batches.items():
             with self.guarded(lazy("take over messages of {topic}"), topic=topic):
                 self._on_batch(topic, batch, now)
+        for key, batch in others.items():
+            with self.guarded(lazy("take over messages of {topic}"), topic=key):
+                self.networks.add(key, batch, now)
         with self.guarded(lazy("count messages")):
-            self.traffic.add(drained.batches, now)
+            self.traffic.add(batches, now)
         with self.guarded(lazy("take over what robots say")):
-            self.fleet.add(drained.batches)
+            self.fleet.add(batches)
         with self.guarded(lazy("take over what is said of the room")):
-            self.room.add_messages(drained.batches)
+            self.room.add_messages(batches)
             self.room.tick()
         with self.guarded(lazy("check messages")):
             found = self._checks.take()
@@ -327,12 +355,18 @@ class Session:
                     _("{topic} can't be read.").format(topic=event.topic),
                     event.sentence,
                 )
-            case RemoteAccessChanged():
-                self.remote_access.changed(event)
+            case RemoteAccessChanged() | NetworkEvent():
+                self._on_network(event, now)
             case JobFailed() if event.what:
                 self.console.add("error", "studio", _(event.what).format(error=event.sentence))
             case _:
                 pass
+
+    def _on_network(self, event: RemoteAccessChanged | NetworkEvent, now: float) -> None:
+        if isinstance(event, NetworkEvent):
+            self.networks.on_event(event, now)
+        else:
+            self.remote_access.changed(event)
 
     def _on_graph(self, view: GraphView, now: float) -> None:
         self.remote_access.follow(view)

@@ -176,14 +176,17 @@ class Images:
             if self._thread is None and not self._closing:
                 self._thread = self._begin_decoding()
 
-    def offer(self, messages: Sequence[Message]) -> None:
-        """A sink: keep the newest message of each topic that somebody looks at. Called in nep's thread."""
+    def offer(self, messages: Sequence[Message], key: str = "") -> None:
+        """A sink: keep the newest message of each topic that somebody looks at. Called in nep's thread.
+
+        ``key`` is the topic's name among those of all networks, where that is not its own.
+        """
         if not self._streams:
             return
         with self.lock:
             now = self.clock()
             for message in messages:
-                for stream in self._streams.get(message.topic, ()):
+                for stream in self._streams.get(key or message.topic, ()):
                     if not stream.held:
                         stream.waiting = (message, now)
                     stream.arriving.add(now)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from app.core.network.topics import key_of
+from nep.patterns.parameters.owned import place_of
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView, NodeInfo
 
 GONE_SHOWN_S = 10.0
@@ -19,7 +21,8 @@ class NodeEntry:
     ``publishes`` and ``subscribes`` are topics in the order of their names, also those with wildcards that it
     subscribes; a topic that it subscribes twice stands there once. ``cpu_ratio`` is the share of one core of
     its process. ``gone_s`` is None while it is there, else the seconds since it vanished; then what it
-    published stays, to be read.
+    published stays, to be read. ``network`` is "" for the native one, ``stale`` whether that can't be asked
+    now. ``has_parameters``: it has declared some, which others ``may_set`` where there are services.
     """
 
     id: str
@@ -35,11 +38,20 @@ class NodeEntry:
     new: bool = False
     gone_s: float | None = None
     gone_since: float | None = None
+    network: str = ""
+    stale: bool = False
+    has_parameters: bool = False
+    may_set: bool = False
+
+    @property
+    def key(self) -> str:
+        """Its id among the nodes of all networks."""
+        return key_of(self.network, self.id)
 
     @property
     def is_original(self) -> bool:
         """Whether it is a program of the original NEP."""
-        return self.generation not in NATIVE
+        return not self.network and self.generation not in NATIVE
 
     @property
     def is_bridge(self) -> bool:
@@ -53,8 +65,9 @@ class Nodes:
     The gateway's own node is left out: it stands for the originals, which have entries of their own.
     """
 
-    def __init__(self) -> None:
-        """Know no node yet."""
+    def __init__(self, network: str = "") -> None:
+        """Know no node yet; ``network`` is that of all of them."""
+        self._network = network
         self._nodes: dict[str, NodeEntry] = {}
         self._first_graph = True
         self._seen = (0, 0)
@@ -72,6 +85,13 @@ class Nodes:
     def get(self, id: str) -> NodeEntry | None:
         """The node of that id, or None."""
         return self._nodes.get(id)
+
+    def set_stale(self, stale: bool) -> None:
+        """Whether the network can't be asked: what is known of those that are there is as it was last."""
+        for node in self._nodes.values():
+            if node.stale is not stale:
+                node.stale, node.cpu_ratio = stale, None
+                self.revision += 1
 
     def mark_seen(self, id: str) -> None:
         """A person looked at it: it is not new any more."""
@@ -109,8 +129,14 @@ class Nodes:
             node = self._nodes.get(id)
             if node is None:
                 self._replace_gone(info)
-                node = self._nodes[id] = NodeEntry(id, info.name, new=not self._first_graph)
+                new = not self._first_graph
+                node = self._nodes[id] = NodeEntry(id, info.name, new=new, network=self._network)
             _take(node, info)
+            place = place_of(id)
+            node.may_set = place in view.services
+            told = view.topics.get(place)
+            told = view.topics.get(place)
+            node.has_parameters = node.may_set or (told is not None and bool(told.publishers))
             node.publishes, node.subscribes = publishes.get(id, ()), subscribes.get(id, ())
         for id, node in self._nodes.items():
             if id not in view.nodes and node.gone_since is None:
@@ -128,6 +154,7 @@ def _take(node: NodeEntry, info: NodeInfo) -> None:
     node.name, node.host, node.pid = info.name, info.host, info.pid
     node.language, node.generation, node.since_ns = info.language, info.generation, info.since_ns
     node.gone_since = node.gone_s = None
+    node.stale = False
 
 
 def _topics_by_node(view: GraphView) -> tuple[Mapping[str, tuple[str, ...]], Mapping[str, tuple[str, ...]]]:

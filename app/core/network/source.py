@@ -33,6 +33,8 @@ _log = logging.getLogger("studio")
 
 Sink = Callable[[str, Sequence[Message]], None]
 """Takes a batch of one topic, oldest first, in nep's thread."""
+NodeSink = Callable[[Sequence[Message]], None]
+"""The same of one topic's subscriber."""
 Job = Callable[[Node], None]
 
 
@@ -119,10 +121,12 @@ class LiveSource:
         post_event: Callable[[object], None],
         *,
         always: Mapping[str, str] | None = None,
+        thread: str = "studio-source",
     ) -> None:
         """Give batches of messages to every sink (in nep's thread) and events to ``post_event``.
 
         ``always``: topics, with their types, that are subscribed from the start, before anybody publishes.
+        ``thread`` is the name of its thread.
         """
         self._always = always or {}
         self.address = address
@@ -132,7 +136,7 @@ class LiveSource:
         self._lock = threading.Lock()
         self._wanted: set[str] = set()
         self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="studio-source", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=thread, daemon=True)
         self._node: Node | None = None
         self._subscribers: dict[str, tuple[str, Subscriber]] = {}
         self._missed_before: Counter[str] = Counter()
@@ -168,12 +172,36 @@ class LiveSource:
             before = dict(self._missed_before)
         return {topic: before.get(topic, 0) + (each.lost or 0) for topic, each in held.items()}
 
-    def close(self) -> None:
-        """See `Source.close`."""
+    def end(self) -> None:
+        """Let its thread end, and wait for nothing; `close` waits."""
         self._closing.set()
         self._jobs.put(None)
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        self.end()
         if self._thread.is_alive():
             self._thread.join(timeout=5)
+
+    # -- what is otherwise on other networks (see `app.core.networks`); in its thread ------------------------
+
+    poll_s = POLL_S
+    """How often the graph is asked for."""
+
+    def join(self) -> Node:
+        """Studio's node there. Raises `NepError` while nobody answers."""
+        view = look(self.address, timeout_s=0.5)
+        if view is None:
+            raise NepError(_("no master answers at {address}").format(address=self.address))
+        return nep.node(_free_name(view), master=self.address)
+
+    def look(self, node: Node) -> GraphView:
+        """Who is there. Raises `NepError`."""
+        return node.graph(timeout_s=1.0)
+
+    def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
+        """Hear a topic of this type. Raises `NepError`."""
+        return node.new_sub(topic, msg_type, sink=sink, wildcards=False)
 
     # -- its thread ------------------------------------------------------------------------------------------
 
@@ -184,7 +212,7 @@ class LiveSource:
                 with log_errors("follow the network"):
                     went_well = self._turn()
                 if not went_well:
-                    self._closing.wait(POLL_S)
+                    self._closing.wait(self.poll_s)
         finally:
             for _, subscriber in self._subscribers.values():
                 with log_errors("end a subscription"):
@@ -197,17 +225,13 @@ class LiveSource:
         if self._node is None and not self._join():
             return False
         asked_s = self._ask()
-        pause_s = max(POLL_S, min(POLL_SLOWEST_S, POLL_PAUSE * asked_s))
+        pause_s = max(self.poll_s, min(POLL_SLOWEST_S, POLL_PAUSE * asked_s))
         self._do_jobs(time.monotonic() + pause_s)
         return True
 
     def _join(self) -> bool:
-        view = look(self.address, timeout_s=0.5)
-        if view is None:
-            self._lost(_("no master answers at {address}").format(address=self.address))
-            return False
         try:
-            self._node = nep.node(_free_name(view), master=self.address)
+            self._node = self.join()
         except NepError as error:
             self._lost(str(error))
             return False
@@ -224,7 +248,7 @@ class LiveSource:
             return 0.0
         asked = time.monotonic()
         try:
-            view = self._node.graph(timeout_s=1.0)
+            view = self.look(self._node)
         except NepError as error:
             self._lost(str(error))
             return 0.0
@@ -281,9 +305,7 @@ class LiveSource:
         if self._node is None:
             return
         try:
-            subscriber = self._node.new_sub(
-                topic, msg_type, sink=partial(self._deliver, topic), wildcards=False
-            )
+            subscriber = self.subscribe(self._node, topic, msg_type, partial(self._deliver, topic))
         except NepError as error:
             self._post_event(WatchFailed(topic, str(error)))
             return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 
@@ -22,6 +22,23 @@ FIGURES_LATE_S = 6.0
 """Nodes of large graphs tell their counts every 5 s; what only they tell is not judged earlier."""
 
 
+_BLANK = " "
+
+
+def key_of(network: str, topic: str) -> str:
+    """The name of a topic among those of all networks: "ros2 /camera"; of the native one ("") its own.
+
+    A native topic has no blank in its name, so none is taken for one of another network.
+    """
+    return f"{network}{_BLANK}{topic}" if network else topic
+
+
+def split_key(key: str) -> tuple[str, str]:
+    """(network, topic) of what `key_of` gave."""
+    network, blank, topic = key.partition(_BLANK)
+    return (network, topic) if blank else ("", key)
+
+
 @dataclass(slots=True, eq=False)
 class Topic:
     """One topic. Figures that are not known are None; a panel shows them blank.
@@ -32,6 +49,8 @@ class Topic:
     ``loss_ratio`` of those that a subscriber should have had. ``gone_s`` is None while it is there, else the
     seconds since it vanished. ``newest``, ``previous`` are kept, and ``received``, ``dropped`` (of those,
     before a panel saw them) and ``missed`` (sent, but not received here) counted, only while somebody looks.
+    ``network`` is "" for the native one, ``stale`` whether that can't be asked now: all is as it was last.
+    ``counted`` are (messages, bytes) a second that arrive here, where nobody tells them and somebody looks.
     """
 
     name: str
@@ -61,6 +80,15 @@ class Topic:
     heard_since: float | None = None
     moved_at: float | None = None
     info: TopicInfo | None = None
+    network: str = ""
+    stale: bool = False
+    counted: tuple[float, float] | None = None
+    received_bytes: int = 0
+
+    @property
+    def key(self) -> str:
+        """Its name among the topics of all networks."""
+        return key_of(self.network, self.name)
 
     @property
     def shown_of(self) -> tuple[int, int]:
@@ -69,17 +97,20 @@ class Topic:
 
     def facts(self) -> tuple[object, ...]:
         """What changes seldom; a panel rebuilds its rows when one of these changes."""
-        return (self.msg_type, self.codec, self.publisher_nodes, self.new, self.gone_since is not None)
+        gone = self.gone_since is not None
+        return (self.msg_type, self.codec, self.publisher_nodes, self.new, gone, self.stale)
 
 
 class Topics:
     """All topics, in the order in which they were first seen. One thread uses it (the window's)."""
 
-    def __init__(self, own: tuple[str, int] | None = None) -> None:
+    def __init__(self, own: tuple[str, int] | None = None, network: str = "") -> None:
         """Know no topic yet. ``own`` is the computer and process that looks (default: this one).
 
-        A topic that only the looking process subscribes has vanished: looking does not keep it.
+        ``network`` is that of all of them. A topic that only the looking process subscribes has vanished:
+        looking does not keep it.
         """
+        self._network = network
         self._own = own if own is not None else (platform.node(), os.getpid())
         self._topics: dict[str, Topic] = {}
         self._first_graph = True
@@ -149,7 +180,7 @@ class Topics:
         for name, info in shown.items():
             topic = self._topics.get(name)
             if topic is None:
-                topic = self._topics[name] = Topic(name, new=not self._first_graph)
+                topic = self._topics[name] = Topic(name, new=not self._first_graph, network=self._network)
                 self.revision += 1
             self._take(topic, info, view, now)
         for name, topic in self._topics.items():
@@ -162,6 +193,36 @@ class Topics:
         for topic in self._topics.values():
             if topic.gone_since is None:
                 self._vanish(topic, now)
+
+    def set_stale(self, stale: bool) -> None:
+        """Whether the network can't be asked: what is known of those that are there is as it was last."""
+        for topic in self._topics.values():
+            if topic.stale is not stale:
+                topic.stale = stale
+                if stale:
+                    topic.rate_hz = topic.bandwidth_Bps = None
+                self.revision += 1
+
+    def count(self, passed_s: float, before: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
+        """Count what arrived of watched topics whose publishers tell no rate, in ``passed_s`` seconds.
+
+        ``before`` is what this gave the last time: messages and bytes that had arrived by then.
+        """
+        arrived = {
+            topic.name: (topic.received, topic.received_bytes)
+            for topic in self._topics.values()
+            if topic.watched and topic.gone_since is None
+        }
+        for name, (received, size_bytes) in arrived.items():
+            had = before.get(name)
+            if had is not None and had[0] <= received and passed_s > 0:
+                topic = self._topics[name]
+                topic.counted = (received - had[0]) / passed_s, (size_bytes - had[1]) / passed_s
+                if topic.info is None or topic.info.rate_hz is None:
+                    topic.rate_hz, topic.bandwidth_Bps = topic.counted
+                    topic.rates.append(topic.counted[0])
+                    self.values_revision += 1
+        return arrived
 
     def age(self, now: float, now_ns: int) -> None:
         """Let time pass: ages grow, what vanished ten seconds ago leaves.
@@ -197,13 +258,16 @@ class Topics:
         """Take over what arrived on a watched topic."""
         topic = self._topics.get(name)
         if topic is None:
-            topic = self._topics[name] = Topic(name, new=True)
+            topic = self._topics[name] = Topic(name, new=True, network=self._network)
             self.revision += 1
         if not batch.messages:
             return
         topic.previous = batch.messages[-2] if len(batch.messages) > 1 else topic.newest
         topic.newest = batch.messages[-1]
         topic.received += batch.arrived
+        kept_bytes = sum(message.size_bytes for message in batch.messages)
+        # what was dropped is taken to have been as large as what was not
+        topic.received_bytes += kept_bytes * batch.arrived // len(batch.messages)
         topic.dropped += batch.dropped
         topic.last_received = topic.moved_at = now
         self.values_revision += 1
@@ -213,7 +277,8 @@ class Topics:
         topic = self._topics.get(name)
         if topic is not None:
             topic.newest = topic.previous = None
-            topic.received = topic.dropped = topic.missed = 0
+            topic.received = topic.dropped = topic.missed = topic.received_bytes = 0
+            topic.counted = None
             topic.last_received = None
             topic.watched = False
 
@@ -231,6 +296,7 @@ class Topics:
         topic.publishers, topic.subscribers = len(info.publishers), len(info.subscribers)
         topic.publisher_nodes = _names(info, view)
         topic.gone_since = topic.gone_s = None
+        topic.stale = False
         self._past.discard(topic.name)
         _take_figures(topic, info, now)
         if topic.facts() != before:
@@ -253,6 +319,8 @@ def _take_figures(topic: Topic, info: TopicInfo, now: float) -> None:
     topic.info = info
     topic.rate_hz = rate_hz = info.rate_hz
     topic.bandwidth_Bps = info.bandwidth_Bps
+    if rate_hz is None and topic.counted is not None:
+        topic.rate_hz, topic.bandwidth_Bps = topic.counted
     topic.lost, topic.loss_ratio = info.lost, info.loss_ratio
     stamp_ns, before = info.last_stamp_ns, topic.last_stamp_ns
     if stamp_ns is not None and (before is None or stamp_ns > before):

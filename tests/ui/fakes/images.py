@@ -62,8 +62,8 @@ class Images(images_module.Images):
         super().add(stream)
         self.decode_waiting()
 
-    def offer(self, messages: Sequence[Message]) -> None:
-        super().offer(messages)
+    def offer(self, messages: Sequence[Message], key: str = "") -> None:
+        super().offer(messages, key)
         self.decode_waiting()
 
     def want(self, stream: images_module.ImageStream, size: tuple[int, int] | None) -> None:

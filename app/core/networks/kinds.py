@@ -1,0 +1,99 @@
+"""The networks that Studio can look at beside its own: their names, where they are, what is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from nep.backends.base import backend_named
+from nep.i18n import _, lazy
+from nep.protocol.graph_view import TopicInfo
+
+_PICTURES_OF_ROS_2 = "sensor_msgs/msg/CompressedImage"
+_TEXT_OF_ROS = "std_msgs/String"
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkKind:
+    """A kind of network. ``name`` is that of nep's back end, ``words`` what people call it.
+
+    ``place`` says what its address is and ``hint`` what a person should know of it, both marked with `lazy`;
+    ``example`` is the address that is meant when none is given. ``tells_figures``: its nodes tell rates,
+    losses and how much of a processor they use. ``codec`` gives a topic's codec where the graph has a more
+    general one, ``reads`` as what a topic is subscribed. ``qos`` is the quality that hears most publishers.
+    """
+
+    name: str
+    words: str
+    place: str
+    example: str
+    hint: str
+    tells_figures: bool
+    codec: Callable[[TopicInfo], str]
+    reads: Callable[[TopicInfo], str]
+    qos: str = ""
+
+    def checked(self, address: str) -> str:
+        """The address as the back end has it. Raises `NepError` for what is none."""
+        return backend_named(self.name).master(address.strip() or self.example)
+
+    @property
+    def not_known(self) -> str:
+        """Why a figure is missing: "not known on ROS 2"."""
+        return _("not known on {network}").format(network=self.words)
+
+
+def _codec_of_ros_2(info: TopicInfo) -> str:
+    return "image" if info.msg_type == _PICTURES_OF_ROS_2 else info.codec
+
+
+def _reads_ros_2(info: TopicInfo) -> str:
+    return "image" if info.msg_type == _PICTURES_OF_ROS_2 else info.msg_type
+
+
+def _reads_ros(info: TopicInfo) -> str:
+    """A subscriber of json reads any message as a map, also of a package that is not installed here."""
+    if info.codec == "image":
+        return "image"
+    return _TEXT_OF_ROS if info.msg_type == _TEXT_OF_ROS else "json"
+
+
+KINDS = (
+    NetworkKind(
+        "ros",
+        "ROS 1",
+        lazy("Address of the master"),
+        "127.0.0.1:11311",
+        lazy("A master on another computer: this one then listens in that network, too."),
+        tells_figures=False,
+        codec=lambda info: info.codec,
+        reads=_reads_ros,
+    ),
+    NetworkKind(
+        "ros2",
+        "ROS 2",
+        lazy("Domain, 0 to 232"),
+        "0",
+        lazy("Only programs on this computer, unless ROS_AUTOMATIC_DISCOVERY_RANGE says otherwise."),
+        tells_figures=False,
+        codec=_codec_of_ros_2,
+        reads=_reads_ros_2,
+        qos="best_effort",  # a reader that does not insist hears writers that don't, and all others
+    ),
+    NetworkKind(
+        "zenoh",
+        "Zenoh",
+        lazy("Where its nodes meet"),
+        "local",
+        lazy("local: on this computer; or a router such as tcp/192.168.1.5:7447."),
+        tells_figures=True,
+        codec=lambda info: info.codec,
+        reads=lambda info: info.msg_type,
+    ),
+)
+_BY_NAME = {kind.name: kind for kind in KINDS}
+
+
+def kind_named(name: str) -> NetworkKind | None:
+    """The kind of this name; None for "", which is the native network, and for any other."""
+    return _BY_NAME.get(name)

@@ -1,0 +1,80 @@
+"""One network beside the native one, joined by a node of its back end in a thread of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+
+import nep
+from app.core.faults import error_words
+from app.core.network.source import NODE_NAME, LiveSource, NodeSink, Sink
+from app.core.network.topics import key_of
+from app.core.networks.kinds import NetworkKind
+from nep.errors import NepError
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.nodes.subscriber import Subscriber
+from nep.protocol.graph_view import GraphView
+
+ASK_S = 1.0
+LOOK_S = 2.0
+
+
+class OtherSource(LiveSource):
+    """As `LiveSource`; sinks are given topics by their names among all networks (`key_of`)."""
+
+    poll_s = ASK_S
+
+    def __init__(
+        self,
+        kind: NetworkKind,
+        address: str,
+        sinks: Sequence[Sink],
+        post_event: Callable[[object], None],
+    ) -> None:
+        """``address`` is where the nodes of this kind of network meet."""
+        super().__init__(
+            address, [_keyed(kind.name, sink) for sink in sinks], post_event, thread=f"studio-{kind.name}"
+        )
+        self._kind = kind
+
+    def join(self) -> Node:
+        """See `LiveSource.join`."""
+        with _in_words():
+            return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=LOOK_S)
+
+    def look(self, node: Node) -> GraphView:
+        """See `LiveSource.look`; topics have the codec and the type by which they are read."""
+        with _in_words():
+            view = node.graph(timeout_s=LOOK_S)
+        topics = {
+            name: info if (codec := self._kind.codec(info)) == info.codec else replace(info, codec=codec)
+            for name, info in view.topics.items()
+        }
+        return replace(view, topics=topics)
+
+    def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
+        """See `LiveSource.subscribe`."""
+        info = self._view.topics.get(topic) if self._view is not None else None
+        wanted = self._kind.reads(info) if info is not None else msg_type
+        with _in_words():
+            return node.new_sub(topic, wanted, sink=sink, wildcards=False, qos=self._kind.qos)
+
+
+@contextmanager
+def _in_words() -> Iterator[None]:
+    """What a back end's library raises becomes a `NepError`."""
+    try:
+        yield
+    except NepError:
+        raise
+    except Exception as error:
+        raise NepError(error_words(error)) from error
+
+
+def _keyed(network: str, sink: Sink) -> Sink:
+    def take(topic: str, messages: Sequence[Message]) -> None:
+        sink(key_of(network, topic), messages)
+
+    return take

@@ -1,0 +1,320 @@
+"""Networks beside the native one: chosen by a person, told apart by name, grey when nobody answers."""
+
+from __future__ import annotations
+
+import json
+import sys
+import uuid
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.network.mailbox import Batch
+from app.core.network.source import GraphSeen, MasterFound, MasterLost, Sink, WatchFailed
+from app.core.network.topics import Topic, Topics, key_of, split_key
+from app.core.networks.kinds import KINDS, NetworkKind, kind_named
+from app.core.networks.networks import KEPT, NetworkEvent, Networks, by_network
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from app.errors import SettingsError
+from nep.errors import BackendUnavailableError, NepError
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from tests.core.waiting import tick_until
+from tests.e2e.waiting import until
+
+
+class Fake:
+    """A source that a test tells what to tell."""
+
+    def __init__(
+        self,
+        kind: NetworkKind,
+        address: str,
+        sinks: Sequence[Sink],
+        post_event: Callable[[object], None],
+    ) -> None:
+        self.kind, self.address, self.sinks, self.tell = kind, address, sinks, post_event
+        self.wanted: set[str] = set()
+        self.said: list[str] = []
+
+    def start(self) -> None:
+        self.said.append("start")
+
+    def watch(self, topic: str) -> None:
+        self.wanted.add(topic)
+
+    def unwatch(self, topic: str) -> None:
+        self.wanted.discard(topic)
+
+    def end(self) -> None:
+        self.said.append("end")
+
+    def close(self) -> None:
+        self.said.append("close")
+
+
+class World:
+    """Networks over fakes, and what was posted."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.made: list[Fake] = []
+        self.posted: list[NetworkEvent] = []
+        self.settings = settings
+        self.networks = Networks(settings, [], self.post, self.make)
+
+    def post(self, event: object) -> None:
+        assert isinstance(event, NetworkEvent)
+        self.posted.append(event)
+
+    def make(
+        self, kind: NetworkKind, address: str, sinks: Sequence[Sink], post: Callable[[object], None]
+    ) -> Fake:
+        self.made.append(Fake(kind, address, sinks, post))
+        return self.made[-1]
+
+    def tell(self, event: object, now: float = 0.0, source: int = -1) -> None:
+        """The newest source tells this, and it is taken over."""
+        self.made[source].tell(event)
+        self.networks.on_event(self.posted.pop(), now)
+
+
+def graph(*topics: str, rate_hz: float | None = None, revision: int = 1) -> GraphView:
+    publisher = PublisherInfo(1, "/arm", (), False, 0, 0, 0, None, rate_hz, None)
+    infos = {name: TopicInfo(name, "std_msgs/String", "ros", (publisher,), (), rate_hz) for name in topics}
+    return GraphView(1, revision, {"/arm": NodeInfo("/arm", "arm", "", None, "", "ros", 0)}, infos)
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> World:
+    return World(Settings(tmp_path))
+
+
+def message(size: int = 10) -> Message:
+    return Message("/a", bytes(size), "bytes", "bytes")
+
+
+def test_names_of_topics_of_all_networks_are_told_apart() -> None:
+    assert split_key(key_of("ros2", "/camera")) == ("ros2", "/camera")
+    assert split_key(key_of("", "/camera")) == ("", "/camera")
+    assert split_key(key_of("ros", "/a b c")) == ("ros", "/a b c"), "strangers may name a topic anything"
+    assert Topic("/camera", network="ros").key == "ros /camera"
+    native, others = by_network({"/a": Batch(), "ros /a": Batch()})
+    assert (list(native), list(others)) == (["/a"], ["ros /a"])
+
+
+def test_nothing_is_looked_at_until_it_is_chosen_and_then_also_at_the_next_start(world: World) -> None:
+    world.networks.start()
+    assert (world.made, world.networks.chosen) == ([], [])
+    world.networks.choose("ros2", " 7 ")
+    world.networks.choose("zenoh", "")
+    assert [(fake.kind.name, fake.address, fake.said) for fake in world.made] == [
+        ("ros2", "7", ["start"]),
+        ("zenoh", "local", ["start"]),
+    ]
+    assert [network.state for network in world.networks] == ["off", "looking", "looking"]
+    again = World(Settings(world.settings.path.parent))
+    again.networks.start()
+    assert [(fake.kind.name, fake.address) for fake in again.made] == [("ros2", "7"), ("zenoh", "local")]
+    again.networks.leave("ros2")
+    assert again.made[0].said == ["start", "end"], "the window does not wait for its thread"
+    third = World(Settings(world.settings.path.parent))
+    third.networks.start()
+    assert [fake.kind.name for fake in third.made] == ["zenoh"]
+    again.networks.close()
+    assert [fake.said for fake in again.made] == [["start", "end", "close"]] * 2
+
+
+@pytest.mark.parametrize(
+    "kept", [[], {"ros2": "999"}, {"ros2": 5}, {"roz": "1"}, {"zenoh": "nowhere at all"}, {"ros": None}]
+)
+def test_whatever_is_kept_and_is_no_choice_is_left_out(kept: object, tmp_path: Path) -> None:
+    (tmp_path / "settings.json").write_text(json.dumps({KEPT: kept}))
+    world = World(Settings(tmp_path))
+    world.networks.start()
+    assert world.made == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "address", "said"),
+    [
+        ("ros2", "-1", "is no domain of ROS 2; use a number from 0 to 232"),
+        ("ros2", "233", "is no domain of ROS 2"),
+        ("ros2", str(2**64 - 1), "is no domain of ROS 2"),
+        ("zenoh", "somewhere", "is no place where nodes of 'zenoh' meet"),
+        ("ros", "::", "is no address of a ROS master"),
+        ("ros", "http://", "is no address of a ROS master"),
+    ],
+)
+def test_a_wrong_address_is_refused_in_words_and_what_was_chosen_stays(
+    world: World, kind: str, address: str, said: str
+) -> None:
+    world.networks.choose(kind, "")
+    before = list(world.made)
+    with pytest.raises(NepError, match=said):
+        world.networks.choose(kind, address)
+    assert world.made == before
+    assert world.networks.get(kind) is not None
+    assert [network.kind.name for network in world.networks.chosen] == [kind]
+
+
+def test_what_can_not_be_kept_is_looked_at_all_the_same(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_key: str, _value: object) -> None:
+        raise SettingsError(Path("settings.json"), "no space left on device")
+
+    monkeypatch.setattr(world.settings, "set", refuse)
+    with pytest.raises(SettingsError):
+        world.networks.choose("zenoh", "")
+    assert [network.kind.name for network in world.networks.chosen] == ["zenoh"]
+
+
+def test_topics_and_nodes_are_there_with_their_network(world: World) -> None:
+    before = world.networks.revision
+    world.networks.choose("ros", "")
+    assert world.networks.revision > before
+    world.tell(MasterFound("127.0.0.1:11311"))
+    world.tell(GraphSeen(graph("/a"), 0.0))
+    assert [(topic.key, topic.network, topic.rate_hz) for topic in world.networks.topics] == [
+        ("ros /a", "ros", None)
+    ]
+    (node,) = world.networks.nodes
+    assert (node.key, node.network, node.is_original, node.publishes) == ("ros /arm", "ros", False, ("/a",))
+    assert world.networks.topic("ros /a") is world.networks.topics[0]
+    assert world.networks.topic("/a") is None
+    assert world.networks.topic("zenoh /a") is None
+
+
+def test_a_network_that_does_not_answer_is_grey_with_a_sentence_until_it_is_back(world: World) -> None:
+    world.networks.choose("ros", "")
+    world.tell(GraphSeen(graph("/a"), 0.0))
+    revision = world.networks.revision
+    world.tell(MasterLost("", "no ROS master answers"), 5.0)
+    (network,) = world.networks.chosen
+    assert (network.state, network.sentence) == ("lost", "no ROS master answers")
+    assert [topic.stale for topic in network.topics] == [node.stale for node in network.nodes] == [True]
+    assert world.networks.revision > revision
+    world.networks.age(100.0, 0)
+    assert [topic.name for topic in network.topics] == ["/a"], "it may be there: who is connected goes on"
+    world.tell(GraphSeen(graph("/a", revision=2), 0.0), 101.0)
+    assert (network.state, network.sentence) == ("there", "")
+    assert [topic.stale for topic in network.topics] == [node.stale for node in network.nodes] == [False]
+    world.tell(GraphSeen(GraphView(1, 3), 0.0), 102.0)
+    assert [topic.gone_s for topic in network.topics] == [0.0]
+    world.networks.age(113.0, 0)
+    assert list(network.topics) == []
+
+
+def test_what_a_source_tells_that_was_ended_is_not_taken_over(world: World) -> None:
+    world.networks.choose("ros", "127.0.0.1:1")
+    world.networks.choose("ros", "127.0.0.1:2")
+    world.tell(GraphSeen(graph("/of/the/first"), 0.0), source=0)
+    assert world.networks.topics == []
+    world.networks.leave("ros")
+    world.tell(GraphSeen(graph("/a"), 0.0))
+    assert (world.networks.topics, world.networks.nodes) == ([], [])
+    world.networks.choose("ros", "127.0.0.1:2")
+    world.networks.choose("ros", "127.0.0.1:2")
+    assert len(world.made) == 3, "the same address again changes nothing"
+
+
+def test_who_looks_before_a_network_is_chosen_sees_it_then(world: World) -> None:
+    world.networks.watch("ros /a")
+    world.networks.watch("ros /b")
+    world.networks.unwatch("ros /b")
+    world.networks.add("ros /a", Batch([message()]), 0.0)  # of a network that was left
+    world.networks.choose("ros", "")
+    assert world.made[0].wanted == {"/a"}
+    world.networks.add("ros /a", Batch([message(), message()], dropped=3), 1.0)
+    world.networks.add("ros /b", Batch([message()]), 1.0)
+    found = world.networks.topic("ros /a")
+    assert found is not None
+    assert (found.received, found.dropped, found.watched) == (5, 3, True)
+    assert world.networks.topic("ros /b") is None
+    world.networks.unwatch("ros /a")
+    assert (found.newest, found.received, found.watched) == (None, 0, False)
+    assert world.made[0].wanted == set()
+
+
+def test_why_a_topic_can_not_be_read_is_known_while_somebody_looks(world: World) -> None:
+    world.networks.choose("ros2", "")
+    world.networks.watch("ros2 /a")
+    world.tell(WatchFailed("/a", "there is no type 'my/Own'"))
+    assert world.networks.unread("ros2 /a") == "there is no type 'my/Own'"
+    assert world.networks.unread("ros2 /b") == world.networks.unread("/a") == ""
+    world.networks.add("ros2 /a", Batch([message()]), 0.0)
+    assert world.networks.unread("ros2 /a") == ""
+    world.tell(WatchFailed("/a", "again"))
+    world.networks.unwatch("ros2 /a")
+    assert world.networks.unread("ros2 /a") == ""
+
+
+def test_what_arrives_is_counted_where_nobody_tells_it() -> None:
+    topics = Topics(("", 0), "ros")
+    topics.update(graph("/a", "/b"), 0.0)
+    topics["/a"].watched = True
+    before = topics.count(0.0, {})
+    topics.add("/a", Batch([message(100)] * 4, dropped=6), 1.0)
+    before = topics.count(2.0, before)
+    assert topics["/a"].counted == (5.0, 500.0)
+    topics.update(graph("/a", "/b"), 2.0)
+    assert (topics["/a"].rate_hz, topics["/a"].bandwidth_Bps) == (5.0, 500.0), (
+        "a graph without does not undo it"
+    )
+    assert topics["/b"].rate_hz is None
+    topics.update(graph("/a", rate_hz=9.0, revision=2), 3.0)
+    assert topics["/a"].rate_hz == 9.0, "who publishes knows better"
+    topics.unwatch("/a")
+    assert (topics["/a"].counted, topics.count(1.0, before)) == (None, {})
+
+
+def test_every_kind_is_a_back_end_that_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    for kind in KINDS:
+        assert kind_named(kind.name) is kind
+        assert kind.checked(kind.example) == kind.checked("")
+        assert kind.not_known == f"not known on {kind.words}"
+    assert kind_named("") is kind_named("zeromq") is None
+    monkeypatch.setitem(sys.modules, "zenoh", None)
+    with pytest.raises(BackendUnavailableError, match=r"pip install .*nep-studio\[zenoh\]"):
+        nep.node("n", "zenoh")
+
+
+def test_a_network_of_zenoh_is_seen_and_heard_beside_the_native_one(session: Session) -> None:
+    pytest.importorskip("zenoh")
+    place = f"local/{uuid.uuid4().hex}"
+    with nep.node("talker") as native, nep.node("arm", "zenoh", master=place) as arm:
+        ours, theirs = native.new_pub("/pose"), arm.new_pub("/pose")
+        watches = [session.watch("/pose"), session.watch("zenoh /pose")]
+        session.networks.choose("zenoh", place)
+        until(lambda: theirs.subscribers == 1, "Studio hears it")
+        until(lambda: ours.subscribers == 1, "and this")
+        ours.publish({"x": 1})
+        theirs.publish({"x": 2})
+
+        def shown(key: str) -> object:
+            topic = session.topic(key)
+            return topic.newest.payload if topic is not None and topic.newest is not None else None
+
+        tick_until(session, lambda: shown("/pose") == {"x": 1})
+        tick_until(session, lambda: shown("zenoh /pose") == {"x": 2})
+        assert session.networks.topic("zenoh /pose") is not session.topics.get("/pose")
+        tick_until(session, lambda: {"arm", "studio"} <= {node.name for node in session.networks.nodes})
+        assert "arm" not in {node.name for node in session.nodes}
+        session.networks.leave("zenoh")
+        until(lambda: theirs.subscribers == 0, "its thread has left the network")
+        assert session.networks.topics == []
+        for watch in watches:
+            watch.close()
+
+
+def test_a_missing_package_is_one_sentence(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "zenoh", None)
+    session.networks.choose("zenoh", "local/nobody")
+    network = session.networks.get("zenoh")
+    assert network is not None
+    tick_until(session, lambda: network.state == "lost")
+    assert "nep-studio[zenoh]" in network.sentence
+    assert "\n" not in network.sentence
