@@ -6,6 +6,7 @@ Ubuntu), the virtual environment ``.venv``, the pinned packages in it, and a vir
     demo           open Studio with its virtual robot; without a screen it does the main job alone
     test           every check and every test
     check          the same as test; add --fast to leave the tests out
+    versions       the library alone, without Qt, and its tests with each Python from 3.10 to 3.13
     bench          the benchmarks
     screenshots    the pictures of the README
     guide-pictures the pictures of the guide, in each language
@@ -29,8 +30,9 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from tools.computer import ROOT, Computer, Trouble, end, timed
+from tools.computer import ROOT, Computer, Trouble, end, timed, venv_python
 from tools.system_packages import bring_system_packages
+from tools.versions import versions
 
 PYTHONS = ((3, 10), (3, 13))
 SCREEN = "1600x1000x24"
@@ -45,11 +47,6 @@ SCRIPTS = {
 
 
 # ---- the virtual environment ----------------------------------------------------------------------
-
-
-def venv_python(folder: Path, platform: str) -> Path:
-    """The interpreter in a virtual environment."""
-    return folder / ("Scripts/python.exe" if platform == "win32" else "bin/python")
 
 
 def stamp(folder: Path, extra: str) -> str:
@@ -194,10 +191,13 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
             "Python {}.{} to {}.{} is needed, this is {}.{}".format(*lowest, *highest, *computer.version)
         )
     begin = time.monotonic()
-    bring_system_packages(computer)
+    if command != "versions":  # which has nothing of Qt's, and so asks nothing of the system
+        bring_system_packages(computer)
     if command == "setup":
         make_environment(computer, ROOT, "dev")
         code = 0
+    elif command == "versions":
+        code = versions(computer, arguments)
     elif command == "demo":
         code = demo(computer, arguments)
     else:
@@ -215,7 +215,7 @@ def main(arguments: Sequence[str] | None = None, computer: Computer | None = Non
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("command", choices=["demo", *SCRIPTS, "setup"])
+    parser.add_argument("command", choices=["demo", *SCRIPTS, "versions", "setup"])
     command: str = parser.parse_args(given[:1]).command
     # A terminal that closes, or a CI that gives up, must not leave a virtual screen behind.
     for name in ("SIGTERM", "SIGHUP"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 import time
@@ -78,6 +79,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """``--driver FILE``: hold the contract of robots against the drivers of this file."""
     told = "a driver of yours to hold tests/robots/driver/test_contract.py against (may be given again)"
     parser.addoption("--driver", action="append", default=[], metavar="FILE", help=told)
+    if importlib.util.find_spec("pytestqt") is None:
+        # The library's tests run without Qt too (dev.py versions): its options are known, and mean nothing.
+        for name in ("qt_api", "qt_log_level_fail", "qt_log_ignore"):
+            parser.addini(name, "an option of pytest-qt, which is not here", type="linelist")
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:

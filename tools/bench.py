@@ -15,6 +15,7 @@ from pathlib import Path
 
 BENCH = Path(__file__).resolve().parent.parent / "bench"
 NAMES = (
+    "nep_import",
     "nep_roundtrip",
     "nep_rate",
     "nep_large",

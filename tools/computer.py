@@ -81,6 +81,11 @@ class Computer:
         )
 
 
+def venv_python(folder: Path, platform: str) -> Path:
+    """The interpreter in a virtual environment."""
+    return folder / ("Scripts/python.exe" if platform == "win32" else "bin/python")
+
+
 @contextlib.contextmanager
 def timed(what: str) -> Iterator[None]:
     """Say what is being done, and how long it took."""

@@ -1,4 +1,4 @@
-"""Write down which packages are installed, with their hashes: requirements/studio.txt and dev.txt.
+"""Write down which packages are installed, with their hashes: requirements/*.txt.
 
     python tools/lock.py             add what pyproject.toml asks for now; what is pinned stays as it is
     python tools/lock.py --upgrade   the newest versions that pyproject.toml allows
@@ -23,24 +23,29 @@ else:
 
 ROOT = Path(__file__).resolve().parents[1]
 OLDEST_PYTHON = "3.10"
+PLAIN = "library"
+"""The file of what nep needs without any extra."""
+LOCKED = ("studio", "dev", "test", PLAIN)
+"""The files, each with the versions of those before it; all but the last are named after their extra."""
 EDITABLE = ("editables",)
 """What hatchling asks for when it installs a checkout; it can't be told from pyproject.toml."""
 
 
 def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
-    """What pins one extra; what builds the project itself is read from standard input."""
+    """What pins one file; what builds the project itself is read from standard input."""
     found = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", OLDEST_PYTHON]
     found += ["--generate-hashes", "--no-annotate", "--no-header", "--no-emit-package", "nep-studio"]
-    found += ["--extra", extra, "--output-file", str(output)]
-    if extra != "studio":
-        found += ["--constraint", str(output.with_name("studio.txt"))]
+    found += ["--output-file", str(output)]
+    if extra != PLAIN:
+        found += ["--extra", extra]
+    found += [f"--constraint={output.with_name(f'{each}.txt')}" for each in LOCKED[: LOCKED.index(extra)]]
     if upgrade:
         found.append("--upgrade")
     return [*found, "pyproject.toml", "-"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write both files; 2 when uv is missing."""
+    """Write all files; 2 when uv is missing."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -52,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     builds = "\n".join((*project["build-system"]["requires"], *EDITABLE))
-    for extra in ("studio", "dev"):
+    for extra in LOCKED:
         output = ROOT / "requirements" / f"{extra}.txt"
         output.parent.mkdir(exist_ok=True)
         done = subprocess.run(

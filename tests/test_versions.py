@@ -1,0 +1,169 @@
+"""dev.py versions: which Pythons it finds, what it runs in each, and that a failure is never lost."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+import dev
+from tools.computer import ROOT, Computer, Trouble, venv_python
+from tools.versions import PROMISED, found, versions
+
+HERE = "{}.{}".format(*sys.version_info[:2])
+OTHERS = [each for each in PROMISED if each != HERE]
+QT = {"pyside6", "pyside6-essentials", "pyside6-addons", "shiboken6", "pytest-qt"}
+
+
+@dataclass
+class Pythons:
+    """A computer of which we say what its interpreters answer; venv makes folders, and steps can fail."""
+
+    answers: Mapping[str, str]
+    path: Mapping[str, str] = field(default_factory=dict)
+    fails: str = "nothing at all"
+    ran: list[list[str]] = field(default_factory=list)
+
+    def ask(self, command: Sequence[str]) -> str:
+        return self.answers.get(" ".join(command[: command.index("-c")]), "")
+
+    def do(self, command: Sequence[str], environ: Mapping[str, str], log: Path | None) -> int:
+        self.ran.append([str(each) for each in command])
+        if "venv" in command:
+            Path(command[-1]).mkdir(parents=True)
+        return int(any(Path(each).name == self.fails for each in self.ran[-1]))
+
+    def computer(self) -> Computer:
+        return Computer(platform="linux", environ={}, which=self.path.get, ask=self.ask, do=self.do)
+
+
+def here(**others: str) -> dict[str, str]:
+    return {sys.executable: f"{HERE} cpython {sys.executable}\n", **others}
+
+
+def test_pythons_are_found_here_on_the_path_by_the_launcher_and_in_pyenv(tmp_path: Path) -> None:
+    first, second, third = OTHERS
+    folders = [tmp_path / ".pyenv" / "versions" / f"{third}.{last}" for last in ("9", "10", "0t")]
+    for each in folders:
+        each.mkdir(parents=True)
+    answers = here(
+        **{
+            "/bin/first": f"{first} cpython /bin/first\n",
+            f"/py -{second}": f"{second} cpython C:/Program Files/python.exe\n",
+            **{
+                str(venv_python(each, "linux")): f"{third} cpython {each}/bin/real python\n"
+                for each in folders
+            },
+        }
+    )
+    system = Pythons(answers, {f"python{first}": "/bin/first", "py": "/py"})
+    assert found(system.computer(), tmp_path) == {
+        HERE: sys.executable,
+        first: "/bin/first",
+        second: "C:/Program Files/python.exe",
+        third: f"{folders[1]}/bin/real python",
+    }
+
+
+@pytest.mark.parametrize("said", ["", "3.9 cpython /bin/x\n", "pyenv: python3.12: command not found", "\0"])
+def test_what_does_not_say_that_it_is_that_python_is_none(said: str, tmp_path: Path) -> None:
+    system = Pythons({"/shim": said, sys.executable: said}, {f"python{each}": "/shim" for each in PROMISED})
+    assert found(system.computer(), tmp_path) == {}
+    with pytest.raises(Trouble, match="none of these Pythons is here; install one"):
+        versions(system.computer(), [], tmp_path / "made", tmp_path)
+
+
+def test_another_kind_of_python_is_not_one_that_is_promised(tmp_path: Path) -> None:
+    system = Pythons({sys.executable: f"{HERE} pypy {sys.executable}\n"})
+    assert found(system.computer(), tmp_path) == {}
+
+
+def test_each_python_gets_two_environments_by_hashes_and_they_are_made_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for expected in (2, 0):
+        system = Pythons(here())
+        assert versions(system.computer(), [], tmp_path, tmp_path) == 0
+        assert sum("venv" in command for command in system.ran) == expected
+        assert sum("--require-hashes" in command for command in system.ran) == expected
+    said = capsys.readouterr()
+    assert f"not on this computer: Python {', '.join(OTHERS)}\n" in said.out
+    assert re.search(rf"Python {HERE}\s+ok", said.err)
+    assert system.ran[-1][1:] == ["-m", "pytest", "-q", "tests/nep", "tests/interop"]
+    assert all((ROOT / each).is_dir() for each in system.ran[-1][-2:])
+    assert system.ran[2][1:2] == ["-I"], "what was installed is tried, not the sources here"
+
+
+def test_arguments_reach_pytest_and_folders_of_a_person_are_instead_of_ours(tmp_path: Path) -> None:
+    for given, rest in (
+        (["-k", "wire"], ["-k", "wire", "tests/nep", "tests/interop"]),
+        (
+            ["tests/nep/protocol/test_wire.py::test_x", "-x"],
+            ["tests/nep/protocol/test_wire.py::test_x", "-x"],
+        ),
+    ):
+        system = Pythons(here())
+        versions(system.computer(), ["--only", HERE, "--", *given], tmp_path, tmp_path)
+        assert system.ran[-1][4:] == rest
+
+
+@pytest.mark.parametrize(
+    ("fails", "told"),
+    [
+        ("--force-reinstall", "plain: install"),
+        ("check", "plain: pip check"),
+        ("library_alone.py", "plain: use"),
+    ],
+)
+def test_a_step_that_fails_is_named_and_the_tests_run_all_the_same(
+    fails: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    system = Pythons(here(), fails=fails)
+    assert versions(system.computer(), [], tmp_path, tmp_path) == 1
+    assert "pytest" in system.ran[-1]
+    assert f"Python {HERE}  FAILED: {told}" in capsys.readouterr().err
+
+
+def test_an_environment_that_failed_is_made_again_and_tests_that_fail_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(Trouble, match="could not be made"):
+        versions(Pythons(here(), fails="--require-hashes").computer(), [], tmp_path, tmp_path)
+    for left in tmp_path.iterdir():
+        left.rmdir()  # what venv --clear does
+    capsys.readouterr()
+    assert versions(Pythons(here(), fails="pytest").computer(), [], tmp_path, tmp_path) == 1
+    assert f"Python {HERE}  FAILED: tests" in capsys.readouterr().err
+
+
+def test_a_python_that_nobody_promised_cannot_be_asked_for(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit):
+        versions(Pythons(here()).computer(), ["--only", "3.9"], tmp_path, tmp_path)
+
+
+def test_the_libraries_of_qt_are_not_asked_for(tmp_path: Path) -> None:
+    system = Pythons({})
+    with pytest.raises(Trouble, match="none of these"):
+        dev.run(system.computer(), "versions", ["--only", "3.13"])
+    assert system.ran == []
+
+
+@pytest.mark.parametrize("name", ["library", "test"])
+def test_nothing_of_qt_is_in_what_they_are_made_of(name: str) -> None:
+    ours = pinned(name)
+    assert {"pyzmq", "orjson", "hatchling"} <= ours.keys()
+    assert ours.keys().isdisjoint(QT)
+    assert all(versions <= pinned("dev")[each] for each, versions in ours.items()), "the same everywhere"
+
+
+def pinned(name: str) -> dict[str, set[str]]:
+    """The versions of each package in a file of requirements: one, or one more for older Pythons."""
+    text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
+    made: dict[str, set[str]] = {}
+    for package, version in re.findall(r"^([\w.-]+)==(\S+)", text, re.MULTILINE):
+        made.setdefault(package.lower(), set()).add(version)
+    return made

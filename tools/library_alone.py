@@ -1,0 +1,128 @@
+"""What an installation of nep without any extra must do; exit code 1 and a sentence when it does not.
+
+    python -I tools/library_alone.py     run by `python3 dev.py versions`; -I keeps this folder's sources out
+
+Messages of each plain type over a master of its own and without one, a service, a picture that asks for its
+extra in one sentence, the command line, and that none of it loads Qt or asks for what is not installed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import nep
+
+ABSENT = ("PySide6", "shiboken6", "numpy", "cv2", "pynng", "zenoh", "iceoryx2", "cyclonedds", "pytest")
+"""What only the extras bring: if one of them is here, this environment proves nothing."""
+MESSAGES = {
+    "json": {"number": 1, "text": "ñ"},
+    "string": "ñandú",
+    "bytes": b"\0\xff",
+    "msgpack": [None, b"x"],
+}
+WAIT_S = 30.0
+EXTRAS = {"nanomsg": "nanomsg", "zenoh": "zenoh", "ros2": "ros2"}
+"""Back ends, each with the extra that it must ask for."""
+
+
+def installed() -> list[str]:
+    """Whether it is the installed nep that runs, alone."""
+    faults = [f"{name} is installed" for name in ABSENT if importlib.util.find_spec(name)]
+    if not Path(nep.__file__).is_relative_to(sys.prefix):
+        faults.append(f"nep was imported from {nep.__file__}, not from {sys.prefix}")
+    return faults
+
+
+def messages(master: str | None) -> list[str]:
+    """Messages of each plain type; through a master, or inside this program when there is none."""
+    backend = "zeromq" if master else "memory"
+    faults = []
+    with nep.node("talker", backend, master=master) as one, nep.node("hearer", backend, master=master) as two:
+        for msg_type, sent in MESSAGES.items():
+            subscriber = two.new_sub(msg_type, msg_type)
+            one.new_pub(msg_type, msg_type).publish(sent)
+            message = subscriber.receive(WAIT_S)
+            if message is None or message.payload != sent:
+                faults.append(f"{backend}: {sent!r} came as {message!r}")
+    return faults
+
+
+def _added_up(request: Any) -> dict[str, int]:  # noqa: ANN401 - whatever JSON a client sends
+    return {"sum": sum(request["of"])}
+
+
+def services(master: str) -> list[str]:
+    """A service with a thread of its own, and a call."""
+    with nep.node("server", master=master) as one, nep.node("caller", master=master) as two:
+        one.new_server("sum", _added_up, threads=1)
+        answer = two.new_client("sum", timeout_s=WAIT_S).call({"of": [1, 2, 3]})
+    return [] if answer == {"sum": 6} else [f"the service answered {answer!r}"]
+
+
+def sentences(master: str) -> list[str]:
+    """What is not installed is asked for by one sentence, which names the extra."""
+    faults = []
+    with nep.node("painter", master=master) as node:
+        try:
+            node.new_pub("picture", "image").publish(object())
+            faults.append("a picture needs no extra")
+        except nep.EncodeError as error:
+            if "nep-studio[image]" not in str(error):
+                faults.append(f"a picture does not name its extra: {error}")
+    for backend, extra in EXTRAS.items():
+        try:
+            nep.node("other", backend).close()
+            faults.append(f"{backend} needs no extra")
+        except nep.NepError as error:
+            if f"nep-studio[{extra}]" not in str(error):
+                faults.append(f"{backend} does not name its extra: {error}")
+    return faults
+
+
+def command_line(master: str) -> list[str]:
+    """The command `nep` answers, as the installed script."""
+    script = Path(sys.executable).with_name("nep.exe" if sys.platform == "win32" else "nep")
+    faults = []
+    for arguments in (["--help"], ["--master", master, "topic", "list"], ["--master", master, "doctor"]):
+        done = subprocess.run(
+            [str(script), *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=2 * WAIT_S,
+            env={**os.environ, "NEP_LANG": "en"},
+        )
+        # The doctor may well have something to say about this computer.
+        allowed = {0, 1} if "doctor" in arguments else {0}
+        if "Traceback" in done.stderr or done.returncode not in allowed:
+            faults.append(f"nep {' '.join(arguments)} ended with {done.returncode}: {done.stderr[-500:]}")
+    return faults
+
+
+def main() -> int:
+    """Try everything; 0 when all of it is well."""
+    with nep.master("127.0.0.1:0", learn_s=0.0) as master:
+        faults = [
+            *installed(),
+            *messages(None),
+            *messages(master.address),
+            *services(master.address),
+            *sentences(master.address),
+            *command_line(master.address),
+        ]
+    faults += [f"{name} was loaded" for name in ABSENT if name in sys.modules]
+    for fault in faults:
+        print(f"library alone: {fault}", file=sys.stderr)
+    if not faults:
+        version = "{}.{}.{}".format(*sys.version_info[:3])
+        print(f"· nep {nep.__version__} alone on Python {version}: messages, services and commands are well")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,161 @@
+"""The library alone, with each Python that it promises: `python3 dev.py versions`. Standard library only.
+
+    python3 dev.py versions                            each Python of this computer, one after the other
+    python3 dev.py versions --only 3.10 --only 3.13    these
+    python3 dev.py versions --plain                    only what nep is without any extra: no tests
+    python3 dev.py versions -- tests/nep/protocol -x   what comes after -- goes to pytest
+
+Each Python gets two environments of the pinned packages in `build/versions`, neither of which has Qt: one
+has the built distribution with what it asks for, and a program publishes, hears and calls in it; in the other
+is what the library's tests need, and they run. Exit code 1 when anything failed in any of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tools.computer import ROOT, Computer, Trouble, timed, venv_python
+
+PROMISED = ("3.10", "3.11", "3.12", "3.13")
+FOLDER = ROOT / "build" / "versions"
+TESTS = ("tests/nep", "tests/interop")
+WHO = "import sys; print('{}.{}'.format(*sys.version_info[:2]), sys.implementation.name, sys.executable)"
+PYENV = ".pyenv/versions"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one Python did: what failed, in the order of the steps."""
+
+    version: str
+    failed: list[str] = field(default_factory=list)
+
+    def told(self) -> str:
+        """One line of the table."""
+        return f"  Python {self.version}  {'FAILED: ' + ', '.join(self.failed) if self.failed else 'ok'}"
+
+
+# ---- which Pythons there are ----------------------------------------------------------------------
+
+
+def found(computer: Computer, home: Path | None = None) -> dict[str, str]:
+    """The interpreter of each promised Python that this computer has, by its version.
+
+    This very one, those that have a name on the path, Windows' launcher's, and pyenv's; in this order.
+    """
+    have: dict[str, str] = {}
+    for version in PROMISED:
+        for command in _candidates(computer, version, home or Path.home()):
+            said = re.fullmatch(r"(\S+) cpython (.+)", computer.ask([*command, "-c", WHO]).strip())
+            if said and said[1] == version:
+                have[version] = said[2]
+                break
+    return have
+
+
+def _candidates(computer: Computer, version: str, home: Path) -> list[list[str]]:
+    """Commands that may start this Python, the likeliest first."""
+    commands = [[sys.executable]] if version == "{}.{}".format(*sys.version_info[:2]) else []
+    if path := computer.which(f"python{version}"):
+        commands.append([path])
+    if launcher := computer.which("py"):
+        commands.append([launcher, f"-{version}"])
+    newest_first = sorted((home / PYENV).glob(f"{version}.*"), key=_number, reverse=True)
+    return [*commands, *([str(venv_python(each, computer.platform))] for each in newest_first)]
+
+
+def _number(folder: Path) -> int:
+    """The last number of a folder called 3.10.13; -1 for 3.13.0t and the like."""
+    last = folder.name.rpartition(".")[2]
+    return int(last) if last.isdecimal() else -1
+
+
+# ---- the environments -----------------------------------------------------------------------------
+
+
+def _stamp(requirements: str) -> str:
+    """What an environment is made of: it is made anew when this changes."""
+    made_of = [ROOT / "pyproject.toml", ROOT / "requirements" / f"{requirements}.txt"]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in made_of)).hexdigest()
+
+
+def _environment(computer: Computer, python: str, folder: Path, requirements: str) -> Path:
+    """The interpreter of an environment with the pinned packages of one file."""
+    made = venv_python(folder, computer.platform)
+    stamp = folder / "nep-stamp"
+    if stamp.is_file() and stamp.read_text(encoding="utf-8") == _stamp(requirements):
+        return made
+    install = [*_pip(made), "--require-hashes", "-r", f"requirements/{requirements}.txt"]
+    with timed(f"making the environment {folder.name}"):
+        for step in ([python, "-m", "venv", "--clear", str(folder)], install):
+            if computer.do(step, computer.environ, None) != 0:
+                raise Trouble(f"{folder} could not be made; the words of Python or pip are above")
+    stamp.write_text(_stamp(requirements), encoding="utf-8")
+    return made
+
+
+def _pip(python: Path) -> list[str]:
+    return [str(python), "-m", "pip", "install", "--disable-pip-version-check", "--quiet"]
+
+
+# ---- what is tried in them ------------------------------------------------------------------------
+
+
+def try_plain(computer: Computer, python: str, folder: Path) -> list[str]:
+    """Install the distribution with no extra, and use it from elsewhere; what failed."""
+    made = _environment(computer, python, folder, "library")
+    ours = [*_pip(made), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
+    # -I: what is tried is what was installed, not the sources here.
+    use = [str(made), "-I", str(ROOT / "tools" / "library_alone.py")]
+    for what, step in (("install", ours), ("pip check", [str(made), "-m", "pip", "check"]), ("use", use)):
+        if computer.do(step, computer.environ, None) != 0:
+            return [f"plain: {what}"]
+    return []
+
+
+def try_tests(computer: Computer, python: str, folder: Path, arguments: Sequence[str]) -> list[str]:
+    """Run the library's tests with what they need; what failed."""
+    made = _environment(computer, python, folder, "test")
+    ours = [*_pip(made), "--no-deps", "--no-build-isolation", "-e", "."]
+    pytest = [str(made), "-m", "pytest", "-q", *arguments]
+    if not any((ROOT / each.partition("::")[0]).exists() for each in arguments):
+        pytest += TESTS
+    for what, step in (("install", ours), ("tests", pytest)):
+        if computer.do(step, computer.environ, None) != 0:
+            return [what]
+    return []
+
+
+def versions(
+    computer: Computer, given: Sequence[str], folder: Path = FOLDER, home: Path | None = None
+) -> int:
+    """Try what was asked for; 0 when all that is there did well, 1 when not."""
+    parser = argparse.ArgumentParser(
+        prog="dev.py versions", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--only", action="append", choices=PROMISED, help="this Python (may be given again)")
+    parser.add_argument("--plain", action="store_true", help="only the library without any extra, no tests")
+    parser.add_argument("pytest_arguments", nargs="*", help="arguments for pytest, after --")
+    options = parser.parse_args(given)
+    wanted = [each for each in PROMISED if each in (options.only or PROMISED)]
+    have = {version: python for version, python in found(computer, home).items() if version in wanted}
+    absent = [version for version in wanted if version not in have]
+    if absent:
+        print(f"· not on this computer: Python {', '.join(absent)}", flush=True)
+    if not have:
+        raise Trouble("none of these Pythons is here; install one of them, by pyenv for example")
+    outcomes = []
+    for version, python in have.items():
+        print(f"\n=== Python {version} ({python})", flush=True)
+        failed = try_plain(computer, python, folder / f"{version}-plain")
+        if not options.plain:
+            failed += try_tests(computer, python, folder / version, options.pytest_arguments)
+        outcomes.append(Outcome(version, failed))
+    print("\n" + "\n".join(each.told() for each in outcomes), file=sys.stderr, flush=True)
+    return 1 if any(each.failed for each in outcomes) else 0
