@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from nep.backends.connection import Configuration
+from nep.backends.deadlines import Deadlines
 from nep.backends.services import (
     CallQueue,
     ClientSpec,
@@ -159,7 +160,7 @@ class MemoryServer:
 class MemoryClient:
     """A client: its calls that are under way. Its counts are written under its hub's lock."""
 
-    def __init__(self, node_id: str, hub: ServiceHub, spec: ClientSpec, deadlines: _Deadlines) -> None:
+    def __init__(self, node_id: str, hub: ServiceHub, spec: ClientSpec, deadlines: Deadlines) -> None:
         self._node_id = node_id
         self._deadlines = deadlines
         self.hub = hub
@@ -283,65 +284,13 @@ class MemoryClient:
         return ClosedError(_("client of '{service}'").format(service=self.spec.service))
 
 
-class _Deadlines:
-    """A thread, once there is a client, that ends calls that waited too long."""
-
-    def __init__(self, node_name: str) -> None:
-        self._name = f"nep-calls-{node_name}"
-        self._changed = threading.Condition(threading.Lock())
-        self._clients: tuple[MemoryClient, ...] = ()
-        self._due = math.inf
-        self._is_closing = False
-        self._thread: threading.Thread | None = None
-
-    def watch(self, client: MemoryClient) -> None:
-        """Its calls, too."""
-        with self._changed:
-            self._clients = (*self._clients, client)
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
-                self._thread.start()
-
-    def forget(self, client: MemoryClient) -> None:
-        """It is closed."""
-        with self._changed:
-            self._clients = tuple(each for each in self._clients if each is not client)
-
-    def add(self, deadline: float) -> None:
-        """A call ends then at the latest."""
-        with self._changed:
-            if deadline < self._due:
-                self._due = deadline
-                self._changed.notify()
-
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                while not self._is_closing and (left := self._due - time.monotonic()) > 0.0:
-                    self._changed.wait(min(left, threading.TIMEOUT_MAX))
-                if self._is_closing:
-                    return
-                self._due = math.inf
-                clients = self._clients
-            for client in clients:
-                self.add(client.expire(time.monotonic()))
-
-    def close(self, timeout_s: float) -> None:
-        """End the thread."""
-        with self._changed:
-            self._is_closing = True
-            self._changed.notify()
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join(timeout_s)
-
-
 class MemoryServices:
     """The servers and clients of one node. Part of `MemoryTransport`; `join` gives the hub."""
 
     def __init__(self, node: NodeRecord, join: Callable[[Configuration], ServiceHub]) -> None:
         self._node = node
         self._join = join
-        self._deadlines = _Deadlines(node.name)
+        self._deadlines = Deadlines(node.name)
         self._servers: tuple[MemoryServer, ...] = ()
         self._clients: tuple[MemoryClient, ...] = ()
 

@@ -45,10 +45,18 @@ class Inboxes:
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
 
-    def wait(self, subscribers: Sequence[Poured], timeout_s: float) -> None:
-        """Wait for a message in one of them, for one of them to be closed, or for `wake`."""
+    @property
+    def wakes(self) -> int:
+        """How often `wake` was called."""
+        return self._wakes
+
+    def wait(self, subscribers: Sequence[Poured], timeout_s: float, wakes: int | None = None) -> None:
+        """Wait for a message in one of them, for one of them to be closed, or for `wake`.
+
+        `wakes`: how often that was called before; whoever was woken since then does not wait.
+        """
         with self.changed:
-            before = self._wakes
+            before = self._wakes if wakes is None else wakes
             self.changed.wait_for(
                 lambda: self._wakes != before or any(each.has_input for each in subscribers),
                 timeout_s,

@@ -6,6 +6,9 @@
     nep/v1/live/NODE/node/...      liveliness tokens: a node, and its publishers and subscribers
     nep/v1/live/NODE/pub/...
     nep/v1/live/NODE/sub/...
+    nep/v1/live/NODE/srv/...       a server, and since when it is there
+    nep/v1/live/NODE/cli/...       a client
+    nep/v1/serve/SERVICE/SINCE/ID  a server answers: the payload, and the call's header as its attachment
 
 Whatever people name is one chunk, percent-encoded as in an address of the web; "" is "%".
 """
@@ -16,12 +19,15 @@ from typing import NamedTuple
 from urllib.parse import quote, unquote
 
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
+from nep.protocol.service_wire import PREFIX, SERVICE_TYPE, service_of
+from nep.protocol.service_wire import topic_of as topic_of_service
 
 __all__ = [
     "ALL_CALLS",
     "ALL_LIVE",
     "Alive",
     "call_key",
+    "client_key",
     "data_key",
     "data_keys",
     "hello_key",
@@ -30,6 +36,8 @@ __all__ = [
     "node_key",
     "parse_live",
     "publisher_key",
+    "serve_key",
+    "server_key",
     "subscriber_key",
     "topic_of",
 ]
@@ -39,7 +47,7 @@ _LIVE = f"{_ROOT}/live/"
 ALL_CALLS = f"{_ROOT}/call/*"
 ALL_LIVE = f"{_LIVE}**"
 _WILD = frozenset({"*", "**"})
-_TOPIC_AT = 3
+_TOPIC_AT, _SINCE_AT = 3, 4
 _ID_MOST = 2**64 - 1
 _NODE_WORDS, _PUBLISHER_WORDS, _SUBSCRIBER_WORDS = 7, 6, 4
 
@@ -123,6 +131,26 @@ def subscriber_key(node_id: str, record: SubscriberRecord) -> str:
     return "/".join((f"{_LIVE}{_word(node_id)}/sub", *map(_word, words)))
 
 
+def serve_key(service: str, since_ns: int, server: int) -> str:
+    """Where a server answers. In the order of these keys, all clients call the one that was there first."""
+    return f"{_ROOT}/serve/{_word(service)}/{since_ns:016x}/{server:016x}"
+
+
+def server_key(node_id: str, record: PublisherRecord) -> str:
+    """The token of a server."""
+    since = record.endpoints[0].split("/")[_SINCE_AT]
+    return "/".join(
+        (f"{_LIVE}{_word(node_id)}/srv", f"{record.id:016x}", _word(service_of(record.topic) or ""), since)
+    )
+
+
+def client_key(node_id: str, record: SubscriberRecord) -> str:
+    """The token of a client."""
+    return "/".join(
+        (f"{_LIVE}{_word(node_id)}/cli", f"{record.id:016x}", _word(service_of(record.topic) or ""))
+    )
+
+
 def parse_live(key: str) -> Alive | None:
     """What the token at this key says; None for anything else."""
     if not key.startswith(_LIVE):
@@ -139,15 +167,33 @@ def parse_live(key: str) -> Alive | None:
             )
         if words[:1] == ["pub"] and len(words) == _PUBLISHER_WORDS:
             _kind, id_, topic, msg_type, codec, latched = words
+            if topic.startswith(PREFIX):  # else whoever makes such a token would be called
+                return None
             record = PublisherRecord(
                 _number(id_), topic, msg_type, codec, (data_key(topic),), latched == "latched"
             )
             return Alive(node_id, record)
         if words[:1] == ["sub"] and len(words) == _SUBSCRIBER_WORDS:
             _kind, id_, topic, msg_type = words
+            if topic.startswith(PREFIX):
+                return None
             return Alive(node_id, SubscriberRecord(_number(id_), topic, msg_type))
+        return _parse_service(node_id, *words)
     except ValueError:
         return None
+
+
+def _parse_service(node_id: str, kind: str = "", id_: str = "", *rest: str) -> Alive | None:
+    """A server or a client. Raises `ValueError`."""
+    if kind == "srv" and len(rest) == 2 and rest[0]:
+        service, since = rest
+        endpoint = serve_key(service, _number(since), _number(id_))
+        record = PublisherRecord(
+            _number(id_), topic_of_service(service), SERVICE_TYPE, SERVICE_TYPE, (endpoint,)
+        )
+        return Alive(node_id, record)
+    if kind == "cli" and len(rest) == 1 and rest[0]:
+        return Alive(node_id, SubscriberRecord(_number(id_), topic_of_service(rest[0]), SERVICE_TYPE))
     return None
 
 

@@ -14,7 +14,7 @@ from nep.errors import BackendUnavailableError, NepError
 from nep.i18n import _
 from nep.system.forks import in_child
 
-__all__ = ["callback", "close_session", "library", "open_session"]
+__all__ = ["callback", "close_session", "keep_for_ever", "library", "open_session"]
 
 _logger = logging.getLogger("nep")
 _sessions: list[Any] = []
@@ -68,13 +68,18 @@ def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh's
             _sessions.remove(session)
 
 
+def keep_for_ever(owned: Any) -> None:  # noqa: ANN401 - zenoh's
+    """In a child: let nobody forget it, for what is forgotten tells the network so."""
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
+
+
 def _forked() -> None:
     """In a child: no session may be closed, not even by being forgotten: that would never end."""
     if "zenoh" not in sys.modules or not _sessions:
         return
     _inherited.add("zenoh")
     for session in _sessions:
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(session))
+        keep_for_ever(session)
 
 
 in_child(_forked)

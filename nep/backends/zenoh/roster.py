@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from nep.backends.zenoh.keys import Alive
 from nep.protocol.requests import Expected, NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
+from nep.protocol.service_wire import service_of, topic_of
 from nep.protocol.topic_pattern import is_pattern, matches
 
 __all__ = ["Roster"]
@@ -64,7 +65,19 @@ class Roster:
     def published(self) -> tuple[str, ...]:
         """The topics that have publishers."""
         with self._lock:
-            return tuple(self._publishers)
+            return tuple(each for each in self._publishers if service_of(each) is None)
+
+    @property
+    def served(self) -> tuple[str, ...]:
+        """The services that have servers."""
+        with self._lock:
+            return tuple(name for each in self._publishers if (name := service_of(each)) is not None)
+
+    def servers_of(self, service: str) -> tuple[str, ...]:
+        """Where the servers of a service answer, those that are there for longest first."""
+        with self._lock:
+            there = self._publishers.get(topic_of(service), {}).values()
+            return tuple(sorted(record.endpoints[0] for _node_id, record in there if record.endpoints))
 
     def subscribers_of(self, topic: str) -> tuple[Expected, ...]:
         """Those that hear a topic."""

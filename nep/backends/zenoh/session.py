@@ -5,14 +5,15 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, Protocol
 
 from nep.backends.zenoh.keys import (
     ALL_CALLS,
     ALL_LIVE,
     call_key,
+    client_key,
     data_key,
     data_keys,
     hello_key,
@@ -21,6 +22,7 @@ from nep.backends.zenoh.keys import (
     node_key,
     parse_live,
     publisher_key,
+    server_key,
     subscriber_key,
 )
 from nep.backends.zenoh.library import callback, close_session, library
@@ -38,20 +40,44 @@ from nep.protocol.encoding import decode_request, encode_request
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     NodeRecord,
+    PublisherCount,
     PublisherRecord,
     RemotePublisher,
     Request,
+    SubscriberCount,
     SubscriberRecord,
 )
+from nep.protocol.service_wire import service_of
 from nep.system.cpu import CpuLoad
 
-__all__ = ["Inquiry", "ZenohSession"]
+__all__ = ["Inquiry", "ListedClient", "ListedServer", "ZenohSession"]
 
 _logger = logging.getLogger("nep")
 _GRACE_S = 1.0
 """Zenoh says itself that the time of a question is over; should it not, nobody waits much longer."""
 _GREETING_S = 10.0
 _REPLIES_MOST, _LISTS_MOST = 100, 20_000
+
+
+class ListedServer(Protocol):
+    """A server, as others may see it."""
+
+    record: PublisherRecord
+
+    def counts(self) -> PublisherCount:
+        """The figures for who looks at the graph."""
+
+
+class ListedClient(Protocol):
+    """A client, as others may see it."""
+
+    record: SubscriberRecord
+
+    def counts(self) -> SubscriberCount:
+        """The figures for who looks at the graph."""
+
+    def servers_changed(self) -> None:
+        """A server of its service came or went. In one of zenoh's threads: it does not wait."""
 
 
 class Inquiry:
@@ -101,6 +127,8 @@ class ZenohSession:
         self._tokens: dict[object, Any] = {}
         self._publishers: tuple[ZenohPublisher, ...] = ()
         self._subscribers: tuple[ZenohSubscriber, ...] = ()
+        self._servers: tuple[ListedServer, ...] = ()
+        self._clients: tuple[ListedClient, ...] = ()
         self._outputs: dict[int, Any] = {}
         self._load = CpuLoad()
         self._graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
@@ -181,25 +209,29 @@ class ZenohSession:
         """This node as it registers and renews; nothing as long as it has nothing."""
         with self._lock:
             publishers, subscribers = self._publishers, self._subscribers
+            servers, clients = self._servers, self._clients
             if self.node.id not in self._tokens:
                 return ()
         join = requests.Join(
             self._own_record(),
             0,
-            tuple(each.record for each in publishers),
-            tuple(
-                SubscriberRecord(
-                    each.spec.id, each.spec.topic, each.spec.msg_type, pattern=each.spec.is_pattern
-                )
-                for each in subscribers
+            tuple(each.record for each in (*publishers, *servers)),
+            (
+                *(
+                    SubscriberRecord(
+                        each.spec.id, each.spec.topic, each.spec.msg_type, pattern=each.spec.is_pattern
+                    )
+                    for each in subscribers
+                ),
+                *(each.record for each in clients),
             ),
         )
         renewal = requests.Renew(
             self.node.id,
             1,
             0,
-            tuple(each.counts() for each in publishers),
-            tuple(each.counts() for each in subscribers),
+            (*(each.counts() for each in publishers), *(each.counts() for each in servers)),
+            (*(each.counts() for each in subscribers), *(each.counts() for each in clients)),
             self._load.ratio(),
         )
         missing = (
@@ -227,6 +259,11 @@ class ZenohSession:
         self.roster.note(alive, is_there=is_there)
         record = alive.record
         if not isinstance(record, PublisherRecord):
+            return
+        if service_of(record.topic) is not None:
+            for client in self._clients:
+                if client.record.topic == record.topic:
+                    client.servers_changed()
             return
         for subscriber in self._subscribers:
             if subscriber.hears(record.topic):
@@ -334,6 +371,56 @@ class ZenohSession:
             if each is not None:
                 with suppress(library().ZError):  # the session was closed, and took it along
                     each.undeclare()
+
+    # ---- servers and clients
+
+    def add_server(self, server: ListedServer) -> None:
+        """It answers from now on, and others may see it."""
+        with self._lock:
+            self._servers = (*self._servers, server)
+            self._tokens[server] = self._declare(server_key(self.node.id, server.record))
+
+    def add_client(self, client: ListedClient) -> None:
+        """It hears of servers from now on, and others may see it."""
+        with self._lock:
+            self._clients = (*self._clients, client)
+            self._tokens[client] = self._declare(client_key(self.node.id, client.record))
+
+    def forget_service(self, closed: ListedServer | ListedClient) -> None:
+        """It is closed, or takes no calls any more: nobody sees it any more. May be called twice."""
+        with self._lock:
+            self._servers = tuple(each for each in self._servers if each is not closed)
+            self._clients = tuple(each for each in self._clients if each is not closed)
+            token = self._tokens.pop(closed, None)
+        if token is not None:
+            with suppress(library().ZError):  # the session was closed, and took it along
+                token.undeclare()
+
+    def answering(self, key: str, take: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh's
+        """A queryable."""
+        return self._zenoh.declare_queryable(key, callback(take))
+
+    def call(
+        self,
+        key: str,
+        parts: Sequence[bytes | memoryview],
+        timeout_s: float,
+        take: Callable[[Any], None],
+        over: Callable[[], None],
+    ) -> None:
+        """Send a call's header and payload to the server at `key`. Raises zenoh's `ZError`."""
+        zenoh = library()
+        header, data = (each if isinstance(each, bytes) else bytes(each) for each in parts)
+        self._zenoh.get(
+            key,
+            callback(take, over),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout_s,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            payload=data,
+            attachment=header,
+        )
 
     # ---- the end
 

@@ -12,10 +12,13 @@ from typing import Any
 
 from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Direct
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec
 from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zenoh.keys import ALL_CALLS, call_key
 from nep.backends.zenoh.library import library
+from nep.backends.zenoh.node_services import ZenohServices
 from nep.backends.zenoh.publisher import ZenohPublisher
+from nep.backends.zenoh.services import ZenohClient, ZenohServer
 from nep.backends.zenoh.session import Inquiry, ZenohSession
 from nep.backends.zenoh.subscriber import ZenohSubscriber
 from nep.errors import ClosedError, NepError
@@ -55,6 +58,7 @@ class ZenohTransport:
         self._farewells: dict[ZenohPublisher, _Farewell] = {}
         self._is_closed = False
         self._is_over = False
+        self._services = ZenohServices(self._session, node.name)
         watch(self)
 
     # ---- publishers and subscribers
@@ -109,6 +113,20 @@ class ZenohTransport:
             subscriber.close()
             raise
         return subscriber
+
+    def server(self, spec: ServerSpec) -> ZenohServer:
+        """A new server. See `ServiceTransport.server`."""
+        with self._unless_closed():
+            return self._services.server(spec)
+
+    def client(self, spec: ClientSpec) -> ZenohClient:
+        """A new client. See `ServiceTransport.client`."""
+        with self._unless_closed():
+            return self._services.client(spec)
+
+    def survey(self, spec: ClientSpec) -> ZenohClient:
+        """A new surveyor. See `ServiceTransport.survey`."""
+        return self.client(spec)
 
     @contextmanager
     def _unless_closed(self) -> Iterator[None]:
@@ -203,9 +221,25 @@ class ZenohTransport:
 
     # ---- waiting
 
-    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait for a message in one of `subscribers`, or for `wake`."""
-        self._inboxes.wait([each for each in subscribers if isinstance(each, ZenohSubscriber)], timeout_s)
+    def wait(
+        self,
+        subscribers: Sequence[SubscriberTransport],
+        timeout_s: float,
+        calls: Sequence[CallQueue] = (),
+    ) -> None:
+        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
+        mine = [each for each in subscribers if isinstance(each, ZenohSubscriber)]
+        before = self._inboxes.wakes
+        entered: list[CallQueue] = []
+        try:
+            for queue in calls:
+                if not queue.enter_wait(self.wake):
+                    return
+                entered.append(queue)
+            self._inboxes.wait(mine, timeout_s, before)
+        finally:
+            for queue in entered:
+                queue.leave_wait(self.wake)
 
     def wake(self) -> None:
         """End all waits."""
@@ -225,6 +259,7 @@ class ZenohTransport:
                 return
             self._is_closed = True
             publishers = list(self._publishers)
+        self._services.begin_close()
         for publisher in publishers:
             self._say_bye(publisher)
 
@@ -241,6 +276,7 @@ class ZenohTransport:
             subscriber.close()
         for publisher in publishers:
             self._finish(publisher, deadline)
+        self._services.close(max(_LEAVE_S, deadline - time.monotonic()))
         self._inboxes.close(max(_LEAVE_S, deadline - time.monotonic()))
         with self._opening:
             sessions = list(self._sessions.values())
@@ -251,5 +287,6 @@ class ZenohTransport:
         """In a child: its sockets are the parent's. See `nep.system.forks`."""
         for session in self._sessions.values():
             give_up(*session.endpoints)
+        self._services.forked()
         for subscriber in self._subscribers:
             subscriber.forked()

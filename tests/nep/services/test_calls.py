@@ -8,28 +8,28 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
-from itertools import count
 
 import pytest
 
 import nep
 from nep.masters.master import Master
+from tests.nep.meeting import BACKENDS, place_for
 from tests.nep.programs import eventually
 
-_names = count()
 LONG_S = 30.0
 Make = Callable[[str], nep.Node]
 
 
-@pytest.fixture(params=["zeromq", "memory", "direct", "tcp"])
+@pytest.fixture(params=["zeromq", "memory", "zenoh", "direct", "tcp"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
     """Makes nodes that can meet; closes them. With "direct" their servers bind and no master is asked."""
     made: list[nep.Node] = []
-    where = f"services-{next(_names)}" if request.param == "memory" else master.address
+    backend = request.param if request.param in BACKENDS else "zeromq"
+    where = place_for(backend, master.address)
     ports: dict[str, int] = {}
 
     def new(name: str) -> nep.Node:
-        made.append(nep.node(name, "memory" if request.param == "memory" else "zeromq", master=where))
+        made.append(nep.node(name, backend, master=where))
         if request.param in {"direct", "tcp"}:
             connect_directly(made[-1], "native" if request.param == "direct" else "tcp", ports)
         return made[-1]
@@ -42,7 +42,7 @@ def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
 @pytest.fixture
 def registered(make: Make, request: pytest.FixtureRequest) -> Make:
     """As `make`, for what needs a master, or a hub: names, graphs, several servers."""
-    if request.node.callspec.params["make"] not in {"zeromq", "memory"}:
+    if request.node.callspec.params["make"] not in BACKENDS:
         pytest.skip("nobody knows who is there without a master")
     return make
 

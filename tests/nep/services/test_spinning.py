@@ -9,13 +9,24 @@ import pytest
 
 import nep
 from nep.masters.master import Master
+from tests.nep.meeting import place_for
 
 LONG_S = 30.0
 
 
-@pytest.mark.parametrize("backends", [("zeromq", "memory"), ("memory", "memory"), ("zeromq", "zeromq")])
+@pytest.mark.parametrize(
+    "backends",
+    [
+        ("zeromq", "memory"),
+        ("memory", "memory"),
+        ("zeromq", "zeromq"),
+        ("zenoh", "zeromq"),
+        ("zenoh", "zenoh"),
+    ],
+)
 def test_servers_of_several_nodes_answer_in_one_spin(master: Master, backends: tuple[str, str]) -> None:
-    wheres = [master.address if each == "zeromq" else "spinning" for each in backends]
+    own = {each: place_for(each, master.address) for each in backends}
+    wheres = [own[each] for each in backends]
     with (
         nep.node("first", backends[0], master=wheres[0]) as first,
         nep.node("second", backends[1], master=wheres[1]) as second,
@@ -41,9 +52,9 @@ def test_servers_of_several_nodes_answer_in_one_spin(master: Master, backends: t
         assert answers.result(LONG_S) == [(n * 2, n / 2) for n in range(50)]
 
 
-@pytest.mark.parametrize("backend", ["zeromq", "memory"])
+@pytest.mark.parametrize("backend", ["zeromq", "memory", "zenoh"])
 def test_a_server_answers_in_a_loop_of_asyncio(master: Master, backend: str) -> None:
-    where = master.address if backend == "zeromq" else "asynchronous"
+    where = place_for(backend, master.address)
 
     async def serve(node: nep.Node, client: nep.Client) -> list[object]:
         spinning = asyncio.create_task(node.spin_async(LONG_S))

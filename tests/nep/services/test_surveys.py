@@ -5,26 +5,25 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterator
-from itertools import count
 
 import pytest
 
 import nep
 from nep.backends.zeromq.transport import ZeromqTransport
 from nep.masters.master import Master
+from tests.nep.meeting import place_for
 from tests.nep.programs import eventually, running
 
-_names = count()
 LONG_S = 30.0
 LONG_MS = LONG_S * 1000
 Make = Callable[[str], nep.Node]
 
 
-@pytest.fixture(params=["zeromq", "memory"])
+@pytest.fixture(params=["zeromq", "memory", "zenoh"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
     """Makes nodes that can meet; closes them."""
     made: list[nep.Node] = []
-    where = f"surveys-{next(_names)}" if request.param == "memory" else master.address
+    where = place_for(request.param, master.address)
 
     def new(name: str) -> nep.Node:
         made.append(nep.node(name, request.param, master=where))

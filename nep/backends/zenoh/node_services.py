@@ -1,0 +1,102 @@
+"""ZenohServices: one node's servers, clients and surveyors, and how they end. Part of `ZenohTransport`."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from nep.backends.base import HANDSHAKE_S
+from nep.backends.connection import Configuration
+from nep.backends.deadlines import Deadlines
+from nep.backends.services import ClientSpec, ServerSpec
+from nep.backends.zenoh.services import ZenohClient, ZenohServer
+from nep.backends.zenoh.session import ZenohSession
+from nep.errors import ClosedError
+
+__all__ = ["ZenohServices"]
+
+Sessions = Callable[[Configuration, float | None], ZenohSession]
+
+
+class ZenohServices:
+    """`session` gives the node's session at a place; it raises `ClosedError` when the node is closed."""
+
+    def __init__(self, session: Sessions, node_name: str) -> None:
+        self._session = session
+        self._node_name = node_name
+        self._lock = threading.Lock()
+        self._deadlines = Deadlines(node_name)
+        self._servers: tuple[ZenohServer, ...] = ()
+        self._clients: tuple[ZenohClient, ...] = ()
+        self._is_closed = False
+
+    def server(self, spec: ServerSpec) -> ZenohServer:
+        """A new server. See `ServiceTransport.server`."""
+        session = self._session(spec.configuration, spec.wait_s)
+        session.join()
+        server = ZenohServer(session, spec, self._forget)
+        try:
+            with self._lock:
+                self._check_open()
+                self._servers = (*self._servers, server)
+            session.add_server(server)
+            session.meet_all(HANDSHAKE_S)
+        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+            server.close(0.0)
+            raise
+        return server
+
+    def client(self, spec: ClientSpec) -> ZenohClient:
+        """A new client; a surveyor, too. See `ServiceTransport.client`."""
+        session = self._session(spec.configuration, spec.wait_s)
+        session.join()
+        client = ZenohClient(session, spec, self._deadlines, self._forget)
+        try:
+            with self._lock:
+                self._check_open()
+                self._clients = (*self._clients, client)
+                self._deadlines.watch(client)
+            session.add_client(client)
+            session.meet_all(HANDSHAKE_S)
+        except BaseException:
+            client.close()
+            raise
+        return client
+
+    def _check_open(self) -> None:
+        """With the lock held. Raises `ClosedError`."""
+        if self._is_closed:
+            raise ClosedError(f"node '{self._node_name}'")
+
+    def _forget(self, closed: ZenohServer | ZenohClient) -> None:
+        with self._lock:
+            self._servers = tuple(each for each in self._servers if each is not closed)
+            self._clients = tuple(each for each in self._clients if each is not closed)
+
+    def begin_close(self) -> None:
+        """Nothing is carried out any more; who waits is told."""
+        with self._lock:
+            self._is_closed = True
+            servers = self._servers
+        for server in servers:
+            server.begin_close()
+
+    def close(self, timeout_s: float) -> None:
+        """Close all of them and end the thread."""
+        deadline = time.monotonic() + timeout_s
+        self.begin_close()
+        for client in self._clients:
+            client.close()
+        for server in self._servers:
+            server.close(max(0.0, deadline - time.monotonic()))
+        self._deadlines.close(max(0.0, deadline - time.monotonic()))
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_closed = True
+        self._lock = threading.Lock()
+        for server in self._servers:
+            server.forked()
+        for client in self._clients:
+            client.forked()

@@ -1,0 +1,370 @@
+"""Servers and clients of zenoh: a server is a queryable, a call a question to it, the answer its reply.
+
+Payloads travel as they are, beside them as attachment the header of `nep.protocol.service_wire`. A question
+whose server ends is ended by zenoh without a reply: so the client knows that it is lost.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from nep.backends.deadlines import Deadlines
+from nep.backends.services import (
+    CallQueue,
+    ClientSpec,
+    IncomingCall,
+    OpenCall,
+    Outcome,
+    ServerSpec,
+    Tally,
+    check_calls,
+    fitting,
+    refusal,
+    too_large,
+)
+from nep.backends.zenoh.keys import serve_key
+from nep.backends.zenoh.library import keep_for_ever, library
+from nep.backends.zenoh.session import ZenohSession
+from nep.backends.zeromq.sockets import Refusals
+from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
+from nep.i18n import _
+from nep.protocol.requests import (
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+    as_count,
+)
+from nep.protocol.service_wire import NATIVE, PAYLOAD_MAX_BYTES, SERVICE_TYPE, Reply, topic_of
+
+__all__ = ["ZenohClient", "ZenohServer"]
+
+_logger = logging.getLogger("nep")
+_LATE_S = 30.0
+"""So long after its time an answer is still heard, and counted as late."""
+_LONGEST_S = 1e9
+
+Then = Callable[[Outcome], None]
+
+
+class ZenohServer:
+    """A server: its queryable, its queue, and the questions that have no answer yet."""
+
+    def __init__(
+        self, session: ZenohSession, spec: ServerSpec, on_close: Callable[[ZenohServer], object]
+    ) -> None:
+        self.spec = spec
+        self.calls = CallQueue()
+        self.tally = Tally()
+        self.is_closed = False
+        self._session = session
+        self._on_close = on_close
+        self._refusals = Refusals()
+        self._lock = threading.Lock()
+        self._queries: set[Any] = set()
+        self._key = serve_key(spec.service, time.time_ns(), spec.id)
+        self.endpoints = (self._key,)
+        self.record = PublisherRecord(
+            spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, self.endpoints
+        )
+        session.check(self.record)
+        self._queryable: Any = session.answering(self._key, self._asked)
+
+    def _asked(self, query: Any) -> None:  # noqa: ANN401 - zenoh's
+        """In one of zenoh's threads: somebody calls."""
+        data: bytes = b"" if query.payload is None else query.payload.to_bytes()
+        beside: bytes = b"" if query.attachment is None else query.attachment.to_bytes()
+        try:
+            call = NATIVE.read_call([beside, data])
+            if len(data) > PAYLOAD_MAX_BYTES:
+                raise WireError(too_large(len(data)))
+        except WireError as error:
+            query.drop()
+            self.tally.add_unreadable()
+            if self._refusals.add(error.reason):
+                _logger.warning("to '%s' came what is no call: %s", self.spec.service, error)
+            return
+        with self._lock:
+            is_closed = self.is_closed
+            if not is_closed:
+                self._queries.add(query)
+        if is_closed:
+            query.drop()
+            return
+        deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
+        number = call.number
+        incoming = IncomingCall(
+            data, call.codec, deadline, lambda reply: self._answer(query, number, fitting(reply))
+        )
+        if not self.calls.put(incoming):
+            incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+
+    def _answer(self, query: Any, number: int, reply: Reply) -> bool:  # noqa: ANN401 - zenoh's
+        self.tally.add(reply)
+        with self._lock:
+            if query not in self._queries:
+                return False
+            self._queries.discard(query)
+        header, data = (bytes(each) for each in NATIVE.answer(number, reply))
+        try:
+            with query:
+                query.reply(self._key, data, attachment=header)
+        except library().ZError as error:  # the session was closed meanwhile
+            _logger.debug("an answer of '%s' could not be sent: %s", self.spec.service, error)
+            return False
+        return True
+
+    def counts(self) -> PublisherCount:
+        """The figures for who looks at the graph."""
+        tally = self.tally
+        return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
+
+    def begin_close(self) -> None:
+        """Unregister, and refuse the calls that wait and those that still come."""
+        self._session.forget_service(self)
+        for call in self.calls.close():
+            call.answer(refusal(self.spec.service, is_closed=True))
+
+    def close(self, timeout_s: float) -> None:  # noqa: ARG002 - answers go out with what follows them
+        """The same, and end: who waits still is told that it has ended."""
+        self.begin_close()
+        with self._lock:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            left, self._queries = tuple(self._queries), set()
+        with suppress(library().ZError):  # the session was closed, and took it along
+            self._queryable.undeclare()
+        for query in left:
+            query.drop()
+        self._on_close(self)
+
+    def forked(self) -> None:
+        """In a child. See `ServerTransport.forked`."""
+        self.is_closed = True
+        for query in self._queries:
+            keep_for_ever(query)
+        self._lock = threading.Lock()
+        self.calls.forked()
+
+
+@dataclass(eq=False)
+class _Call:
+    """A call that is under way, sent to the server at `key`; "": it waits for one."""
+
+    number: int
+    data: bytes | memoryview
+    timeout_s: float | None
+    deadline: float
+    then: Then
+    key: str = ""
+
+
+class ZenohClient:
+    """A client, or a surveyor: its calls that are under way."""
+
+    def __init__(
+        self,
+        session: ZenohSession,
+        spec: ClientSpec,
+        deadlines: Deadlines,
+        on_close: Callable[[ZenohClient], object],
+    ) -> None:
+        self.spec = spec
+        self.is_closed = False
+        self.late = 0
+        self.record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE)
+        self._session = session
+        self._deadlines = deadlines
+        self._on_close = on_close
+        self._refusals = Refusals()
+        self._lock = threading.Lock()
+        self._calls: dict[int, _Call] = {}
+        self._bytes = 0
+        self._numbers = itertools.count(1)
+        self._answered = self._failed = 0
+        session.check(self.record)
+
+    # ---- calling
+
+    @property
+    def _servers(self) -> tuple[str, ...]:
+        return self._session.roster.servers_of(self.spec.service)
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether there is a server."""
+        return not self.is_closed and bool(self._servers)
+
+    @property
+    def respondents(self) -> int:
+        """How many servers there are now."""
+        return len(self._servers)
+
+    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+        """See `ClientTransport.begin`."""
+        call = self._added(data, timeout_s, then)
+        self._send(call, next(iter(self._servers), ""))
+        self._deadlines.add(call.deadline)
+        return call
+
+    def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
+        """Call each server. See `SurveyTransport.begin_all`."""
+        calls: list[OpenCall] = []
+        try:
+            for key in self._servers:
+                call = self._added(data, timeout_s, then)
+                calls.append(call)
+                self._send(call, key)
+                self._deadlines.add(call.deadline)
+        except BaseException:
+            self.forget_all(calls)
+            raise
+        return calls
+
+    def _added(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> _Call:
+        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        with self._lock:
+            if self.is_closed:
+                raise self._closed_error()
+            check_calls(self.spec.service, len(self._calls), self._bytes, len(data))
+            call = _Call(next(self._numbers), data, timeout_s, deadline, then)
+            self._calls[call.number] = call
+            self._bytes += len(data)
+        return call
+
+    def _send(self, call: _Call, key: str) -> None:
+        """Ask the server at `key`, unless somebody has asked one already. Without the lock."""
+        with self._lock:
+            if not key or call.key or call.number not in self._calls:
+                return
+            call.key = key
+        limit_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
+        parts = NATIVE.call(call.number, self.spec.codec.number, limit_s, call.data)
+        heard_s = _LONGEST_S if limit_s is None else min(_LONGEST_S, limit_s + _LATE_S)
+        try:
+            self._session.call(
+                key, parts, heard_s, lambda reply: self._replied(call, reply), lambda: self._over(call)
+            )
+        except library().ZError as error:  # the session was closed meanwhile
+            _logger.debug("a call of '%s' could not be sent: %s", self.spec.service, error)
+            self._end(call, self._closed_error())
+
+    def _replied(self, call: _Call, reply: Any) -> None:  # noqa: ANN401 - zenoh's
+        """In one of zenoh's threads, or in the one that sends: the server answers."""
+        if reply.ok is None:
+            return  # zenoh's own word, such as of a time that is over
+        sample = reply.ok
+        beside = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        try:
+            number, outcome = NATIVE.read_answer([beside, sample.payload.to_bytes()])
+            if number != call.number:
+                raise WireError(_("it is no answer of a service"))
+        except WireError as error:
+            if self._refusals.add(error.reason):
+                said = "the server of '%s' says what nobody understands: %s"
+                _logger.warning(said, self.spec.service, error)
+            return
+        if not self._end(call, outcome):
+            with self._lock:
+                self.late += 1
+
+    def _over(self, call: _Call) -> None:
+        """Nothing comes any more: the server has ended, unless it has answered."""
+        self._end(call, ServerGoneError(self.spec.service))
+
+    def _end(self, call: _Call, outcome: Outcome) -> bool:
+        """Tell who waits; False when nobody does."""
+        with self._lock:
+            if not self._take(call):
+                return False
+            self._answered += not isinstance(outcome, NepError)
+            self._failed += isinstance(outcome, NepError)
+        self._tell(call, outcome)
+        return True
+
+    def _tell(self, call: _Call, outcome: Outcome) -> None:
+        try:
+            call.then(outcome)
+        except Exception:  # the others get theirs
+            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
+
+    def _take(self, call: _Call) -> bool:
+        """It is not under way any more; whether it was. With the lock held."""
+        if self._calls.pop(call.number, None) is None:
+            return False
+        self._bytes -= len(call.data)
+        return True
+
+    def forget(self, call: OpenCall) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            known = self._calls.get(call.number)
+            if known is not None:
+                self._take(known)
+
+    def forget_all(self, calls: Sequence[OpenCall]) -> None:
+        """Nobody waits for these any more."""
+        for call in calls:
+            self.forget(call)
+
+    # ---- what happens meanwhile
+
+    def servers_changed(self) -> None:
+        """A server came or went: the thread of deadlines sends what waits."""
+        self._deadlines.add(0.0)
+
+    def expire(self, now: float) -> float:
+        """Send what waited for a server, and end what waited too long; when to do so again."""
+        key = next(iter(self._servers), "")
+        with self._lock:
+            waiting = [each for each in self._calls.values() if not each.key and each.deadline > now]
+        for call in waiting:
+            self._send(call, key)
+        with self._lock:
+            late = [each for each in self._calls.values() if each.deadline <= now]
+        for call in late:
+            kind = ServiceTimeoutError if call.key else NoServerError
+            self._end(call, kind(self.spec.service, call.timeout_s or 0.0))
+        with self._lock:
+            return min((each.deadline for each in self._calls.values()), default=math.inf)
+
+    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - at once
+        """The services that have a server now."""
+        return tuple(sorted(self._session.roster.served))
+
+    def counts(self) -> SubscriberCount:
+        """The figures for who looks at the graph."""
+        return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed))
+
+    # ---- the end
+
+    def close(self) -> None:
+        """Unregister; calls that are under way end."""
+        with self._lock:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            left, self._calls = list(self._calls.values()), {}
+        self._session.forget_service(self)
+        self._deadlines.forget(self)
+        self._on_close(self)
+        for call in left:
+            self._tell(call, self._closed_error())
+
+    def forked(self) -> None:
+        """In a child. See `ClientTransport.forked`."""
+        self.is_closed = True
+        self._lock = threading.Lock()
+        self._calls = {}
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(_("client of '{service}'").format(service=self.spec.service))
