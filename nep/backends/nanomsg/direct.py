@@ -24,7 +24,7 @@ from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.system.addresses import in_numbers
 
-__all__ = ["DirectPublisher", "DirectSubSocket", "attach", "check_direct"]
+__all__ = ["DirectPublisher", "DirectSubSocket", "attach", "check_direct", "dial"]
 
 _logger = logging.getLogger("nep")
 _LINGER_S = 0.2
@@ -50,15 +50,19 @@ def check_direct(direct: Direct) -> None:
 
 def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str:  # noqa: ANN401 - pynng's
     """Listen or dial as the mode says; the endpoint. Raises `AddressInUseError`, `NepError`."""
-    nng = library()
     address = f"{direct.ip}:{direct.port}"
     if is_publisher == (direct.mode == "one2many"):
         listen(socket, address, what)
         return f"tcp://{address}"
+    return dial(socket, address)
+
+
+def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng's
+    """Connect to `HOST:PORT`, as soon as somebody listens there; the endpoint. Raises `NepError`."""
     try:
         address = in_numbers(address)
         socket.dial(f"tcp://{address}", block=False)
-    except nng.NNGException as error:
+    except library().NNGException as error:
         raise NepError(
             _("'{address}' cannot be connected to; use a computer's address and a port up to 65535").format(
                 address=address

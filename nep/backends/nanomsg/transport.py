@@ -11,11 +11,17 @@ from collections.abc import Callable
 from nep.backends.base import PublisherSpec, PublisherTransport, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Direct
 from nep.backends.nanomsg.direct import DirectPublisher, DirectSubSocket, check_direct
+from nep.backends.nanomsg.direct_services import DirectServices
 from nep.backends.nanomsg.library import library
 from nep.backends.nanomsg.publisher import NanomsgPublisher
 from nep.backends.nanomsg.sub_socket import NanomsgSubSocket
-from nep.backends.nanomsg.surveys import Surveys
-from nep.backends.services import ClientSpec, ServerSpec, ServerTransport, SurveyTransport
+from nep.backends.services import (
+    ClientSpec,
+    ClientTransport,
+    ServerSpec,
+    ServerTransport,
+    SurveyTransport,
+)
 from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.subscriber import NativeReadable, Readable, SocketSubscriber
 from nep.backends.zeromq.transport import (
@@ -39,37 +45,47 @@ class NanomsgTransport(ZeromqTransport):
 
     def __init__(self, node: NodeRecord) -> None:
         library()
-        self._surveys = Surveys(node.name)
+        self._direct_services = DirectServices(node.name)
         super().__init__(node)
 
     def server(self, spec: ServerSpec) -> ServerTransport:
-        """A respondent without a master is nanomsg's; servers are those of the back end zeromq."""
-        if isinstance(spec.configuration, Direct) and spec.service.startswith(SURVEY):
-            check_direct(spec.configuration)
-            return self._surveys.respondent(spec, spec.configuration)
+        """Without a master by REP or RESPONDENT; through one, and by plain TCP, as over zeromq."""
+        direct = spec.configuration
+        if isinstance(direct, Direct) and spec.service.startswith(SURVEY):
+            check_direct(direct)
+            return self._direct_services.respondent(spec, direct)
+        if isinstance(direct, Direct) and direct.wire != "tcp":
+            return self._direct_services.server(spec, direct)
         return super().server(spec)
+
+    def client(self, spec: ClientSpec) -> ClientTransport:
+        """Without a master by REQ; through one, and by plain TCP, as over zeromq."""
+        direct = spec.configuration
+        if isinstance(direct, Direct) and direct.wire != "tcp":
+            return self._direct_services.client(spec, direct)
+        return super().client(spec)
 
     def survey(self, spec: ClientSpec) -> SurveyTransport:
         """A surveyor without a master is nanomsg's; others are those of the back end zeromq."""
         if isinstance(spec.configuration, Direct):
             check_direct(spec.configuration)
-            return self._surveys.surveyor(spec, spec.configuration, DIRECT_WAIT_S)
+            return self._direct_services.surveyor(spec, spec.configuration, DIRECT_WAIT_S)
         return super().survey(spec)
 
     def begin_close(self) -> None:
         """See `Transport.begin_close`."""
         super().begin_close()
-        self._surveys.begin_close()
+        self._direct_services.begin_close()
 
     def close(self, timeout_s: float) -> None:
         """See `Transport.close`."""
         deadline = time.monotonic() + timeout_s
-        self._surveys.close(timeout_s)
+        self._direct_services.close(timeout_s)
         super().close(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
         """In a child. See `nep.system.forks`."""
-        self._surveys.forked()
+        self._direct_services.forked()
         super().forked()
 
     def _session(self, address: str) -> MasterSession:

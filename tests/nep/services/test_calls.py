@@ -20,22 +20,23 @@ LONG_S = 30.0
 Make = Callable[[str], nep.Node]
 
 
-@pytest.fixture(params=["zeromq", "memory", "zenoh", "direct", "tcp"])
+@pytest.fixture(params=["zeromq", "memory", "zenoh", "direct", "tcp", "sp"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them. With "direct" their servers bind and no master is asked."""
+    """Makes nodes that can meet; closes them. With "direct", "tcp" and "sp" their servers bind and no master
+    is asked."""
     made: list[nep.Node] = []
-    backend = request.param if request.param in BACKENDS else "zeromq"
+    backend = {"direct": "zeromq", "tcp": "zeromq", "sp": "nanomsg"}.get(request.param, request.param)
     where = place_for(backend, master.address)
     ports: dict[str, int] = {}
 
     def new(name: str) -> nep.Node:
         made.append(nep.node(name, backend, master=where))
-        if request.param in {"direct", "tcp"}:
-            connect_directly(made[-1], "native" if request.param == "direct" else "tcp", ports)
+        if backend != request.param:
+            connect_directly(made[-1], "tcp" if request.param == "tcp" else "native", ports)
         return made[-1]
 
     yield new
-    for node in made:
+    for node in reversed(made):  # SP's server waits a moment for clients that are still there
         node.close()
 
 

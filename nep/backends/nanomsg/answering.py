@@ -1,0 +1,172 @@
+"""NanomsgServer: answers calls over SP's REP, and questions of surveys over its RESPONDENT, without a master.
+
+Each call has a context of pynng's of its own, until it is answered: so any number of them may wait.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from nep.backends.nanomsg.library import keep_for_ever, library
+from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
+from nep.backends.zeromq.sockets import Refusals
+from nep.errors import WireError
+from nep.protocol.service_wire import HEADER_BYTES, NATIVE, Framing, Reply
+
+__all__ = ["ANSWER_S", "NanomsgServer", "close_context", "heard", "in_one", "in_parts"]
+
+_logger = logging.getLogger("nep")
+ANSWER_S = 2.0
+"""So long a client may take to take an answer."""
+_JOIN_S = 2.0
+_LINGER_S = 0.2
+"""pynng throws away what it has queued when it is closed: the last answer gets so long, unless nobody is
+connected any more."""
+
+
+def in_one(framing: Framing, parts: list[bytes | memoryview]) -> bytes:
+    """A call or answer as one message of SP: the native header and the payload, or the payload alone."""
+    return b"".join(parts) if framing is NATIVE else bytes(parts[-1])
+
+
+def in_parts(framing: Framing, message: bytes) -> list[bytes]:
+    """The parts that `framing` reads."""
+    return [message[:HEADER_BYTES], message[HEADER_BYTES:]] if framing is NATIVE else [b"", message]
+
+
+def heard(context: Any) -> bytes | None:  # noqa: ANN401 - pynng has no types
+    """The next that comes; None when its time is up, or it is closed."""
+    try:
+        data: bytes = context.recv()
+    except (library().NNGException, TypeError):  # the latter is what pynng says of one that was closed before
+        return None
+    return data
+
+
+def close_context(context: Any) -> None:  # noqa: ANN401 - pynng has no types
+    """Close it, whoever does so, too."""
+    with contextlib.suppress(library().NNGException, TypeError):
+        context.close()
+
+
+class NanomsgServer:
+    """Owns a socket that is attached already, and a thread that hears calls. See `ServerTransport`."""
+
+    def __init__(
+        self,
+        socket: Any,  # noqa: ANN401 - pynng has no types
+        endpoint: str,
+        spec: ServerSpec,
+        framing: Framing,
+        on_close: Callable[[NanomsgServer], object],
+    ) -> None:
+        self.spec = spec
+        self.calls = CallQueue()
+        self.tally = Tally()
+        self.is_closed = False
+        self.endpoints: tuple[str, ...] = (endpoint,)
+        self._socket = socket
+        self._framing = framing
+        self._on_close = on_close
+        self._refusals = Refusals()
+        self._lock = threading.Lock()
+        self._answered_at = 0.0
+        self._contexts: set[Any] = set()
+        """Those that hear a call, or whose call has no answer yet."""
+        self._is_alone = threading.Event()
+        socket.add_post_pipe_remove_cb(self._went)
+        self._thread = threading.Thread(target=self._hear, name=f"nep-{spec.service}", daemon=True)
+        self._thread.start()
+
+    def _went(self, _pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+        if self.is_closed and not self._socket.pipes:
+            self._is_alone.set()
+
+    def _hear(self) -> None:
+        while (context := self._new_context()) is not None and (data := heard(context)) is not None:
+            try:
+                call = self._framing.read_call(in_parts(self._framing, data))
+            except WireError as error:
+                self._leave_out(context, error)
+                continue
+            deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
+            incoming = IncomingCall(call.data, call.codec, deadline, self._answerer(context, call.number))
+            if not self.calls.put(incoming):
+                incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+
+    def _leave_out(self, context: Any, error: WireError) -> None:  # noqa: ANN401 - pynng has no types
+        with self._lock:
+            self._contexts.discard(context)
+        close_context(context)
+        self.tally.add_unreadable()
+        if self._refusals.add(error.reason):
+            _logger.warning("to '%s' came what is no call: %s", self.spec.service, error)
+
+    def _new_context(self) -> Any:  # noqa: ANN401 - pynng has no types
+        """None when it is closed."""
+        with self._lock:
+            if self.is_closed:
+                return None
+            context = self._socket.new_context()
+            self._contexts.add(context)
+            return context
+
+    def _answerer(self, context: Any, number: int) -> Callable[[Reply], bool]:  # noqa: ANN401 - see above
+        def answer(reply: Reply) -> bool:
+            fit = fitting(reply)
+            self.tally.add(fit)
+            with self._lock:
+                if self.is_closed:
+                    return False
+                self._answered_at = time.monotonic()
+            try:
+                context.send(in_one(self._framing, self._framing.answer(number, fit)))
+            except (library().NNGException, TypeError) as error:  # nobody waits for it any more
+                _logger.debug("an answer of '%s' could not be sent: %s", self.spec.service, error)
+                return False
+            finally:
+                with self._lock:
+                    self._answered_at = time.monotonic()
+                    is_open = context in self._contexts
+                    self._contexts.discard(context)
+                if is_open:
+                    close_context(context)
+            return True
+
+        return answer
+
+    def begin_close(self) -> None:
+        """Refuse the calls that wait and those that still come."""
+        for call in self.calls.close():
+            call.answer(refusal(self.spec.service, is_closed=True))
+
+    def close(self, timeout_s: float) -> None:
+        """The same, and end. May be called twice."""
+        self.begin_close()
+        with self._lock:
+            if self.is_closed:
+                return
+            self.is_closed = True
+        self._on_close(self)
+        left = min(timeout_s, self._answered_at + _LINGER_S - time.monotonic())
+        if left > 0.0 and self._socket.pipes:
+            self._is_alone.wait(left)
+        with self._lock:
+            contexts, self._contexts = tuple(self._contexts), set()
+        for context in contexts:  # before the socket: pynng cannot do so afterwards
+            close_context(context)
+        self._socket.close()
+        self._thread.join(_JOIN_S)
+
+    def forked(self) -> None:
+        """In a child that was forked: nothing of nng may be touched."""
+        self.is_closed = True
+        self._lock = threading.Lock()
+        self.calls.forked()
+        for context in self._contexts:
+            keep_for_ever(context)

@@ -1,0 +1,232 @@
+"""NanomsgClient: calls a server over SP's REQ, without a master.
+
+Each call has a context of pynng's, and a thread that waits for the answer. pynng would send
+a call again when nobody answers it or its connection ends. It is told not to: the call ends then, and whoever
+made it knows that nobody can know whether it was carried out.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from nep.backends.deadlines import Deadlines
+from nep.backends.nanomsg.answering import close_context, in_one, in_parts
+from nep.backends.nanomsg.library import keep_for_ever, library
+from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
+from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
+from nep.i18n import _
+from nep.protocol.service_wire import ORIGINAL, Framing
+
+__all__ = ["NanomsgClient"]
+
+_logger = logging.getLogger("nep")
+_JSON = 1
+_JOIN_S = 2.0
+_LEFT_MAX = 100
+"""So many answers for which nobody waits any more are still heard."""
+
+Then = Callable[[Outcome], None]
+
+
+@dataclass(eq=False)
+class _Call:
+    """A call that is under way."""
+
+    number: int
+    data: bytes | memoryview
+    timeout_s: float | None
+    deadline: float
+    then: Then
+    context: Any
+    is_sent: bool = False
+    thread: threading.Thread | None = field(default=None)
+
+
+class NanomsgClient:
+    """Owns a REQ that is made already. See `ClientTransport`."""
+
+    def __init__(
+        self,
+        socket: Any,  # noqa: ANN401 - pynng has no types
+        spec: ClientSpec,
+        framing: Framing,
+        deadlines: Deadlines,
+        on_close: Callable[[NanomsgClient], object],
+    ) -> None:
+        if framing is ORIGINAL and spec.codec.number != _JSON:
+            raise NepError(_("a call without a master is JSON; leave out msg_type, or use wire='native'"))
+        self.spec = spec
+        self.is_closed = False
+        self.late = 0
+        self._socket = socket
+        self._framing = framing
+        self._deadlines = deadlines
+        self._on_close = on_close
+        self._lock = threading.Lock()
+        self._pipes: set[int] = set()
+        self._calls: dict[int, _Call] = {}
+        self._left: dict[int, _Call] = {}
+        """Those for which nobody waits any more, oldest first: what still comes is counted."""
+        self._bytes = 0
+        self._numbers = itertools.count(1)
+        self._threads: set[threading.Thread] = set()
+        socket.add_post_pipe_connect_cb(self._came)
+        socket.add_post_pipe_remove_cb(self._went)
+
+    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+        self._pipes.add(pipe.id)
+
+    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+        self._pipes.discard(pipe.id)
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether a server is there."""
+        return not self.is_closed and bool(self._pipes)
+
+    # ---- calling
+
+    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+        """See `ClientTransport.begin`."""
+        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        with self._lock:
+            if self.is_closed:
+                raise self._closed_error()
+            check_calls(self.spec.service, len(self._calls), self._bytes, len(data))
+            call = _Call(next(self._numbers), data, timeout_s, deadline, then, self._socket.new_context())
+            call.thread = threading.Thread(
+                target=self._run, args=(call,), name=f"nep-call-{self.spec.service}", daemon=True
+            )
+            self._calls[call.number] = call
+            self._bytes += len(data)
+            self._threads.add(call.thread)
+            call.thread.start()
+        self._deadlines.add(deadline)
+        return call
+
+    def _run(self, call: _Call) -> None:
+        try:
+            outcome = self._outcome(call)
+        except Exception as error:
+            _logger.exception("a call of '%s' could not be carried out", self.spec.service)
+            outcome = NepError(_("the call failed: {reason}").format(reason=type(error).__name__))
+        close_context(call.context)
+        if outcome is not None:
+            self._end(call, outcome)
+        with self._lock:
+            self._threads.discard(threading.current_thread())
+
+    def _outcome(self, call: _Call) -> Outcome | None:
+        """How it ended; None when somebody has closed its context, who tells why."""
+        nng = library()
+        left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
+        parts = self._framing.call(call.number, self.spec.codec.number, left_s, call.data)
+        try:
+            call.context.send(in_one(self._framing, parts))  # as soon as there is a server
+            call.is_sent = True
+            data = call.context.recv()
+        except nng.ConnectionReset:
+            return ServerGoneError(self.spec.service)
+        except (nng.NNGException, TypeError):
+            return None
+        try:
+            return self._framing.read_answer(in_parts(self._framing, data)).reply
+        except WireError as error:
+            return error
+
+    def _end(self, call: _Call, outcome: Outcome) -> None:
+        with self._lock:
+            is_waited_for = self._take(call)
+            is_late = self._left.pop(call.number, None) is not None and not isinstance(outcome, NepError)
+            self.late += is_late
+        if is_waited_for:
+            self._tell(call, outcome)
+
+    def _tell(self, call: _Call, outcome: Outcome) -> None:
+        try:
+            call.then(outcome)
+        except Exception:  # the others get theirs
+            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
+
+    def _take(self, call: _Call) -> bool:
+        """It is not under way any more; whether it was. With the lock held."""
+        if self._calls.pop(call.number, None) is None:
+            return False
+        self._bytes -= len(call.data)
+        return True
+
+    def forget(self, call: OpenCall) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            known = self._calls.get(call.number)
+            if known is not None:
+                self._take(known)
+        if known is not None:
+            self._leave(known)
+
+    def _leave(self, call: _Call) -> None:
+        """Nobody waits any more for a call that is not under way. Without the lock."""
+        with self._lock:
+            if call.is_sent:
+                self._left[call.number] = call
+            too_many = len(self._left) > _LEFT_MAX
+            closed = self._left.pop(next(iter(self._left))) if too_many else None if call.is_sent else call
+        if closed is not None:
+            close_context(closed.context)
+
+    def expire(self, now: float) -> float:
+        """End what waited too long; when to do so again."""
+        with self._lock:
+            late = [each for each in tuple(self._calls.values()) if each.deadline <= now and self._take(each)]
+            due = min((each.deadline for each in self._calls.values()), default=math.inf)
+        for call in late:
+            self._leave(call)
+            kind = ServiceTimeoutError if call.is_sent else NoServerError
+            self._tell(call, kind(self.spec.service, call.timeout_s or 0.0))
+        return due
+
+    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - nobody is asked
+        """None: there is no master."""
+        return ()
+
+    # ---- the end
+
+    def close(self) -> None:
+        """Calls that are under way end. May be called twice."""
+        with self._lock:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            left, self._calls = list(self._calls.values()), {}
+            abandoned, self._left = list(self._left.values()), {}
+            threads = tuple(self._threads)
+        self._deadlines.forget(self)
+        self._on_close(self)
+        for call in abandoned:
+            close_context(call.context)
+        for call in left:
+            close_context(call.context)
+            self._tell(call, self._closed_error())
+        deadline = time.monotonic() + _JOIN_S
+        for thread in threads:
+            if thread is not threading.current_thread():
+                thread.join(max(0.0, deadline - time.monotonic()))
+        self._socket.close()
+
+    def forked(self) -> None:
+        """In a child that was forked: nothing of nng may be touched."""
+        self.is_closed = True
+        self._lock = threading.Lock()
+        for call in (*self._calls.values(), *self._left.values()):
+            keep_for_ever(call.context)
+        self._calls = {}
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(_("client of '{service}'").format(service=self.spec.service))

@@ -1,0 +1,156 @@
+"""DirectServices: one node's servers, clients, respondents and surveyors that need no master, by pynng.
+
+A server binds the port that it is given, and its clients connect there, whatever the mode says. Respondents
+connect, and the surveyor binds. Part of `NanomsgTransport`.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING
+
+from nep.backends.connection import Direct
+from nep.backends.deadlines import Deadlines
+from nep.backends.nanomsg.answering import ANSWER_S, NanomsgServer
+from nep.backends.nanomsg.calling import NanomsgClient
+from nep.backends.nanomsg.direct import attach, dial
+from nep.backends.nanomsg.library import listen, new_socket
+from nep.backends.nanomsg.surveys import NanomsgSurveyor
+from nep.backends.services import ClientSpec, ServerSpec
+from nep.errors import ClosedError
+from nep.protocol.service_wire import HEADER_BYTES, NATIVE, ORIGINAL, PAYLOAD_MAX_BYTES, Framing
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["DirectServices"]
+
+_LARGEST = PAYLOAD_MAX_BYTES + HEADER_BYTES
+_ANSWER_MS = round(ANSWER_S * 1000)
+_FOR_EVER = -1
+_AGAIN = {"reconnect_time_min": 10, "reconnect_time_max": 500}
+"""Milliseconds after which a server that was not there is looked for again: the first time, and later."""
+
+
+class DirectServices:
+    """Makes them, and ends them with the node. May be used from any thread."""
+
+    def __init__(self, node_name: str) -> None:
+        self._node_name = node_name
+        self._lock = threading.Lock()
+        self._deadlines = Deadlines(node_name)
+        self._surveyors: set[NanomsgSurveyor] = set()
+        self._servers: set[NanomsgServer] = set()
+        self._clients: set[NanomsgClient] = set()
+        self._is_closed = False
+
+    def surveyor(self, spec: ClientSpec, direct: Direct, wait_s: float) -> NanomsgSurveyor:
+        """A new one; waits for somebody who is connected."""
+        self._check_open()
+        surveyor = NanomsgSurveyor(spec, direct, self._surveyors.discard)
+        with self._lock:
+            self._surveyors.add(surveyor)
+        try:
+            surveyor.wait_for_any(wait_s)
+            self._check_open()
+        except BaseException:
+            surveyor.close()
+            raise
+        return surveyor
+
+    def respondent(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
+        """A new one."""
+
+        def attached(socket: object) -> str:
+            return attach(socket, direct, is_publisher=False, what=f"a respondent of '{spec.service}'")
+
+        return self._serving(spec, "Respondent0", ORIGINAL, attached)
+
+    def server(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
+        """A new one, which binds. Raises `AddressInUseError`."""
+
+        def attached(socket: object) -> str:
+            listen(socket, f"{direct.ip}:{direct.port}", f"a server of '{spec.service}'")
+            return f"tcp://{direct.ip}:{direct.port}"
+
+        return self._serving(spec, "Rep0", _framing(direct), attached)
+
+    def _serving(
+        self, spec: ServerSpec, kind: str, framing: Framing, attached: Callable[[object], str]
+    ) -> NanomsgServer:
+        self._check_open()
+        socket = new_socket(kind, send_timeout=_ANSWER_MS, recv_max_size=_LARGEST)
+        try:
+            server = NanomsgServer(socket, attached(socket), spec, framing, self._servers.discard)
+        except BaseException:
+            socket.close()
+            raise
+        with self._lock:
+            self._servers.add(server)
+        try:
+            self._check_open()
+        except BaseException:
+            server.close(0.0)
+            raise
+        return server
+
+    def client(self, spec: ClientSpec, direct: Direct) -> NanomsgClient:
+        """A new one, which connects; a server need not be there yet."""
+        self._check_open()
+        socket = new_socket("Req0", resend_time=_FOR_EVER, recv_max_size=_LARGEST, **_AGAIN)
+        try:
+            client = NanomsgClient(socket, spec, _framing(direct), self._deadlines, self._clients.discard)
+            dial(socket, f"{direct.ip}:{direct.port}")
+        except BaseException:
+            socket.close()
+            raise
+        with self._lock:
+            self._clients.add(client)
+            self._deadlines.watch(client)
+        try:
+            self._check_open()
+        except BaseException:
+            client.close()
+            raise
+        return client
+
+    def _check_open(self) -> None:
+        if self._is_closed:
+            raise ClosedError(f"node '{self._node_name}'")
+
+    def begin_close(self) -> None:
+        """Nothing is answered any more; who waits is told."""
+        with self._lock:
+            self._is_closed = True
+            servers = tuple(self._servers)
+        for server in servers:
+            server.begin_close()
+
+    def close(self, timeout_s: float) -> None:
+        """End all of them."""
+        with self._lock:
+            surveyors, servers, clients = tuple(self._surveyors), tuple(self._servers), tuple(self._clients)
+        for surveyor in surveyors:
+            surveyor.close()
+        for client in clients:
+            client.close()
+        deadline = time.monotonic() + timeout_s
+        for server in servers:
+            server.close(max(0.0, deadline - time.monotonic()))
+        self._deadlines.close(max(0.0, deadline - time.monotonic()))
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_closed = True
+        self._lock = threading.Lock()
+        for surveyor in self._surveyors:
+            surveyor.forked()
+        for client in self._clients:
+            client.forked()
+        for server in self._servers:
+            server.forked()
+
+
+def _framing(direct: Direct) -> Framing:
+    return ORIGINAL if direct.wire == "original" else NATIVE
