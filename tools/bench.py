@@ -1,6 +1,6 @@
 """The benchmarks, one after the other.
 
-    python tools/bench.py                       all of them but nep_tail, nep_ros, soak, ways and film
+    python tools/bench.py                       all of them but nep_tail, nep_ros, paper, soak, ways and film
     python tools/bench.py nep_rate -- ARGS      one; what comes after -- goes to it
 
 Exit code 1 when a run does not count because the computer was busy. See `bench/README.md`.
@@ -30,7 +30,7 @@ NAMES = (
     "blocks_editor",
     "studio_tabs",
 )
-ASKED = ("nep_tail", "nep_ros", "soak", "ways", "film")
+ASKED = ("nep_tail", "nep_ros", "paper", "soak", "ways", "film")
 """These run only when they are asked for: they take long, need ROS 1, or time nothing."""
 
 

@@ -1,0 +1,288 @@
+"""The paper's two scenarios: ping-pong between two programs, by nep and by what there is beside it.
+
+    python3 dev.py bench paper                  both, six minutes
+    python3 dev.py bench paper -- --write       and make docs/figures.md of it, with its pictures
+    python3 dev.py bench paper -- --scenarios local --rows nep --kinds string json --seconds 60
+    python3 dev.py bench paper -- --from docs/figures.json --write      make them again, without measuring
+
+    L-local     two programs on one computer
+    R-remote    two programs in two networks, joined by a link with a Wi-Fi's delay and rate (`link.py`)
+
+Each message is encoded, sent, received, decoded, and the same way back; both ends are processes of their own
+that do nothing else (`paper_ends.py`). Kinds are the paper's `string` and `json` (a map with one text), and
+`bytes`. All rows, kinds and sizes are interleaved in random order in each block, until the time is over.
+"plain again" is plain pyzmq against itself: a size counts only when that is within 5 %.
+
+Rows that cannot be run say why, and the others are measured. rosbridge is in no package registry: give
+the command that starts one, in which {port} and {host} are replaced and which finds $ROS_MASTER_URI
+(--rosbridge-start), or the address of one that runs (--rosbridge ws://127.0.0.1:9090, L-local only; its ROS
+master is $ROS_MASTER_URI).
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import os
+import platform
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from datetime import datetime, timezone
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from link import HOSTS, LinkError, Wifi, joined, why_no_networks
+from paper_ends import ENDS, KINDS
+from paper_figures import AGAIN, PLAIN, does_count, goals, report, write
+from paper_pairs import NotRunError, Pair, Places, around
+
+from nep.backends.ros.library import PLACES
+
+ROOT = Path(__file__).parents[1]
+SIZES = {
+    "local": tuple(1024 * n for n in (1, 4, 16, 64, 256, 1024, 4096, 8192)),
+    "remote": tuple(1024 * n for n in (1, 4, 16, 64, 256, 1024)),
+}
+TRIPS = {"local": ((256 * 1024, 20), (1024 * 1024, 10)), "remote": ((16 * 1024, 8), (64 * 1024, 4))}
+"""So many trips in a block up to these sizes."""
+LARGE_TRIPS = {"local": 5, "remote": 2}
+WARM_TRIPS = {"local": 1, "remote": 0}
+"""So many more come first and are not counted: they pay for waking both ends."""
+SHARES = {"local": 2 / 3, "remote": 1 / 3}
+"""How the time is divided between the scenarios."""
+PACKAGES = ("pyzmq", "pynng", "eclipse-zenoh", "iceoryx2", "orjson", "roslibpy")
+Cell = tuple[str, str, int]
+"""Row, kind and size."""
+
+
+def trips(scenario: str, size: int) -> int:
+    """How many trips a block of it has."""
+    return next((count for most, count in TRIPS[scenario] if size <= most), LARGE_TRIPS[scenario])
+
+
+def start_pairs(
+    rows: Sequence[str], places: Places, stack: ExitStack
+) -> tuple[dict[str, Pair], dict[str, str]]:
+    """The pairs of all rows that can be run, and why the others can't."""
+    pairs, not_run = {}, {}
+    for row in rows:
+        try:
+            pairs[row] = Pair(row, places)
+            stack.callback(pairs[row].close)
+        except NotRunError as error:
+            not_run[row] = str(error)
+        print(f"· {row}: {not_run.get(row, 'ready')}", file=sys.stderr, flush=True)
+    return pairs, not_run
+
+
+def measure(arguments: argparse.Namespace, scenario: str, places: Places) -> dict[str, Any]:
+    """All blocks of a scenario for which there is time."""
+    ends_at = time.monotonic() + arguments.seconds * share(scenario, arguments.scenarios)
+    taken: dict[Cell, list[float]] = {}
+    sizes = [size for size in SIZES[scenario] if size in arguments.sizes] or SIZES[scenario]
+    with ExitStack() as stack:
+        pairs, not_run = start_pairs(arguments.rows, places, stack)
+        longest_s, blocks = 0.0, 0
+        for blocks in itertools.count(1):
+            started = time.monotonic()
+            cells = [
+                (name, kind, size)
+                for name in (*pairs, *([AGAIN] if PLAIN in pairs else []))
+                for kind, size in itertools.product(arguments.kinds, sizes)
+            ]
+            for name, kind, size in random.sample(cells, len(cells)):
+                row = PLAIN if name == AGAIN else name
+                if row not in pairs:
+                    continue
+                try:
+                    came = pairs[row].take(kind, size, trips(scenario, size), WARM_TRIPS[scenario])
+                except NotRunError as error:
+                    not_run[row] = f"{kind} of {size}: {error}"
+                    del pairs[row]
+                else:
+                    taken.setdefault((name, kind, size), []).extend(came)
+            longest_s = max(longest_s, time.monotonic() - started)
+            if blocks == arguments.blocks or time.monotonic() + longest_s > ends_at or not pairs:
+                break
+    return {
+        "blocks": blocks,
+        "not_run": not_run,
+        "cells": [cell_of(cell, seconds) for cell, seconds in taken.items() if cell[0] not in not_run],
+    }
+
+
+def share(scenario: str, scenarios: Sequence[str]) -> float:
+    """What part of the time it has beside the others."""
+    return SHARES[scenario] / sum(SHARES[each] for each in scenarios)
+
+
+def cell_of(cell: Cell, seconds: Sequence[float]) -> dict[str, Any]:
+    """What is kept of a cell."""
+    row, kind, size = cell
+    return {
+        "row": row,
+        "kind": kind,
+        "size": size,
+        "trips": len(seconds),
+        "median_ms": statistics.median(seconds) * 1e3,
+        "p95_ms": statistics.quantiles(seconds, n=20, method="inclusive")[-1] * 1e3,
+    }
+
+
+def measure_local(arguments: argparse.Namespace) -> dict[str, Any]:
+    """L-local, all of it at 127.0.0.1."""
+    here = ("127.0.0.1", "127.0.0.1")
+    with around(here, (), arguments.rosbridge, arguments.rosbridge_start) as places:
+        return {"name": "local", "link": "loopback", **measure(arguments, "local", places)}
+
+
+def measure_remote(_arguments: argparse.Namespace) -> dict[str, Any]:
+    """R-remote: this program once more, in a network of its own. Raises `NotRunError`."""
+    why = why_no_networks()
+    if why:
+        raise NotRunError(why)
+    with tempfile.TemporaryDirectory(prefix="nep-paper-") as folder:
+        result = Path(folder, "remote.json")
+        command = ["unshare", "-rn", sys.executable, __file__, *sys.argv[1:], "--inside", str(result)]
+        if subprocess.run(command, check=False).returncode or not result.exists():
+            raise NotRunError("the program in a network of its own failed; its words are above")
+        found: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
+    if "not run" in found:
+        raise NotRunError(found["not run"])
+    return found
+
+
+def inside(arguments: argparse.Namespace) -> None:
+    """R-remote, in a network of its own; what was found goes to the file that was named."""
+    wifi = Wifi(arguments.delay_ms, arguments.jitter_ms, arguments.rate_mbit)
+    found: dict[str, Any]
+    try:
+        with ExitStack() as stack:
+            link = stack.enter_context(joined(wifi))
+            places = stack.enter_context(around(HOSTS, link.elsewhere, "", arguments.rosbridge_start))
+            found = measure(arguments, "remote", places)
+        delay = f"{wifi.delay_ms:g} ± {wifi.jitter_ms:g} ms each way"
+        said = f"{delay}, {wifi.rate_mbit:g} Mbit/s, by {link.made_by}"
+        found = {"name": "remote", "link": said, "link_told": link.told, **found}
+    except LinkError as error:
+        found = {"not run": str(error)}
+    Path(arguments.inside).write_text(json.dumps(found), encoding="utf-8")
+
+
+def computer() -> dict[str, Any]:
+    """What the figures were taken on; no names."""
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return {
+        "processor": models[0] if models else platform.machine(),
+        "processors": os.cpu_count(),
+        "system": f"{platform.system()} {platform.release().partition('-')[0]}",
+        "load_before": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
+    }
+
+
+def versions() -> dict[str, str]:
+    """Of what carries the messages."""
+    found = {"Python": platform.python_version()}
+    for name in ("nep-studio", *PACKAGES):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    asked = subprocess.run(
+        ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
+    )
+    if not asked.returncode:
+        found["nep-studio"] += f" ({asked.stdout.strip()})"
+    rospy = next(iter(metadata.distributions(name="rospy", path=list(PLACES))), None)
+    return found | ({"rospy": rospy.version} if rospy else {})
+
+
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Measure what was asked for."""
+    found: dict[str, Any] = {
+        "taken": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
+        "computer": computer(),
+        "versions": versions(),
+        "scenarios": [],
+        "not_run": {},
+    }
+    for scenario, measured in (("local", measure_local), ("remote", measure_remote)):
+        if scenario not in arguments.scenarios:
+            continue
+        try:
+            found["scenarios"].append(measured(arguments))
+        except NotRunError as error:
+            found["not_run"][scenario] = str(error)
+    return found
+
+
+def asked() -> argparse.Namespace:
+    """What the command line says."""
+    wifi = Wifi()
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scenarios", nargs="+", choices=SIZES, default=list(SIZES))
+    parser.add_argument(
+        "--rows", nargs="+", choices=ENDS, default=list(ENDS), help=f"{PLAIN} is always there"
+    )
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--sizes", nargs="+", type=int, default=[], help="of those that there are; else all")
+    parser.add_argument(
+        "--seconds", type=float, default=360.0, help="for all of it; a block is always finished"
+    )
+    parser.add_argument("--blocks", type=int, default=0, help="at most; else as many as there is time for")
+    parser.add_argument("--rosbridge", default="", help="the address of a running server")
+    parser.add_argument("--rosbridge-start", default="", help="a command that starts one at {host}:{port}")
+    parser.add_argument("--delay-ms", type=float, default=wifi.delay_ms, help="of the link, in one direction")
+    parser.add_argument("--jitter-ms", type=float, default=wifi.jitter_ms)
+    parser.add_argument("--rate-mbit", type=float, default=wifi.rate_mbit)
+    parser.add_argument("--write", action="store_true", help="make docs/figures.md and its pictures of it")
+    parser.add_argument("--from", dest="source", type=Path, help="measure nothing; take what was kept there")
+    parser.add_argument("--keep", type=Path, default=ROOT / "build" / "paper.json", help="where it is kept")
+    parser.add_argument("--inside", default="", help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if not (arguments.rate_mbit > 0 and arguments.delay_ms >= 0 and arguments.jitter_ms >= 0):
+        parser.error("a link has a rate above 0, and neither delay nor jitter below 0")
+    unknown = set(arguments.sizes).difference(*SIZES.values())
+    if unknown:
+        parser.error(
+            f"not among the sizes: {sorted(unknown)}; there are {sorted(set().union(*SIZES.values()))}"
+        )
+    arguments.rows = list(dict.fromkeys([PLAIN, *arguments.rows]))
+    return arguments
+
+
+def main() -> int:
+    """Measure, keep and print it; 1 when a run does not count or a goal is missed."""
+    arguments = asked()
+    if arguments.inside:
+        inside(arguments)
+        return 0
+    if arguments.source:
+        found = json.loads(arguments.source.read_text(encoding="utf-8"))
+    else:
+        found = run(arguments)
+        arguments.keep.parent.mkdir(parents=True, exist_ok=True)
+        arguments.keep.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    print(report(found))
+    counts = does_count(found)
+    said = "counts" if counts else "does NOT count, the computer is too busy"
+    print(f"\nthis run {said} (A/A within 5 % in the mean of each table counts)")
+    if arguments.write:
+        print("written:", *(path.relative_to(ROOT) for path in write(found, ROOT / "docs")))
+    return 0 if counts and all(goal.is_reached for goal in goals(found)) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,258 @@
+"""What `paper.py` measures with: ping and pong of a row as processes, and what the rows need around them."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shlex
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+START_S = 60.0
+END_S = 10.0
+ROS_MASTER = "http://127.0.0.1:11311"
+
+
+class NotRunError(Exception):
+    """Why a row or a scenario is not measured."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the ends of all rows meet: the hosts of both, and what stands before the command of pong.
+
+    Two networks on one computer share its memory, which two computers don't: there nep is told not to.
+    """
+
+    hosts: tuple[str, str]
+    elsewhere: tuple[str, ...]
+    folder: Path
+    ros_master: str = ""
+    rosbridge: str = ""
+    rosbridge_master: str = ""
+    missing: Mapping[str, str] = field(default_factory=dict)
+    """Why rows cannot be run, by their names."""
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What both ends find in their environment beside ours."""
+        return {"NEP_SHARED_MEMORY": "0"} if self.elsewhere else {}
+
+    def of(self, row: str) -> tuple[str, str]:
+        """What ping and pong are told. Raises `NotRunError`."""
+        if row in self.missing:
+            raise NotRunError(self.missing[row])
+        if row == "zenoh":
+            end = f"tcp/{self.hosts[0]}:{free_port(self.hosts[0])}"
+            return end, end
+        if row == "nep over zenoh":
+            return self._nep_zenoh()
+        if row == "rosbridge":
+            return self.rosbridge_master, self.rosbridge
+        return self.ros_master, self.ros_master
+
+    def _nep_zenoh(self) -> tuple[str, str]:
+        if not self.elsewhere:
+            here = f"local/paper-{os.getpid()}"
+            return here, here
+        endpoints = {"endpoints": [f"tcp/{self.hosts[0]}:{free_port(self.hosts[0])}"]}
+        # As it comes zenoh drops what the link does not take within 50 ms: here 1 MB needs 170.
+        drop = {"wait_before_drop": 5_000_000, "max_wait_before_drop_fragments": 5_000_000}
+        link = {"link": {"tx": {"queue": {"congestion_control": {"drop": drop}}}}}
+        files = []
+        for what in ("listen", "connect"):
+            path = self.folder / f"{what}.json5"
+            settings = {"mode": "peer", "transport": link, what: endpoints}
+            path.write_text(json.dumps(settings), encoding="utf-8")
+            files.append(str(path))
+        return files[0], files[1]
+
+
+class Process:
+    """One end of a row."""
+
+    def __init__(self, command: Sequence[str], more: Mapping[str, str]) -> None:
+        environment = {**os.environ, "PYTHONPATH": str(HERE.parent), **more}
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        )
+
+    def write(self, what: object) -> None:
+        """Ask. Raises `NotRunError`."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(what) + "\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise NotRunError(self._last_words()) from None
+
+    def read(self, key: str) -> Any:  # noqa: ANN401 - what was asked for
+        """The answer. Raises `NotRunError`, with the end's own words when it has some."""
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        answer = json.loads(line) if line else {}
+        if key not in answer:
+            raise NotRunError(answer.get("not run", self._last_words()))
+        return answer[key]
+
+    def _last_words(self) -> str:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            said = json.loads(line)
+            if "not run" in said:
+                return str(said["not run"])
+        return f"one of its programs ended by itself with exit code {self._process.wait()}"
+
+    def close(self) -> None:
+        """Let it end; kill it when it doesn't."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.close()
+        end(self._process)
+        self._process.stdout.close()
+
+
+class Pair:
+    """Ping and pong of a row. Raises `NotRunError`."""
+
+    def __init__(self, row: str, places: Places) -> None:
+        own, others = places.of(row)
+        program = (sys.executable, str(HERE / "paper_ends.py"))
+        commands = (
+            (*program, "ping", row, places.hosts[0], own),
+            (*places.elsewhere, *program, "pong", row, places.hosts[1], others),
+        )
+        with ExitStack() as stack:
+            self._ends = [Process(command, places.environment) for command in commands]
+            for each in self._ends:
+                stack.callback(each.close)
+            ends = [each.read("end") for each in self._ends]
+            for each, other in zip(self._ends, reversed(ends), strict=True):
+                each.write(other)
+            for each in self._ends:
+                each.read("ready")
+            self.close = stack.pop_all().close
+
+    def take(self, kind: str, size: int, count: int, warm: int) -> list[float]:
+        """Some round trips, after `warm` that do not count; seconds. Raises `NotRunError`."""
+        ping, pong = self._ends
+        for each in (pong, ping):
+            each.write([kind, size, warm + count])
+        taken: list[float] = ping.read("taken")
+        pong.read("taken")
+        return taken[warm:]
+
+
+def free_port(host: str) -> int:
+    """A port that nobody has now."""
+    with socket.socket() as free:
+        free.bind((host, 0))
+        port: int = free.getsockname()[1]
+    return port
+
+
+def end(process: subprocess.Popen[Any]) -> None:
+    """Wait until it has ended, and no longer than ten seconds."""
+    try:
+        process.wait(END_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+@contextmanager
+def ros_master(host: str, folder: Path) -> Iterator[str]:
+    """The address of a ROS master. Raises `NotRunError`."""
+    program = shutil.which("rosmaster")
+    if program is None:
+        raise NotRunError("there is no 'rosmaster'; install it with 'sudo apt install python3-rosmaster'")
+    port = free_port(host)
+    address = f"http://{host}:{port}"
+    with started([program, "--core", "-p", str(port)], address, host, folder) as process:
+        until_open(process, host, port, "the ROS master")
+        yield address
+
+
+@contextmanager
+def rosbridge(command: str, address: str, host: str, folder: Path) -> Iterator[str]:
+    """The address of a rosbridge that `command` starts beside this ROS master. Raises `NotRunError`."""
+    port = free_port(host)
+    words = [word.format(port=port, host=host) for word in shlex.split(command)]
+    with started(words, address, host, folder) as process:
+        until_open(process, host, port, "the rosbridge server")
+        yield f"ws://{host}:{port}"
+
+
+@contextmanager
+def started(
+    command: Sequence[str], ros_master: str, host: str, folder: Path
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A program of ROS, which ends with the block."""
+    environment = {**os.environ, "ROS_MASTER_URI": ros_master, "ROS_IP": host, "ROS_LOG_DIR": str(folder)}
+    try:
+        process = subprocess.Popen(
+            command, env=environment, stdout=subprocess.DEVNULL, stderr=(folder / "errors.txt").open("ab")
+        )
+    except OSError as error:
+        raise NotRunError(f"'{command[0]}' could not be started: {error.strerror}") from None
+    try:
+        yield process
+    finally:
+        process.terminate()
+        end(process)
+
+
+def until_open(process: subprocess.Popen[bytes], host: str, port: int, what: str) -> None:
+    """Wait until somebody listens there. Raises `NotRunError`."""
+    pause, deadline = threading.Event(), time.monotonic() + START_S
+    while True:
+        with contextlib.suppress(OSError), socket.create_connection((host, port), 1.0):
+            return
+        if process.poll() is not None:
+            raise NotRunError(f"{what} ended by itself with exit code {process.returncode}")
+        if time.monotonic() > deadline:
+            raise NotRunError(f"{what} does not listen at {host}:{port}")
+        pause.wait(0.05)
+
+
+@contextmanager
+def around(
+    hosts: tuple[str, str], elsewhere: tuple[str, ...], rosbridge_at: str, rosbridge_start: str
+) -> Iterator[Places]:
+    """The places where rows meet, with a ROS master and a rosbridge server where these can be had."""
+    missing = {}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nep-paper-")))
+        places = Places(hosts, elsewhere, folder)
+        try:
+            master = stack.enter_context(ros_master(hosts[0], folder))
+            places = replace(places, ros_master=master)
+        except NotRunError as error:
+            missing["rospy"] = str(error)
+        if elsewhere:
+            missing["nep over nanomsg"] = "nep's back end nanomsg joins the nodes of one computer only"
+        try:
+            if rosbridge_start and "rospy" not in missing:
+                at = stack.enter_context(rosbridge(rosbridge_start, places.ros_master, hosts[0], folder))
+                places = replace(places, rosbridge=at, rosbridge_master=places.ros_master)
+            elif rosbridge_at and not elsewhere:
+                running = os.environ.get("ROS_MASTER_URI", ROS_MASTER)
+                places = replace(places, rosbridge=rosbridge_at, rosbridge_master=running)
+            else:
+                missing["rosbridge"] = "no server was given"
+        except NotRunError as error:
+            missing["rosbridge"] = str(error)
+        yield replace(places, missing=missing)
