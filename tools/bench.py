@@ -19,6 +19,7 @@ NAMES = (
     "nep_roundtrip",
     "nep_rate",
     "nep_large",
+    "nep_fan",
     "nep_logs",
     "nep_join",
     "nep_master",
