@@ -19,7 +19,9 @@ __all__ = ["MOST", "SMALL_BYTES", "SOON_NS", "WAIT_NS", "PendingBatch"]
 
 SOON_NS = 20_000
 WAIT_NS = 100_000
-MOST = 16
+MOST = 64
+FULL_BYTES = 65_536
+"""A batch of about so many bytes goes out, too: copying more at once takes longer than sending it costs."""
 SMALL_BYTES = 16_384
 """Only smaller messages are sent together: copying larger ones costs more than it saves."""
 _GOES_ON_S = 500e-6
@@ -104,7 +106,7 @@ class PendingBatch:
                 return
             put((data, stamp_ns))
             count = len(waiting)
-            if count >= MOST:
+            if count >= MOST or count * len(data) >= FULL_BYTES:
                 with lock:
                     way.flush()
                 batch.has_gone_full = True

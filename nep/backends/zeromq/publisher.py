@@ -337,12 +337,12 @@ class NativePublisher(GreetedPublisher):
         while batch.waiting:
             taken = batch.take()
             self._last_stamp_ns = stamp_ns = taken[-1][1]
-            count = len(taken)
-            if count > 1 and batch.is_allowed and self._bytes + count * _ONE_PART_BYTES < self._settle_at:
-                payloads, stamps_ns = zip(*taken, strict=True)
+            count, payloads, stamps_ns = len(taken), *zip(*taken, strict=True)
+            size = sum(map(len, payloads))
+            if count > 1 and batch.is_allowed and self._bytes + size < self._settle_at:
                 part = batch_part(self._topic, self._form, self._count + 1, self._id, stamps_ns, payloads)
                 self._count += count
-                self._bytes += sum(map(len, payloads))
+                self._bytes += size
                 self._send(part)
             else:
                 self._send_each(taken)
