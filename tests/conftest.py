@@ -45,6 +45,7 @@ LONG_S = {
     "tests/core/robots/test_robot_bad_days.py": 30.0,
     "tests/core/robots/test_refused_stop.py": 25.0,
     "tests/core/network/test_no_network.py": 21.0,
+    "tests/faults/test_faults.py": 25.0,
     "tests/blocks/compiler/test_expressions.py": 20.0,
     "tests/blocks/compiler/test_hostile.py": 20.0,
     "tests/robots/driver/test_contract_of_any_file.py": 16.0,
@@ -76,8 +77,11 @@ class ByFile(LoadScopeScheduling):
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """``--driver FILE``: hold the contract of robots against the drivers of this file."""
+    """``--driver FILE``: hold the contract of robots against the drivers of this file. ``--long``: faults."""
     told = "a driver of yours to hold tests/robots/driver/test_contract.py against (may be given again)"
+    parser.addoption(
+        "--long", action="store_true", help="let faults in tests/faults last, one after the other"
+    )
     parser.addoption("--driver", action="append", default=[], metavar="FILE", help=told)
     if importlib.util.find_spec("pytestqt") is None:
         # The library's tests run without Qt too (dev.py versions): its options are known, and mean nothing.

@@ -19,10 +19,10 @@ from dataclasses import replace
 
 import zmq
 
-from nep.backends.zeromq.sockets import LOOPBACK, Socket, bind_free_port
+from nep.backends.zeromq.sockets import LOOPBACK, Socket, bind_free_port, keep_alive
 from nep.errors import AddressInUseError, TooManyFilesError
 from nep.protocol.requests import RemotePublisher
-from nep.system.addresses import is_loopback, nearest
+from nep.system.addresses import endpoint_of, is_loopback, nearest
 from nep.system.descriptors import has_room
 
 __all__ = ["SMALL", "Bindings", "has_local_names", "in_reach", "local_of", "may_stay"]
@@ -133,6 +133,7 @@ class Bindings:
         for host in hosts:
             if host not in self._bound:
                 try:
+                    keep_alive(self._socket, endpoint_of(f"{host}:*"))
                     self._bound[host] = bind_free_port(self._socket, host)
                     name = _bind_beside(self._socket, self._bound[host]) if self._may_be_local else ""
                     if name:

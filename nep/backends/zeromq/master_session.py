@@ -108,6 +108,9 @@ class SessionSubscriber(Protocol):
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """The newest messages of publishers that the master knows."""
 
+    def connect_again(self) -> None:
+        """This computer has another address: connect to those on others anew."""
+
 
 class Pace:
     """When a node renews what it has registered: every second, unless the master says otherwise.
@@ -167,6 +170,7 @@ class MasterSession:
             self._found(self._name.known)
         self._name.look(time.monotonic())
         self._moved_to = self.hosts
+        self._connected_from = self._own_host
         self._load = CpuLoad()
         self._clock = ClockSamples()
         self._read_at = self._clock.now()
@@ -338,6 +342,7 @@ class MasterSession:
         """Move publishers when this computer or the master has another address, or files are short."""
         if not self._is_near and self._name.known:
             self._own_host = host_towards(self._name.known) or self._own_host
+            self._connect_from(self._own_host)
         is_cramped = not may_stay()
         if self.hosts == self._moved_to and not is_cramped:
             return
@@ -355,6 +360,16 @@ class MasterSession:
                     self._publishers[id] = (moved, publisher)
                     if id in self._confirmed:
                         self._calls.tell(AddPublisher(self._node, moved))
+
+    def _connect_from(self, host: str) -> None:
+        """Leave connections that begin at another address: they would be silent for many seconds."""
+        before, self._connected_from = self._connected_from, host
+        if before in {host, LOOPBACK}:  # LOOPBACK: nobody knew yet
+            return
+        self._calls.connect_again()
+        self._was_connected = False
+        for _record, subscriber in self._all_subscribers():
+            subscriber.connect_again()
 
     def _in_reach(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
         """Publishers, each with the one endpoint that this node can reach."""

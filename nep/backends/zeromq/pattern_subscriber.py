@@ -205,6 +205,11 @@ class PatternSubscriber(WakingSubscriber):
                     self._gone.add(member)
                 member.close()
 
+    def connect_again(self) -> None:
+        """See `NativeSubscriber.connect_again`."""
+        for member in list(self._members.values()):
+            member.connect_again()
+
     # ---- closing
 
     def close(self) -> None:

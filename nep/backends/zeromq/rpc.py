@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import zmq
 
-from nep.backends.zeromq.sockets import Refusals, Socket, wait_until
+from nep.backends.zeromq.sockets import CONNECT_MS, Refusals, Socket, wait_until
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
 from nep.i18n import _
 from nep.protocol.encoding import call_of_view, decode_answer, encode_request
@@ -75,6 +75,7 @@ class RpcClient:
         if not is_loopback(address):  # a computer that vanishes does not close its connections
             socket.setsockopt(zmq.HEARTBEAT_IVL, 1000)
             socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
+            socket.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_MS)
         self.endpoint = ""
         """Where it is connected; "" before `lead_to`."""
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -95,6 +96,15 @@ class RpcClient:
             self.endpoint = endpoint_of(address)
             self._socket.connect(self.endpoint)
         self._after_use()
+
+    def connect_again(self) -> None:
+        """Over a new connection: the old one begins at an address that this computer has no more."""
+        with self._changed:
+            if self._is_closed or not self.endpoint:
+                return
+            self._socket.disconnect(self.endpoint)
+            self._socket.connect(self.endpoint)
+            self.is_connected = False
 
     def ask(self, request: Request, timeout_s: float | None) -> Reply:
         """The reply; `timeout_s` None waits for ever.

@@ -17,6 +17,7 @@ from nep.system.descriptors import check_room
 from nep.system.log_rarely import is_logged
 
 __all__ = [
+    "CONNECT_MS",
     "LOOPBACK",
     "ORIGINAL_PORTS",
     "SHORT_WAIT_S",
@@ -26,6 +27,7 @@ __all__ = [
     "bind_free_port",
     "connect",
     "host_towards",
+    "is_far",
     "keep_alive",
     "receive_mark",
     "send_mark",
@@ -48,6 +50,10 @@ _HELD = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE,
 _MOST = 50_000
 _LEAST = 32
 _PORT_FILES = 2
+_SILENT_S = 15
+"""What was sent to another computer and is not taken for so long ends the connection."""
+CONNECT_MS = 3000
+"""For an attempt to connect to another computer; the system alone would try ever more rarely."""
 ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
 """Ports that programs of the original NEP expect to find something else on."""
 
@@ -141,15 +147,25 @@ def host_towards(address: str) -> str | None:
         return None
 
 
-def keep_alive(owner: Socket, endpoint: str) -> None:
-    """Notice within a dozen seconds when the computer behind the next connection has vanished.
+def is_far(endpoint: str) -> bool:
+    """Whether it is on another computer, or may be reached from there."""
+    return endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
 
-    The kernel answers for a program that a debugger holds; a heartbeat of ZeroMQ would cut it off. Only for
-    other computers: on this one the kernel tells of every end.
+
+def keep_alive(owner: Socket, endpoint: str) -> None:
+    """Notice within a dozen seconds when a computer behind the connections of the next endpoint has vanished.
+
+    The endpoint may be one to connect to or one to bind; "*" is any port. While nothing is under way the
+    kernel asks the other one's, which answers for a program that a debugger holds; a heartbeat of ZeroMQ
+    would cut it off. What is under way it sends again and again, for a quarter of an hour and ever more
+    rarely: hence a limit, which a program that is held and is sent a lot may reach as well. Only for other
+    computers: on this one the kernel tells of every end.
     """
-    is_far = endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
-    owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if is_far else -1)
-    if is_far:
+    far = is_far(endpoint)
+    owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if far else -1)
+    owner.setsockopt(zmq.TCP_MAXRT, _SILENT_S * 1000 if far else 0)
+    owner.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_MS if far else 0)
+    if far:
         owner.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
         owner.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
         owner.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)

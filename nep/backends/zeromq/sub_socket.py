@@ -18,7 +18,7 @@ from nep.backends.base import SubscriberSpec
 from nep.backends.zeromq.byte_window import WINDOW_BYTES
 from nep.backends.zeromq.loss import HeardPublisher, HeardPublishers
 from nep.backends.zeromq.shared.payloads import SharedSources
-from nep.backends.zeromq.sockets import Refusals, Socket, keep_alive, receive_mark, wait_shortly
+from nep.backends.zeromq.sockets import Refusals, Socket, is_far, keep_alive, receive_mark, wait_shortly
 from nep.errors import WireError
 from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for, codec_numbered
@@ -261,6 +261,12 @@ class SubSocket:
             self._refuse(source, endpoint, str(error))
         else:
             source.endpoint = endpoint
+
+    def connect_again(self) -> None:
+        """Connect anew to the publishers on other computers. What was not read of them is dropped."""
+        for source in self.sources.by_id.values():
+            if is_far(source.endpoint):
+                self._connect(source, source.endpoint)
 
     def _refuse(self, source: HeardPublisher, endpoint: str, why: str) -> None:
         """Whoever tells the master nonsense keeps nobody from hearing the others: it is named, not raised."""

@@ -133,6 +133,9 @@ class NativeReadable(Readable, Protocol):
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and forget it."""
 
+    def connect_again(self) -> None:
+        """Connect anew to the publishers on other computers. What was not read of them is dropped."""
+
 
 class _ReadAhead:
     """How many messages a reader gets at once.
@@ -513,6 +516,15 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             for remote in remotes:
                 self._readable.connect(remote)
             self._after_use()
+
+    def connect_again(self) -> None:
+        """This computer has another address: connect to publishers on others anew."""
+        with self._turn():
+            if not self.is_closed:
+                self._fill()
+                self._wake_waiters()
+                self._readable.connect_again()
+                self._after_use()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """These are all publishers of the topic: connect to new ones; others are silent."""

@@ -19,7 +19,7 @@ import zmq
 
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
 from nep.backends.zeromq.io_thread import Rest
-from nep.backends.zeromq.sockets import Refusals
+from nep.backends.zeromq.sockets import Refusals, is_far
 from nep.errors import (
     ClosedError,
     NepError,
@@ -133,6 +133,8 @@ class SocketClient:
         self._unlisted: int | None = None
         """A server that is not listed any more and was kept, because there is no other and it may only be
         suspended."""
+        self._place = ""
+        """To which of its endpoints there is a connection; another one when that is to be left."""
         self._leave_at = math.inf
         """When the connection to a server that is not listed any more is given up, if new calls wait."""
         self._tries = 0
@@ -250,6 +252,13 @@ class SocketClient:
                 self._unlisted = server
         self._soon(self)
 
+    def connect_again(self) -> None:
+        """This computer has another address: connect to a server on another one anew."""
+        with self._lock:
+            if is_far(self._place):
+                self._place = ""
+        self._soon(self)
+
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """These are all servers that are there."""
         listed = {
@@ -338,6 +347,8 @@ class SocketClient:
         if connection is not None and connection.is_over:
             self._lose(ended)
             self._tries, self._try_at = 0, now + connection.again_s
+        elif connection is not None and self._has_moved():
+            self._leave(ended)  # it would be silent for long
         elif connection is not None and connection.is_open:
             self._tries = 0
             if self._current not in self._servers:
@@ -346,6 +357,11 @@ class SocketClient:
                 self._leave_at = math.inf
         if not self.is_connected and now >= self._try_at:
             self._try(now)
+
+    def _has_moved(self) -> bool:
+        """Whether the connection begins or ends at an address that its computer has no more."""
+        known = None if self._current is None else self._servers.get(self._current)
+        return known not in {None, self._place} and (not self._place or is_far(self._place))
 
     def _hand_over(self, now: float, ended: _Ended) -> None:
         """The server has closed, or was replaced: take its last answers, then go to another one."""
@@ -381,7 +397,7 @@ class SocketClient:
             return
         place = known.index(self._current) + 1 if self._current in self._servers and self._tries else 0
         self._current = known[place % len(known)]
-        endpoint = self._servers[self._current]
+        endpoint = self._place = self._servers[self._current]
         self._tries += 1
         try:
             self._connection = self._connect_to(endpoint, self._serve_connection)

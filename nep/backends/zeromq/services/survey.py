@@ -133,6 +133,12 @@ class SurveyClient:
             client.gone(0, 0, is_closed=True)
             self._leaving.append(client)
 
+    def connect_again(self) -> None:
+        """This computer has another address: connect to those on others anew."""
+        with self._lock:
+            for client in self._clients.values():
+                client.connect_again()
+
     def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - counts messages
         """A respondent is not listed any more."""
         with self._lock:

@@ -1,0 +1,120 @@
+"""A day of a network: its master, who publishes and who hears on its hosts, and what they counted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from time import monotonic
+from typing import Any
+
+from tests.faults import traffic
+from tests.faults.hosts import Host, Network
+from tests.nep.programs import Program, eventually, running
+
+WAIT_S = 60.0
+"""For what must happen in the end, however busy this computer is."""
+_MASTER = "from nep.cli import main; main()"
+
+
+class Part:
+    """A program of `traffic` on a host."""
+
+    def __init__(self, program: Program, host: Host) -> None:
+        self.host = host
+        self._program = program
+        assert program.line() == "ready"
+
+    def ask(self, what: str) -> dict[str, Any]:
+        """Its answer. An AssertionError when something went wrong in it."""
+        self._program.say(what)
+        answer: dict[str, Any] = json.loads(self._program.line())
+        assert not answer.get("error"), answer["error"]
+        return answer
+
+
+class Master:
+    """The master that runs, and where."""
+
+    def __init__(self, program: Program, host: Host) -> None:
+        self.host = host
+        self.kill = program.kill
+
+
+class Day:
+    """Starts programs on hosts; they are killed at the end.
+
+    `address` is that of the master for other hosts.
+    """
+
+    def __init__(self, hosts: Network, stack: ExitStack) -> None:
+        self.hosts = hosts
+        self.address = ""
+        self.master: Master
+        self._stack = stack
+
+    def begin_master(self, host: Host) -> float:
+        """Start a master that serves the network, as a person does; when that was. Returns when it does."""
+        began = now()
+        self.address = f"{host.address}:7780"
+        words = ("master", "--no-gateway", "--listen", host.address)
+        # `nep` names itself by the first word.
+        code = f"import sys; sys.argv[0] = 'nep'; {_MASTER}"
+        program = self._stack.enter_context(running(code, *words, before=host.inside(), NEP_MASTER=""))
+        assert program.process.stderr is not None
+        for line in program.process.stderr:
+            if "NEP_MASTER=" in line:
+                self.master = Master(program, host)
+                return began
+        raise AssertionError("the master ended")
+
+    def start(
+        self, part: Callable[[], None], host: Host, topic: str, *, master: str = "", **more: Any
+    ) -> Part:
+        """A program of `traffic`, when it is ready."""
+        options = json.dumps({"node": f"{part.__name__}-{host.name}", "topic": topic, **more})
+        program = running(
+            traffic.code_of(part),
+            options,
+            before=host.inside(),
+            NEP_MASTER=self.address,
+            XDG_RUNTIME_DIR=f"/dev/shm/{host.name}",
+        )
+        return Part(self._stack.enter_context(program), host)
+
+
+@contextmanager
+def day(hosts: Network) -> Iterator[Day]:
+    """Ends all programs at the end."""
+    with ExitStack() as stack:
+        yield Day(hosts, stack)
+
+
+def balance(sent: int, subscriber: Part) -> dict[str, Any]:
+    """Wait until all that was sent is received or lost; what the subscriber counted then.
+
+    It must have been given what it received, each once and in order.
+    """
+    seen: dict[str, Any] = {}
+
+    def is_met() -> bool:
+        seen.update(subscriber.ask("look"))
+        return bool(seen["received"] + seen["lost"] == sent == seen["read"] + seen["lost"])
+
+    try:
+        eventually(is_met, WAIT_S)
+    except AssertionError:
+        raise AssertionError(f"{sent} were sent, but the subscriber counted {seen}") from None
+    assert seen["twice"] == seen["backwards"] == seen["refused"] == 0, seen
+    return seen
+
+
+def is_hearing(subscriber: Part) -> Callable[[], bool]:
+    """Whether it got anything since now."""
+    before = subscriber.ask("look")["read"]
+    return lambda: bool(subscriber.ask("look")["read"] > before)
+
+
+def now() -> float:
+    """The clock that the programs on all hosts have, too."""
+    return monotonic()

@@ -1,0 +1,255 @@
+"""Faults, one a function: each uses hosts and a topic of its own, so that several go on side by side.
+
+All check that every message is received or counted as lost, also the last ones, that none comes twice or out
+of order, and that everything goes on by itself. Each returns what it measured, in seconds or messages.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from tests.faults import traffic
+from tests.faults.day import WAIT_S, Day, Part, balance, is_hearing, now
+from tests.nep.programs import eventually
+
+_BEFORE_S = 0.5
+"""Traffic before a fault."""
+RATE = 500
+"""Messages a second."""
+Measured = dict[str, float]
+Scenario = Callable[[Day, float], Measured]
+
+
+def _wait(seconds: float) -> None:
+    """Let a fault last."""
+    threading.Event().wait(seconds)
+
+
+def _back_s(subscriber: Part, since: float) -> float:
+    """Wait until it hears again; how long that took since then."""
+    eventually(is_hearing(subscriber), WAIT_S)
+    return max(0.0, float(subscriber.ask("look")["back_at"]) - since)
+
+
+def _begin(day: Day, name: str, **more: Any) -> tuple[Part, Part]:
+    """A publisher and a subscriber on hosts of their own, with traffic between them."""
+    subscriber = day.start(traffic.subscriber, day.hosts.host(f"s-{name}"), name, **more)
+    publisher = day.start(traffic.publisher, day.hosts.host(f"p-{name}"), name, rate=RATE)
+    publisher.ask("go")
+    eventually(is_hearing(subscriber), WAIT_S)
+    _wait(_BEFORE_S)
+    subscriber.ask("again")
+    return publisher, subscriber
+
+
+def _close(publisher: Part, subscriber: Part) -> dict[str, Any]:
+    """More traffic, then the publisher closes; all must be told of then."""
+    publisher.ask("go")
+    eventually(is_hearing(subscriber), WAIT_S)
+    sent = publisher.ask("end")
+    return balance(sent["sent"], subscriber)
+
+
+def cable_of_subscriber(day: Day, out_s: float) -> Measured:
+    """The subscriber's cable is pulled; then again, and what is sent meanwhile are the last messages."""
+    publisher, subscriber = _begin(day, "cable-s")
+    return _cable(day, publisher, subscriber, subscriber, out_s)
+
+
+def cable_of_publisher(day: Day, out_s: float) -> Measured:
+    """The same with the publisher's cable."""
+    publisher, subscriber = _begin(day, "cable-p")
+    return _cable(day, publisher, subscriber, publisher, out_s)
+
+
+def _cable(day: Day, publisher: Part, subscriber: Part, cut: Part, out_s: float) -> Measured:
+    day.hosts.cable(cut.host, is_in=False)
+    _wait(out_s)
+    day.hosts.cable(cut.host, is_in=True)
+    back_s = _back_s(subscriber, now())
+    day.hosts.cable(cut.host, is_in=False)
+    _wait(_BEFORE_S)
+    sent = publisher.ask("pause")["sent"]
+    _wait(out_s)
+    day.hosts.cable(cut.host, is_in=True)
+    since = now()
+    balance(sent, subscriber)
+    told_s = now() - since
+    seen = _close(publisher, subscriber)
+    return {"back_s": back_s, "told_s": told_s, "lost": seen["lost"]}
+
+
+def address_of_publisher(day: Day, _out_s: float) -> Measured:
+    """The publisher's host gets another address while it publishes."""
+    publisher, subscriber = _begin(day, "addr-p")
+    publisher.host.change_address("10.88.0.200")
+    back_s = _back_s(subscriber, now())
+    return {"back_s": back_s, "lost": _close(publisher, subscriber)["lost"]}
+
+
+def address_of_subscriber(day: Day, _out_s: float) -> Measured:
+    """The subscriber's host gets another address."""
+    publisher, subscriber = _begin(day, "addr-s")
+    subscriber.host.change_address("10.88.0.201")
+    back_s = _back_s(subscriber, now())
+    return {"back_s": back_s, "lost": _close(publisher, subscriber)["lost"]}
+
+
+def subscriber_gone(day: Day, _out_s: float) -> Measured:
+    """A subscriber's host vanishes: the other one misses nothing, and the publisher notices."""
+    publisher, subscriber = _begin(day, "gone-s")
+    other = day.start(traffic.subscriber, day.hosts.host("s2-gone-s"), "gone-s")
+    eventually(lambda: publisher.ask("look")["subscribers"] == 2, WAIT_S)
+    other.host.kill()
+    since = now()
+    eventually(lambda: publisher.ask("look")["subscribers"] == 1, WAIT_S)
+    noticed_s = now() - since
+    seen = _close(publisher, subscriber)
+    assert seen["lost"] == 0, seen
+    return {"noticed_s": noticed_s, "lost": seen["lost"]}
+
+
+def publisher_gone(day: Day, _out_s: float) -> Measured:
+    """A publisher's host vanishes, and another one comes with the same address and the same program."""
+    publisher, subscriber = _begin(day, "gone-p")
+    sent = publisher.ask("pause")["sent"]
+    balance(sent, subscriber)
+    publisher.host.kill()
+    since = now()
+    host = day.hosts.host("p2-gone-p", publisher.host.address)
+    options = {"node": "publisher-p-gone-p", "after": sent}
+    again = day.start(traffic.publisher, host, "gone-p", **options)
+    again.ask("go")
+    back_s = _back_s(subscriber, since)
+    again.ask("pause")
+    sent += again.ask("end")["sent"]
+    return {"back_s": back_s, "lost": balance(sent, subscriber)["lost"]}
+
+
+def lossy_1(day: Day, out_s: float) -> Measured:
+    """1 % of all packets is lost at the subscriber's cable, both ways."""
+    return _lossy(day, out_s, 0.01)
+
+
+def lossy_10(day: Day, out_s: float) -> Measured:
+    """10 %."""
+    return _lossy(day, out_s, 0.1)
+
+
+def _lossy(day: Day, out_s: float, ratio: float) -> Measured:
+    publisher, subscriber = _begin(day, f"lossy{ratio:.0%}".strip("%"))
+    hosts = (publisher.host, subscriber.host)
+    before = sum(host.resent() for host in hosts)
+    day.hosts.lose(subscriber.host, ratio)
+    _wait(out_s)
+    silent_s = subscriber.ask("look")["silent_s"]
+    resent = sum(host.resent() for host in hosts) - before
+    assert resent > 0, "no packet was lost"
+    return {"lost": _close(publisher, subscriber)["lost"], "silent_s": silent_s, "resent": resent}
+
+
+_SLOW_S = 100 / RATE
+"""For each message: 100 times too long."""
+_ROOM = 20
+
+
+def slow_all(day: Day, out_s: float) -> Measured:
+    """A subscriber that is 100 times too slow has room for 20 messages."""
+    publisher, subscriber = _begin(day, "slow-all", work_s=_SLOW_S, max_messages=_ROOM)
+    _wait(out_s)
+    sent = publisher.ask("end")["sent"]
+    seen = balance(sent, subscriber)
+    assert seen["last"] == sent, "the newest are kept"
+    assert seen["lost"] > sent / 2, seen
+    return {"sent": sent, "lost": seen["lost"]}
+
+
+def slow_latest(day: Day, out_s: float) -> Measured:
+    """A subscriber that is 100 times too slow wants the newest message only: it is never late."""
+    publisher, subscriber = _begin(day, "slow-new", work_s=_SLOW_S, keep="latest")
+    _wait(out_s)
+    sent = publisher.ask("end")["sent"]
+    eventually(lambda: subscriber.ask("look")["last"] == sent, WAIT_S)
+    seen = subscriber.ask("look")
+    assert (seen["received"], seen["lost"], seen["backwards"], seen["twice"]) == (sent, 0, 0, 0), seen
+    assert seen["read"] + seen["skipped"] == sent, seen
+    return {"sent": sent, "lost": 0, "replaced": sent - seen["read"]}
+
+
+def calls(day: Day, out_s: float) -> Measured:
+    """A client's cable is pulled while it calls: each call is answered or raises, none is made twice."""
+    server = day.start(traffic.server, day.hosts.host("p-calls"), "calls")
+    client = day.start(traffic.client, day.hosts.host("s-calls"), "calls")
+    client.ask("go")
+    eventually(lambda: client.ask("look")["ends"].get("answered", 0) > 10, WAIT_S)
+    day.hosts.cable(client.host, is_in=False)
+    eventually(lambda: bool(set(client.ask("look")["ends"]) - {"answered"}), WAIT_S)
+    _wait(max(0.0, out_s - 1.0))
+    day.hosts.cable(client.host, is_in=True)
+    since = now()
+    eventually(lambda: client.ask("look")["back_at"] > since, WAIT_S)
+    back_s = client.ask("look")["back_at"] - since
+    server.host.change_address("10.88.0.202")
+    since = now()
+    eventually(lambda: client.ask("look")["back_at"] > since, WAIT_S)
+    moved_s = client.ask("look")["back_at"] - since
+    seen = client.ask("pause")
+    assert sum(seen["ends"].values()) == seen["calls"], seen
+    assert seen["wrong"] == 0
+    done = server.ask("look")
+    assert done["twice"] == 0
+    assert seen["ends"]["answered"] <= done["done"] <= seen["calls"], (done, seen)
+    return {"back_s": back_s, "moved_s": moved_s, "failed": seen["calls"] - seen["ends"]["answered"]}
+
+
+SIDE_BY_SIDE = (
+    cable_of_subscriber,
+    cable_of_publisher,
+    address_of_publisher,
+    address_of_subscriber,
+    publisher_gone,
+    lossy_1,
+    lossy_10,
+    slow_all,
+    slow_latest,
+    calls,
+)
+
+
+ALONE = (subscriber_gone,)
+"""What takes long whatever the fault is."""
+
+
+def master_again(day: Day, out_s: float) -> Measured:
+    """The master is killed, and after a while there is one that knows nothing."""
+    publisher, subscriber = _begin(day, "master")
+    day.master.kill()
+    _wait(out_s)
+    later = day.begin_master(day.master.host)
+    return _with_another_master(day, publisher, subscriber, later)
+
+
+def master_moved(day: Day, out_s: float) -> Measured:
+    """The master's computer vanishes, and another one has its address and a master that knows nothing."""
+    publisher, subscriber = _begin(day, "master")
+    day.master.host.kill()
+    _wait(out_s)
+    later = day.begin_master(day.hosts.host("m2", day.master.host.address))
+    return _with_another_master(day, publisher, subscriber, later)
+
+
+def _with_another_master(day: Day, publisher: Part, subscriber: Part, began: float) -> Measured:
+    """Nothing was lost meanwhile, and who comes now meets who was there before."""
+    late = day.start(traffic.subscriber, day.hosts.host("late"), "master")
+    found_s = now() - began
+    sent = publisher.ask("pause")["sent"]
+    seen = balance(sent, subscriber)
+    assert seen["lost"] == 0, seen
+    heard = late.ask("look")["read"]
+    publisher.ask("go")
+    eventually(lambda: late.ask("look")["read"] > heard, WAIT_S)
+    sent = publisher.ask("end")["sent"]
+    assert balance(sent, subscriber)["lost"] == 0
+    return {"found_s": found_s, "lost": 0}

@@ -1,0 +1,79 @@
+"""Computers that vanish, cables that are pulled, packets that are lost: no loss that is not counted.
+
+`docs/faults.md` has the table of what was measured; `--long` measures it.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from tests.faults import scenarios
+from tests.faults.day import Day, day
+from tests.faults.hosts import CannotMakeHostsError, network
+
+_OUT_S, _OUT_LONG_S = 1.5, 10.0
+"""How long a fault lasts."""
+
+
+@pytest.fixture
+def is_long(pytestconfig: pytest.Config) -> bool:
+    """Whether faults last."""
+    return bool(pytestconfig.getoption("--long"))
+
+
+@pytest.fixture
+def _with_long(is_long: bool) -> None:
+    if not is_long:
+        pytest.skip("with --long")
+
+
+@pytest.fixture
+def today() -> Iterator[Day]:
+    """A network with a master that serves it, on a host of its own."""
+    try:
+        with network() as hosts, day(hosts) as made:
+            made.begin_master(hosts.host("m"))
+            yield made
+    except CannotMakeHostsError as error:
+        pytest.skip(f"no computers can be made here: {error}")
+
+
+def _name(scenario: scenarios.Scenario) -> str:
+    return str(getattr(scenario, "__name__", scenario))
+
+
+def _tell(scenario: scenarios.Scenario, measured: scenarios.Measured) -> None:
+    """For the table, with `-s`; pytest shows it, too, when something fails."""
+    sys.stdout.write(
+        f"{_name(scenario)}: {json.dumps({each: round(value, 2) for each, value in measured.items()})}\n"
+    )
+
+
+@pytest.mark.timeout(150)
+def test_whatever_happens_in_a_network_each_message_is_received_or_counted(today: Day) -> None:
+    with ThreadPoolExecutor(len(scenarios.SIDE_BY_SIDE)) as side_by_side:
+        begun = {each: side_by_side.submit(each, today, _OUT_S) for each in scenarios.SIDE_BY_SIDE}
+    failures = {_name(each): done.exception() for each, done in begun.items() if done.exception()}
+    for each, done in begun.items():
+        if _name(each) not in failures:
+            _tell(each, done.result())
+    assert not failures, failures
+
+
+@pytest.mark.timeout(150)
+@pytest.mark.parametrize("scenario", [scenarios.master_again, scenarios.master_moved])
+def test_another_master_is_found_and_no_message_is_lost_meanwhile(
+    today: Day, scenario: scenarios.Scenario, is_long: bool
+) -> None:
+    _tell(scenario, scenario(today, _OUT_LONG_S if is_long else _OUT_S))
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("scenario", [*scenarios.SIDE_BY_SIDE, *scenarios.ALONE])
+def test_a_fault_that_lasts(_with_long: None, today: Day, scenario: scenarios.Scenario) -> None:
+    _tell(scenario, scenario(today, _OUT_LONG_S))
