@@ -74,6 +74,7 @@ def test_another_master_is_found_and_no_message_is_lost_meanwhile(
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.usefixtures("_with_long")
 @pytest.mark.parametrize("scenario", [*scenarios.SIDE_BY_SIDE, *scenarios.ALONE])
-def test_a_fault_that_lasts(_with_long: None, today: Day, scenario: scenarios.Scenario) -> None:
+def test_a_fault_that_lasts(today: Day, scenario: scenarios.Scenario) -> None:
     _tell(scenario, scenario(today, _OUT_LONG_S))
