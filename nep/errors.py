@@ -36,7 +36,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from nep.i18n import _
-from nep.text import escaped, shortened
+from nep.text import escaped, quotable, shortened
 
 __all__ = [
     "AddressInUseError",
@@ -242,7 +242,9 @@ class BadTopicError(NepError, ValueError):
         self.topic = topic
         self.reason = reason
         super().__init__(
-            _("'{topic}' cannot be a topic; {reason}").format(topic=escaped(topic), reason=reason)
+            _("'{topic}' cannot be a topic; {reason}").format(
+                topic=escaped(shortened(topic, 200)), reason=reason
+            )
         )
 
 
@@ -267,7 +269,7 @@ class UnknownBackendError(NepError):
         self.known = tuple(known)
         super().__init__(
             _("no back end '{name}'; {did_you_mean}").format(
-                name=name, did_you_mean=did_you_mean(name.lower(), self.known)
+                name=quotable(name), did_you_mean=did_you_mean(name.lower(), self.known)
             )
         )
 

@@ -10,7 +10,10 @@ import re
 
 from nep.i18n import _
 
-__all__ = ["control_in", "escaped", "harmless", "shortened"]
+__all__ = ["control_in", "escaped", "harmless", "quotable", "shortened"]
+
+_QUOTED = 200
+"""So many letters of somebody's word are in a sentence."""
 
 _CONTROLS = (
     "\x00-\x1f\x7f-\x9f"  # C0, DEL and C1: cursor, colours, screen, title, clipboard
@@ -52,6 +55,11 @@ def shortened(text: str, most: int) -> str:
     if len(text) <= most:
         return text
     return _("{beginning}… ({count} characters)").format(beginning=text[:most], count=len(text))
+
+
+def quotable(text: str) -> str:
+    """Somebody's word as a sentence may have it, however long and whatever is in it."""
+    return escaped(shortened(text, _QUOTED))
 
 
 def _readable(found: re.Match[str]) -> str:

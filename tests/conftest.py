@@ -8,6 +8,7 @@ import signal
 import time
 from collections.abc import Generator, Iterator
 
+import hypothesis
 import pytest
 from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
@@ -21,6 +22,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that starts tests in the background lets them, and all they start, ignore Ctrl+C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# However busy the computer is: a value may take long to make, and an example to run.
+hypothesis.settings.register_profile(
+    "nep", hypothesis.settings(), deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.load_profile("nep")
 pytest.register_assert_rewrite("tests.robots.whose_words_count")  # a contract: others hold to it
 os.environ["NEP_LANG"] = "en"  # what tests read is English, also on a computer that is set to something else
 WITH_FIXED_PORTS = ("tests/interop/", "tests/e2e/test_rize.py")

@@ -7,6 +7,7 @@ from typing import Literal
 
 from nep.errors import NepError, did_you_mean
 from nep.i18n import _
+from nep.text import quotable
 
 __all__ = ["Configuration", "Direct", "Hybrid", "Mode", "checked_mode", "checked_port", "for_messages"]
 
@@ -56,7 +57,7 @@ def checked_mode(mode: str) -> Mode:
     except KeyError:
         raise NepError(
             _("no mode '{mode}'; {did_you_mean}").format(
-                mode=mode, did_you_mean=did_you_mean(mode, tuple(_MODES))
+                mode=quotable(str(mode)), did_you_mean=did_you_mean(mode, tuple(_MODES))
             )
         ) from None
 
@@ -64,6 +65,6 @@ def checked_mode(mode: str) -> Mode:
 def checked_port(port: str | int) -> int:
     """`port` as a number from 1 to 65535. Raises `NepError`."""
     text = str(port)
-    if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= 65535:
-        raise NepError(_("'{port}' is no port; use a number from 1 to 65535").format(port=port))
+    if not text.isascii() or not text.isdigit() or len(text) > 5 or not 1 <= int(text) <= 65535:
+        raise NepError(_("'{port}' is no port; use a number from 1 to 65535").format(port=quotable(text)))
     return int(text)

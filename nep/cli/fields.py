@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from nep.errors import NepError
 from nep.i18n import _
+from nep.text import quotable
 
 __all__ = ["MISSING", "Path", "leaves", "parse_path", "pick"]
 
@@ -14,7 +15,7 @@ Path = tuple[str | int, ...]
 MISSING = object()
 """What `pick` gives for a field that a message does not have."""
 
-_STEP = re.compile(r"""\.?(?:\[(-?\d+)\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
+_STEP = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
 _PLAIN = re.compile(r"[^.\[\]\"\s]+")
 
 
@@ -29,7 +30,7 @@ def parse_path(text: str) -> Path:
         if found is None or (text[at] != "." and text[at] != "[" and at > 0):
             raise NepError(
                 _("'{text}' is no field; write it like 'pose.x', 'joints[3]' or '.' for everything").format(
-                    text=text
+                    text=quotable(text)
                 )
             )
         index, quoted, plain = found.groups()

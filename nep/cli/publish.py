@@ -26,6 +26,7 @@ from nep.messages.encoded import Encoded
 from nep.nodes.arguments import text
 from nep.nodes.publisher import Publisher
 from nep.protocol.graph_view import TopicInfo
+from nep.text import escaped
 
 _SHOWN = 40
 _MOST_BYTES = 10**9
@@ -149,15 +150,23 @@ def value_of(text: str, msg_type: str) -> object:
     if msg_type in _TEXT_TYPES:
         return text
     if msg_type == "bytes":
-        return text.encode()
+        return _bytes_typed(text)
     if msg_type in _BYTE_TYPES:
         raise EncodeError(msg_type, "str", _("name a JPEG or PNG file: @picture.jpg"))
     try:
         return orjson.loads(text)
     except orjson.JSONDecodeError as error:
-        shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]} …"
+        shown = escaped(text if len(text) <= _SHOWN else f"{text[:_SHOWN]} …")
         said = _("'{shown}' is no JSON; put a text into quotes ('{quoted}'), or use --type string")
-        raise NepError(said.format(shown=shown, quoted=f'"{text[:20]}"')) from error
+        raise NepError(said.format(shown=shown, quoted=escaped(f'"{text[:20]}"'))) from error
+
+
+def _bytes_typed(text: str) -> bytes:
+    """What a person typed, also where that is no UTF-8. Raises `EncodeError`."""
+    try:
+        return text.encode("utf-8", "surrogateescape")
+    except UnicodeEncodeError as error:
+        raise EncodeError("bytes", "str", _("it holds half of a surrogate pair")) from error
 
 
 def read_file(file: Path, msg_type: str) -> bytes:

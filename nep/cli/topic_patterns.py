@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Collection, Sequence
 from contextlib import suppress
@@ -47,8 +46,21 @@ def _with_empty(parts: Sequence[str], at: set[int]) -> set[int]:
 
 
 def _is_part(pattern: str, part: str) -> bool:
-    letters = (".*" if each == "*" else "." if each == "?" else re.escape(each) for each in pattern)
-    return re.fullmatch("".join(letters), part, re.DOTALL) is not None
+    """From left to right, back to the last `*` alone: an expression takes years for `*a*a*a*a*a*b`."""
+    at = begin = after = 0
+    star = -1
+    while begin < len(part):
+        letter = pattern[at : at + 1]
+        if letter == "*":
+            star, at, after = at, at + 1, begin
+        elif letter and letter in {"?", part[begin]}:
+            at, begin = at + 1, begin + 1
+        elif star >= 0:
+            after += 1  # the star stands for one letter more
+            at, begin = star + 1, after
+        else:
+            return False
+    return not pattern[at:].strip("*")
 
 
 class TopicPatterns:

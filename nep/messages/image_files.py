@@ -278,11 +278,11 @@ class _Png(_Reader):
         orientation, at = 1, 8
         for _piece in range(MOST_PIECES):
             kind, end = bytes(self.data[at + 4 : at + 8]), at + 12 + self.number(at, 4)
-            if end > self.size:  # OpenCV takes memory for as much as a chunk tells: 4 GB for a few bytes
-                raise self.broken(_("it ends too early"))
             if kind == b"IHDR" and kind in kinds:
                 raise self.broken(_("it has two heads"))
             if kind in _NEEDED:
+                if end > self.size:  # OpenCV takes memory for all that it tells of, 4 GB, and then looks
+                    raise self.broken(_("it ends too early"))
                 kinds.add(kind)
                 if needed and needed[-1][1] == at:
                     needed[-1] = needed[-1][0], end

@@ -9,6 +9,7 @@ here"), *bye* (the same with the flag BYE: "nothing comes after this") and messa
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -86,6 +87,8 @@ READ = b"\xffread/"
 SHARES = b"\xffshares/"
 """How a filter starts that answers an offer. It is taken back at once."""
 
+_HEX = re.compile(rb"[0-9a-fA-F]{16}")
+"""`int` would take a sign and underscores, too."""
 _HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
 _QUICKLY = struct.Struct("<IIQQQ")  # the first three in one
 SIZE_MAX = 2**32 - 1
@@ -223,7 +226,7 @@ def parse_hello(part: bytes) -> Hello | None:
         return None
     digits, slash, topic = part[len(begin) :].partition(b"/")
     try:
-        if len(digits) != 16 or not slash:
+        if not _HEX.fullmatch(digits) or not slash:
             return None
         rank = _HELLOS.index(begin)
         return Hello(int(digits, 16), topic.decode("utf-8"), rank <= 2, rank <= 1, rank == 0)
@@ -255,12 +258,9 @@ def parse_shares(part: bytes) -> Shares | None:
 
 def _numbers_behind(begin: bytes, part: bytes, count: int) -> list[int] | None:
     words = part[len(begin) :].split(b"/")
-    if not part.startswith(begin) or [len(each) for each in words] != [16] * count:
+    if not part.startswith(begin) or len(words) != count or not all(map(_HEX.fullmatch, words)):
         return None
-    try:
-        return [int(each, 16) for each in words]
-    except ValueError:
-        return None
+    return [int(each, 16) for each in words]
 
 
 def read_header(part: bytes) -> Header:

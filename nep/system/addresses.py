@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
 from nep.system.lazy_import import lazy_module
+from nep.text import quotable
 
 if TYPE_CHECKING:
     import psutil
@@ -47,6 +48,8 @@ DEFAULT_MASTER = "127.0.0.1:7780"
 _DEFAULT_PORT = 7780
 _HOST = re.compile(r"[\w.-]+|\*", re.ASCII)
 _NUMBERS = re.compile(r"[\d.]+", re.ASCII)
+_PORT = re.compile(r"\d{1,5}", re.ASCII)
+_BYTE = re.compile(r"0*\d{1,3}", re.ASCII)
 _ENDPOINT = re.compile(r"tcp://[\w.-]{1,253}:(\d{1,5})|ipc://@nep-(\d{1,5})", re.ASCII)
 
 ANY = "0.0.0.0"  # noqa: S104 - bound only where a person asked for it
@@ -72,10 +75,10 @@ def master_address(address: str | None = None) -> str:
     host, colon, port = chosen.rpartition(":")
     if not colon:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
-    if not _HOST.fullmatch(host) or not _is_possible(host) or not port.isdigit() or int(port) > 65535:
+    if not _HOST.fullmatch(host) or not _is_possible(host) or not _is_port(port):
         raise NepError(
             _("'{chosen}' is no address of a master; write it as '{example}'").format(
-                chosen=chosen, example=DEFAULT_MASTER
+                chosen=quotable(chosen), example=DEFAULT_MASTER
             )
         )
     return chosen
@@ -91,22 +94,26 @@ def checked_host(host: object) -> str:
             _(
                 "'{host}' is an IPv6 address, which nep does not speak; use one such as '127.0.0.1', "
                 "or the computer's name"
-            ).format(host=host)
+            ).format(host=quotable(host))
         )
     if not isinstance(host, str) or not _HOST.fullmatch(host) or not _is_possible(host):
         raise NepError(
             _("'{host}' is no address of a computer; use one such as '127.0.0.1', or a name").format(
-                host=host
+                host=quotable(str(host))
             )
         )
     return host
+
+
+def _is_port(word: str) -> bool:
+    return _PORT.fullmatch(word) is not None and int(word) <= 65535
 
 
 def _is_possible(host: str) -> bool:
     if not _NUMBERS.fullmatch(host):
         return True
     numbers = host.split(".")
-    return len(numbers) == 4 and all(each.isdigit() and int(each) < 256 for each in numbers)
+    return len(numbers) == 4 and all(_BYTE.fullmatch(each) and int(each[-3:]) < 256 for each in numbers)
 
 
 def is_endpoint(endpoint: str) -> bool:

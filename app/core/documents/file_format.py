@@ -77,7 +77,10 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
         raise DocumentError(path, _("{file} has no blocks in it").format(file=name), _(FROM_BEFORE))
     described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
     others = {name: value for name, value in content.items() if name not in OURS}
-    return BehaviourFile(str(content.get("name") or path.stem), workspace, described, others)
+    called = content.get("name")
+    return BehaviourFile(
+        called if isinstance(called, str) and called else path.stem, workspace, described, others
+    )
 
 
 def write_file(path: Path, behaviour: BehaviourFile) -> None:

@@ -226,8 +226,10 @@ def _is_heard(link: RobotLink) -> bool:
 
 
 def _share(value: object, default: float = 0.0, whole: float = 1.0) -> float:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return min(1.0, max(0.0, (float(value) if good else default) / whole))  # type: ignore[arg-type]
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        value = default
+    # First the bounds: JSON has whole numbers that no float can be.
+    return float(min(whole, max(0.0, value))) / whole
 
 
 def _notes(value: object) -> Notes:

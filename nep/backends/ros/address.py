@@ -8,6 +8,7 @@ from urllib.parse import urlsplit
 from nep.errors import NepError
 from nep.i18n import _
 from nep.system.addresses import checked_host, host_of
+from nep.text import quotable
 
 __all__ = ["address_of", "is_own_computer"]
 
@@ -30,7 +31,7 @@ def address_of(given: str | None) -> str:
     if not host or not port:
         raise NepError(
             _("'{chosen}' is no address of a ROS master; write it as '{example}'").format(
-                chosen=text, example=f"127.0.0.1:{_PORT}"
+                chosen=quotable(text), example=f"127.0.0.1:{_PORT}"
             )
         )
     return f"{checked_host(host)}:{port}"

@@ -23,7 +23,7 @@ __all__ = ["Definition", "parse"]
 _SEPARATOR = re.compile(r"^={10,}\s*$", re.MULTILINE)
 _HEAD = re.compile(r"\s*MSG:\s*([\w/]+)[^\n]*\n?")
 _CONSTANT = re.compile(r"[\w/]+\s+\w+\s*=")
-_FIELD = re.compile(r"([A-Za-z][\w/]*)(\[(\d*)\])?\s+([A-Za-z]\w*)")
+_FIELD = re.compile(r"([A-Za-z][\w/]*)(\[(\d{0,10})\])?\s+([A-Za-z]\w*)")
 _INTEGERS = {
     "int8": "b", "byte": "b", "uint8": "B", "char": "B", "int16": "h", "uint16": "H", "int32": "i",
     "uint32": "I", "int64": "q", "uint64": "Q",
@@ -160,14 +160,16 @@ class _Parser:
 
     def fields_of(self, name: str, depth: int) -> tuple[_Field, ...]:
         fields: list[_Field] = []
+        names: set[str] = set()
         for line in self._texts[name].splitlines():
             stripped = line.partition("#")[0].strip()
             if not stripped or _CONSTANT.match(line.strip()):
                 continue
             found = _FIELD.fullmatch(stripped)
             self._count += 1
-            if found is None or self._count > _MOST_FIELDS:
+            if found is None or self._count > _MOST_FIELDS or found[4] in names:
                 raise self._bad(stripped)
+            names.add(found[4])
             if depth == 0 and not fields:
                 self.has_header = found[1] in _HEADERS and not found[2] and found[4] == "header"
             kind = self._kind(name, found[1], depth)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from nep.i18n import _
+from nep.text import escaped
 
 __all__ = ["RosField", "RosFieldError", "Types", "from_message", "read_definition", "to_message"]
 
@@ -106,7 +107,7 @@ def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:
     for key in payload:
         if key not in fields:
             raise RosFieldError(
-                _joined(path, str(key)[:100]),
+                _joined(path, escaped(str(key)[:100])),
                 _("is no field of '{name}'; it has {fields}").format(
                     name=name, fields=", ".join(f"'{each}'" for each in fields) or _("none")
                 ),

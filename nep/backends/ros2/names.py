@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from nep.errors import BadTopicError, NepError
 from nep.i18n import _
+from nep.text import quotable
 
 __all__ = [
     "dds_topic",
@@ -55,7 +56,7 @@ def type_name(msg_type: str) -> str:
     if found is None:
         raise NepError(
             _("'{name}' is no type of a message of ROS; write it as 'std_msgs/msg/String'").format(
-                name=msg_type
+                name=quotable(msg_type)
             )
         )
     return f"{found[1]}/msg/{found[3]}"

@@ -17,6 +17,8 @@ __all__ = ["MOST_LEVELS", "Key", "key_matches", "key_of_topic", "key_text", "lit
 Key = tuple[str, ...]
 MOST_LEVELS = 32
 _MOST_LETTERS = 1_000
+_LONGEST = 2 * _MOST_LETTERS + MOST_LEVELS
+"""A key as it is written: a backslash before each letter, and the dots."""
 _SPECIAL = re.compile(r"([.\\])")
 _NAME = re.compile(r"((?:[^.\\]|\\.|\\$)*)(?:\.|$)", re.DOTALL)
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
@@ -26,6 +28,8 @@ _WILD = frozenset({"*", "**"})
 def parse_key(key: str | Sequence[str]) -> Key:
     """The names of a key; a tuple of names is taken as it is. Raises `BadKeyError`."""
     if isinstance(key, str):
+        if len(key) > _LONGEST:  # it takes time to find out how many names that are
+            raise _too_long(key)
         names = tuple(key.split(".")) if "\\" not in key else _names(key)
     elif isinstance(key, tuple) and all(isinstance(each, str) for each in key):
         names = key
@@ -36,12 +40,16 @@ def parse_key(key: str | Sequence[str]) -> Key:
     if len(names) > MOST_LEVELS:
         raise BadKeyError(key_text(names), _("use {most} names at most").format(most=MOST_LEVELS))
     if sum(map(len, names)) > _MOST_LETTERS:
-        raise BadKeyError(key_text(names), _("use {most} letters at most").format(most=_MOST_LETTERS))
+        raise _too_long(key_text(names))
     try:
         "".join(names).encode()
     except UnicodeEncodeError:
         raise BadKeyError(key_text(names), _("it holds half of a surrogate pair")) from None
     return names
+
+
+def _too_long(key: str) -> BadKeyError:
+    return BadKeyError(key, _("use {most} letters at most").format(most=_MOST_LETTERS))
 
 
 def _names(text: str) -> Key:

@@ -15,6 +15,7 @@ from nep.backends.base import Backend, backend_named
 from nep.errors import NepError, did_you_mean
 from nep.i18n import _
 from nep.protocol.wire import check_node_name, check_topic
+from nep.text import quotable
 
 __all__ = [
     "DIRECTIONS",
@@ -190,7 +191,7 @@ def direction_named(name: str) -> Direction:
     if name not in DIRECTIONS:
         raise NepError(
             _("'{name}' is no direction; {did_you_mean}").format(
-                name=name, did_you_mean=did_you_mean(name, tuple(DIRECTIONS))
+                name=quotable(name), did_you_mean=did_you_mean(name, tuple(DIRECTIONS))
             )
         )
     return DIRECTIONS[name]
@@ -234,6 +235,6 @@ def _side_and_topic(word: str) -> tuple[SideConfiguration, str]:
         raise NepError(
             _(
                 "'{word}' is no BACKEND:TOPIC; write it as 'zeromq:/topic' or 'zeromq@HOST:7780:/topic'"
-            ).format(word=word)
+            ).format(word=quotable(word))
         )
     return side_of(backend, master), topic

@@ -11,6 +11,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import math
 import re
 from dataclasses import dataclass
 from typing import Literal
@@ -176,14 +177,23 @@ def _is_json_in_json(frame: bytes) -> bool:
     try:
         text = json.loads(frame)
         return isinstance(text, str) and isinstance(json.loads(text), (dict, list))
-    except ValueError:
+    except (ValueError, RecursionError):
         return False
 
 
 def _without_nan(data: bytes) -> bytes:
     """JSON with `null` for NaN and infinity, which JSON does not have and strict readers refuse."""
     try:
-        value = json.loads(data, parse_constant=lambda _: None)
-    except ValueError:
+        value = json.loads(data, parse_constant=lambda _: None, parse_float=_finite)
+    except (ValueError, RecursionError):
         return data  # the words stood in something else; whoever decodes it will say so
-    return json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()
+    try:
+        return json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()
+    except UnicodeEncodeError:  # half a letter, which JSON can only write as its number
+        return json.dumps(value, separators=(",", ":")).encode()
+
+
+def _finite(written: str) -> float | None:
+    """A number as JSON has it; `1e999` is infinity, too."""
+    number = float(written)
+    return number if math.isfinite(number) else None

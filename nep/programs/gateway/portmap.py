@@ -148,7 +148,7 @@ class PortMap:
                 known = _registration(entry)
                 if known.line in self._ports:
                     self.add(known)
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
             return
 
 

@@ -1,0 +1,57 @@
+"""Bytes that a parser once could not bear, by the target that finds them, each with what became of it."""
+
+from __future__ import annotations
+
+import json
+
+LONG = b"9" * 5_000
+"""More digits than Python makes a number of."""
+DEEP = 100_000
+NEIGHBOUR = {"robot": "a", "figure": "f", "theta_deg": 9, "radius": 0.2, "height": 1}
+HUGE = 10**400
+
+CASES: dict[str, list[bytes]] = {
+    # `str.isdigit` is true of a raised two, which is no number; and numbers with too many digits.
+    "addresses": ["host:\u00b2".encode(), b"host:" + LONG, LONG + b".1.1.1"],
+    # `int` takes signs and underscores: a subscriber -1.
+    "filters": [b"\xffhello/-000000000000001/t", b"\xffread/" + b"/".join([b"0_00000000000001"] * 4)],
+    # A sentence as long as what came.
+    "names": [b"t" * 1_000_000],
+    # Half a letter beside NaN, and depth, ended the gateway's thread; 1e999 became the bare word Infinity.
+    "frames_of_originals": [
+        b't {"a": NaN, "b": "\\ud800"}',
+        b"[NaN, 1e999]",
+        b"[" * DEEP + b"NaN",
+        b'"' + b"[" * DEEP + b'"',
+    ],
+    "the_gateways_file": [
+        b"[" * DEEP,
+        json.dumps({"version": 1, "boot": HUGE, "lines": [], "programs": []}).encode(),
+    ],
+    # The time grew with the square of the length.
+    "keys": [b"\\\\" + b"." * 1_000_000],
+    # ... and with a power of the length: years.
+    "patterns_of_topics": [b"*a*a*a*a*a*a*a*a*b\xff|\xff" + b"a" * 200],
+    "field_paths": [b"[" + LONG + b"]"],
+    "payloads": [b"\x80"],
+    # A stranger's definition: a number of 5000 digits, and a field twice.
+    "definitions_of_ros": [b"uint8[" + LONG + b"] x", b"uint8[] flags\nbool[3] flags\n"],
+    # `math.isfinite` and `float` raise for whole numbers that no float can be.
+    "neighbours_of_robots": [json.dumps({**NEIGHBOUR, "x": HUGE, "y": 0}).encode()],
+    "voices_of_robots": [json.dumps({"spoken": HUGE, "volume": -HUGE}).encode()],
+    # The name of a behaviour was a list of 2000 levels.
+    "files_of_behaviours": [
+        b'{"format": "nep-behaviour", "version": 1, "workspace": {}, "name": '
+        + b"[" * 2_000
+        + b"]" * 2_000
+        + b"}"
+    ],
+    # 89 bytes took 4 GB and 3 s: a chunk that is cut off tells of 4 GB.
+    "pictures_decoded": [
+        bytes.fromhex(
+            "89504e470d0a1a0a0000000d494844520000000200000002080000dd0052000057f800000e49444154789c6348"
+            "4c62484c02000497018700010112000300080002000300003f001230347fe5640000000049454e44ae426082"
+        )
+    ],
+    "maps_for_ros2": [b'{"fr\\ud800ame_id": "a"}'],
+}

@@ -1,0 +1,126 @@
+"""Targets: what a person types after `nep`, and how what came is shown on a terminal."""
+
+from __future__ import annotations
+
+import json
+
+import orjson
+
+from nep.cli import topic_patterns
+from nep.cli.fields import MISSING, leaves, parse_path, pick
+from nep.cli.publish import value_of as payload_of
+from nep.cli.values import ids_as_text, json_of, presented
+from nep.errors import EncodeError, NepError, WrongTypeError
+from nep.messages.codecs import CODECS
+from nep.system.arguments import at_least, limit, one_of, period, seconds, text, within
+from nep.text import control_in, escaped, harmless, shortened
+from tests.fuzz.target import SEPARATOR, Targets, joined, parts_of, text_of, value_of
+
+TARGETS = Targets()
+
+
+@TARGETS.add(
+    NepError, EncodeError, seeds=lambda: [b'{"a":[1,2]}', b"hello", b"NaN"], words=(b'{"', b"\\u", b"1e999")
+)
+def payloads(data: bytes) -> None:
+    typed = text_of(data).replace("@", "a")  # which would read a file
+    for msg_type in ("string", "bytes", "json"):
+        try:
+            made = CODECS[msg_type].encode(payload_of(typed, msg_type))
+        except EncodeError:
+            continue
+        assert isinstance(made.data, bytes)
+
+
+def fields() -> list[bytes]:
+    value = orjson.dumps({"pose": {"x": [1, {"a b": 2}]}})
+    return [joined([path, value]) for path in (b"pose.x[1]", b'pose.x[-1]["a b"]', b".", b"[0]")]
+
+
+@TARGETS.add(
+    NepError, seeds=fields, words=(b'["', b'"]', b"[-1]", b".x", SEPARATOR, b"[99999999999999999999]")
+)
+def field_paths(data: bytes) -> None:
+    path, *rest = parts_of(data)
+    value = value_of(b"".join(rest))
+    for leaf in leaves(value):
+        try:
+            steps = parse_path(leaf)
+        except NepError:
+            continue  # a name that is empty, say
+        pick(value, steps)
+    found = pick(value, parse_path(text_of(path)))
+    assert found is MISSING or found is not None or value is not None
+
+
+@TARGETS.add(
+    seeds=lambda: [joined([b"/*/odom", b"/robot/odom"]), joined([b"*a*a*a*a*a*b", b"a" * 200])],
+    words=(b"**", b"*?", b"*a*a", SEPARATOR, b"/"),
+    slower=2,
+)
+def patterns_of_topics(data: bytes) -> None:
+    pattern, *rest = [text_of(part)[:200] for part in parts_of(data)] or [""]
+    topic = rest[0] if rest else ""
+    topic_patterns.is_pattern(pattern)
+    topic_patterns.matches(pattern, topic)
+    assert topic_patterns.matches("**", topic)
+
+
+@TARGETS.add(
+    seeds=lambda: [
+        orjson.dumps({"id": 2**63, "a": [1.5, None, {"publisher": 3}]}),
+        b"[NaN, 1e999, 12345678901234567890123]",
+    ],
+    words=(b"NaN", b"\\u009b", b"\\ud800", b'"id":'),
+    slower=2,
+)
+def values_on_a_terminal(data: bytes) -> None:
+    value = value_of(data)
+    for made in (json_of(value), json_of(value, indent=True), json_of(ids_as_text(value))):
+        json.loads(made)
+    for whole in (False, True):
+        shown = presented(value, whole=whole)
+        shown.encode()
+        assert not control_in(shown.replace("\n", ""))
+
+
+@TARGETS.add(
+    seeds=lambda: ["a\x1b[31m\u202eb\n\ufeff".encode()],
+    words=("\u202e".encode(), b"\x1b", b"\xc2\x9b", b"\n"),
+)
+def texts_of_strangers(data: bytes) -> None:
+    said = text_of(data)
+    for lines in (False, True):
+        escaped(said, lines=lines).encode()
+        harmless(said, lines=lines).encode()
+        assert not control_in(escaped(said, lines=lines).replace("\n", "").replace("\t", ""))
+    assert not control_in(escaped(said))
+    assert len(shortened(said, 10)) < 100
+
+
+@TARGETS.add(
+    WrongTypeError,
+    ValueError,
+    TypeError,
+    seeds=lambda: [b"1", b"1.5", b"null", b'"json"', b"-1", b"1e999"],
+    words=(b"NaN", b"true", b"18446744073709551616"),
+)
+def arguments(data: bytes) -> None:
+    value = value_of(data)
+    failed = []
+    for check in (
+        lambda: text("name", value),
+        lambda: at_least("count", value, 0),
+        lambda: within("count", value, 0, 9),
+        lambda: seconds("timeout_s", value),
+        lambda: period("period_s", value),
+        lambda: limit("rate", value),
+        lambda: one_of("mode", value, ("a", "b")),
+    ):
+        try:
+            check()
+        except ValueError as error:
+            failed.append(error)
+    for error in failed:
+        assert str(error)
+        assert len(str(error)) < 20_000

@@ -1,0 +1,77 @@
+"""Whatever bytes a parser gets: a value, or the one error that it promises; and soon.
+
+`python3 dev.py fuzz` looks for more, with the same targets (docs/fuzzing.md); what it found is in `cases`.
+"""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.fuzz.cases import CASES
+from tests.fuzz.target import Target
+from tests.fuzz.targets import TARGETS
+
+FEW = settings(
+    deadline=None,
+    max_examples=25,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much],
+)
+SECONDS = 2.0
+"""Of processor time: no parser may take longer for so few bytes, however busy the computer is."""
+
+
+def mutated(target: Target) -> st.SearchStrategy[bytes]:
+    """Bytes at random, and what the parser takes with something cut, repeated or replaced."""
+    seeds = st.sampled_from([*target.seeds(), b""])
+    piece = st.binary(max_size=12) | st.sampled_from([*target.words, b"\0", b"\xff" * 4])
+
+    def change(seed: bytes, at: float, count: float, new: bytes) -> bytes:
+        begin = int(at * len(seed))
+        return seed[:begin] + new + seed[begin + int(count * (len(seed) - begin)) :]
+
+    share = st.floats(0, 1)
+    once = st.builds(change, seeds, share, share, piece)
+    twice = st.builds(change, once, share, st.just(0.0) | share, piece)
+    return st.binary(max_size=80) | once | twice
+
+
+@pytest.mark.parametrize("name", sorted(TARGETS))
+def test_any_bytes(name: str) -> None:
+    target = TARGETS[name]
+
+    @FEW
+    @given(mutated(target))
+    def soon(data: bytes) -> None:
+        began = time.thread_time()
+        target.try_bytes(data)
+        assert time.thread_time() - began < SECONDS
+
+    soon()
+
+
+@pytest.mark.parametrize("name", sorted(TARGETS))
+def test_what_the_parser_takes_is_taken(name: str) -> None:
+    target, taken = TARGETS[name], 0
+    for seed in target.seeds():
+        target.try_bytes(seed)
+        try:
+            target.run(seed)
+        except target.errors:
+            continue
+        taken += 1
+    assert taken, "a target that refuses all of its seeds tries nothing"
+
+
+@pytest.mark.parametrize(("name", "data"), [(name, data) for name, found in CASES.items() for data in found])
+def test_what_was_found_before(name: str, data: bytes) -> None:
+    if name not in TARGETS:
+        pytest.skip("needs a package that is not here")
+    began = time.thread_time()
+    TARGETS[name].try_bytes(data)
+    assert time.thread_time() - began < SECONDS
