@@ -7,6 +7,7 @@ Ubuntu), the virtual environment ``.venv``, the pinned packages in it, and a vir
     test           every check and every test
     check          the same as test; add --fast to leave the tests out
     versions       the library alone, without Qt, and its tests with each Python from 3.10 to 3.13
+    fuzz           strange bytes for every parser, a quarter of an hour; -- --minutes 1 takes less
     bench          the benchmarks
     screenshots    the pictures of the README
     guide-pictures the pictures of the guide, in each language
@@ -31,6 +32,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from tools.computer import ROOT, Computer, Trouble, end, timed, venv_python
+from tools.fuzz import fuzz
 from tools.system_packages import bring_system_packages
 from tools.versions import versions
 
@@ -191,13 +193,15 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
             "Python {}.{} to {}.{} is needed, this is {}.{}".format(*lowest, *highest, *computer.version)
         )
     begin = time.monotonic()
-    if command != "versions":  # which has nothing of Qt's, and so asks nothing of the system
+    if command not in {"versions", "fuzz"}:  # which have nothing of Qt's, and so ask nothing of the system
         bring_system_packages(computer)
     if command == "setup":
         make_environment(computer, ROOT, "dev")
         code = 0
     elif command == "versions":
         code = versions(computer, arguments)
+    elif command == "fuzz":
+        code = fuzz(computer, arguments)
     elif command == "demo":
         code = demo(computer, arguments)
     else:
@@ -215,7 +219,7 @@ def main(arguments: Sequence[str] | None = None, computer: Computer | None = Non
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("command", choices=["demo", *SCRIPTS, "versions", "setup"])
+    parser.add_argument("command", choices=["demo", *SCRIPTS, "versions", "fuzz", "setup"])
     command: str = parser.parse_args(given[:1]).command
     # A terminal that closes, or a CI that gives up, must not leave a virtual screen behind.
     for name in ("SIGTERM", "SIGHUP"):

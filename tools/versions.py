@@ -85,13 +85,13 @@ def _stamp(requirements: str) -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in made_of)).hexdigest()
 
 
-def _environment(computer: Computer, python: str, folder: Path, requirements: str) -> Path:
+def environment(computer: Computer, python: str, folder: Path, requirements: str) -> Path:
     """The interpreter of an environment with the pinned packages of one file."""
     made = venv_python(folder, computer.platform)
     stamp = folder / "nep-stamp"
     if stamp.is_file() and stamp.read_text(encoding="utf-8") == _stamp(requirements):
         return made
-    install = [*_pip(made), "--require-hashes", "-r", f"requirements/{requirements}.txt"]
+    install = [*pip(made), "--require-hashes", "-r", f"requirements/{requirements}.txt"]
     with timed(f"making the environment {folder.name}"):
         for step in ([python, "-m", "venv", "--clear", str(folder)], install):
             if computer.do(step, computer.environ, None) != 0:
@@ -100,7 +100,8 @@ def _environment(computer: Computer, python: str, folder: Path, requirements: st
     return made
 
 
-def _pip(python: Path) -> list[str]:
+def pip(python: Path) -> list[str]:
+    """How its pip installs."""
     return [str(python), "-m", "pip", "install", "--disable-pip-version-check", "--quiet"]
 
 
@@ -109,8 +110,8 @@ def _pip(python: Path) -> list[str]:
 
 def try_plain(computer: Computer, python: str, folder: Path) -> list[str]:
     """Install the distribution with no extra, and use it from elsewhere; what failed."""
-    made = _environment(computer, python, folder, "library")
-    ours = [*_pip(made), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
+    made = environment(computer, python, folder, "library")
+    ours = [*pip(made), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
     # -I: what is tried is what was installed, not the sources here.
     use = [str(made), "-I", str(ROOT / "tools" / "library_alone.py")]
     for what, step in (("install", ours), ("pip check", [str(made), "-m", "pip", "check"]), ("use", use)):
@@ -121,8 +122,8 @@ def try_plain(computer: Computer, python: str, folder: Path) -> list[str]:
 
 def try_tests(computer: Computer, python: str, folder: Path, arguments: Sequence[str]) -> list[str]:
     """Run the library's tests with what they need; what failed."""
-    made = _environment(computer, python, folder, "test")
-    ours = [*_pip(made), "--no-deps", "--no-build-isolation", "-e", "."]
+    made = environment(computer, python, folder, "test")
+    ours = [*pip(made), "--no-deps", "--no-build-isolation", "-e", "."]
     pytest = [str(made), "-m", "pytest", "-q", *arguments]
     if not any((ROOT / each.partition("::")[0]).exists() for each in arguments):
         pytest += TESTS

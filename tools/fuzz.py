@@ -1,0 +1,99 @@
+"""Strange bytes for every parser, by atheris: `python3 dev.py fuzz`. Standard library only.
+
+    python3 dev.py fuzz                          a quarter of an hour for all targets together
+    python3 dev.py fuzz -- --minutes 60          an hour
+    python3 dev.py fuzz -- json_codec keys       these targets; --list names all
+    python3 dev.py fuzz -- --again FILE          what a finding was
+
+Makes an environment in `build/fuzz` of pinned packages, without Qt. What atheris found interesting is kept
+in `build/fuzz/corpus` and begun with the next time; each finding is a file in `build/fuzz/findings` with what
+was raised beside it. Exit code 1 when there is any. Then: mend the library, and add the bytes to
+`tests/fuzz/cases.py`. See docs/fuzzing.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from tools.computer import ROOT, Computer, Trouble
+from tools.versions import environment
+
+FOLDER = ROOT / "build" / "fuzz"
+HARNESS = "tests/fuzz/harness.py"
+MINUTES = 15.0
+LEAST_S = 1
+"""A target has so long at least."""
+
+
+def seconds_each(weights: Mapping[str, int], minutes: float) -> dict[str, int]:
+    """How long each target is tried: what is slower gets twice as long."""
+    shares = {name: 2 if weight > 1 else 1 for name, weight in weights.items()}
+    one = minutes * 60 / max(1, sum(shares.values()))
+    return {name: max(LEAST_S, round(one * share)) for name, share in shares.items()}
+
+
+def findings_in(folder: Path) -> list[Path]:
+    """Files of bytes that a parser could not bear; what was raised is beside each."""
+    return sorted(path for path in folder.glob("*") if path.suffix != ".txt") if folder.is_dir() else []
+
+
+def fuzz(computer: Computer, given: Sequence[str], folder: Path = FOLDER) -> int:
+    """Try what was asked for; 0 when nothing was found, 1 when something was."""
+    parser = argparse.ArgumentParser(
+        prog="dev.py fuzz", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("names", nargs="*", metavar="TARGET", help="all when none is given")
+    parser.add_argument("--minutes", type=float, default=MINUTES, help="for all targets together")
+    parser.add_argument("--list", action="store_true", help="name the targets")
+    parser.add_argument("--again", type=Path, metavar="FILE", help="give these bytes to their target")
+    options = parser.parse_args([each for each in given if each != "--"])
+    if not 0 < options.minutes <= 24 * 60:
+        parser.error("--minutes is more than 0 and at most 1440")
+    if computer.platform != "linux":
+        raise Trouble("atheris has packages for Linux only; the tests in tests/fuzz run everywhere")
+    python = environment(computer, sys.executable, folder / "environment", "fuzz")
+    command = [str(python), str(ROOT / HARNESS)]
+    if options.again is not None:
+        return computer.do([*command, "--again", str(options.again.resolve())], computer.environ, None)
+    weights = _targets(computer, command)
+    if options.list:
+        print("\n".join(weights), flush=True)
+        return 0
+    if unknown := [name for name in options.names if name not in weights]:
+        raise Trouble(f"there is no target '{unknown[0]}'; --list names them")
+    wanted = {name: weights[name] for name in options.names or weights}
+    found = folder / "findings"
+    shutil.rmtree(found, ignore_errors=True)
+    found.mkdir(parents=True)
+    plan = [f"{name}={seconds}" for name, seconds in seconds_each(wanted, options.minutes).items()]
+    code = computer.do([*command, str(folder), *plan], computer.environ, None)
+    return max(code, _told(folder / "findings"))
+
+
+def _targets(computer: Computer, command: Sequence[str]) -> dict[str, int]:
+    """All targets, with how slow they are."""
+    try:
+        weights: dict[str, int] = json.loads(computer.ask([*command, "--list"]))
+    except ValueError:
+        raise Trouble(f"the targets cannot be imported; '{' '.join(command)} --list' says why") from None
+    return weights
+
+
+def _told(folder: Path) -> int:
+    """Say what was found; 1 when there is anything."""
+    found = findings_in(folder)
+    for path in found:
+        beside = path.with_suffix(".txt")
+        print(f"\n=== {path}", flush=True)
+        print(
+            beside.read_text(encoding="utf-8")
+            if beside.is_file()
+            else "it takes too long, or too much memory"
+        )
+    print(f"· {len(found)} findings in {folder}", flush=True)
+    return 1 if found else 0
