@@ -98,7 +98,7 @@ class Session:
         make_source = source if source is not None else partial(LiveSource, always=LOGS)
         sinks = [self._checks.look, self._mailbox.post, self._offer]
         self.source: Source = make_source(self.address, sinks, self._mailbox.post_event)
-        self.networks = Networks(self.settings, sinks[1:], self._mailbox.post_event)
+        self.networks = Networks(self.settings, sinks[1:], self._mailbox.post_event, self.alerts)
         modules = VIRTUAL_ROBOTS.values()
         processes = VirtualProcesses(modules, lambda: self.launcher.process_ids)
         self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Literal, Protocol
 
+from app.core.alerts import Alerts
 from app.core.network.mailbox import Batch
 from app.core.network.nodes import NodeEntry, Nodes
 from app.core.network.source import GraphSeen, MasterFound, MasterLost, Sink, WatchFailed
@@ -15,9 +16,12 @@ from app.core.networks.kinds import KINDS, NetworkKind, kind_named
 from app.core.networks.source import OtherSource
 from app.core.storage.settings import Settings
 from nep.errors import NepError
+from nep.i18n import _
 
 KEPT = "networks"
 """Which are looked at, by kind: their addresses."""
+LOOK_COMMAND = "network.look"
+"""The window's command that lets a person choose."""
 COUNT_S = 1.0
 
 NetworkState = Literal["off", "looking", "there", "lost"]
@@ -120,9 +124,14 @@ class Networks:
         settings: Settings,
         sinks: Sequence[Sink],
         post_event: Callable[[object], None],
+        alerts: Alerts,
         make: MakeNetwork = OtherSource,
     ) -> None:
-        """``sinks`` take messages by their topics' names among all networks, ``post_event`` what is told."""
+        """``sinks`` take messages by their topics' names among all networks, ``post_event`` what is told.
+
+        ``alerts`` say which network does not answer.
+        """
+        self._alerts = alerts
         self._settings, self._sinks, self._post_event, self._make = settings, tuple(sinks), post_event, make
         self._networks = {kind.name: OtherNetwork(kind) for kind in KINDS}
         self._watched: dict[str, set[str]] = {kind.name: set() for kind in KINDS}
@@ -229,6 +238,7 @@ class Networks:
             network.source.end()
             self._ending.append(network.source)
             network.source = None
+            self._alerts.resolve(f"network:{network.kind.name}")
             self._changes += network.topics.revision + network.nodes.revision + 1
             network.forget()
 
@@ -240,7 +250,25 @@ class Networks:
         if network.is_chosen and told.number == network.number:
             before = network.state
             network.take(told.event, now)
-            self._changes += network.state != before
+            if network.state != before:
+                self._changes += 1
+                self._tell(network)
+
+    def _tell(self, network: OtherNetwork) -> None:
+        """An alert says what is wrong with it, as long as that is so."""
+        id = f"network:{network.kind.name}"
+        if network.state != "lost":
+            self._alerts.resolve(id)
+            return
+        self._alerts.put(
+            id,
+            "warn",
+            _("{network} can't be looked at now.").format(network=network.kind.words),
+            f"{network.sentence[:1].upper()}{network.sentence[1:]}.",
+            button=_("Other networks"),
+            action=LOOK_COMMAND,
+            count=0,
+        )
 
     def add(self, key: str, batch: Batch, now: float) -> None:
         """Take over what arrived on a topic that is looked at."""
@@ -294,10 +322,23 @@ class Networks:
         self._ending.clear()
 
 
+def lost_words(network: OtherNetwork) -> str:
+    """Why nothing new is known of it: "ROS 1: no ROS master answers at ..."; empty while it is well."""
+    if network.state != "lost":
+        return ""
+    return _("{network}: {reason}.").format(network=network.kind.words, reason=network.sentence)
+
+
 def network_words(name: str) -> str:
     """What people call the network of this kind; "NEP" for the native one."""
     kind = kind_named(name)
     return kind.words if kind is not None else "NEP"
+
+
+def topic_words(key: str) -> str:
+    """What a topic is called: "/camera", or "/camera on ROS 2"."""
+    name, topic = split_key(key)
+    return _("{topic} on {network}").format(topic=topic, network=network_words(name)) if name else topic
 
 
 def by_network(batches: Mapping[str, Batch]) -> tuple[dict[str, Batch], dict[str, Batch]]:

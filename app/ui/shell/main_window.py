@@ -321,7 +321,7 @@ class MainWindow(QMainWindow):
 
     def open_topic(self, topic: str) -> None:
         """Show a topic in the open panel that fits it best, else in the inspector."""
-        known = self.session.topics.get(topic)
+        known = self.session.topic(topic)
         kinds = {known.codec, known.msg_type} if known is not None else set()
         bench = self.bench if self.bench is not None else self.show_layout("developer")
         dock = fitting(bench.docks, bench.open_names(), kinds)

@@ -5,86 +5,25 @@ from __future__ import annotations
 import json
 import sys
 import uuid
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
 import nep
 from app.core.network.mailbox import Batch
-from app.core.network.source import GraphSeen, MasterFound, MasterLost, Sink, WatchFailed
+from app.core.network.source import GraphSeen, MasterFound, MasterLost, WatchFailed
 from app.core.network.topics import Topic, Topics, key_of, split_key
-from app.core.networks.kinds import KINDS, NetworkKind, kind_named
-from app.core.networks.networks import KEPT, NetworkEvent, Networks, by_network
+from app.core.networks.kinds import KINDS, kind_named
+from app.core.networks.networks import KEPT, by_network, lost_words
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
 from nep.errors import BackendUnavailableError, NepError
 from nep.messages.message import Message
-from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from nep.protocol.graph_view import GraphView
+from tests.core.networks.fake_networks import World, graph
 from tests.core.waiting import tick_until
 from tests.e2e.waiting import until
-
-
-class Fake:
-    """A source that a test tells what to tell."""
-
-    def __init__(
-        self,
-        kind: NetworkKind,
-        address: str,
-        sinks: Sequence[Sink],
-        post_event: Callable[[object], None],
-    ) -> None:
-        self.kind, self.address, self.sinks, self.tell = kind, address, sinks, post_event
-        self.wanted: set[str] = set()
-        self.said: list[str] = []
-
-    def start(self) -> None:
-        self.said.append("start")
-
-    def watch(self, topic: str) -> None:
-        self.wanted.add(topic)
-
-    def unwatch(self, topic: str) -> None:
-        self.wanted.discard(topic)
-
-    def end(self) -> None:
-        self.said.append("end")
-
-    def close(self) -> None:
-        self.said.append("close")
-
-
-class World:
-    """Networks over fakes, and what was posted."""
-
-    def __init__(self, settings: Settings) -> None:
-        self.made: list[Fake] = []
-        self.posted: list[NetworkEvent] = []
-        self.settings = settings
-        self.networks = Networks(settings, [], self.post, self.make)
-
-    def post(self, event: object) -> None:
-        assert isinstance(event, NetworkEvent)
-        self.posted.append(event)
-
-    def make(
-        self, kind: NetworkKind, address: str, sinks: Sequence[Sink], post: Callable[[object], None]
-    ) -> Fake:
-        self.made.append(Fake(kind, address, sinks, post))
-        return self.made[-1]
-
-    def tell(self, event: object, now: float = 0.0, source: int = -1) -> None:
-        """The newest source tells this, and it is taken over."""
-        self.made[source].tell(event)
-        self.networks.on_event(self.posted.pop(), now)
-
-
-def graph(*topics: str, rate_hz: float | None = None, revision: int = 1) -> GraphView:
-    publisher = PublisherInfo(1, "/arm", (), False, 0, 0, 0, None, rate_hz, None)
-    infos = {name: TopicInfo(name, "std_msgs/String", "ros", (publisher,), (), rate_hz) for name in topics}
-    return GraphView(1, revision, {"/arm": NodeInfo("/arm", "arm", "", None, "", "ros", 0)}, infos)
 
 
 @pytest.fixture
@@ -196,11 +135,15 @@ def test_a_network_that_does_not_answer_is_grey_with_a_sentence_until_it_is_back
     (network,) = world.networks.chosen
     assert (network.state, network.sentence) == ("lost", "no ROS master answers")
     assert [topic.stale for topic in network.topics] == [node.stale for node in network.nodes] == [True]
+    assert lost_words(network) == "ROS 1: no ROS master answers."
+    (alert,) = world.alerts.active
+    assert (alert.title, alert.detail) == ("ROS 1 can't be looked at now.", "No ROS master answers.")
     assert world.networks.revision > revision
     world.networks.age(100.0, 0)
     assert [topic.name for topic in network.topics] == ["/a"], "it may be there: who is connected goes on"
     world.tell(GraphSeen(graph("/a", revision=2), 0.0), 101.0)
-    assert (network.state, network.sentence) == ("there", "")
+    assert (network.state, network.sentence, lost_words(network)) == ("there", "", "")
+    assert world.alerts.active == ()
     assert [topic.stale for topic in network.topics] == [node.stale for node in network.nodes] == [False]
     world.tell(GraphSeen(GraphView(1, 3), 0.0), 102.0)
     assert [topic.gone_s for topic in network.topics] == [0.0]
@@ -213,7 +156,9 @@ def test_what_a_source_tells_that_was_ended_is_not_taken_over(world: World) -> N
     world.networks.choose("ros", "127.0.0.1:2")
     world.tell(GraphSeen(graph("/of/the/first"), 0.0), source=0)
     assert world.networks.topics == []
+    world.tell(MasterLost("", "no ROS master answers"))
     world.networks.leave("ros")
+    assert world.alerts.active == (), "nobody wants to know any more"
     world.tell(GraphSeen(graph("/a"), 0.0))
     assert (world.networks.topics, world.networks.nodes) == ([], [])
     world.networks.choose("ros", "127.0.0.1:2")

@@ -204,7 +204,7 @@ def test_the_curve_of_the_last_rates_stands_before_the_rate(panel, window) -> No
 
 def test_columns_are_chosen_in_a_menu_and_come_back_with_the_layout(qtbot, panel, window) -> None:
     assert panel.table.isColumnHidden(place_of(panel, "subscribers"))
-    (columns,) = panel.more_actions()
+    columns, _others = panel.more_actions()
     menu = columns.menu()
     by_words = {action.text(): action for action in menu.actions()}
     assert "Topic" not in by_words  # it names the row
@@ -221,7 +221,7 @@ def test_columns_are_chosen_in_a_menu_and_come_back_with_the_layout(qtbot, panel
     assert isinstance(again, TopicsPanel)
     assert not again.table.isColumnHidden(place_of(panel, "subscribers"))
     assert again.table.isColumnHidden(place_of(panel, "bandwidth"))
-    (columns,) = again.more_actions()
+    columns, _others = again.more_actions()
     next(action for action in columns.menu().actions() if action.text() == "As at first").trigger()
     assert again.table.isColumnHidden(place_of(panel, "subscribers"))
     assert again.save_state()["columns"] == {}

@@ -10,6 +10,7 @@ from PySide6.QtCore import QPoint, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage, QResizeEvent
 
 from app.core.messages import snapshots
+from app.core.networks.networks import topic_words
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.image.actions import PictureActions
 from app.ui.panels.image.snapshot import SnapshotJob
@@ -43,7 +44,7 @@ class ImagePanel(PanelWidget):
         self._watch: Watch | None = None
         self._watched_robot = ""
         self._places: dict[str, PicturePlace] = {}
-        self._revision = -1
+        self._revision = (-1, -1)
         self._there: bool | None = None
         self.choose = IconButton(self.theme, "chevron-down", _("Choose a picture topic"), size=26)
         self.choose.setProperty("place", "start")
@@ -81,8 +82,9 @@ class ImagePanel(PanelWidget):
         self.header = [self.fit, self.freeze, self.keep]
 
     def topics(self) -> list[str]:
-        """The picture topics that there are now."""
-        return [topic.name for topic in self.session.topics if topic.codec == CODEC and topic.gone_s is None]
+        """The picture topics that there are now; those of other networks last."""
+        every = (*self.session.topics, *self.session.networks.topics)
+        return [topic.key for topic in every if topic.codec == CODEC and topic.gone_s is None]
 
     def show_topic(self, name: str) -> None:
         """Look at another topic."""
@@ -94,10 +96,10 @@ class ImagePanel(PanelWidget):
         self._topic = name
         self.view.clear()
         self.freeze.setChecked(False)
-        self.set_title(_("Image"), name)
+        self.set_title(_("Image"), topic_words(name))
         if name:
             self._stream = self.session.images.stream(name)
-            self.session.topics.mark_seen(name)
+            self.session.mark_seen(name)
         self._say_nothing()
 
     def _show_place_of(self, topic: str) -> None:
@@ -108,8 +110,9 @@ class ImagePanel(PanelWidget):
         self.actions_of.show_checks()
 
     def refresh(self) -> None:
-        if self.session.topics.revision != self._revision:
-            self._revision = self.session.topics.revision
+        revision = self.session.topics.revision, self.session.networks.revision
+        if revision != self._revision:
+            self._revision = revision
             there = self.topics()
             self.choose.setVisible(bool(there))
             if not self._topic and there:
@@ -137,7 +140,7 @@ class ImagePanel(PanelWidget):
 
     def _say_nothing(self) -> None:
         if self._topic:
-            words = _("The next picture on {topic} appears here.").format(topic=self._topic)
+            words = _("The next picture on {topic} appears here.").format(topic=topic_words(self._topic))
             self.empty.say(_("No pictures yet"), words, "image")
             self.empty.set_actions([])
         else:
@@ -220,7 +223,7 @@ class ImagePanel(PanelWidget):
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
         for name in self.topics():
-            action = menu.addAction(plain.entry(name))
+            action = menu.addAction(plain.entry(topic_words(name)))
             action.setCheckable(True)
             action.setChecked(name == self._topic)
             action.triggered.connect(lambda _on=False, name=name: self.show_topic(name))

@@ -129,6 +129,14 @@ class InspectorBody(QWidget):
             self.empty.say(_("No message yet"), words)
             self.empty.set_actions([])
 
+    def say_unread(self, topic: str, reason: str) -> None:
+        """Messages of this topic can't be read, and why."""
+        words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
+        if words != self._waiting:
+            self._waiting = words
+            self.empty.say(_("It can't be read here"), words)
+            self.empty.set_actions([])
+
     def say_nothing(self, topic: str, choose: Callable[[], object]) -> None:
         """There is no message: of which topic, or that none is chosen."""
         self._waiting = ""

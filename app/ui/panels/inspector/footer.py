@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, QSize, Qt
@@ -16,6 +17,7 @@ from app.ui.widgets import FixedWidthLabel, IconButton, Separator, label, paint
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
+    from app.core.networks.kinds import NetworkKind
     from nep.messages.message import Message
 
 FACTS_S = 0.1  # nobody reads faster, and each time is painted
@@ -23,10 +25,12 @@ _SHOWN_S = 0.0001
 """Less than the last digit is not shown as nothing."""
 
 
-def message_facts(message: Message, since_ns: int = 0) -> str:
+def message_facts(message: Message, since_ns: int = 0, network: NetworkKind | None = None) -> str:
     """``seq 18 204   412 B   latency 0.6 ms``, just when it came; what is not known is left out.
 
-    Of another computer's message ``latency 3.2 ms ± 0.4 ms``, corrected by how the clocks differ.
+    Of another computer's message ``latency 3.2 ms ± 0.4 ms``, corrected by how the clocks differ. Another
+    ``network`` than Studio's own is named when it does not tell what is missing.
+
     A latched message from before ``since_ns``, when somebody began to look, took no time on its way: it says
     how long ago it was sent.
     """
@@ -39,6 +43,8 @@ def message_facts(message: Message, since_ns: int = 0) -> str:
             facts.append(_("latched, sent {age} ago").format(age=age_words(age_s)))
         else:
             facts += _latency_facts(message)
+    if network is not None:
+        facts += _untold(message, network.words)
     return "   ".join(facts)
 
 
@@ -54,6 +60,16 @@ def _latency_facts(message: Message) -> list[str]:
             latency=words, uncertainty=latency_words(max(uncertainty_s, _SHOWN_S))
         )
     return [_("latency {latency}").format(latency=words)]
+
+
+def _untold(message: Message, network: str) -> Iterator[str]:
+    """What can't be known of a message, because its network does not tell it."""
+    if message.seq is None and message.stamp_ns is None:
+        yield _("{network} tells no seq and no latency").format(network=network)
+    elif message.seq is None:
+        yield _("{network} tells no seq").format(network=network)
+    elif message.stamp_ns is None:
+        yield _("{network} tells no latency").format(network=network)
 
 
 class Legend(QWidget):

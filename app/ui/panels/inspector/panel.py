@@ -11,6 +11,9 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.messages.reader import LARGE_BYTES, Reader, Reading
+from app.core.network.topics import split_key
+from app.core.networks.kinds import kind_named
+from app.core.networks.networks import topic_words
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
 from app.ui.panels.inspector.actions import InspectorActions
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE, InspectorBody
@@ -100,29 +103,36 @@ class InspectorPanel(PanelWidget):
         self.foot.clear()
         for button in (self.freeze, self.pin):
             button.setChecked(False)
-        self.set_title(_("Inspector"), name)
+        self.set_title(_("Inspector"), topic_words(name))
         if name:
             self._since_ns = time.time_ns()
             self._watch = self.session.watch(name)
-            self.session.topics.mark_seen(name)
+            self.session.mark_seen(name)
         self._say_nothing()
 
     def refresh(self) -> None:
         if not self._topic:
             return
-        topic = self.session.topics.get(self._topic)
+        topic = self.session.topic(self._topic)
         self.live.set(*chip_words(topic, self.frozen))
         newest = topic.newest if topic is not None and topic.gone_s is None else None
         if topic is not None and newest is not None and newest is not self._shown and not self.frozen:
             self._take(newest)
         if self.body.page == NOTHING:
-            self.body.say_waiting(self._topic, topic is not None and topic.publishers > 0)
+            self._say_waiting(topic)
         done = self.reader.take()
         if done is not None and not self._raw_wanted:
             self._show_read(done)
         self.foot.show_next_facts(self.clock())
         if self.body.page == TREE and self.tree.fading():
             self.tree.viewport().update()
+
+    def _say_waiting(self, topic: Topic | None) -> None:
+        unread = self.session.networks.unread(self._topic)
+        if unread:
+            self.body.say_unread(topic_words(self._topic), unread)
+        else:
+            self.body.say_waiting(topic_words(self._topic), topic is not None and topic.publishers > 0)
 
     def _take(self, message: Message) -> None:
         large = message.size_bytes > LARGE_BYTES and message.codec != "image"
@@ -153,7 +163,7 @@ class InspectorPanel(PanelWidget):
         self._shown, self._reading = message, done
         if fresh:
             self._before = self._value if self._value is not None else OFF
-            topic = self.session.topics.get(self._topic)
+            topic = self.session.topic(self._topic)
             if message.size_bytes <= LARGE_BYTES and topic is not None and topic.previous is not None:
                 self._before = payload_or(topic.previous, self._before)
             self.finder.forget()
@@ -165,7 +175,8 @@ class InspectorPanel(PanelWidget):
     def _facts(self, message: Message) -> str:
         """What is said of a message stays as it was when it came, however long it is looked at."""
         if message is not self._facts_of[0]:
-            self._facts_of = (message, message_facts(message, self._since_ns))
+            kind = kind_named(split_key(self._topic)[0])
+            self._facts_of = (message, message_facts(message, self._since_ns, kind))
         return self._facts_of[1]
 
     def _show_value(self) -> None:
@@ -213,7 +224,7 @@ class InspectorPanel(PanelWidget):
         self.own.set_enabled(page == TREE)
 
     def _say_nothing(self) -> None:
-        self.body.say_nothing(self._topic, lambda: self.context.run("panel:topics"))
+        self.body.say_nothing(topic_words(self._topic), lambda: self.context.run("panel:topics"))
         if not self._topic:
             self.live.set("")
         for button in (self.freeze, self.pin):
@@ -243,7 +254,7 @@ class InspectorPanel(PanelWidget):
             return
         if self._reading is not None and self._reading.message is shown and not self._raw_wanted:
             self._show_read(self._reading)
-        elif self.session.topics.get(self._topic) is not None:
+        elif self.session.topic(self._topic) is not None:
             self._take(shown)
 
     def _chosen(self, index: QModelIndex) -> None:
@@ -310,6 +321,8 @@ def chip_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
         return pgettext("message", "frozen"), "off", "snowflake"
     if topic is None:
         return pgettext("topic", "gone"), "off", ""
+    if topic.stale:
+        return pgettext("topic", "no answer"), "warn", ""
     if topic.gone_s is not None:
         return _("gone {seconds} s").format(seconds=int(topic.gone_s)), "off", ""
     return pgettext("message", "live"), "info", ""

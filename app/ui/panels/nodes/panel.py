@@ -9,9 +9,11 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.network.source import NODE_NAME
+from app.core.networks.networks import network_words
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.network_table import NetworkTable, own_everywhere
 from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, limits_of, rows_of
-from app.ui.panels.table_panel import TablePanel, TableWords
+from app.ui.panels.table_panel import TableWords
 from app.ui.text.numbers import rate_words
 from app.ui.widgets import Scrolled
 from app.ui.widgets.table.model import TableModel
@@ -31,7 +33,7 @@ SORT_EVERY = 30  # refreshes of 30 a second: what moves is sorted once a second
 LIVELY = frozenset({"cpu"})
 
 
-class NodesPanel(TablePanel[NodeRow]):
+class NodesPanel(NetworkTable[NodeRow]):
     """The table of nodes, a filter in the title, what is known of the chosen one below."""
 
     def __init__(self, context: PanelContext) -> None:
@@ -41,7 +43,8 @@ class NodesPanel(TablePanel[NodeRow]):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget, stretch in ((self.pages, 1), (self.line, 0), (self._about, 0), (self.doctor, 0)):
+        parts = ((self.pages, 1), (self.networks, 0), (self.line, 0), (self._about, 0), (self.doctor, 0))
+        for widget, stretch in parts:
             column.addWidget(widget, stretch)
         self._opened: set[str] = set()
         self._seen: tuple[object, ...] = ()
@@ -59,22 +62,28 @@ class NodesPanel(TablePanel[NodeRow]):
 
     def _own(self, node: NodeEntry) -> bool:
         """Whether it is Studio, or a virtual robot that Studio itself started."""
+        if node.network:
+            return own_everywhere([node.name])
         return node.name in {NODE_NAME, *self.session.launcher.virtual_robots}
 
     def refresh(self) -> None:
         self._ticks += 1
-        nodes = self.session.nodes
         order = self.table.order.column
         due = order is not None and order.name in LIVELY and self._ticks % SORT_EVERY == 0
-        if due or (nodes.revision, self.session.master.kind) != self._seen:
+        if due or self._facts() != self._seen:
             self.rebuild()
-        if nodes.values_revision != self._values or (self._gone and self._ticks % SORT_EVERY == 0):
-            self._values = nodes.values_revision
+        values = self.session.nodes.values_revision + self.session.networks.values_revision
+        if values != self._values or (self._gone and self._ticks % SORT_EVERY == 0):
+            self._values = values
             self.table.tell_visible_changed()
 
+    def _facts(self) -> tuple[object, ...]:
+        session = self.session
+        return session.nodes.revision, session.networks.revision, session.master.kind
+
     def rebuild(self) -> None:
-        nodes = self.session.nodes
-        self._seen = (nodes.revision, self.session.master.kind)
+        nodes = [*self.session.nodes, *self.session.networks.nodes]
+        self._seen = self._facts()
         self._gone = any(node.gone_s is not None for node in nodes)
         words = self.filter_words()
         found = [node for node in nodes if all(word in _haystack(node) for word in words)]
@@ -82,10 +91,11 @@ class NodesPanel(TablePanel[NodeRow]):
         self.filter.setVisible(len(nodes) > 0)
         self.table.tell_visible_changed()
         self.show_table(bool(found), bool(words))
+        self.show_networks()
         self._say_chosen()
 
     def _rate(self, name: str) -> str:
-        topic = self.session.topics.get(name)
+        topic = self.session.topic(name)
         return rate_words(topic.rate_hz) if topic is not None else ""
 
     def say_empty(self) -> None:
@@ -110,17 +120,18 @@ class NodesPanel(TablePanel[NodeRow]):
         if row is None:
             return
         if row.topic:
-            self.session.topics.mark_seen(row.topic)
-            self.context.open_topic(row.topic)
+            self.session.mark_seen(row.topic_key)
+            self.context.open_topic(row.topic_key)
         else:
-            self.session.nodes.mark_seen(row.node.id)
-            self._fold(key, row.node.id not in self._opened)
+            network = self.session.networks.get(row.node.network)
+            (network.nodes if network is not None else self.session.nodes).mark_seen(row.node.id)
+            self._fold(key, row.node.key not in self._opened)
 
     def _fold(self, key: str, opened: bool) -> None:
         row = self.model.row_at(self.model.index_of(key))
         if row is None or (opened and row.topic):
             return
-        (self._opened.add if opened else self._opened.discard)(row.node.id)
+        (self._opened.add if opened else self._opened.discard)(row.node.key)
         self.rebuild()
         self.table.choose(NodeRow(row.node).key)
 
@@ -141,7 +152,9 @@ class _NodeTable(TableView[NodeRow]):
 
 def _haystack(node: NodeEntry) -> str:
     topics = " ".join((*node.publishes, *node.subscribes))
-    return f"{node.name} {node.host} {node.pid} {node.language} {node.generation} {topics}".casefold()
+    network = network_words(node.network)
+    facts = f"{node.name} {node.host} {node.pid} {node.language} {node.generation} {network}"
+    return f"{facts} {topics}".casefold()
 
 
 PANEL = Panel("nodes", WORDS.title, "network", (), NodesPanel)

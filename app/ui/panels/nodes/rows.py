@@ -8,6 +8,8 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 
 from app.core.network.nodes import NodeEntry
+from app.core.network.topics import key_of
+from app.core.networks.kinds import kind_named
 from app.ui.text.numbers import age_words
 from app.ui.widgets.table.model import Cell, Column, Order
 from nep.i18n import _, lazy, number, pgettext, plazy
@@ -25,6 +27,10 @@ NOT_SERVED = lazy("NEP {version} is not served: nobody understands its messages.
 LIMITS = lazy(
     "A program of {nep}: it sends no numbers and no times, so what was lost and how old a message is can't "
     "be known."
+)
+LIMITS_OF_NETWORK = lazy(
+    "A node of {network}: nobody tells there in which process it runs, since when, and what it takes of a"
+    " processor."
 )
 ORIGINAL = lazy("the original NEP")
 BRIDGE = lazy(
@@ -47,7 +53,12 @@ class NodeRow:
     @property
     def key(self) -> str:
         """Names the row for ever."""
-        return f"{self.node.id} {self.way} {self.topic}"
+        return f"{self.node.key} {self.way} {self.topic}"
+
+    @property
+    def topic_key(self) -> str:
+        """The topic's name among those of all networks."""
+        return key_of(self.node.network, self.topic)
 
 
 def rows_of(
@@ -56,9 +67,9 @@ def rows_of(
     order: Order[NodeRow],
     rate: Callable[[str], str],
 ) -> list[NodeRow]:
-    """The nodes in their order; below each of those ``opened`` (ids) its topics."""
+    """The nodes in their order; below each of those ``opened`` (their keys) its topics."""
     rows: list[NodeRow] = []
-    for head in order.sort([NodeRow(node, node.id in opened) for node in nodes]):
+    for head in order.sort([NodeRow(node, node.key in opened) for node in nodes]):
         rows.append(head)
         if head.opened:
             node = head.node
@@ -68,12 +79,21 @@ def rows_of(
 
 
 def generation_words(node: NodeEntry) -> str:
-    """Native, or which versions of the original NEP."""
+    """Native, which versions of the original NEP, or which other network."""
+    kind = kind_named(node.network)
+    if kind is not None:
+        return kind.words
     return _(GENERATIONS.get(node.generation, f"NEP {node.generation}"))
 
 
 def limits_of(node: NodeEntry) -> str:
-    """What an original program can't do, or what a bridge does, in words; empty for any other."""
+    """What an original program can't do, what a bridge does, or what can't be known on its network.
+
+    Empty for any other.
+    """
+    kind = kind_named(node.network)
+    if kind is not None:
+        return "" if kind.tells_figures else _(LIMITS_OF_NETWORK).format(network=kind.words)
     if node.is_bridge:
         return _(BRIDGE).format(topic=BRIDGES_TOPIC)
     if node.generation in UNSERVED:
@@ -108,7 +128,7 @@ def cpu_words(ratio: float | None) -> str:
 
 
 def _ink(row: NodeRow, role: str) -> str:
-    return role if row.node.gone_s is None else "textDisabled"
+    return role if row.node.gone_s is None and not row.node.stale else "textDisabled"
 
 
 def name_cell(row: NodeRow) -> Cell:
@@ -124,15 +144,25 @@ def name_cell(row: NodeRow) -> Cell:
 def generation_cell(row: NodeRow) -> Cell:
     """Native, original or a bridge; of a topic what the node does with it, and how often."""
     if row.topic:
-        rate = row.rate(row.topic) if row.rate is not None and row.way == PUBLISHES else ""
+        rate = row.rate(row.topic_key) if row.rate is not None and row.way == PUBLISHES else ""
         said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.way)
         return Cell(said, role=_ink(row, "textTertiary"))
     if row.node.is_bridge:
         return Cell(pgettext("node", "bridge"), "arrow-left-right", _ink(row, "textSecondary"))
     if row.node.generation in UNSERVED:
         return Cell(generation_words(row.node), "triangle-alert", _ink(row, "warn"))
-    icon = "plug" if row.node.is_original else None
+    icon = "plug" if row.node.is_original else "waypoints" if row.node.network else None
     return Cell(generation_words(row.node), icon, _ink(row, "textSecondary"))
+
+
+def cpu_cell(row: NodeRow) -> Cell:
+    """The share of a core, since when it is gone, or that its network does not tell."""
+    kind = kind_named(row.node.network)
+    if row.topic or row.node.gone_s is not None or kind is None or kind.tells_figures:
+        return _of_node(_cpu)(row)
+    if row.node.cpu_ratio is not None:
+        return _of_node(_cpu)(row)
+    return Cell(_("not told"), role=_ink(row, "textTertiary"))
 
 
 def _of_node(cell: Callable[[NodeEntry], str], role: str = "text") -> Callable[[NodeRow], Cell]:
@@ -163,11 +193,16 @@ def _name_tip(row: NodeRow) -> str:
 def _generation_tip(row: NodeRow) -> str:
     if row.topic:
         return _name_tip(row)
+    if row.node.network:
+        return limits_of(row.node) or _("On {network}").format(network=generation_words(row.node))
     said = _("Made with nep: nothing is lost unseen, every message has its number and time")
     return limits_of(row.node) or said
 
 
-def _cpu_tip(_row: NodeRow) -> str:
+def _cpu_tip(row: NodeRow) -> str:
+    kind = kind_named(row.node.network)
+    if kind is not None and row.node.cpu_ratio is None:
+        return limits_of(row.node)
     return _("The share of one processor core that its process used in the last second")
 
 
@@ -178,7 +213,8 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
     ),
     Column(
         "generation", lazy("Generation"), 116, generation_cell,
-        lambda r: (r.node.is_bridge, r.node.is_original, r.node.generation), tip=_generation_tip,
+        lambda r: (r.node.network, r.node.is_bridge, r.node.is_original, r.node.generation),
+        tip=_generation_tip,
     ),
     Column(
         "language", plazy("of a program", "Language"), 78, _of_node(lambda n: n.language, "textSecondary"),
@@ -192,7 +228,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
         "pid", lazy("PID"), 66, _of_node(lambda n: str(n.pid) if n.pid is not None else ""),
         lambda r: r.node.pid, figures=True, yields=5,
     ),
-    Column("cpu", lazy("CPU"), 66, _of_node(_cpu), lambda r: r.node.cpu_ratio, figures=True, tip=_cpu_tip),
+    Column("cpu", lazy("CPU"), 66, cpu_cell, lambda r: r.node.cpu_ratio, figures=True, tip=_cpu_tip),
     Column(
         "publishes", lazy("Publishes"), 80, _of_node(lambda n: str(len(n.publishes))),
         lambda r: len(r.node.publishes), figures=True, yields=1,

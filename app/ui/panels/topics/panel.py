@@ -7,19 +7,28 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.network.source import NODE_NAME
+from app.core.networks.networks import network_words
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.table_panel import TablePanel, TableWords
+from app.ui.panels.network_table import NetworkTable, own_everywhere
+from app.ui.panels.table_panel import TableWords
 from app.ui.panels.topics.columns import columns
 from app.ui.text.numbers import grouped
 from app.ui.widgets import EmptyAction, label
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
-from nep.i18n import _, lazy, ngettext
+from nep.i18n import _, lazy, listed, ngettext
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from app.core.network.topics import Topic
+    from app.core.networks.kinds import NetworkKind
 
 FOOT = lazy("Rates come from the publishers; nothing is subscribed but what you look at")
+FOOT_OF_NETWORKS = lazy(
+    "Rates come from the publishers; on {networks} nobody tells rates or losses, and what you look at is"
+    " counted here"
+)
 WORDS = TableWords(
     title=lazy("Topics"),
     filter=lazy("Filter topics"),
@@ -31,40 +40,41 @@ SORT_EVERY = 30
 LIVELY = frozenset({"rate", "bandwidth", "age", "loss"})
 
 
-class TopicsPanel(TablePanel["Topic"]):
+class TopicsPanel(NetworkTable["Topic"]):
     """The table of topics, a filter in the title, a line about the figures below."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, WORDS, "radio-tower")
         self.count = label("", "small", role="textSecondary")
         self.header.insert(0, self.count)
-        self.foot.setText(_(FOOT))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget, stretch in ((self.pages, 1), (self.line, 0), (self.foot, 0), (self.doctor, 0)):
+        parts = ((self.pages, 1), (self.networks, 0), (self.line, 0), (self.foot, 0), (self.doctor, 0))
+        for widget, stretch in parts:
             column.addWidget(widget, stretch)
-        self._seen = (-1, -1, "")
+        self._seen: tuple[object, ...] = ()
         self._ours: tuple[str, ...] = ()
         self._ticks = 0
         self._wanted = ""
 
     def make_model(self) -> TableModel[Topic]:
-        return TableModel(columns(self._own), lambda topic: topic.name)
+        return TableModel(columns(self._own, self.has_several), lambda topic: topic.key)
 
     def make_table(self, model: TableModel[Topic]) -> TableView[Topic]:
         return TableView(self.theme, model, "topic")
 
     def _own(self, topic: Topic) -> bool:
         """Whether only virtual robots that Studio itself started publish it, or Studio."""
+        if topic.network:
+            return own_everywhere(topic.publisher_nodes)
         if not topic.publisher_nodes:
             return topic.name.startswith(tuple(f"/{robot}/" for robot in self._ours))
         return {*self._ours, NODE_NAME}.issuperset(topic.publisher_nodes)
 
     def refresh(self) -> None:
         self._ticks += 1
-        topics = self.session.topics
-        facts = (topics.revision, len(topics), self.session.master.kind)
+        facts = self._facts()
         order = self.table.order.column
         lively = order is not None and order.name in LIVELY
         if facts != self._seen or (lively and self._ticks % SORT_EVERY == 0):
@@ -72,9 +82,13 @@ class TopicsPanel(TablePanel["Topic"]):
         if self._ticks % FIGURES_EVERY == 0 and self.model.rowCount():
             self.table.tell_visible_changed()
 
+    def _facts(self) -> tuple[object, ...]:
+        topics, networks = self.session.topics, self.session.networks
+        return topics.revision, len(topics), networks.revision, self.session.master.kind
+
     def rebuild(self) -> None:
-        topics = self.session.topics
-        self._seen = (topics.revision, len(topics), self.session.master.kind)
+        self._seen = self._facts()
+        topics = [*self.session.topics, *self.session.networks.topics]
         self._ours = self.session.launcher.virtual_robots
         words = self.filter_words()
         rows = [topic for topic in topics if all(word in _haystack(topic) for word in words)]
@@ -83,20 +97,23 @@ class TopicsPanel(TablePanel["Topic"]):
             self.show_topic(self._wanted)
         self._say_counts(len(topics), len(rows) if words else None)
         self.show_table(bool(rows), bool(words))
+        self.show_networks()
+        self.foot.setText(_foot([network.kind for network in self.session.networks.chosen]))
         self.foot.setVisible(bool(rows))
         self.line.setVisible(bool(rows))
 
     def _say_counts(self, known: int, found: int | None) -> None:
-        graph = self.session.graph
+        nodes = len(self.session.networks.nodes)
+        if self.session.graph is not None:
+            nodes += len(self.session.graph.nodes)
         if found is None:
             words = ngettext("{count} topic", "{count} topics", known)
         else:
             words = ngettext("{found} of {count} topic", "{found} of {count} topics", known)
         words = words.format(count=grouped(known), found=found)
-        if graph is not None and graph.nodes:
-            count = len(graph.nodes)
-            nodes = ngettext("{count} node", "{count} nodes", count).format(count=grouped(count))
-            words = _("{topics}, {nodes}").format(topics=words, nodes=nodes)
+        if nodes:
+            there = ngettext("{count} node", "{count} nodes", nodes).format(count=grouped(nodes))
+            words = _("{topics}, {nodes}").format(topics=words, nodes=there)
         self.count.setText(words if known else "")
         self.filter.setVisible(known > 0)
 
@@ -115,7 +132,7 @@ class TopicsPanel(TablePanel["Topic"]):
         self.context.run("robots.virtual")
 
     def open_row(self, key: str) -> None:
-        self.session.topics.mark_seen(key)
+        self.session.mark_seen(key)
         self.context.open_topic(key)
 
     def show_topic(self, name: str) -> None:
@@ -123,8 +140,17 @@ class TopicsPanel(TablePanel["Topic"]):
         self.table.choose(name)
 
 
+def _foot(kinds: Sequence[NetworkKind]) -> str:
+    """Where the figures come from."""
+    untold = [kind.words for kind in kinds if not kind.tells_figures]
+    if not untold:
+        return _(FOOT)
+    return _(FOOT_OF_NETWORKS).format(networks=listed(untold))
+
+
 def _haystack(topic: Topic) -> str:
-    return f"{topic.name} {topic.msg_type} {' '.join(topic.publisher_nodes)}".casefold()
+    words = (network_words(topic.network), topic.name, topic.msg_type, *topic.publisher_nodes)
+    return " ".join(words).casefold()
 
 
 PANEL = Panel("topics", WORDS.title, "list", (), TopicsPanel)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from app.core.documents.titles import recent_titles
+from app.core.networks.networks import topic_words
 from app.core.session import Session
 from app.ui.shell.actions.command import Command
 from app.ui.shell.actions.shortcuts import Shortcuts
@@ -35,7 +36,7 @@ class PaletteEntries:
         self._shown = [command for command in commands if command.in_palette]
         self._why_not = why_not
         self._topics: list[Entry] = []
-        self._topics_seen = -1
+        self._topics_seen = (-1, -1)
 
     def all(self) -> list[Entry]:
         """Everything, in the order in which equals stand in the palette."""
@@ -94,11 +95,17 @@ class PaletteEntries:
         return [Entry(f"example:{each.path}", each.name, "blocks", each.text) for each in examples]
 
     def _of_topics(self) -> list[Entry]:
-        topics = self._session.topics
-        if topics.revision != self._topics_seen:
-            self._topics_seen = topics.revision
+        topics, networks = self._session.topics, self._session.networks
+        if (topics.revision, networks.revision) != self._topics_seen:
+            self._topics_seen = topics.revision, networks.revision
+            there = [*topics.live(), *(topic for topic in networks.topics if topic.gone_since is None)]
             self._topics = [
-                Entry(f"topic:{topic.name}", topic.name, TOPIC_ICONS.get(topic.codec, "list"), topic.msg_type)
-                for topic in topics.live()
+                Entry(
+                    f"topic:{topic.key}",
+                    topic_words(topic.key),
+                    TOPIC_ICONS.get(topic.codec, "list"),
+                    topic.msg_type,
+                )
+                for topic in there
             ]
         return self._topics

@@ -11,6 +11,7 @@ from app.core.session import Session
 from app.errors import SettingsError
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.dialogs.network_access import NetworkAccessSheet
+from app.ui.shell.dialogs.other_networks import OtherNetworksSheet
 from app.ui.shell.documents import DocumentController
 from nep.i18n import _
 
@@ -46,6 +47,7 @@ class RobotCommands:
         """``undo`` takes back the last edit of the blocks."""
         self._shell, self._session, self._files, self._undo = shell, session, files, undo
         self._network_access: NetworkAccessSheet | None = None
+        self._other_networks: OtherNetworksSheet | None = None
 
     # -- virtual robots ---------------------------------------------------------------------------
 
@@ -152,6 +154,14 @@ class RobotCommands:
                 self._shell.theme, self._shell.surface, self._session.remote_access
             )
         self._network_access.open()
+
+    def choose_networks(self) -> None:
+        """Show which other networks are looked at, and let the person choose."""
+        if self._other_networks is None:
+            self._other_networks = OtherNetworksSheet(
+                self._shell.theme, self._shell.surface, self._session.networks
+            )
+        self._other_networks.open()
 
 
 def _model(kind: object) -> str | None:

@@ -274,6 +274,8 @@ COMMANDS: tuple[C, ...] = (
       "Robots", icon="footprints"),
     C("network.others", lazy("Let other computers connect"), lambda do: do.robots.ask_about_others(),
       "Robots", icon="wifi", above=True),
+    C("network.look", lazy("Look at other networks"), lambda do: do.robots.choose_networks(), "Robots",
+      icon="waypoints"),
     C("help.first_steps", lazy("First steps"), lambda do: do.view.first_steps(), "Help", icon="lightbulb"),
     C("help.guide", lazy("Guide"), lambda do: do.view.open_guide(), "Help", icon="book-open"),
     C("help.examples", lazy("Examples"), lambda do: do.view.examples(), "Help", icon="blocks"),

@@ -44,6 +44,9 @@ class TableAppearance(Protocol):
     def cell_at(self, row: int, column: int) -> Cell:
         """What a cell shows now."""
 
+    def columnWidth(self, column: int) -> int:
+        """How wide a column is; 0 when it is hidden."""
+
 
 def padded(rect: QRect, column: int, last: int) -> QRectF:
     """The inside of a cell: the outer columns keep further from the edge."""
@@ -97,11 +100,21 @@ class CellDelegate(QStyledItemDelegate):
             painter.fillRect(QRect(rect.left(), rect.top(), 2, rect.height()), theme.colour("accent"))
         figures = self._view.shown_columns[column].figures
         inside = padded(rect, column, self._view.last_shown)
+        if cell.spills:
+            inside.setLeft(inside.left() - self._blank_before(row, column))
         role = "selectedText" if chosen and cell.role == "text" else cell.role
         if chosen and role == "textTertiary":
             role = "accentText"
         self._paint_cell(painter, inside, cell, role, figures=figures)
         painter.restore()
+
+    def _blank_before(self, row: int, column: int) -> int:
+        """The room of the blank cells at the left of a cell."""
+        room = 0
+        while column > 0 and self._view.cell_at(row, column - 1).is_blank:
+            column -= 1
+            room += self._view.columnWidth(column)
+        return room
 
     def _paint_cell(self, painter: QPainter, box: QRectF, cell: Cell, role: str, *, figures: bool) -> None:
         theme = self._theme
@@ -110,7 +123,7 @@ class CellDelegate(QStyledItemDelegate):
             paint_sparkline(painter, place, cell.curve, theme.colour(role))
             return
         box = box.adjusted(cell.indent, 0, 0, 0)
-        if not (cell.text or cell.icon or cell.chip):
+        if cell.is_blank:
             return
         font = self._view.cell_font(cell)
         metrics = QFontMetricsF(font)

@@ -23,6 +23,8 @@ class ColumnChoice:
 
     def wanted(self, column: Column[Any]) -> bool:
         """Whether the column is to be shown where there is room."""
+        if column.when is not None and not column.when():
+            return False
         return self._chosen.get(column.name, not column.off) or column is self._columns[0]
 
     def show(self, name: str, shown: bool) -> None:
@@ -79,6 +81,8 @@ class ColumnChoice:
             changed()
 
         for column in self._columns[1:]:
+            if column.when is not None and not column.when():
+                continue
             action = menu.addAction(_(column.words or column.title))
             action.setCheckable(True)
             action.setChecked(self.wanted(column))

@@ -28,7 +28,7 @@ class Cell:
 
     Text that does not fit is shortened at its end, or in its ``middle``. ``curve`` are values to draw as a
     sparkline in place of the text, ``indent`` pixels to stand further in, ``tint`` the role of a box behind
-    the text.
+    the text. Text that ``spills`` goes on over the blank cells at its left.
     """
 
     text: str = ""
@@ -42,6 +42,12 @@ class Cell:
     curve: Sequence[float] = ()
     indent: int = 0
     tint: str = ""
+    spills: bool = False
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether nothing is painted."""
+        return not (self.text or self.icon or self.chip or self.curve)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +57,8 @@ class Column(Generic[Row]):
     ``title`` and ``words`` are marked with `lazy`. ``key`` gives what it is sorted by (None at the end,
     whatever the direction); without it the column can't be sorted. ``stretch`` takes the width that is left.
     ``tip`` is the tooltip's sentence. Where there is too little room (large text) columns that ``yield`` are
-    not shown, the largest number first. ``off`` ones are shown only when a person chooses them; ``words``
-    names one whose head is blank.
+    not shown, the largest number first. ``off`` ones are shown only when a person chooses them, those with
+    ``when`` only while that is so; ``words`` names one whose head is blank.
     """
 
     name: str
@@ -66,6 +72,7 @@ class Column(Generic[Row]):
     yields: int = 0
     off: bool = False
     words: str = ""
+    when: Callable[[], bool] | None = None
 
 
 @dataclass(slots=True)

@@ -1,0 +1,86 @@
+"""NetworkTable: a table of what is on Studio's own network, and on others that a person chose."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from app.core.network.source import NODE_NAME
+from app.core.networks.networks import LOOK_COMMAND, lost_words
+from app.ui.panels.base import PanelContext
+from app.ui.panels.table_panel import TablePanel, TableWords
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Separator, label
+from app.ui.widgets.buttons import LinkButton
+from app.ui.widgets.paint import show_when
+from nep.i18n import _
+
+Row = TypeVar("Row")
+
+
+class NetworkTable(TablePanel[Row]):
+    """As `TablePanel`; `networks`, below the table, says which other networks do not answer."""
+
+    def __init__(self, context: PanelContext, words: TableWords, icon: str) -> None:
+        """``icon`` is that of the empty state."""
+        super().__init__(context, words, icon)
+        self.networks = NetworkLine(self.theme, context.run)
+        self._networks_seen = 0
+        self._others = QAction(self.theme.icon("waypoints"), _("Other networks"), self)
+        self._others.triggered.connect(lambda _on=False: context.run(LOOK_COMMAND))
+
+    def has_several(self) -> bool:
+        """Whether a person looks at other networks beside Studio's own."""
+        return bool(self.session.networks.chosen)
+
+    def show_networks(self) -> None:
+        """Show which networks do not answer, and the column that tells rows apart where there are several."""
+        self.networks.say([lost_words(each) for each in self.session.networks.chosen])
+        if self._networks_seen != len(self.session.networks.chosen):
+            self._networks_seen = len(self.session.networks.chosen)
+            self.table.fit_columns()
+
+    def more_actions(self) -> list[QAction]:
+        return [*super().more_actions(), self._others]
+
+
+class NetworkLine(QWidget):
+    """Below the rows: which other networks do not answer and why, with the button that leads to them."""
+
+    def __init__(self, theme: Theme, run: Callable[[str], None]) -> None:
+        """``run`` does a command of the window by its name."""
+        super().__init__()
+        self.words = label("", "small", role="warn", wrap=True)
+        self.words.setMinimumWidth(0)
+        self.button = LinkButton(theme, _("Other networks"))
+        self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+        self.button.clicked.connect(lambda: run(LOOK_COMMAND))
+        row = QHBoxLayout()
+        row.setContentsMargins(12, 5, 12, 5)
+        row.setSpacing(8)
+        row.addWidget(self.words, 1)
+        row.addWidget(self.button, 0, Qt.AlignmentFlag.AlignTop)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(Separator(theme))
+        column.addLayout(row)
+        self.hide()
+
+    def say(self, sentences: Sequence[str]) -> None:
+        """Show these, each in a line of its own; nothing when all are empty."""
+        said = "\n".join(filter(None, sentences))
+        self.words.setText(said)
+        show_when(self, bool(said))
+
+
+def own_everywhere(nodes: Iterable[str]) -> bool:
+    """Whether these are only Studio's own nodes on another network; ROS names them after the process."""
+    process = f"{NODE_NAME}_{os.getpid()}_"
+    names = [name.lstrip("/") for name in nodes]
+    return bool(names) and all(name == NODE_NAME or name.startswith(process) for name in names)

@@ -1,0 +1,222 @@
+"""Which other networks Studio looks at beside its own: a switch for each, where it is, and how it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QScrollArea, QVBoxLayout, QWidget
+
+from app.core.networks.networks import Networks, OtherNetwork
+from app.errors import SettingsError
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.text.numbers import grouped
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Separator, Switch, label, paint, set_role
+from app.ui.widgets.menus import EditMenu
+from nep.errors import NepError
+from nep.i18n import _, lazy, ngettext
+
+WIDE = 560
+SWITCH_WIDE = 132
+LOOK_MS = 300
+SIDE, GAP, SCROLL_BAR = 19, 12, 10
+INTRODUCTION = lazy(
+    "Studio shows its own network. Switch on another one to see its topics and nodes beside it. Studio only"
+    " listens there."
+)
+
+
+class OtherNetworksSheet(Overlay):
+    """What is switched applies at once and is kept for the next start; there is nothing to confirm."""
+
+    top = 96
+
+    def __init__(self, theme: Theme, window: QWidget, networks: Networks) -> None:
+        super().__init__(theme, window, _("Other networks"))
+        self.rows = [NetworkRow(theme, each, networks) for each in networks]
+        self.introduction = label(_(INTRODUCTION), "body", role="textSecondary", wrap=True)
+        self._inside = QWidget()
+        self._inside.setProperty("bare", "true")
+        inside = QVBoxLayout(self._inside)
+        inside.setContentsMargins(SIDE, 0, SIDE, 0)
+        inside.setSpacing(GAP)
+        inside.addWidget(self.introduction)
+        for row in self.rows:
+            row.changed.connect(self.place)
+            inside.addWidget(Separator(theme))
+            inside.addWidget(row)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.viewport().setAutoFillBackground(False)
+        self._area.setWidget(self._inside)
+        self._head = self.head(label(_("Other networks"), "heading"))
+        self._head.setContentsMargins(SIDE, 0, SIDE, 0)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 14, 1, 16)
+        column.setSpacing(10)
+        column.addLayout(self._head)
+        column.addWidget(self._area, 1)
+        self._timer = QTimer(self)
+        self._timer.setInterval(LOOK_MS)
+        self._timer.timeout.connect(self.show_states)
+        self.closed.connect(self._timer.stop)
+
+    def first(self) -> QWidget:
+        return self.rows[0].switch
+
+    def wanted_size(self, room: QSize) -> QSize:
+        least = max(row.minimumSizeHint().width() for row in self.rows) + 2 + 2 * SIDE + SCROLL_BAR
+        wide = min(room.width(), max(round(self.theme.scaled(WIDE)), least))
+        inner = wide - 2 - 2 * SIDE - SCROLL_BAR
+        high = self.introduction.heightForWidth(inner)
+        # asked of each row: its place in the sheet's layout knows only later that its words have changed
+        high += sum(row.height_for(inner) + 1 + 2 * GAP for row in self.rows)
+        return QSize(wide, min(room.height(), high + self._head.sizeHint().height() + 14 + 10 + 16 + 4))
+
+    def open(self) -> None:
+        """Show what is chosen, and how it is, as long as it is open."""
+        for row in self.rows:
+            row.show_choice()
+        self.show_states()
+        self._timer.start()
+        super().open()
+
+    def shut(self) -> None:
+        """Also take over what was typed."""
+        for row in self.rows:
+            row.take()
+        super().shut()
+
+    def show_states(self) -> None:
+        """Say how each of them is."""
+        for row in self.rows:
+            row.show_state()
+
+
+class NetworkRow(QWidget):
+    """A switch with the network's name, its address, and a sentence below; `changed`: it may be higher."""
+
+    changed = Signal()
+
+    def __init__(self, theme: Theme, network: OtherNetwork, networks: Networks) -> None:
+        super().__init__()
+        self._network, self._networks = network, networks
+        kind = network.kind
+        self.switch = Switch(theme, kind.words)
+        self.switch.setMinimumWidth(round(theme.scaled(SWITCH_WIDE)))
+        place = _(kind.place)
+        self.address = AddressField(theme, f"{kind.words}: {place}", kind.example, self.take)
+        said = label(place, "small", role="textTertiary")
+        self.state = label("", "small", role="textSecondary", wrap=True)
+        self._wrong = ""
+        above = QHBoxLayout()
+        above.setSpacing(10)
+        above.addWidget(self.switch)
+        above.addStretch(1)
+        above.addWidget(said)
+        above.addWidget(self.address)
+        self._lines = QVBoxLayout(self)
+        self._lines.setContentsMargins(0, 0, 0, 0)
+        self._lines.setSpacing(4)
+        self._lines.addLayout(above)
+        self._lines.addWidget(self.state)
+        self.switch.clicked.connect(self._switched)
+        self.address.editingFinished.connect(self.take)
+
+    def height_for(self, width: int) -> int:
+        """The height that it needs now."""
+        self._lines.invalidate()
+        return self._lines.totalHeightForWidth(width)
+
+    def show_choice(self) -> None:
+        """What is chosen now."""
+        network = self._network
+        self.switch.setChecked(network.is_chosen)
+        if network.is_chosen:
+            self.address.setText(network.address)
+        self._complain("")
+
+    def show_state(self) -> None:
+        """How it is: there, looked for, or why it is not; what its address means while it is off."""
+        words = self._wrong or state_words(self._network)
+        role = "error" if self._wrong else "warn" if self._network.state == "lost" else "textSecondary"
+        set_role(self.state, role)
+        if words != self.state.text():
+            self.state.setText(words)
+            self.switch.setAccessibleDescription(words)
+            self.changed.emit()
+
+    def _switched(self, on: bool) -> None:
+        if on:
+            self._do(lambda: self._networks.choose(self._network.kind.name, self.address.text()))
+            self.switch.setChecked(self._network.is_chosen)
+        else:
+            self._do(lambda: self._networks.leave(self._network.kind.name))
+
+    def take(self) -> None:
+        """Look at the address that was typed, if it is switched on and another one."""
+        network = self._network
+        if network.is_chosen and self.address.text().strip() != network.address:
+            self._do(lambda: self._networks.choose(network.kind.name, self.address.text()))
+
+    def _do(self, change: Callable[[], None]) -> None:
+        try:
+            change()
+        except (NepError, SettingsError) as error:
+            self._complain(f"{str(error)[:1].upper()}{str(error)[1:]}.")
+        else:
+            self._complain("")
+            if self._network.is_chosen:
+                self.address.setText(self._network.address)
+
+    def _complain(self, sentence: str) -> None:
+        self._wrong = sentence
+        self.address.mark(wrong=bool(sentence))
+        self.show_state()
+        if sentence:
+            paint.announce(self.state, sentence)
+
+
+class AddressField(QLineEdit):
+    """Where a network is; Return takes it over and stays."""
+
+    def __init__(self, theme: Theme, name: str, example: str, take: Callable[[], object]) -> None:
+        super().__init__()
+        self._take = take
+        self.setAccessibleName(name)
+        self.setPlaceholderText(example)
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.setMinimumWidth(round(theme.scaled(190)))
+        self.setMaxLength(400)
+        EditMenu(theme, self)
+
+    def mark(self, *, wrong: bool) -> None:
+        """Give it the edge of a wrong value, or take it away."""
+        self.setProperty("wrong", "true" if wrong else "false")
+        self.style().unpolish(self)
+        self.style().polish(self)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self._take()
+        else:
+            super().keyPressEvent(event)
+
+
+def state_words(network: OtherNetwork) -> str:
+    """How a network is, in a sentence; what its address means while it is not looked at."""
+    if network.state == "lost":
+        return f"{network.sentence[:1].upper()}{network.sentence[1:]}."
+    if network.state == "looking":
+        return _("Looking for it.")
+    if network.state == "off":
+        return _(network.kind.hint)
+    topics, nodes = len(network.topics), len(network.nodes)
+    return _("There: {topics}, {nodes}.").format(
+        topics=ngettext("{count} topic", "{count} topics", topics).format(count=grouped(topics)),
+        nodes=ngettext("{count} node", "{count} nodes", nodes).format(count=grouped(nodes)),
+    )

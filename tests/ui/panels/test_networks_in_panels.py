@@ -1,0 +1,259 @@
+"""Topics, Nodes and Inspector show what is on other networks, and say in words what can't be known there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from PySide6.QtWidgets import QLabel
+
+from app.core.network.source import GraphSeen, MasterLost, WatchFailed
+from app.ui.panels.image.panel import PANEL as IMAGE
+from app.ui.panels.inspector.panel import PANEL as INSPECTOR
+from app.ui.panels.inspector.panel import InspectorPanel
+from app.ui.panels.nodes.panel import PANEL as NODES
+from app.ui.panels.nodes.panel import NodesPanel
+from app.ui.panels.topics.panel import PANEL as TOPICS
+from app.ui.panels.topics.panel import TopicsPanel
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from tests.core.networks.fake_networks import Fake
+from tests.pseudo import untranslated
+from tests.ui.clipping import clipped
+from tests.ui.fakes import Session
+from tests.ui.panel_case import OUT_OF_SIGHT, Window, ticks
+from tests.ui.panels.test_words import rows_of
+
+REASON = "no ROS master answers at '127.0.0.1:11311'; start one with 'roscore'"
+Look = Callable[[str], Fake]
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def look(window: Window) -> Look:
+    """Look at a network of this kind; what a test lets it tell is taken over with the next tick."""
+    made: list[Fake] = []
+
+    def make(*told: object) -> Fake:
+        made.append(Fake(*told))  # type: ignore[arg-type]
+        return made[-1]
+
+    window.session.networks._make = make  # type: ignore[assignment]
+
+    def choose(kind: str) -> Fake:
+        window.session.networks.choose(kind, "")
+        return made[-1]
+
+    return choose
+
+
+def ros_graph(codec: str = "ros") -> GraphView:
+    publisher = PublisherInfo(1, "/arm", (), False, 0, 0, 0, None, None, None)
+    ours = SubscriberInfo(2, "own", 3, None)
+    infos = (
+        TopicInfo("/camera", "sensor_msgs/Image", "image", (publisher,)),
+        TopicInfo("/blackboard", "std_msgs/String", codec, (publisher,), (ours,)),
+    )
+    nodes = (
+        NodeInfo("/arm", "arm", "", None, "", "ros", 0),
+        NodeInfo("own", "studio", "", None, "", "ros", 0),
+    )
+    return GraphView(1, 1, {n.id: n for n in nodes}, {t.name: t for t in infos})
+
+
+def message(topic: str, payload: bytes, seq: int | None = None) -> Message:
+    return Message(topic, payload, "json", "json", stamp_ns=None, seq=seq, publisher=1)
+
+
+def cells(panel: TopicsPanel | NodesPanel, key: str) -> dict[str, object]:
+    row = panel.model.index_of(key).row()
+    assert row >= 0, key
+    return {
+        column.name: panel.model.data(panel.model.index(row, place))
+        for place, column in enumerate(panel.table.columns)
+    }
+
+
+def tips(panel: TopicsPanel | NodesPanel, key: str) -> dict[str, str]:
+    row = panel.model.row_at(panel.model.index_of(key))
+    assert row is not None
+    return {column.name: column.tip(row) for column in panel.table.columns if column.tip}  # type: ignore[arg-type]
+
+
+def test_without_other_networks_topics_are_as_ever(qtbot, window: Window, look: Look) -> None:
+    panel = window.make(TOPICS)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, TopicsPanel)
+    place = [column.name for column in panel.table.columns].index("network")
+    assert panel.table.isColumnHidden(place)
+    assert "Network" not in [action.text() for action in panel.table.column_menu().actions()]
+    look("zenoh")
+    ticks(window, panel, 2)
+    assert not panel.table.isColumnHidden(place)
+    window.session.networks.leave("zenoh")
+    ticks(window, panel, 2)
+    assert panel.table.isColumnHidden(place)
+
+
+def test_topics_of_ros_stand_beside_the_native_ones_and_say_what_is_not_known(
+    qtbot, window: Window, look: Look
+) -> None:
+    panel = window.make(TOPICS)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, TopicsPanel)
+    ros = look("ros")
+    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ticks(window, panel, 2)
+    assert panel.count.text() == "15 topics, 9 nodes"
+    assert cells(panel, "/blackboard")["network"] == "NEP"
+    theirs = cells(panel, "ros /blackboard")
+    assert (theirs["topic"], theirs["network"], theirs["type"]) == ("/blackboard", "ROS 1", "String")
+    assert (theirs["rate"], theirs["bandwidth"], theirs["loss"]) == ("", "", "not known on ROS 1")
+    told = tips(panel, "ros /blackboard")
+    assert "nobody tells it" in told["rate"]
+    assert "not counted" in told["loss"]
+    assert "on ROS 1 nobody tells rates or losses" in panel.foot.text()
+    panel.filter.setText("ros 1 camera")
+    assert [panel.model.key_of(row) for row in panel.model._rows.shown] == ["ros /camera"]
+    panel.filter.clear()
+    panel.table.opened.emit("ros /camera")
+    assert window.opened == ["ros /camera"]
+
+
+def test_what_one_looks_at_there_is_counted_here(qtbot, window: Window, look: Look) -> None:
+    session = window.session
+    panel = window.make(TOPICS)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, TopicsPanel)
+    ros = look("ros")
+    ros.tell(GraphSeen(ros_graph(), 0.0))
+    watch = session.watch("ros /blackboard")
+    ticks(window, panel, 40)
+    for _ in range(60):
+        for sink in ros.sinks:
+            sink("ros /blackboard", [message("/blackboard", b"1")])
+        ticks(window, panel)
+    theirs = cells(panel, "ros /blackboard")
+    assert 25 < float(str(theirs["rate"])) < 35
+    assert (str(theirs["bandwidth"]).partition(" ")[2], theirs["loss"]) == ("B/s", "")
+    assert "Counted here while you look" in tips(panel, "ros /blackboard")["rate"]
+    watch.close()
+
+
+def test_a_network_that_is_lost_is_grey_and_says_why_where_its_rows_are(
+    qtbot, window: Window, look: Look
+) -> None:
+    topics, nodes = window.make(TOPICS), window.make(NODES)
+    for each in (topics, nodes):
+        qtbot.addWidget(each)
+    assert isinstance(topics, TopicsPanel)
+    assert isinstance(nodes, NodesPanel)
+    ros = look("ros")
+    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(MasterLost("", REASON))
+    ticks(window, topics, 2)
+    nodes.refresh()
+    for panel, key in ((topics, "ros /camera"), (nodes, "ros /arm  ")):
+        assert panel.networks.isVisibleTo(panel)
+        assert panel.networks.words.text() == f"ROS 1: {REASON}."
+        assert panel.model.cell_at(panel.model.index_of(key).row(), 0).role == "textDisabled"
+    assert topics.model.cell_at(topics.model.index_of("/odom").row(), 0).role == "text"
+    topics.networks.button.click()
+    assert window.commands == ["network.look"]
+    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ticks(window, topics, 2)
+    assert not topics.networks.isVisibleTo(topics)
+    assert topics.model.cell_at(topics.model.index_of("ros /camera").row(), 0).role == "text"
+
+
+def test_nodes_of_ros_say_where_they_are_and_what_nobody_tells(qtbot, window: Window, look: Look) -> None:
+    panel = window.make(NODES)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, NodesPanel)
+    ros = look("ros")
+    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ticks(window, panel, 2)
+    arm = cells(panel, "ros /arm  ")
+    assert (arm["node"], arm["generation"], arm["cpu"], arm["publishes"]) == ("arm", "ROS 1", "not told", "2")
+    assert "nobody tells there" in tips(panel, "ros /arm  ")["cpu"]
+    panel.table.opened.emit("ros /arm  ")
+    topic = next(row for row in panel.model._rows.shown if row.topic == "/camera")
+    assert topic.way == "publishes"
+    panel.table.opened.emit(topic.key)
+    assert window.opened == ["ros /camera"]
+
+
+def test_the_inspector_shows_messages_of_another_network(qtbot, window: Window, look: Look) -> None:
+    panel = window.make(INSPECTOR)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, InspectorPanel)
+    ros = look("ros")
+    ros.tell(GraphSeen(ros_graph(), 0.0))
+    panel.show_topic("ros /blackboard")
+    ticks(window, panel, 2)
+    assert panel.subtitle() == "/blackboard on ROS 1"
+    assert ros.wanted == {"/blackboard"}
+    assert "/blackboard" not in window.session.watched, "the native one of the same name is another topic"
+    for sink in ros.sinks:
+        sink("ros /blackboard", [message("/blackboard", b'{"x": 7}')])
+    ticks(window, panel, 5)
+    assert panel.model.value() == {"x": 7}
+    assert panel._facts_of[1] == "8 B   ROS 1 tells no seq and no latency"
+    ros.tell(MasterLost("", REASON))
+    ticks(window, panel, 2)
+    assert panel.live.accessibleName() == "no answer"
+    panel.shut()
+    assert ros.wanted == set()
+
+
+def test_the_inspector_says_why_a_topic_can_not_be_read(qtbot, window: Window, look: Look) -> None:
+    panel = window.make(INSPECTOR)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, InspectorPanel)
+    ros = look("ros2")
+    ros.tell(GraphSeen(ros_graph(), 0.0))
+    panel.show_topic("ros2 /blackboard")
+    ros.tell(WatchFailed("/blackboard", "no type 'my/Own' is known here; install its package"))
+    ticks(window, panel, 2)
+    said = [each.text() for each in panel.body.empty.findChildren(QLabel) if each.text()]
+    assert said[0] == "It can't be read here"
+    assert said[1] == "/blackboard on ROS 2: no type 'my/Own' is known here; install its package."
+    panel.shut()
+
+
+def test_pictures_of_another_network_are_shown_where_pictures_are(qtbot, window: Window, look: Look) -> None:
+    panel = window.make(IMAGE)
+    qtbot.addWidget(panel)
+    ros = look("ros")
+    ros.tell(GraphSeen(ros_graph(), 0.0))
+    panel.show_topic("ros /camera")
+    ticks(window, panel, 3)
+    assert panel.subtitle() == "/camera on ROS 1"
+    assert "/camera" in ros.wanted
+    assert "ros /camera" in panel.topics()  # type: ignore[attr-defined]
+    panel.shut()
+
+
+@pytest.mark.parametrize("panel", [TOPICS, NODES, INSPECTOR], ids=lambda panel: panel.name)
+def test_words_are_translated_and_fit(qtbot, pseudo, window: Window, look: Look, panel) -> None:
+    made = window.make(panel)
+    qtbot.addWidget(made)
+    ros = look("ros")
+    ros.tell(GraphSeen(ros_graph(), 0.0))
+    made.show_topic("ros /blackboard")
+    ticks(window, made, 3)
+    ros.tell(MasterLost("", "Ñó ŕóš"))
+    ticks(window, made, 3)
+    if not isinstance(made, InspectorPanel):
+        said = [text for text in rows_of(made.model) if "ROS" in text]  # type: ignore[attr-defined]
+        assert len(said) > 5
+        data = ("ROS 1", "/camera", "/blackboard", "/arm", "arm", "studio", "std_msgs/String", "String")
+        assert [text for text in said if untranslated(text, *data)] == []
+        assert [untranslated(made.networks.words.text(), "ROS 1")] == [[]]  # type: ignore[attr-defined]
+    faults = [fault for fault in clipped(made) if f"at {9 - OUT_OF_SIGHT}," not in fault]  # no title's place
+    assert faults == []
+    made.shut()
