@@ -41,6 +41,7 @@ from app.core.network.topics import Topic, Topics, split_key
 from app.core.network.traffic import Traffic
 from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import NetworkEvent, Networks, by_network
+from app.core.networks.parameters import ParameterSetter
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
@@ -98,7 +99,10 @@ class Session:
         make_source = source if source is not None else partial(LiveSource, always=LOGS)
         sinks = [self._checks.look, self._mailbox.post, self._offer]
         self.source: Source = make_source(self.address, sinks, self._mailbox.post_event)
-        self.networks = Networks(self.settings, sinks[1:], self._mailbox.post_event, self.alerts)
+        self.networks, self.parameters = (
+            Networks(self.settings, sinks[1:], self._mailbox.post_event, self.alerts),
+            ParameterSetter(self.source.submit),
+        )
         modules = VIRTUAL_ROBOTS.values()
         processes = VirtualProcesses(modules, lambda: self.launcher.process_ids)
         self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)
@@ -253,6 +257,7 @@ class Session:
             ("end the doctor", self.doctor.close),
             ("leave the network", self.source.close),
             ("leave other networks", self.networks.close),
+            ("end setting parameters", self.parameters.close),
             ("end what was started here", self.launcher.close),
             ("end the reach", self.remote_access.close),
         ]

@@ -10,18 +10,24 @@ from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.network.source import NODE_NAME
 from app.core.networks.networks import network_words
-from app.ui.panels.base import Panel, PanelContext
+from app.core.networks.parameters import NodeParameters
+from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.network_table import NetworkTable, own_everywhere
-from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, limits_of, rows_of
+from app.ui.panels.nodes.parameters import ParametersPart
+from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, lack_of_parameters, limits_of, rows_of
 from app.ui.panels.table_panel import TableWords
 from app.ui.text.numbers import rate_words
 from app.ui.widgets import Scrolled
+from app.ui.widgets.paint import show_when
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from app.core.network.nodes import NodeEntry
+    from app.core.network.watches import Suspendable
 
 WORDS = TableWords(
     title=lazy("Nodes"),
@@ -40,10 +46,23 @@ class NodesPanel(NetworkTable[NodeRow]):
         super().__init__(context, WORDS, "network")
         self.table.selectionModel().currentChanged.connect(self._chosen)
         self._about = Scrolled(self.foot)
+        session = self.session
+        self._parameters = NodeParameters(
+            session.watch, session.topic, session.parameters, lambda: session.master.kind == "connected"
+        )
+        self.parameters = ParametersPart(self.theme, self._parameters)
+        self.parameters.hide()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        parts = ((self.pages, 1), (self.networks, 0), (self.line, 0), (self._about, 0), (self.doctor, 0))
+        parts = (
+            (self.pages, 1),
+            (self.parameters, 1),
+            (self.networks, 0),
+            (self.line, 0),
+            (self._about, 0),
+            (self.doctor, 0),
+        )
         for widget, stretch in parts:
             column.addWidget(widget, stretch)
         self._opened: set[str] = set()
@@ -76,6 +95,7 @@ class NodesPanel(NetworkTable[NodeRow]):
         if values != self._values or (self._gone and self._ticks % SORT_EVERY == 0):
             self._values = values
             self.table.tell_visible_changed()
+        self.parameters.refresh()
 
     def _facts(self) -> tuple[object, ...]:
         session = self.session
@@ -111,6 +131,10 @@ class NodesPanel(NetworkTable[NodeRow]):
         shown = self.pages.currentIndex() == 0
         words = _("Open a node to see its topics") if row is None else facts_of(row.node)
         limits = limits_of(row.node) if row is not None else ""
+        if row is not None:
+            limits = "\n".join(filter(None, (limits, lack_of_parameters(row.node))))
+        self._parameters.show(row.node if row is not None and shown else None)
+        show_when(self.parameters, self._parameters.node is not None)
         self.foot.setText(f"{words}.\n{limits}" if limits else words)
         self._about.setVisible(shown)
         self.line.setVisible(shown)
@@ -134,6 +158,20 @@ class NodesPanel(NetworkTable[NodeRow]):
         (self._opened.add if opened else self._opened.discard)(row.node.key)
         self.rebuild()
         self.table.choose(NodeRow(row.node).key)
+
+    def looks(self) -> Iterable[Suspendable | None]:
+        return (self._parameters.watching,)
+
+    def shut(self) -> None:
+        self._parameters.close()
+
+    def set_density(self, density: Density) -> None:
+        super().set_density(density)
+        self.parameters.table.set_row_height(self.row_height(), large=density == "comfortable")
+
+    def theme_changed(self) -> None:
+        super().theme_changed()
+        self.parameters.table.set_row_height(self.row_height(), large=self.density == "comfortable")
 
 
 class _NodeTable(TableView[NodeRow]):

@@ -103,6 +103,18 @@ def limits_of(node: NodeEntry) -> str:
     return _(LIMITS).format(nep=_(VERSIONS.get(node.generation, ORIGINAL)))
 
 
+def lack_of_parameters(node: NodeEntry) -> str:
+    """Why there are no parameters to see, and what gives a node some; empty when it has some."""
+    if node.has_parameters or node.is_original or node.gone_s is not None:
+        return ""
+    kind = kind_named(node.network)
+    if kind is not None and not kind.tells_figures:
+        return _("Parameters of nodes on {network} can't be seen here.").format(network=kind.words)
+    return _("It has no parameters: a program declares them with {call}.").format(
+        call="node.parameters.declare"
+    )
+
+
 def facts_of(node: NodeEntry) -> str:
     """Where it runs and since when, in one line: what a narrow table has no column for."""
     parts = [node.name]

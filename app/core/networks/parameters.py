@@ -1,0 +1,308 @@
+"""The parameters of the node that a person chose: what they are now, which have just changed, setting one.
+
+Values are heard on the topic on which a node tells them; they are set by a call, in a thread of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
+
+import orjson
+
+from app.core.documents.background_worker import BackgroundWorker
+from app.core.faults import error_words
+from app.core.network.nodes import NodeEntry
+from app.core.network.source import Job
+from app.core.network.topics import Topic, key_of
+from nep.errors import NepError
+from nep.i18n import _
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.remote import RemoteParameters
+
+ANSWER_S = 3.0
+"""How long a node may take to answer that it has set one."""
+MOST = 1000
+"""As many as a node may declare; of a stranger's the others are not shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShownParameter:
+    """A parameter as its node tells it. ``kind`` is "bool", "int", "float", "str", "list" or "dict".
+
+    ``minimum`` and ``maximum`` bound numbers, ``choices`` are the only values there are, if there are any.
+    ``read_only``: only its own node may set it.
+    """
+
+    name: str
+    value: object
+    kind: str
+    description: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[object, ...] = ()
+    read_only: bool = False
+
+
+class Watching(Protocol):
+    """What keeps a topic subscribed (`app.core.network.watches.Watch`)."""
+
+    @property
+    def resting(self) -> bool:
+        """Whether it is not subscribed now."""
+
+    def rest(self) -> None:
+        """It is not subscribed until `wake`."""
+
+    def wake(self) -> None:
+        """Look again."""
+
+    def close(self) -> None:
+        """Look no more."""
+
+
+class ParameterSetter:
+    """Sets parameters of nodes of the native network. One thread uses it (the window's)."""
+
+    def __init__(self, submit: Callable[[str, Job], None]) -> None:
+        """``submit`` gives Studio's node to a job (`app.core.network.source.Source.submit`)."""
+        self._submit = submit
+        self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-parameters")
+
+    def set(self, node_id: str, name: str, value: object) -> None:
+        """Ask the node to give it this value; `take` tells how that went."""
+        owner = f"{node_id} {name}"
+        self._submit("", lambda node: self._worker.ask(owner, partial(_set, node, node_id, name, value)))
+
+    def take(self, node_id: str, name: str) -> bool:
+        """Whether the node has set it since the last time. Raises `NepError` with why it has not."""
+        return self._worker.take(f"{node_id} {name}") is True
+
+    def close(self) -> None:
+        """Wait for a call that goes on, 2 s at most."""
+        self._worker.close()
+
+
+def _set(node: Node, node_id: str, name: str, value: object) -> bool:
+    try:
+        with RemoteParameters(node.new_client(place_of(node_id), timeout_s=ANSWER_S)) as theirs:
+            theirs.set(name, value)
+    except NepError:
+        raise
+    except Exception as error:
+        raise NepError(error_words(error)) from error
+    return True
+
+
+class NodeParameters:
+    """Those of the node that is shown. One thread uses it (the window's).
+
+    ``changed`` has, by name, when a value changed while it was watched (monotonic seconds). ``revision``
+    grows with every change.
+    """
+
+    def __init__(
+        self,
+        watch: Callable[[str], Watching],
+        topic: Callable[[str], Topic | None],
+        setter: ParameterSetter,
+        has_master: Callable[[], bool] = lambda: True,
+    ) -> None:
+        """``watch`` looks at a topic by its name among those of all networks, ``topic`` is what came.
+
+        ``has_master``: whether the native network's master answers, so that nodes can be called.
+        """
+        self._watch, self._topic, self._setter, self._has_master = watch, topic, setter, has_master
+        self.watching: Watching | None = None
+        self.node: NodeEntry | None = None
+        self.all: tuple[ShownParameter, ...] = ()
+        self.changed: dict[str, float] = {}
+        self.heard = False
+        """Whether the node has told them since it is shown."""
+        self.problem = ""
+        """Why what it told can't be read."""
+        self.setting = ""
+        """The one that is being set."""
+        self.refusal = ""
+        """Why the last one was not set, as a sentence."""
+        self.revision = 0
+        self._shown: Message | None = None
+
+    def show(self, node: NodeEntry | None) -> None:
+        """Look at the parameters of this node, which may have none; None: of no node."""
+        wanted = node if node is not None and node.has_parameters else None
+        if wanted is self.node:
+            return
+        self.close()
+        self.node = wanted
+        if wanted is not None:
+            self.watching = self._watch(key_of(wanted.network, place_of(wanted.id)))
+
+    def close(self) -> None:
+        """Look at none."""
+        if self.watching is not None:
+            self.watching.close()
+        self.watching = self.node = self._shown = None
+        self.all, self.changed, self.heard = (), {}, False
+        self.problem = self.setting = self.refusal = ""
+        self.revision += 1
+
+    def find(self, name: str) -> ShownParameter | None:
+        """The parameter of this name."""
+        return next((each for each in self.all if each.name == name), None)
+
+    def refresh(self, now: float) -> None:
+        """Take over what has come; ``now`` is monotonic seconds."""
+        node = self.node
+        if node is None:
+            return
+        topic = self._topic(key_of(node.network, place_of(node.id)))
+        newest = topic.newest if topic is not None else None
+        if newest is not None and newest is not self._shown:
+            self._shown = newest
+            self._take(newest, now)
+        if self.setting:
+            self._look_how_it_went(node)
+
+    def _take(self, message: Message, now: float) -> None:
+        self.revision += 1
+        try:
+            told = parameters_in(message.payload)
+        except NepError as error:  # also a `DecodeError`
+            self.problem = str(error)
+            return
+        before = {each.name: each.value for each in self.all}
+        if self.heard:
+            self.changed.update(
+                {
+                    each.name: now
+                    for each in told
+                    if each.name not in before or not _same(before[each.name], each.value)
+                }
+            )
+        self.all, self.heard, self.problem = told, True, ""
+
+    def _look_how_it_went(self, node: NodeEntry) -> None:
+        try:
+            done = self._setter.take(node.id, self.setting)
+        except NepError as error:
+            self.refusal, self.setting = str(error), ""
+            self.revision += 1
+        else:
+            if done:
+                self.setting = ""
+                self.revision += 1
+
+    def set(self, name: str, text: str) -> None:
+        """Ask the node to give it the value that the text means; why it can't be is then in `refusal`."""
+        node, parameter = self.node, self.find(name)
+        self.revision += 1
+        self.refusal = ""
+        if node is None or parameter is None:
+            return
+        self.refusal = refusal_of(node, parameter)
+        if not self.refusal and not self._has_master():
+            self.refusal = _("no master answers, so its node can't be asked; try it again when one does")
+        if self.refusal:
+            return
+        try:
+            value = value_of(text, parameter.kind)
+        except ValueError as error:
+            self.refusal = str(error)
+            return
+        self.setting = name
+        self._setter.set(node.id, name, value)
+
+
+def refusal_of(node: NodeEntry, parameter: ShownParameter) -> str:
+    """Why a parameter can't be set from here; empty when it can."""
+    if node.gone_s is not None:
+        return _("its node has gone")
+    if not node.may_set:
+        return _("on this network parameters can be read only")
+    return _("only its own node may set it") if parameter.read_only else ""
+
+
+def parameters_in(state: object) -> tuple[ShownParameter, ...]:
+    """What a node tells of its parameters. Raises `NepError` for anything else: anybody may publish there."""
+    listed = state.get("parameters") if isinstance(state, Mapping) else None
+    if not isinstance(listed, list):
+        raise NepError(_("this is no list of parameters"))
+    return tuple(_parameter(each) for each in listed[:MOST] if isinstance(each, Mapping))
+
+
+def _parameter(told: Mapping[str, object]) -> ShownParameter:
+    choices = told.get("choices")
+    return ShownParameter(
+        str(told.get("name")),
+        told.get("value"),
+        str(told.get("type")),
+        str(told.get("description") or ""),
+        _number(told.get("min")),
+        _number(told.get("max")),
+        tuple(choices) if isinstance(choices, list) else (),
+        told.get("read_only") is True,
+    )
+
+
+def _number(told: object) -> float | None:
+    return told if isinstance(told, int | float) and not isinstance(told, bool) else None
+
+
+def _same(one: object, other: object) -> bool:
+    """1, 1.0 and True are three values."""
+    return type(one) is type(other) and one == other
+
+
+def text_of(value: object) -> str:
+    """A value as a person edits it: a text as it is, anything else as JSON."""
+    if isinstance(value, str):
+        return value
+    try:
+        return orjson.dumps(value).decode()
+    except TypeError:  # what no JSON has, and a stranger sent
+        return str(value)
+
+
+def value_of(text: str, kind: str) -> object:
+    """What a text means for a parameter of this kind. Raises `ValueError` with a sentence."""
+    if kind == "str":
+        return text
+    said = text.strip()
+    if kind == "int":
+        return _whole(said)
+    if kind == "float":
+        return _decimal(said)
+    try:
+        value: object = orjson.loads(said)
+    except orjson.JSONDecodeError:
+        value = None
+    if kind == "bool" and not isinstance(value, bool):
+        raise ValueError(_("write true or false"))
+    if kind == "list" and not isinstance(value, list):
+        raise ValueError(_("write a list as JSON, such as [1, 2]"))
+    if kind == "dict" and not isinstance(value, dict):
+        raise ValueError(_("write a map as JSON, such as {example}").format(example='{"x": 1}'))
+    return value
+
+
+def _whole(said: str) -> int:
+    try:
+        return int(said)
+    except ValueError:
+        raise ValueError(_("write a whole number")) from None
+
+
+def _decimal(said: str) -> float:
+    try:
+        value = float(said.replace(",", "."))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):  # which no JSON has
+        raise ValueError(_("write a number"))
+    return value

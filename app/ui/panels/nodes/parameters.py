@@ -1,0 +1,281 @@
+"""The parameters of the chosen node, below the table of nodes: live, and each can be given another value."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from PySide6.QtCore import QModelIndex, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.networks.parameters import NodeParameters, ShownParameter, refusal_of, text_of
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, ComboBox, ElidedLabel, Separator, label, paint, set_role
+from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.table.model import Cell, Column, TableModel
+from app.ui.widgets.table.view import TableView
+from nep.i18n import _, lazy, listed
+from nep.text import shortened
+
+CHANGED_S = 0.8
+SHOWN_LETTERS = 200
+CHOICES_SHOWN = 6
+LINE, CHOICE = range(2)
+
+
+def allowed_words(parameter: ShownParameter) -> str:
+    """What it may be: "0 to 2", "walk, run or crawl", "read only"; empty when nothing is said."""
+    if parameter.read_only:
+        return _("read only")
+    if parameter.choices:
+        some = [shortened(text_of(each), 40) for each in parameter.choices[:CHOICES_SHOWN]]
+        return ", ".join(some) + " …" if len(parameter.choices) > CHOICES_SHOWN else listed(some, "or")
+    least, most = parameter.minimum, parameter.maximum
+    if least is not None and most is not None:
+        return _("{least} to {most}").format(least=text_of(least), most=text_of(most))
+    if least is not None:
+        return _("{least} and more").format(least=text_of(least))
+    return _("{most} and less").format(most=text_of(most)) if most is not None else ""
+
+
+class ParametersPart(QWidget):
+    """A table of the parameters, and below it the chosen one with a field to change it."""
+
+    def __init__(self, theme: Theme, parameters: NodeParameters) -> None:
+        super().__init__()
+        self.theme, self.parameters = theme, parameters
+        self.clock: Callable[[], float] = time.monotonic
+        self._seen: tuple[object, ...] = ()
+        self._edited = self._waits = False
+        self.title = ElidedLabel("small", "textSecondary")
+        self.title.setContentsMargins(12, 5, 12, 3)
+        self.model = TableModel(self._columns(), lambda each: each.name)
+        self.table = TableView(theme, self.model)
+        self.table.setAccessibleName(_("Parameters"))
+        self.table.setMinimumHeight(3 * self.table.row_height)
+        self.table.opened.connect(lambda _name: self._edit())
+        self.table.selectionModel().currentChanged.connect(self._chosen)
+        self.name = label("", "code")
+        self.name.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.field = ValueField(theme, self._set, self._leave)
+        self.field.textEdited.connect(self._note_edit)
+        self.choice = ComboBox(theme)
+        self.choice.activated.connect(lambda _index: self._set())
+        self.editors = QStackedWidget()
+        self.editors.addWidget(self.field)
+        self.editors.addWidget(self.choice)
+        self.editors.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self.button = Button(theme, _("Set"), size="small")
+        self.button.clicked.connect(self._set)
+        self.sentence = label("", "small", role="textTertiary", wrap=True)
+        self.sentence.setMinimumWidth(0)
+        self._strip = QWidget()
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        edit = QHBoxLayout()
+        edit.setSpacing(8)
+        edit.addWidget(self.name, 2)
+        edit.addWidget(self.editors, 3)
+        edit.addWidget(self.button)
+        strip = QVBoxLayout(self._strip)
+        strip.setContentsMargins(12, 5, 10, 6)
+        strip.setSpacing(3)
+        strip.addLayout(edit)
+        strip.addWidget(self.sentence)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget, stretch in (
+            (Separator(self.theme), 0), (self.title, 0), (self.table, 1), (Separator(self.theme), 0),
+            (self._strip, 0),
+        ):  # fmt: skip
+            column.addWidget(widget, stretch)
+
+    def _columns(self) -> tuple[Column[ShownParameter], ...]:
+        return (
+            Column("parameter", lazy("Parameter"), 96, self._name_cell, stretch=True, tip=_tip),
+            Column("value", lazy("Value"), 130, self._value_cell, tip=lambda p: text_of(p.value)[:2000]),
+            Column("allowed", lazy("Allowed"), 124, _allowed_cell, tip=allowed_words, yields=1),
+        )
+
+    def _ink(self, role: str) -> str:
+        node = self.parameters.node
+        is_here = node is not None and node.gone_s is None and not node.stale
+        return role if is_here else "textDisabled"
+
+    def _name_cell(self, parameter: ShownParameter) -> Cell:
+        return Cell(parameter.name, role=self._ink("text"), mono=True, middle=True)
+
+    def _value_cell(self, parameter: ShownParameter) -> Cell:
+        words = shortened(text_of(parameter.value), SHOWN_LETTERS)
+        changed = self.parameters.changed.get(parameter.name)
+        if changed is not None and self.clock() - changed < CHANGED_S:
+            return Cell(words, role="changed", mono=True, tint="changedTint")
+        return Cell(words, role=self._ink("text"), mono=True)
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Show what is known now; called with every refresh of the panel."""
+        parameters = self.parameters
+        parameters.refresh(self.clock())
+        node = parameters.node
+        if node is None:
+            return
+        facts = (parameters.revision, node.key, node.gone_s is None, node.may_set, node.stale)
+        if facts != self._seen:
+            another = not self._seen or facts[1] != self._seen[1]
+            self._seen = facts
+            if another:
+                self._edited = False
+            self.title.setText(self._title())
+            self.model.set_rows(parameters.all)
+            self._show_chosen()
+        self.table.tell_visible_changed()
+
+    def _title(self) -> str:
+        parameters = self.parameters
+        name = parameters.node.name if parameters.node is not None else ""
+        if parameters.problem:
+            said = _("The parameters of {node} can't be read: {reason}")
+            return said.format(node=name, reason=parameters.problem)
+        said = _("Parameters of {node}") if parameters.heard else _("Waiting for the parameters of {node}")
+        return said.format(node=name)
+
+    @property
+    def chosen(self) -> ShownParameter | None:
+        """The parameter that is chosen."""
+        row = self.model.row_at(self.table.currentIndex())
+        return self.parameters.find(row.name) if row is not None else None
+
+    def _chosen(self, _now: QModelIndex, _before: QModelIndex) -> None:
+        self._edited = False
+        self.parameters.refusal = ""
+        self._show_chosen()
+
+    def _show_chosen(self) -> None:
+        parameter, node = self.chosen, self.parameters.node
+        shown = parameter is not None and node is not None
+        for widget in (self.name, self.editors, self.button):
+            paint.show_when(widget, shown)
+        if parameter is None or node is None:
+            self._say(_("Choose a parameter to give it another value."))
+            return
+        self.name.setText(parameter.name)
+        self.name.setToolTip(plain.tip(_tip(parameter)))
+        why_not = refusal_of(node, parameter)
+        options = [text_of(each) for each in parameter.choices]
+        if parameter.kind == "bool" and not options:
+            options = ["false", "true"]
+        waits = self.parameters.setting == parameter.name
+        if self._waits and not self.parameters.setting:
+            self._waits = False
+            self._edited = bool(self.parameters.refusal)
+        self._show_editor(parameter, options)
+        self.field.setEnabled(not why_not)
+        self.choice.setEnabled(not why_not)
+        self.button.setEnabled(not why_not and not waits)
+        paint.show_when(self.button, not options)
+        self._say_about(parameter, why_not, waits=waits)
+
+    def _show_editor(self, parameter: ShownParameter, options: list[str]) -> None:
+        now = text_of(parameter.value)
+        self.editors.setCurrentIndex(CHOICE if options else LINE)
+        for widget in (self.field, self.choice):
+            widget.setAccessibleName(_("Value of {parameter}").format(parameter=parameter.name))
+        if options:
+            if [self.choice.itemData(place) for place in range(self.choice.count())] != options:
+                self.choice.clear()
+                for each in options:
+                    self.choice.addItem(shortened(each, SHOWN_LETTERS), each)
+            self.choice.set_value(now)
+        elif not self._edited and self.field.text() != now:
+            self.field.setText(now)
+
+    def _say_about(self, parameter: ShownParameter, why_not: str, *, waits: bool) -> None:
+        refusal = self.parameters.refusal
+        self.field.mark(wrong=bool(refusal))
+        if refusal:
+            self._say(_sentence(refusal), "error")
+        elif waits:
+            self._say(_("Waiting for the node's answer"))
+        elif why_not:
+            self._say(_sentence(why_not))
+        else:
+            words = (shortened(parameter.description, 300), allowed_words(parameter))
+            self._say("; ".join(filter(None, words)))
+
+    def _say(self, words: str, role: str = "textTertiary") -> None:
+        set_role(self.sentence, role)
+        if words != self.sentence.text():
+            self.sentence.setText(words)
+            if role == "error":
+                paint.announce(self.sentence, words)
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def _note_edit(self, _text: str) -> None:
+        self._edited = True
+
+    def _edit(self) -> None:
+        editor = self.choice if self.editors.currentIndex() == CHOICE else self.field
+        if editor.isEnabled():
+            editor.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def _leave(self) -> None:
+        """Leave the value as it is."""
+        self._edited = False
+        self.parameters.refusal = ""
+        self._show_chosen()
+        self.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def _set(self) -> None:
+        parameter = self.chosen
+        if parameter is None:
+            return
+        by_choice = self.editors.currentIndex() == CHOICE
+        self.parameters.set(parameter.name, self.choice.value if by_choice else self.field.text())
+        self._edited = True  # what was typed stays until the node has taken it
+        self._waits = bool(self.parameters.setting)
+        self._show_chosen()
+
+
+class ValueField(QLineEdit):
+    """A value; Return sets it, Esc leaves it as it was."""
+
+    def __init__(self, theme: Theme, take: Callable[[], object], leave: Callable[[], object]) -> None:
+        super().__init__()
+        self._take, self._leave = take, leave
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.setMinimumWidth(60)
+        EditMenu(theme, self)
+
+    def mark(self, *, wrong: bool) -> None:
+        """Give it the edge of a wrong value, or take it away."""
+        if (self.property("wrong") == "true") is not wrong:
+            self.setProperty("wrong", "true" if wrong else "false")
+            self.style().unpolish(self)
+            self.style().polish(self)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self._take()
+        elif event.key() == Qt.Key.Key_Escape:
+            self._leave()
+        else:
+            super().keyPressEvent(event)
+
+
+def _tip(parameter: ShownParameter) -> str:
+    return "\n".join(filter(None, (parameter.name, shortened(parameter.description, 1000))))
+
+
+def _allowed_cell(parameter: ShownParameter) -> Cell:
+    return Cell(allowed_words(parameter), role="textTertiary")
+
+
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}."

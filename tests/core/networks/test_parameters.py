@@ -1,0 +1,229 @@
+"""The parameters of a node as Studio shows and sets them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nep
+from app.core.network.nodes import NodeEntry
+from app.core.networks.parameters import NodeParameters, parameters_in, refusal_of, text_of, value_of
+from app.core.session import Session
+from nep.masters.master import Master
+from nep.patterns.parameters.owned import place_of
+from tests.core.waiting import tick_until
+
+
+@pytest.fixture
+def robot(master: Master) -> Iterator[nep.Node]:
+    with nep.node("robot") as node:
+        node.parameters.declare("speed", 0.5, min=0, max=2, description="in m/s")
+        node.parameters.declare("gait", "walk", choices=("walk", "run"))
+        node.parameters.declare("serial", "7", read_only=True)
+        yield node
+
+
+@pytest.fixture
+def shown(session: Session, robot: nep.Node) -> Iterator[NodeParameters]:
+    made = NodeParameters(session.watch, session.topic, session.parameters)
+    tick_until(session, lambda: entry(session, robot) is not None)
+    tick_until(session, lambda: entry_of(session, robot).may_set)
+    made.show(entry(session, robot))
+    tick_until(session, lambda: _refreshed(made).heard)
+    yield made
+    made.close()
+
+
+def entry(session: Session, node: nep.Node) -> NodeEntry | None:
+    return session.nodes.get(node.id)
+
+
+def entry_of(session: Session, node: nep.Node) -> NodeEntry:
+    found = entry(session, node)
+    assert found is not None
+    return found
+
+
+def _refreshed(shown: NodeParameters, now: float = 0.0) -> NodeParameters:
+    shown.refresh(now)
+    return shown
+
+
+def values(shown: NodeParameters) -> dict[str, object]:
+    return {each.name: each.value for each in shown.all}
+
+
+def settled(session: Session, shown: NodeParameters) -> str:
+    """The refusal, when the node has answered."""
+    tick_until(session, lambda: not _refreshed(shown).setting)
+    return shown.refusal
+
+
+def test_they_are_there_with_their_limits_and_each_change_is_seen(
+    session: Session, robot: nep.Node, shown: NodeParameters
+) -> None:
+    speed = shown.find("speed")
+    assert speed is not None
+    assert (speed.value, speed.kind, speed.minimum, speed.maximum) == (0.5, "float", 0, 2)
+    assert (shown.find("gait").choices, shown.find("serial").read_only) == (("walk", "run"), True)  # type: ignore[union-attr]
+    assert shown.changed == {}, "what it was at first has not changed"
+    robot.parameters["speed"] = 1.5
+    tick_until(session, lambda: values(_refreshed(shown, 7.0))["speed"] == 1.5)
+    assert shown.changed == {"speed": 7.0}
+    robot.parameters.declare("later", True)
+    tick_until(session, lambda: "later" in values(_refreshed(shown, 8.0)))
+    assert shown.changed == {"speed": 7.0, "later": 8.0}
+
+
+def test_one_is_set_and_a_refusal_is_in_the_words_of_the_node(
+    session: Session, robot: nep.Node, shown: NodeParameters
+) -> None:
+    robot.parameters.on_change(lambda new: "1.3 shakes the head" if new.get("speed") == 1.3 else None)
+    shown.set("speed", "1")
+    assert shown.setting == "speed"
+    assert settled(session, shown) == ""
+    assert (robot.parameters["speed"], type(robot.parameters["speed"])) == (1.0, float), "its type is kept"
+    tick_until(session, lambda: values(_refreshed(shown))["speed"] == 1.0)
+    for text, said in (("9", "the most is 2"), ("1,3", "1.3 shakes the head"), ("-1e9", "the least is 0")):
+        shown.set("speed", text)
+        assert said in settled(session, shown)
+    for text in ("", "fast", "nan", "inf", "1e999", "true", "[1]", "1.2.3"):
+        shown.set("speed", text)
+        assert (shown.refusal, shown.setting) == ("write a number", "")
+    shown.set("gait", "fly")
+    assert "use 'walk' or 'run'" in settled(session, shown)
+    shown.set("serial", "8")
+    assert (shown.refusal, shown.setting) == ("only its own node may set it", "")
+    shown.set("no such", "8")
+    assert (robot.parameters["speed"], robot.parameters["gait"], robot.parameters["serial"]) == (
+        1.0,
+        "walk",
+        "7",
+    )
+
+
+def test_a_number_that_no_wire_carries_is_refused_and_the_window_lives_on(
+    session: Session, robot: nep.Node, shown: NodeParameters
+) -> None:
+    robot.parameters.declare("count", 1)
+    tick_until(session, lambda: "count" in values(_refreshed(shown)))
+    for text in (str(2**63), str(2**64), str(-(2**70))):
+        shown.set("count", text)
+        assert settled(session, shown)
+    shown.set("count", str(2**62))
+    assert settled(session, shown) == ""
+    assert robot.parameters["count"] == 2**62
+
+
+def test_a_node_that_ends_while_it_is_asked_is_told_in_words(
+    session: Session, robot: nep.Node, shown: NodeParameters, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.core.networks.parameters.ANSWER_S", 0.3)
+    halted = threading.Event()
+    robot.parameters.on_change(lambda _new: halted.wait(20.0) and None)
+    shown.set("speed", "1")
+    try:
+        assert "answer" in settled(session, shown)
+    finally:
+        halted.set()
+    robot.close()
+    tick_until(session, lambda: entry_of(session, robot).gone_s is not None)
+    shown.set("speed", "1")
+    assert (shown.refusal, shown.setting) == ("its node has gone", "")
+    assert values(shown)["serial"] == "7", "what was known stays to be read"
+
+
+def test_without_a_master_nothing_waits_to_be_set_much_later(session: Session, shown: NodeParameters) -> None:
+    shown._has_master = lambda: False
+    shown.set("speed", "1")
+    assert shown.setting == ""
+    assert "no master answers" in shown.refusal
+
+
+def test_another_node_and_none_leave_nothing_behind(session: Session, shown: NodeParameters) -> None:
+    watching, revision = shown.watching, shown.revision
+    shown.show(NodeEntry("x", "without"))
+    assert (shown.node, shown.all, shown.watching, shown.heard) == (None, (), None, False)
+    assert shown.revision > revision
+    assert watching is not None
+    assert not session._watches.watched(watching.topics[0])  # type: ignore[attr-defined]
+    shown.show(None)
+    shown.refresh(0.0)
+    shown.set("speed", "1")
+    assert shown.refusal == ""
+
+
+def test_whatever_a_stranger_publishes_there_is_said_or_read(
+    session: Session, robot: nep.Node, shown: NodeParameters
+) -> None:
+    with nep.node("stranger") as stranger, stranger.new_pub(place_of(robot.id)) as loud:
+        for payload in ("words", 7, {"parameters": None}, {}):
+            loud.publish(payload)
+        tick_until(session, lambda: _refreshed(shown).problem)
+        assert shown.problem == "this is no list of parameters"
+        assert "speed" in values(shown), "what the node told stays"
+        loud.publish({"parameters": [1, {"name": ["x"], "type": 5, "min": "a", "choices": 3, "value": None}]})
+        tick_until(session, lambda: not _refreshed(shown).problem)
+        (strange,) = shown.all
+        assert (strange.name, strange.kind, strange.minimum, strange.choices) == ("['x']", "5", None, ())
+        loud.publish_bytes(b"{no json")
+        tick_until(session, lambda: _refreshed(shown).problem)
+
+
+JSON = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**60), 2**60)
+    | st.floats(allow_nan=False)
+    | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+@given(state=JSON)
+def test_any_state_is_parameters_or_a_sentence(state: object) -> None:
+    try:
+        found = parameters_in({"parameters": state} if isinstance(state, list) else state)
+    except nep.NepError:
+        assert not isinstance(state, list)
+    else:
+        assert all(isinstance(text_of(each.value), str) for each in found)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"),
+    [
+        (True, "bool"), (7, "int"), (-0.5, "float"), ("a, b", "str"), ("", "str"), ([1, "x"], "list"),
+        ({"x": [1]}, "dict"),
+    ],
+)  # fmt: skip
+def test_what_is_shown_means_the_same_when_it_is_set(value: object, kind: str) -> None:
+    assert value_of(text_of(value), kind) == value
+    assert type(value_of(text_of(value), kind)) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "said"),
+    [
+        ("1", "bool", "true or false"), ("yes", "bool", "true or false"), ("1.5", "int", "a whole number"),
+        ("9" * 5000, "int", "a whole number"), ("{}", "list", "a list as JSON"),
+        ("[", "list", "a list as JSON"),
+        ("[1]", "dict", "a map as JSON"), ("", "dict", "a map as JSON"),
+    ],
+)  # fmt: skip
+def test_what_is_no_value_of_its_type_is_refused_with_the_next_step(text: str, kind: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        value_of(text, kind)
+
+
+def test_where_parameters_can_only_be_read_it_is_said() -> None:
+    (parameter,) = parameters_in({"parameters": [{"name": "gain", "value": 1, "type": "int"}]})
+    node = NodeEntry("a", "arm", network="zenoh", has_parameters=True)
+    assert refusal_of(node, parameter) == "on this network parameters can be read only"
+    node.may_set = True
+    assert refusal_of(node, parameter) == ""

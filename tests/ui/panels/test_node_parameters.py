@@ -1,0 +1,249 @@
+"""The parameters of the chosen node in Nodes: seen live, set by keys or a choice, refused in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+import nep
+from app.core.networks.parameters import ShownParameter
+from app.ui.panels.nodes.panel import PANEL, NodesPanel
+from app.ui.panels.nodes.parameters import CHOICE, LINE, allowed_words
+from nep.messages.message import Message
+from nep.patterns.parameters.owned import place_of
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, ServerInfo, ServiceInfo, TopicInfo
+from tests.pseudo import untranslated
+from tests.ui.clipping import clipped
+from tests.ui.fakes import Session
+from tests.ui.panel_case import OUT_OF_SIGHT, Window, ticks
+from tests.ui.panels.test_words import said_by
+
+
+class World:
+    """A robot with parameters on a network in memory, and the panel over it."""
+
+    def __init__(self, window: Window, robot: nep.Node) -> None:
+        self.window, self.robot = window, robot
+        self.panel = window.make(PANEL)
+        assert isinstance(self.panel, NodesPanel)
+        self.part = self.panel.parameters
+
+    def hear(self) -> None:
+        """What the robot tells comes to who watches it."""
+        topic = place_of(self.robot.id)
+        with self.window.session.source.node.new_sub(topic, "json") as kept:
+            message = kept.receive(5.0)
+        assert message is not None
+        self.window.session.source.send(Message(topic, bytes(message.data), "json", "json", seq=message.seq))
+        ticks(self.window, self.panel, 2)
+
+    def choose(self, node: str) -> None:
+        row = next(row for row in self.panel.model._rows.shown if row.node.name == node)
+        self.panel.table.choose(row.key)
+        ticks(self.window, self.panel, 2)
+
+    def settle(self, qtbot) -> None:
+        """The robot has answered, and told what it has now."""
+        qtbot.waitUntil(lambda: self._refreshed() == "", timeout=20_000)
+        self.hear()
+
+    def _refreshed(self) -> str:
+        ticks(self.window, self.panel)
+        return self.panel._parameters.setting
+
+    def cells(self) -> list[tuple[str, ...]]:
+        model = self.part.model
+        return [
+            tuple(str(model.data(model.index(row, column))) for column in range(3))
+            for row in range(model.rowCount())
+        ]
+
+
+def graph(robot: nep.Node, *, may_set: bool = True) -> GraphView:
+    place = place_of(robot.id)
+    told = PublisherInfo(1, robot.id, (), True, 1, 1, 1, None, None, None)
+    nodes = (
+        NodeInfo(robot.id, "robot", "", 7, "Python", "native", 5),
+        NodeInfo("b", "bare", "", 8, "", "native", 5),
+    )
+    served = {place: ServiceInfo(place, "json", (ServerInfo(1, robot.id, (), 0, 0, 0),))} if may_set else {}
+    return GraphView(
+        1, 1, {n.id: n for n in nodes}, {place: TopicInfo(place, "json", "json", (told,))}, services=served
+    )
+
+
+@pytest.fixture
+def robot(qapp, request: pytest.FixtureRequest) -> Iterator[tuple[Window, nep.Node]]:
+    session = Session()
+    with nep.node("robot", "memory", master=session.source._master) as node:
+        node.parameters.declare("speed", 0.5, min=0, max=2, description="in m/s")
+        node.parameters.declare("gait", "walk", choices=("walk", "run"))
+        node.parameters.declare("lights", True)
+        node.parameters.declare("serial", "7", read_only=True)
+        node.parameters.declare("<b>long</b>", "x" * 5000)
+        session.source.find_master()
+        session.source.tell(graph(node))
+        session.take_over()
+        yield Window(session), node
+
+
+@pytest.fixture
+def world(qtbot, robot: tuple[Window, nep.Node]) -> Iterator[World]:
+    made = World(*robot)
+    qtbot.addWidget(made.panel)
+    made.choose("robot")
+    made.hear()
+    yield made
+    made.panel.shut()
+
+
+def test_they_are_shown_with_what_they_may_be(world: World) -> None:
+    assert world.part.isVisibleTo(world.panel)
+    assert world.part.title.text() == "Parameters of robot"
+    assert world.cells()[:4] == [
+        ("speed", "0.5", "0 to 2"),
+        ("gait", "walk", "walk or run"),
+        ("lights", "true", ""),
+        ("serial", "7", "read only"),
+    ]
+    assert world.cells()[4][1].endswith("x… (5000 characters)")
+    assert len(world.cells()[4][1]) < 250
+    assert world.window.session.watched == [place_of(world.robot.id)]
+    assert world.part.sentence.text() == "Choose a parameter to give it another value."
+
+
+def test_a_value_is_set_with_return_and_what_was_typed_stays_when_it_is_refused(qtbot, world: World) -> None:
+    part = world.part
+    part.table.choose("speed")
+    assert (part.editors.currentIndex(), part.field.text()) == (LINE, "0.5")
+    assert part.sentence.text() == "in m/s; 0 to 2"
+    QTest.keyClick(part.table, Qt.Key.Key_Return)
+    part.field.selectAll()
+    QTest.keyClicks(part.field, "9")
+    QTest.keyClick(part.field, Qt.Key.Key_Return)
+    world.settle(qtbot)
+    assert part.sentence.text() == "The parameter 'speed' cannot be 9.0; the most is 2."
+    assert (part.field.text(), part.field.property("wrong")) == ("9", "true")
+    part.field.selectAll()
+    QTest.keyClicks(part.field, "fast")
+    part.button.click()
+    assert part.sentence.text() == "Write a number."
+    part.field.selectAll()
+    QTest.keyClicks(part.field, "1.25")
+    part.button.click()
+    world.settle(qtbot)
+    assert world.robot.parameters["speed"] == 1.25
+    assert (part.field.text(), part.field.property("wrong")) == ("1.25", "false")
+    assert world.cells()[0][1] == "1.25"
+    speed = part.model.cell_at(0, 1)
+    assert (speed.role, speed.tint) == ("changed", "changedTint")
+    later = part.clock() + 5
+    part.clock = lambda: later
+    assert part.model.cell_at(0, 1).tint == ""
+
+
+def test_what_is_typed_is_not_overwritten_by_what_comes_and_esc_leaves_it(world: World) -> None:
+    part = world.part
+    part.table.choose("speed")
+    part.field.selectAll()
+    QTest.keyClicks(part.field, "1.")
+    world.robot.parameters["speed"] = 0.75
+    world.hear()
+    assert (part.field.text(), world.cells()[0][1]) == ("1.", "0.75")
+    QTest.keyClick(part.field, Qt.Key.Key_Escape)
+    assert part.field.text() == "0.75"
+    world.robot.parameters["speed"] = 1
+    world.hear()
+    assert part.field.text() == "1.0"
+
+
+def test_a_choice_applies_at_once(qtbot, world: World) -> None:
+    part = world.part
+    part.table.choose("gait")
+    assert part.editors.currentIndex() == CHOICE
+    assert not part.button.isVisibleTo(part)
+    part.choice.set_value("run")
+    part.choice.activated.emit(1)
+    world.settle(qtbot)
+    assert world.robot.parameters["gait"] == "run"
+    part.table.choose("lights")
+    assert [part.choice.itemData(place) for place in range(part.choice.count())] == ["false", "true"]
+    part.choice.set_value("false")
+    part.choice.activated.emit(0)
+    world.settle(qtbot)
+    assert world.robot.parameters["lights"] is False
+
+
+def test_what_can_not_be_set_says_why(world: World) -> None:
+    part = world.part
+    part.table.choose("serial")
+    assert not part.field.isEnabled()
+    assert not part.button.isEnabled()
+    assert part.sentence.text() == "Only its own node may set it."
+    world.window.session.source.tell(GraphView(1, 2, {}))
+    ticks(world.window, world.panel, 2)
+    part.table.choose("speed")
+    assert (part.field.isEnabled(), part.sentence.text()) == (False, "Its node has gone.")
+    assert part.model.cell_at(0, 0).role == "textDisabled"
+
+
+def test_a_node_without_any_says_so_and_what_to_do(world: World) -> None:
+    world.choose("bare")
+    assert not world.part.isVisibleTo(world.panel)
+    assert (
+        "It has no parameters: a program declares them with node.parameters.declare."
+        in world.panel.foot.text()
+    )
+    assert world.window.session.watched == []
+    world.choose("robot")
+    assert "no parameters" not in world.panel.foot.text()
+
+
+def test_a_panel_that_nobody_sees_hears_nothing(world: World) -> None:
+    world.panel.rest()
+    assert world.window.session.watched == []
+    world.panel.wake()
+    assert world.window.session.watched == [place_of(world.robot.id)]
+    world.panel.shut()
+    assert world.window.session.watched == []
+
+
+@pytest.mark.parametrize(
+    ("parameter", "words"),
+    [
+        (ShownParameter("a", 1, "int"), ""),
+        (ShownParameter("a", 1, "int", minimum=0), "0 and more"),
+        (ShownParameter("a", 1, "float", maximum=0.5), "0.5 and less"),
+        (ShownParameter("a", 1, "int", choices=tuple(range(9))), "0, 1, 2, 3, 4, 5 …"),
+        (ShownParameter("a", 1, "int", minimum=0, read_only=True), "read only"),
+    ],
+)
+def test_what_is_allowed_is_said(parameter: ShownParameter, words: str) -> None:
+    assert allowed_words(parameter) == words
+
+
+@pytest.mark.parametrize("size", [(430, 340), (900, 700)])
+def test_words_are_translated_and_fit(
+    qtbot, pseudo, robot: tuple[Window, nep.Node], size: tuple[int, int]
+) -> None:
+    made = World(*robot)
+    qtbot.addWidget(made.panel)
+    made.panel.resize(*size)
+    made.choose("robot")
+    made.hear()
+    names = ("speed", "gait", "lights", "serial", "<b>long</b>")
+    data = (*names, "robot", "bare", "walk", "run", "true", "false", "in m/s", "x" * 5000, "Python", "native")
+    for name in names:
+        made.part.table.choose(name)
+        ticks(made.window, made.panel, 2)
+        if name == "speed":
+            QTest.keyClicks(made.part.field, "fast")
+            QTest.keyClick(made.part.field, Qt.Key.Key_Return)
+        said = [text for _where, text in said_by(made.part) if "xxx" not in text and "long" not in text]
+        assert [text for text in said if untranslated(text, *data)] == []
+        faults = [fault for fault in clipped(made.panel) if f"at {9 - OUT_OF_SIGHT}," not in fault]
+        assert faults == []
+    made.panel.shut()
