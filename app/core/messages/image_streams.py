@@ -11,10 +11,9 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from app.core.messages.picture import Picture, Size, decode
-from app.core.network.watches import Suspendable
+from app.core.network.watches import Watching
 from nep.i18n import _
 from nep.messages.message import Message
 
@@ -139,13 +138,6 @@ class ImageStream:
         self._resting = self.closed = True
         self._images.forget(self)
         self._watch.close()
-
-
-class Watching(Suspendable, Protocol):
-    """What keeps a stream's topic subscribed (`app.core.network.watches.Watch`)."""
-
-    def close(self) -> None:
-        """For good; said twice it does nothing."""
 
 
 class Images:

@@ -18,6 +18,13 @@ class Suspendable(Protocol):
         """It can be seen again; said twice it does nothing."""
 
 
+class Watching(Suspendable, Protocol):
+    """What keeps a topic subscribed: a `Watch`, as those need it who only hold one."""
+
+    def close(self) -> None:
+        """For good; said twice it does nothing."""
+
+
 @final
 class Watch:
     """Somebody looks at some topics until `close`; also a context manager."""

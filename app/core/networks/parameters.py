@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
 
 import orjson
 
@@ -18,6 +17,7 @@ from app.core.faults import error_words
 from app.core.network.nodes import NodeEntry
 from app.core.network.source import Job
 from app.core.network.topics import Topic, key_of
+from app.core.network.watches import Watching
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
@@ -47,23 +47,6 @@ class ShownParameter:
     maximum: float | None = None
     choices: tuple[object, ...] = ()
     read_only: bool = False
-
-
-class Watching(Protocol):
-    """What keeps a topic subscribed (`app.core.network.watches.Watch`)."""
-
-    @property
-    def resting(self) -> bool:
-        """Whether it is not subscribed now."""
-
-    def rest(self) -> None:
-        """It is not subscribed until `wake`."""
-
-    def wake(self) -> None:
-        """Look again."""
-
-    def close(self) -> None:
-        """Look no more."""
 
 
 class ParameterSetter:

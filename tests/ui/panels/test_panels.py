@@ -23,6 +23,7 @@ from tests.ui.panels.test_behaviour import Editor
 BASES = {
     "base",
     "registry",
+    "network_table",
     "one_robot_panel",
     "table_panel",
     "no_robot",
