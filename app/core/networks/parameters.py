@@ -27,6 +27,9 @@ from nep.patterns.parameters.remote import RemoteParameters
 
 ANSWER_S = 3.0
 """How long a node may take to answer that it has set one."""
+READ_BYTES = 4 * 2**20
+"""More is not read in the window."""
+EDITED_LETTERS = 20_000
 MOST = 1000
 """As many as a node may declare; of a stranger's the others are not shown."""
 
@@ -36,7 +39,7 @@ class ShownParameter:
     """A parameter as its node tells it. ``kind`` is "bool", "int", "float", "str", "list" or "dict".
 
     ``minimum`` and ``maximum`` bound numbers, ``choices`` are the only values there are, if there are any.
-    ``read_only``: only its own node may set it.
+    ``read_only``: only its own node may set it. ``text`` is the value as a person edits it.
     """
 
     name: str
@@ -47,6 +50,7 @@ class ShownParameter:
     maximum: float | None = None
     choices: tuple[object, ...] = ()
     read_only: bool = False
+    text: str = ""
 
 
 class ParameterSetter:
@@ -155,6 +159,8 @@ class NodeParameters:
     def _take(self, message: Message, now: float) -> None:
         self.revision += 1
         try:
+            if message.size_bytes > READ_BYTES:
+                raise NepError(_("they are too large to be shown here; use nep param list"))
             told = parameters_in(message.payload)
         except NepError as error:  # also a `DecodeError`
             self.problem = str(error)
@@ -206,6 +212,8 @@ def refusal_of(node: NodeEntry, parameter: ShownParameter) -> str:
     """Why a parameter can't be set from here; empty when it can."""
     if node.gone_s is not None:
         return _("its node has gone")
+    if len(parameter.text) > EDITED_LETTERS:
+        return _("it is too long to be changed here; use nep param set")
     if not node.may_set:
         return _("on this network parameters can be read only")
     return _("only its own node may set it") if parameter.read_only else ""
@@ -216,7 +224,8 @@ def parameters_in(state: object) -> tuple[ShownParameter, ...]:
     listed = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(listed, list):
         raise NepError(_("this is no list of parameters"))
-    return tuple(_parameter(each) for each in listed[:MOST] if isinstance(each, Mapping))
+    told = [_parameter(each) for each in listed[:MOST] if isinstance(each, Mapping)]
+    return tuple({each.name: each for each in told}.values())
 
 
 def _parameter(told: Mapping[str, object]) -> ShownParameter:
@@ -228,8 +237,9 @@ def _parameter(told: Mapping[str, object]) -> ShownParameter:
         str(told.get("description") or ""),
         _number(told.get("min")),
         _number(told.get("max")),
-        tuple(choices) if isinstance(choices, list) else (),
+        tuple(choices[:MOST]) if isinstance(choices, list) else (),
         told.get("read_only") is True,
+        text_of(told.get("value")),
     )
 
 

@@ -169,6 +169,14 @@ def test_whatever_a_stranger_publishes_there_is_said_or_read(
         loud.publish({"parameters": [1, {"name": ["x"], "type": 5, "min": "a", "choices": 3, "value": None}]})
         tick_until(session, lambda: not _refreshed(shown).problem)
         (strange,) = shown.all
+        loud.publish({"parameters": [{"name": "a", "value": 1}, {"name": "a", "value": 2}]})
+        tick_until(session, lambda: values(_refreshed(shown)) == {"a": 2})
+        loud.publish({"parameters": [{"name": "a", "value": "x" * (5 * 2**20)}]})
+        tick_until(session, lambda: "too large" in _refreshed(shown).problem)
+        loud.publish({"parameters": [{"name": "a", "value": "x" * 30_000, "type": "str"}]})
+        tick_until(session, lambda: not _refreshed(shown).problem)
+        shown.set("a", "y")
+        assert "too long" in shown.refusal
         assert (strange.name, strange.kind, strange.minimum, strange.choices) == ("['x']", "5", None, ())
         loud.publish_bytes(b"{no json")
         tick_until(session, lambda: _refreshed(shown).problem)

@@ -9,7 +9,13 @@ from PySide6.QtCore import QModelIndex, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.networks.parameters import NodeParameters, ShownParameter, refusal_of, text_of
+from app.core.networks.parameters import (
+    EDITED_LETTERS,
+    NodeParameters,
+    ShownParameter,
+    refusal_of,
+    text_of,
+)
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, ElidedLabel, Separator, label, paint, set_role
@@ -49,6 +55,7 @@ class ParametersPart(QWidget):
         self.clock: Callable[[], float] = time.monotonic
         self._seen: tuple[object, ...] = ()
         self._edited = self._waits = False
+        self._fades_until = 0.0
         self.title = ElidedLabel("small", "textSecondary")
         self.title.setContentsMargins(12, 5, 12, 3)
         self.model = TableModel(self._columns(), lambda each: each.name)
@@ -97,7 +104,7 @@ class ParametersPart(QWidget):
     def _columns(self) -> tuple[Column[ShownParameter], ...]:
         return (
             Column("parameter", lazy("Parameter"), 96, self._name_cell, stretch=True, tip=_tip),
-            Column("value", lazy("Value"), 130, self._value_cell, tip=lambda p: text_of(p.value)[:2000]),
+            Column("value", lazy("Value"), 130, self._value_cell, tip=lambda p: p.text[:2000]),
             Column("allowed", lazy("Allowed"), 124, _allowed_cell, tip=allowed_words, yields=1),
         )
 
@@ -110,7 +117,7 @@ class ParametersPart(QWidget):
         return Cell(parameter.name, role=self._ink("text"), mono=True, middle=True)
 
     def _value_cell(self, parameter: ShownParameter) -> Cell:
-        words = shortened(text_of(parameter.value), SHOWN_LETTERS)
+        words = shortened(parameter.text, SHOWN_LETTERS)
         changed = self.parameters.changed.get(parameter.name)
         if changed is not None and self.clock() - changed < CHANGED_S:
             return Cell(words, role="changed", mono=True, tint="changedTint")
@@ -134,7 +141,9 @@ class ParametersPart(QWidget):
             self.title.setText(self._title())
             self.model.set_rows(parameters.all)
             self._show_chosen()
-        self.table.tell_visible_changed()
+            self._fades_until = self.clock() + 2 * CHANGED_S
+        if self.clock() < self._fades_until:  # what has changed is marked, and soon no more
+            self.table.tell_visible_changed()
 
     def _title(self) -> str:
         parameters = self.parameters
@@ -182,7 +191,7 @@ class ParametersPart(QWidget):
         self._say_about(parameter, why_not, waits=waits)
 
     def _show_editor(self, parameter: ShownParameter, options: list[str]) -> None:
-        now = text_of(parameter.value)
+        now = parameter.text
         self.editors.setCurrentIndex(CHOICE if options else LINE)
         for widget in (self.field, self.choice):
             widget.setAccessibleName(_("Value of {parameter}").format(parameter=parameter.name))
@@ -193,7 +202,7 @@ class ParametersPart(QWidget):
                     self.choice.addItem(shortened(each, SHOWN_LETTERS), each)
             self.choice.set_value(now)
         elif not self._edited and self.field.text() != now:
-            self.field.setText(now)
+            self.field.setText(now[:EDITED_LETTERS])
 
     def _say_about(self, parameter: ShownParameter, why_not: str, *, waits: bool) -> None:
         refusal = self.parameters.refusal

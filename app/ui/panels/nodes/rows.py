@@ -174,7 +174,7 @@ def cpu_cell(row: NodeRow) -> Cell:
         return _of_node(_cpu)(row)
     if row.node.cpu_ratio is not None:
         return _of_node(_cpu)(row)
-    return Cell(_("not told"), role=_ink(row, "textTertiary"))
+    return Cell(pgettext("figure", "not told"), role=_ink(row, "textTertiary"))
 
 
 def _of_node(cell: Callable[[NodeEntry], str], role: str = "text") -> Callable[[NodeRow], Cell]:
