@@ -11,6 +11,7 @@ Ubuntu), the virtual environment ``.venv``, the pinned packages in it, and a vir
     bench          the benchmarks
     screenshots    the pictures of the README
     guide-pictures the pictures of the guide, in each language
+    reference      the pages of docs/api, from the docstrings
     setup          only make the environment
 
 What stands behind the command goes to the program that it starts. Standard library only.
@@ -45,6 +46,7 @@ SCRIPTS = {
     "bench": ("tools/bench.py", "dev"),
     "screenshots": ("tools/screenshots.py", "dev"),
     "guide-pictures": ("tools/guide_pictures.py", "dev"),
+    "reference": ("tools/reference.py", "dev"),
 }
 
 

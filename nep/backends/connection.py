@@ -18,7 +18,10 @@ _MODES: dict[str, Mode] = {"one2many": "one2many", "many2one": "many2one", "many
 
 @dataclass(frozen=True)
 class Hybrid:
-    """Connected through the master at `master`. Any number on both sides, whatever the mode says."""
+    """Connected through the master at `master`. Any number on both sides, whatever the mode says.
+
+    `mode`: as the original NEP has it. `Node.hybrid` makes one.
+    """
 
     master: str
     mode: Mode = "many2many"
@@ -26,11 +29,14 @@ class Hybrid:
 
 @dataclass(frozen=True)
 class Direct:
-    """Connected without a master, at `ip:port`.
+    """Connected without a master, at `ip:port`. `Node.direct` makes one.
+
+    `ip`: an address, or a name of a computer. `port`: 1 to 65535. `mode`: who binds the port, see below.
+    `wire`: "original" frames of `generation` "A" (`topic {…}`) or "B" (`{…}`), the "native" wire, or plain
+    "tcp" (calls only).
 
     one2many: the publisher binds the port. many2one: the subscriber does. many2many: both connect, publishers
-    to `port`, subscribers to `port + 1`, and a proxy of the original NEP has to run there. `wire`: "original"
-    frames of `generation` "A" (`topic {…}`) or "B" (`{…}`), the "native" wire, or plain "tcp" (calls only).
+    to `port`, subscribers to `port + 1`, and a proxy of the original NEP has to run there.
     """
 
     ip: str
@@ -41,6 +47,7 @@ class Direct:
 
 
 Configuration = Hybrid | Direct
+"""How a publisher, subscriber, server or client is connected; left out it is the node's own master."""
 
 
 def for_messages(configuration: Configuration) -> Configuration:

@@ -45,7 +45,9 @@ class Attachment(Protocol):
 class Master:
     """A master at `address` ("127.0.0.1:7780"; port 0 takes a free one). A context manager.
 
-    `start()` raises `AddressInUseError` when something is there already. `learn_s`: how long a master that
+    `start()` raises `AddressInUseError` when something is there already. `address`: as `master_address` has
+    it. `attachments`: what lives with it, such as the gateway. `lease_s`: a node that was silent for so long
+    is unlisted, in seconds. `learn_s`: how long a master that
     has just started waits for nodes that an earlier one knew; 0 when there cannot have been one.
     `owner_pid`: end by itself when that process is gone and no node of another process is registered.
     """
@@ -132,13 +134,19 @@ class Master:
         return server.submit(request, timeout_s)
 
     def listen(self, hosts: Sequence[str]) -> None:
-        """Serve other computers at these addresses of this one, none: no more. See `listen`."""
+        """Serve other computers at these addresses of this one, none: no more.
+
+        Raises `RequestRefusedError` when it cannot be bound there, and as `view`.
+        """
         reply = self.submit(Listen(tuple(hosts)))
         if isinstance(reply, Refused):
             raise RequestRefusedError(reply.reason)
 
     def view(self) -> GraphView:
-        """The graph now. Raises as `submit` does."""
+        """The graph now.
+
+        Raises `ClosedError` when it has ended, `WaitTimeoutError` when it does not get to it in time.
+        """
         reply = self.submit(Look())
         if not isinstance(reply, Seen):
             raise ClosedError(f"the master at '{self.address}'")

@@ -10,7 +10,11 @@ __all__ = ["Encoded", "encoded"]
 
 
 class Encoded(NamedTuple):
-    """Bytes of a payload, and what has to travel beside them. A publisher sends it unchanged."""
+    """Bytes of a payload, and what has to travel beside them. A publisher sends it unchanged.
+
+    `data`: the bytes, as the codec of the topic's type has them. `extension`: a map with text keys, such as
+    an image's "shape" and "encoding"; None for nothing.
+    """
 
     data: bytes | memoryview
     extension: Mapping[str, object] | None = None

@@ -65,7 +65,7 @@ class ImageFormat:
     """How a publisher sends its pictures: `nep.ImageFormat("jpeg", quality=70, width=640)`.
 
     `kind`: "jpeg" (of `uint8` with one or three channels), "png", "raw", or "auto", which keeps what there
-    is. `quality` of a JPEG, 1 to 100. `width`: a wider picture is made so wide, and its height goes with it;
+    is. `quality`: of a JPEG, 1 to 100. `width`: a wider picture is made so wide, and its height goes with it;
     of depth and labels (16 bits and more) pixels are left out then, not mixed. Bytes that are a file already,
     and `raw_image`, are sent as they are. Raises `ValueError` for what is none of these.
     """
@@ -181,7 +181,8 @@ def _as_png(frame: NDArray[Any]) -> Encoded:
 def raw_image(payload: object) -> Encoded:
     """A picture without loss: its numbers as they are, in the array's own memory. Raises `EncodeError`.
 
-    Publish it before the array changes.
+    `payload`: an array of numpy, (height, width) or (height, width, 1 to 4 channels), colours as OpenCV has
+    them: blue, green, red. Publish it before the array changes.
     """
     try:
         return _raw(_checked(payload))

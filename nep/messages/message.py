@@ -62,7 +62,7 @@ class Message:
     `publisher`  the publisher's id; None from the original wire
     `extension`  what travels beside the payload (an image's shape and encoding), else empty
     `is_latched` True when the publisher kept it for subscribers that come late
-    `latency_s`  how long after its publication this program looked at it (s), by this computer's clock
+    `latency_s`  how long after its publication this program looked at it (s)
     `latency_uncertainty_s`  how surely that is known (s)
     """
 

@@ -74,11 +74,13 @@ _closed_in = 0
 class Node(ServiceNode):
     """A node of this name. It needs no master until something is made on it; works in any thread.
 
-    `transport` names a back end: "zeromq" (also "ZMQ"), "memory" (nodes of this process only). `master` is
-    the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`: how long `new_pub` and
-    `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for ever. Raises
-    `UnknownBackendError`, `BadNameError`, `TooManyFilesError`. In a child that is forked it is closed, with
-    all that was made on it; a new node works there.
+    `name`: what others see it as; it may be there more than once, which is an alert. `transport`: the back
+    end, "zeromq" (also "ZMQ"), "memory" (nodes of this process only), "zenoh", "nanomsg", "ros" or "ros2"
+    (docs/backends.md). `master`: the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`:
+    how long `new_pub` and `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for
+    ever. `generation`: what it is in the graph, another word for gateways to other systems. Raises
+    `UnknownBackendError`, `BackendUnavailableError`, `BadNameError`, `TooManyFilesError`. In a child that is
+    forked it is closed, with all that was made on it; a new node works there.
     """
 
     def __init__(
@@ -396,7 +398,7 @@ class Node(ServiceNode):
 
     @property
     def log(self) -> logging.Logger:
-        """A logger whose records, from INFO on, Console and `nep log` show (`nep.nodes.log_handler`)."""
+        """A logger whose records, from INFO on, Console and `nep log` show."""
         return self.log_handler.logger
 
     @property

@@ -13,8 +13,7 @@ class Timer:
     """Due every `period_s` seconds, for the first time after one period; late, it is due once.
 
     So a timer whose periods passed while something else ran does not make up for them, and keeps its beat:
-    it is due at whole periods after it was made. `clock` tells seconds that never go back. May be used from
-    any thread, and by several that spin.
+    it is due at whole periods after it was made. May be used from any thread, and by several that spin.
     """
 
     def __init__(

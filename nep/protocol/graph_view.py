@@ -25,7 +25,10 @@ BRIDGES_TOPIC = "/nep/bridges"
 
 @dataclass(frozen=True)
 class Alert:
-    """A present problem: `id` such as "type:/camera", a sentence for people, and what to do."""
+    """A present problem, for people.
+
+    `id`: what it is about, such as "type:/camera". `sentence`: what is wrong. `hint`: what to do.
+    """
 
     id: str
     sentence: str
@@ -34,7 +37,11 @@ class Alert:
 
 @dataclass(frozen=True)
 class NodeInfo:
-    """A program, or a part of one. `generation` is "native", "gateway", or the original NEP's "A", "B".
+    """A program, or a part of one.
+
+    `id`: 16 hexadecimal digits. `host`: its computer's name. `pid`: its process, None if not known.
+    `since_ns`: when it was made, in nanoseconds since 1970 by its own clock. `generation` is "native",
+    "gateway", or the original NEP's "A", "B".
 
     `cpu_ratio` is the share of one core that its process used between its last two renewals (0.5 is half a
     core), None until known; nodes of one process have the same. `clock_offset_ns`: what to add to its
@@ -58,7 +65,10 @@ class NodeInfo:
 class PublisherInfo:
     """A publisher. Its counters are those of its last renewal, one second old at most; in large graphs more.
 
-    `endpoints` is empty for the original NEP's. `rate_hz` and `bandwidth_Bps` are None until known.
+    `endpoints` is empty for the original NEP's. `latched`: it keeps messages for who comes later. `count`:
+    messages so far. `bytes`: of their payloads. `last_seq`: the number of the newest. `last_stamp_ns`: its
+    time, in nanoseconds since 1970 by the publisher's clock. `rate_hz`: messages a second, None until known.
+    `bandwidth_Bps`: bytes a second, None until known.
     """
 
     id: int
@@ -75,7 +85,11 @@ class PublisherInfo:
 
 @dataclass(frozen=True)
 class SubscriberInfo:
-    """A subscriber; `received` and `lost` are None where nobody can count them (the original NEP)."""
+    """A subscriber.
+
+    `received`: messages that arrived. `lost`: messages that did not. Both are None where nobody can count
+    them (the original NEP).
+    """
 
     id: int
     node_id: str
@@ -85,7 +99,12 @@ class SubscriberInfo:
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """A topic with everybody on it. Rates are sums over its publishers; loss over its subscribers."""
+    """A topic with everybody on it. Rates are sums over its publishers; loss over its subscribers.
+
+    `codec`: how its publishers encode, empty when there is none. `rate_hz`: messages a second.
+    `bandwidth_Bps`: bytes a second. `last_stamp_ns`: of the newest message, in nanoseconds since 1970.
+    `loss_ratio`: lost ones of all that should have arrived, 0 to 1. What nobody knows is None.
+    """
 
     name: str
     msg_type: str
@@ -110,7 +129,11 @@ class PatternInfo:
 
 @dataclass(frozen=True)
 class ServerInfo:
-    """A server. `calls` were answered, `errors` of them with an error; `bytes` is the size of the answers."""
+    """A server of a service.
+
+    `calls`: those that were answered. `errors`: of these, those answered with an error. `bytes`: the size of
+    the answers.
+    """
 
     id: int
     node_id: str
@@ -122,7 +145,11 @@ class ServerInfo:
 
 @dataclass(frozen=True)
 class ClientInfo:
-    """A client: calls that were answered, and that ended without an answer; None until known."""
+    """A client of a service.
+
+    `answered`: calls that were, also with an error. `failed`: those that ended without an answer. Both are
+    None until known.
+    """
 
     id: int
     node_id: str
@@ -144,8 +171,10 @@ class ServiceInfo:
 
 @dataclass(frozen=True)
 class GraphView:
-    """The whole graph at one moment. `revision` grows when somebody comes or goes, not with statistics.
+    """The whole graph at one moment.
 
+    `epoch`: another number after the master was started again. `revision`: grows when somebody comes or goes,
+    not with statistics. `nodes`: by id. `topics`: by name. `services`: by name. `alerts`: what is wrong now.
     `listens`: the addresses at which the master serves other computers; none when it serves its own only.
     """
 

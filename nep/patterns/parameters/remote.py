@@ -19,7 +19,7 @@ __all__ = ["RemoteParameters", "node_with_parameters"]
 
 
 class RemoteParameters:
-    """Reads and sets another node's parameters; a context manager. `client` calls it."""
+    """Reads and sets another node's parameters; a context manager. `Node.parameters_of` makes one."""
 
     def __init__(self, client: Client) -> None:
         self._client = client

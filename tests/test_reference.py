@@ -1,0 +1,120 @@
+"""The reference is what the docstrings say, and they say something of every public name."""
+
+from __future__ import annotations
+
+import re
+
+import griffe
+import pytest
+
+import nep
+from tools import reference
+
+INTERNAL = re.compile(
+    r"\bnep\.(nodes|backends|system|patterns|protocol|masters|messages|programs|cli)\b|\b_[a-z]\w+|ParameterHost"
+)
+"""Rooms and names that programs never see; two words are joined by one stroke within a name only."""
+
+
+@pytest.fixture(scope="module")
+def book() -> reference.Reference:
+    return reference.reference()
+
+
+def test_the_pages_are_what_the_code_says() -> None:
+    assert reference.main(["--check"]) == 0, "docstrings have changed: python3 dev.py reference"
+
+
+def test_every_public_name_has_its_place(book: reference.Reference) -> None:
+    names = {each for each in nep.__all__ if not each.startswith("_")} - book.spellings.keys()
+    types = {*nep.geometry.__all__, *nep.sensor.__all__}
+    assert book.names == names | types
+    assert book.spellings == {"node": "Node", "master": "Master"}
+
+
+def test_every_public_name_has_a_docstring(book: reference.Reference) -> None:
+    silent = []
+    for name in sorted(book.names):
+        found = book.find(name)
+        silent += [] if found.docstring else [name]
+        if isinstance(found, griffe.Class):
+            silent += [
+                f"{name}.{each.name}"
+                for each in book.members(found)
+                if isinstance(each, griffe.Function) or "property" in each.labels
+                if not each.docstring
+            ]
+    assert silent == []
+
+
+def test_nothing_internal_appears() -> None:
+    found = [
+        f"{name}: {line}"
+        for name, page in reference.pages().items()
+        for line in page.splitlines()
+        if INTERNAL.search(line.replace("raw_image", ""))
+    ]
+    assert found == []
+
+
+def test_what_is_called_internal_is_there(book: reference.Reference) -> None:
+    for each in reference.INTERNAL:
+        owner, _, member = each.partition(".")
+        found = book.find(owner)
+        assert isinstance(found, griffe.Class)
+        inherited = {name for base in (found, *found.mro()) for name in base.members}
+        init = found.members.get("__init__")
+        assert member in inherited, f"{each} is gone: {init}"
+
+
+def test_lines_are_as_wide_as_a_page_and_links_lead_somewhere() -> None:
+    pages = reference.pages()
+    headings = {
+        name: {
+            re.sub(r"[^\w-]", "", line.lstrip("# ").lower())
+            for line in page.splitlines()
+            if line.startswith("#")
+        }
+        for name, page in pages.items()
+    }
+    for name, page in pages.items():
+        for line in page.splitlines():
+            assert len(line) <= reference.WIDTH or line.startswith(("|", "[")), f"{name}: {line}"
+            for file, anchor in re.findall(r"\]\((\w+\.md)#(\w+)\)", line):
+                assert anchor in headings[file], f"{name}: {line}"
+
+
+DOCSTRING = """A thing of so many.
+
+`count`: how many there are. It is not said of `other`. `size` is in metres. Raises `NepError` when it fails,
+and `ValueError`.
+
+Second, with 0.5.4 in it.
+
+    thing(1)
+    thing(2)
+"""
+
+
+def test_a_docstring_is_taken_apart() -> None:
+    words = reference.words_of(DOCSTRING, ["count", "size"])
+    assert words.names == {"count": "how many there are.", "size": "`size` is in metres."}
+    assert words.raises == ("`NepError` when it fails, and `ValueError`.",)
+    assert words.paragraphs == (
+        "A thing of so many.",
+        "It is not said of `other`.",
+        "Second, with 0.5.4 in it.",
+        "    thing(1)\n    thing(2)",
+    )
+
+
+def test_a_list_in_columns_is_taken_apart() -> None:
+    words = reference.words_of("A thing.\n\n`a`   one\n`long`  two\n       and three\n`b` four", [])
+    assert words.names == {"a": "one", "long": "two and three", "b": "four"}
+    assert words.paragraphs == ("A thing.",)
+
+
+def test_the_first_sentence_stays_where_it_is() -> None:
+    words = reference.words_of("`name` is no name. `name`: the name.", ["name"])
+    assert words.paragraphs == ("`name` is no name.",)
+    assert words.names == {"name": "the name."}

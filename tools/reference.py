@@ -1,0 +1,479 @@
+"""Write the reference: docs/api, a page for each field, from the docstrings of nep's public names.
+
+    python tools/reference.py            write it anew
+    python tools/reference.py --check    1 when what is written is no longer true
+
+It reads the sources and imports nothing of nep. Of a docstring, sentences that begin with an argument's
+name go into the table of arguments, and those that begin with "Raises" below it. `tests/test_reference.py`
+compares the pages with the code, so they can't grow old.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import re
+import sys
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import griffe
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / "docs" / "api"
+WIDTH = 118
+MADE_BY = "Made from the docstrings by `python3 dev.py reference`; do not write here."
+
+
+@dataclass(frozen=True)
+class Field:
+    """A page: its title, what it begins with, and where its names live."""
+
+    title: str
+    words: str
+    homes: tuple[str, ...]
+
+
+PAGES: Mapping[str, Field] = {
+    "nodes": Field(
+        "Nodes, publishers and subscribers",
+        'Begin with `nep.node("name")`; docs/guide.md shows how.',
+        ("nep.nodes.node", "nep.nodes", "nep.backends.connection"),
+    ),
+    "messages": Field(
+        "Messages",
+        "What a subscriber gets, and what can be published beside plain values; see docs/types.md and "
+        "docs/latency.md.",
+        ("nep.messages",),
+    ),
+    "types": Field(
+        "Types of robots' messages",
+        "Dataclasses in `nep.geometry` and `nep.sensor`, for `new_pub` and `new_sub`; see docs/types.md.",
+        ("nep.geometry", "nep.sensor"),
+    ),
+    "services": Field(
+        "Services, surveys and parameters",
+        "Programs that answer each other; see docs/services.md and docs/patterns.md.",
+        ("nep.patterns.services", "nep.patterns.parameters"),
+    ),
+    "blackboard": Field(
+        "Blackboards",
+        "The newest value of each key; see docs/blackboard.md.",
+        ("nep.programs",),
+    ),
+    "masters": Field(
+        "Masters and the graph",
+        "Who is there, and who talks to whom.",
+        ("nep.masters.master", "nep.masters", "nep.system", "nep.protocol"),
+    ),
+    "errors": Field("Errors", "All of them are `NepError`s, and say what to do next.", ("nep.errors",)),
+}
+OWN_PAGES = ("nep.geometry", "nep.sensor")
+"""Public modules of which all that `__all__` names is public."""
+MADE_BY_HAND = frozenset({"Node", "Master", "Blackboard", "ImageFormat", "Encoded"})
+"""Classes that programs call. Of others nep makes the instances, but for those on pages of types."""
+INTERNAL = frozenset({
+    "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.take", "Client.join", "Master.epoch",
+    "Master.submit", "Message.decoded", "Message.kind", "Message.raw", "Message.seen_ns",
+    "Node.open_parameters", "NodeParameter.as_map", "NodeParameter.with_value", "Publisher.refuse",
+    "Respondent.service",
+    "Server.join", "Server.run_one", "Server.spun", "Subscriber.decoded", "Subscriber.is_typed",
+    "Subscriber.typed", "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.take_turn",
+})  # fmt: skip
+"""What other parts of nep need of these classes,"""
+INTERNAL_EVERYWHERE = frozenset({"args", "forked", "node_closes"})
+"""and of any."""
+_BEGINNINGS: Mapping[str, str] = {"0": "int", "''": "str"}
+"""What something is that begins as this."""
+
+_SENTENCE = re.compile(r"(?<=[.!?]) +(?=[A-Z`\"(])")
+_SAID = re.compile(r"`(\w+)`(?::| (?=(?:is|are|as|tells|says|has|counts|are|may)\b))\s*(.*)", re.DOTALL)
+_LISTED = re.compile(r"^`(\w+)`\s+(.*)$")
+_IN_COLUMNS = re.compile(r"`\w+`\s{2,}")
+_PAGE = re.compile(r"\bdocs/([\w-]+\.md)")
+_CODE = "    "
+
+
+@dataclass(frozen=True)
+class Words:
+    """A docstring in parts: what is said of names, of errors, and the rest as paragraphs."""
+
+    paragraphs: tuple[str, ...]
+    names: Mapping[str, str]
+    raises: tuple[str, ...]
+
+
+def words_of(docstring: str, names: Iterable[str]) -> Words:
+    """Take a docstring apart; `names` are those of its arguments or attributes."""
+    known, told, raises = frozenset(names), dict[str, str](), list[str]()
+    paragraphs: list[str] = []
+    is_first = True
+    for paragraph in re.split(r"\n\s*\n", inspect.cleandoc(docstring)):
+        if paragraph.startswith(_CODE):
+            paragraphs.append(paragraph)
+            continue
+        listed = _listed(paragraph)
+        if listed:
+            told.update(listed)
+            continue
+        kept = []
+        for sentence in _SENTENCE.split(" ".join(paragraph.split())):
+            said = None if is_first else _SAID.fullmatch(sentence)
+            is_first = False
+            if said and said.group(1) in known and said.group(1) not in told:
+                told[said.group(1)] = said.group(2) if sentence[said.end(1) + 1] == ":" else sentence
+            elif sentence.startswith("Raises "):
+                raises.append(sentence.removeprefix("Raises "))
+            else:
+                kept.append(sentence)
+        if kept:
+            paragraphs.append(" ".join(kept))
+    return Words(tuple(paragraphs), told, tuple(raises))
+
+
+def _listed(paragraph: str) -> Mapping[str, str]:
+    """A list of names with what is said of each, as columns."""
+    if not _IN_COLUMNS.match(paragraph):
+        return {}
+    found: dict[str, str] = {}
+    last = ""
+    for line in paragraph.splitlines():
+        entry = _LISTED.match(line)
+        if entry:
+            last = entry.group(1)
+            found[last] = entry.group(2)
+        elif last and line.startswith("  "):
+            found[last] += f" {line.strip()}"
+        else:
+            return {}
+    return found
+
+
+class Reference:
+    """All public names, each with its page. `package` is nep's."""
+
+    def __init__(self, package: griffe.Module) -> None:
+        self._package = package
+        self._pages = {name: page for page in PAGES for name in self._names_on(page)}
+
+    @property
+    def names(self) -> frozenset[str]:
+        """All that have a page."""
+        return frozenset(self._pages)
+
+    def page(self, name: str) -> str:
+        """The whole page of this name."""
+        field = PAGES[name]
+        parts = [
+            f"# {field.title}",
+            f"{MADE_BY} [All pages](README.md).",
+            *self._filled(field.words),
+        ]
+        for each in self._names_on(name):
+            parts += self._entry(each)
+        return "\n\n".join(part.rstrip() for part in parts) + "\n"
+
+    def contents(self) -> str:
+        """The page that leads to all others."""
+        lines = [
+            "# The reference",
+            MADE_BY,
+        ]
+        for page, field in PAGES.items():
+            listed = ", ".join(f"[{each}]({page}.md#{_anchor(each)})" for each in self._names_on(page))
+            lines += [f"## [{field.title}]({page}.md)", *self._filled(field.words), *self._filled(listed)]
+        return "\n\n".join(lines) + "\n"
+
+    @property
+    def spellings(self) -> Mapping[str, str]:
+        """Other spellings of public names, which `nep.public` has beside them."""
+        members = self._package["public"].members.items()
+        return {name: str(each.value) for name, each in members if not each.is_alias and each.is_attribute}
+
+    # ---- which names there are
+
+    def _names_on(self, page: str) -> list[str]:
+        homes = PAGES[page].homes
+        placed = [
+            (next(number for number, home in enumerate(homes) if _lies_in(found.path, home)), name)
+            for name, found in self._public()
+            if any(_lies_in(found.path, home) for home in homes)
+        ]
+        return [name for _, name in sorted(placed, key=lambda each: each[0])]
+
+    def _public(self) -> Iterator[tuple[str, griffe.Object]]:
+        public = self._package["public"]
+        for name, member in public.members.items():
+            if not name.startswith("_") and member.is_alias:
+                yield name, _target(member)
+        for home in OWN_PAGES:
+            module = self._package[home.removeprefix("nep.")]
+            for name in module.exports or ():
+                yield str(name), _target(module.members[str(name)])
+
+    def find(self, name: str) -> griffe.Object:
+        """What is public under this name."""
+        return next(found for each, found in self._public() if each == name)
+
+    def members(self, of: griffe.Class) -> list[griffe.Object]:
+        """The members of a class that programs may use, also those that it has from others of nep."""
+        bases = [base for base in of.mro() if base.path.startswith("nep.")]
+        found: dict[str, griffe.Object] = {}
+        for each in (of, *bases):
+            for name, member in each.members.items():
+                if not name.startswith("_") and name not in INTERNAL_EVERYWHERE:
+                    found.setdefault(name, _target(member))
+        return [
+            member
+            for name, member in found.items()
+            if isinstance(member, griffe.Function | griffe.Attribute)
+            and not any(f"{each.name}.{name}" in INTERNAL for each in (of, *bases))
+        ]
+
+    # ---- entries
+
+    def _entry(self, name: str) -> list[str]:
+        found = self.find(name)
+        if isinstance(found, griffe.Class):
+            return self._class_entry(name, found)
+        if isinstance(found, griffe.Function):
+            return [f"## {name}", *self._function(found, f"{name}")]
+        value = found.value if isinstance(found, griffe.Attribute) else ""
+        return [f"## {name}", _block(f"{name} = {value}"), *self._prose(words_of(_said(found), ()))]
+
+    def _class_entry(self, name: str, found: griffe.Class) -> list[str]:
+        members = self.members(found)
+        attributes = [each for each in members if isinstance(each, griffe.Attribute)]
+        made = found.members.get("__init__") or found.all_members.get("__init__")
+        is_made = name in MADE_BY_HAND or found.module.path in OWN_PAGES
+        start = made if is_made and isinstance(made, griffe.Function) else None
+        arguments = [each.name for each in start.parameters if each.name != "self"] if start else []
+        words = words_of(_said(found), [*(each.name for each in attributes), *arguments])
+        parts = [f"## {name}"]
+        if start is not None:
+            parts.append(_block(self._signature(start, name, has_result=False)))
+        parts += self._prose(words)
+        parts += [f"`nep.{short}` is the same." for short, long in self.spellings.items() if long == name]
+        if start is not None and name in MADE_BY_HAND:
+            parts += self._arguments(start, words)
+            attributes = [each for each in attributes if each.name not in arguments]
+        kind = found.members.get("MSG_TYPE")
+        if isinstance(kind, griffe.Attribute):
+            attributes = [each for each in attributes if each.name != "MSG_TYPE"]
+            parts.append(f"In the graph it is `{str(kind.value)[1:-1]}`.")
+        parts += self._attributes(attributes, words, start if isinstance(start, griffe.Function) else made)
+        parts += self._raises(words)
+        for each in members:
+            if isinstance(each, griffe.Function):
+                parts += [f"### {name}.{each.name}", *self._function(each, each.name)]
+        return parts
+
+    def _function(self, found: griffe.Function, name: str) -> list[str]:
+        words = words_of(_said(found), [each.name for each in found.parameters])
+        parts = [_block(self._signature(found, name)), *self._prose(words)]
+        return [*parts, *self._arguments(found, words), *self._raises(words)]
+
+    def _prose(self, words: Words) -> list[str]:
+        return [part for paragraph in words.paragraphs for part in self._filled(paragraph)]
+
+    def _filled(self, paragraph: str) -> list[str]:
+        if paragraph.startswith(_CODE):
+            return [_block(textwrap.dedent(paragraph))]
+        linked = self._linked(paragraph)
+        return [textwrap.fill(linked, WIDTH, break_long_words=False, break_on_hyphens=False)]
+
+    def _raises(self, words: Words) -> list[str]:
+        return [part for each in words.raises for part in self._filled(f"**Raises** {each}")]
+
+    def _arguments(self, of: griffe.Function, words: Words) -> list[str]:
+        listed = [each for each in of.parameters if each.name != "self"]
+        if not any(each.name in words.names for each in listed):
+            return []
+        rows = [
+            f"| `{each.name}` | {_cell(self._type(each.annotation))} | {_cell(_default(each))} "
+            f"| {self._linked(words.names.get(each.name, ''))} |"
+            for each in listed
+        ]
+        return ["\n".join(("| argument | type | if left out | |", "|---|---|---|---|", *rows))]
+
+    def _attributes(self, attributes: Sequence[griffe.Attribute], words: Words, made: object) -> list[str]:
+        """A table; those without a type of their own have that of the argument of their name."""
+        arguments = made.parameters if isinstance(made, griffe.Function) else ()
+        given = {each.name: each.annotation for each in arguments}
+        rows = []
+        for each in attributes:
+            said = " ".join(_said(each).split()) or words.names.get(each.name, "")
+            known = each.annotation if each.annotation is not None else given.get(each.name)
+            kind = self._type(known) or _BEGINNINGS.get(str(each.value), "")
+            rows.append(f"| `{each.name}` | {_cell(kind)} | {self._linked(said)} |")
+        return ["\n".join(("| attribute | type | |", "|---|---|---|", *rows))] if rows else []
+
+    def _signature(self, found: griffe.Function, name: str, *, has_result: bool = True) -> str:
+        result = self._type(found.returns) if has_result else ""
+        end = f") -> {result}" if result else ")"
+        before = "async " if "async" in found.labels else ""
+        listed = _parameters(found, self._type)
+        one_line = f"{before}{name}({', '.join(listed)}{end}"
+        if len(one_line) <= 100:
+            return one_line
+        return "\n".join((f"{before}{name}(", *(f"    {each}," for each in listed), end))
+
+    def _type(self, annotation: str | griffe.Expr | None) -> str:
+        """A type as a reader knows it: what only nep's own code has a name for is told in full."""
+        said = "" if annotation is None else str(annotation)
+        if '"' not in said:
+            said = said.replace("'", '"')
+        if not isinstance(annotation, griffe.Expr):
+            return said
+        for each in annotation.iterate(flat=True):
+            if isinstance(each, griffe.ExprName) and each.name not in self._pages:
+                alias = self._alias(each)
+                if alias:
+                    said = re.sub(rf"\b{each.name}\b", alias.replace("\\", r"\\"), said)
+        return said
+
+    def _alias(self, name: griffe.ExprName) -> str:
+        path = name.canonical_path
+        if not path.startswith("nep."):
+            return ""
+        try:
+            found = _target(self._package[path.removeprefix("nep.")])
+        except (KeyError, griffe.AliasResolutionError):
+            return ""
+        value = found.value if isinstance(found, griffe.Attribute) else None
+        return self._type(value) if isinstance(value, griffe.Expr) and not _is_call(value) else ""
+
+    def _linked(self, text: str) -> str:
+        """Public names as links to their places."""
+
+        def link(found: re.Match[str]) -> str:
+            whole = found.group(1)
+            page = self._pages.get(whole.removeprefix("nep.").partition(".")[0])
+            name = whole.removeprefix("nep.")
+            if page is None or not self._is_place(name):
+                return found.group(0)
+            return f"[`{whole}`]({page}.md#{_anchor(name)})"
+
+        return _PAGE.sub(r"[\1](../\1)", re.sub(r"`([A-Za-z_][\w.]*)`", link, text))
+
+    def _is_place(self, name: str) -> bool:
+        """Whether it has a heading of its own."""
+        owner, _, member = name.partition(".")
+        if owner not in self._pages or owner[0].islower():
+            return not member and owner in self._pages and "_" in owner
+        found = self.find(owner)
+        if not member:
+            return True
+        return isinstance(found, griffe.Class) and any(
+            each.name == member and isinstance(each, griffe.Function) for each in self.members(found)
+        )
+
+
+def _target(member: griffe.Object | griffe.Alias) -> griffe.Object:
+    return member.final_target if isinstance(member, griffe.Alias) else member
+
+
+def _said(found: griffe.Object) -> str:
+    return found.docstring.value if found.docstring else ""
+
+
+def _lies_in(path: str, home: str) -> bool:
+    return path == home or path.startswith(f"{home}.")
+
+
+def _is_call(value: griffe.Expr) -> bool:
+    return isinstance(value, griffe.ExprCall)
+
+
+def _anchor(heading: str) -> str:
+    """The anchor that GitHub makes of a heading."""
+    return re.sub(r"[^\w-]", "", heading.lower())
+
+
+def _cell(text: str) -> str:
+    return "`" + text.replace("|", "\\|") + "`" if text else ""
+
+
+def _block(code: str) -> str:
+    return f"```python\n{code}\n```"
+
+
+def _default(of: griffe.Parameter) -> str:
+    if of.default is None:
+        return ""
+    said = _value(of.default)
+    if '"' not in said:
+        said = said.replace("'", '"')
+    is_internal = said.startswith(("field(", "_"))
+    return "" if is_internal else said
+
+
+def _value(of: str | griffe.Expr) -> str:
+    """A value as it is written; that of a constant of nep is what it stands for."""
+    if isinstance(of, griffe.ExprName) and isinstance(of.parent, griffe.Object):
+        try:
+            found = _target(of.parent.modules_collection[of.canonical_path])
+        except (KeyError, griffe.AliasResolutionError):
+            return str(of)
+        if isinstance(found, griffe.Attribute) and found.value is not None:
+            return _value(found.value)
+    return str(of)
+
+
+def _parameters(of: griffe.Function, type_of: Callable[[str | griffe.Expr | None], str]) -> list[str]:
+    listed: list[str] = []
+    is_by_name = False
+    for each in of.parameters:
+        if each.name == "self":
+            continue
+        if each.kind is griffe.ParameterKind.keyword_only and not is_by_name:
+            listed.append("*")
+        is_by_name = is_by_name or each.kind in {
+            griffe.ParameterKind.keyword_only,
+            griffe.ParameterKind.var_positional,
+        }
+        stars = {griffe.ParameterKind.var_positional: "*", griffe.ParameterKind.var_keyword: "**"}
+        said = f"{stars.get(each.kind, '')}{each.name}"
+        annotation = type_of(each.annotation)
+        said += f": {annotation}" if annotation else ""
+        default = "" if each.kind in stars else _default(each)
+        if default or (each.default is not None and each.kind not in stars):
+            said += f" = {default or '...'}" if annotation else f"={default or '...'}"
+        listed.append(said)
+    return listed
+
+
+def reference() -> Reference:
+    """The reference of the sources as they are now."""
+    package = griffe.load("nep", search_paths=[ROOT], allow_inspection=False, resolve_aliases=True)
+    return Reference(cast("griffe.Module", package))
+
+
+def pages() -> dict[str, str]:
+    """All pages, by the names of their files."""
+    found = reference()
+    return {"README.md": found.contents(), **{f"{each}.md": found.page(each) for each in PAGES}}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write or check the pages; 1 when they are not what the code says."""
+    parser = argparse.ArgumentParser(description="Write the reference from the docstrings.")
+    parser.add_argument("--check", action="store_true", help="write nothing; 1 when a page is old")
+    options = parser.parse_args(arguments)
+    now = pages()
+    there = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.glob("*.md")}
+    if options.check:
+        return 0 if there == now else 1
+    FOLDER.mkdir(exist_ok=True)
+    for name in there.keys() - now.keys():
+        (FOLDER / name).unlink()
+    for name, page in now.items():
+        (FOLDER / name).write_text(page, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
