@@ -119,9 +119,11 @@ def by_netem(wifi: Wifi, other_pid: int, link: Link) -> str:
 
 @contextmanager
 def by_process(wifi: Wifi, other_pid: int, link: Link) -> Iterator[None]:
-    """The link as a process of ours. Raises `LinkError`."""
-    numbers = (str(wifi.delay_ms), str(wifi.jitter_ms), str(wifi.rate_mbit))
-    with subprocess.Popen([sys.executable, __file__, *numbers], stdout=subprocess.PIPE, text=True) as process:
+    """The link as a process of ours, which ends with its standard input. Raises `LinkError`."""
+    command = [sys.executable, __file__, *map(str, (wifi.delay_ms, wifi.jitter_ms, wifi.rate_mbit))]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) as process:
+        assert process.stdin is not None
         assert process.stdout is not None
         try:
             said = process.stdout.readline().strip()
@@ -130,7 +132,7 @@ def by_process(wifi: Wifi, other_pid: int, link: Link) -> Iterator[None]:
             run("ip", "link", "set", OTHER, "netns", str(other_pid))
             yield
         finally:
-            process.send_signal(signal.SIGTERM)
+            process.stdin.close()
             last = process.stdout.readline()
             link.told = json.loads(last) if last.startswith("{") else {}
 
@@ -186,7 +188,7 @@ class Way:
 
 
 def main() -> int:
-    """Be the link until SIGTERM, then tell how it went."""
+    """Be the link until standard input ends, then tell how it went."""
     wifi = Wifi(*map(float, sys.argv[1:4]))
     try:
         own, other = tun(OWN), tun(OTHER)
@@ -194,19 +196,15 @@ def main() -> int:
         print(f"there is no TUN device: {error.strerror}", flush=True)
         return 1
     ways = {own: Way(wifi, own, other), other: Way(wifi, other, own)}
-    ended = False
-
-    def end(_number: int, _frame: object) -> None:
-        nonlocal ended
-        ended = True
-
-    signal.signal(signal.SIGTERM, end)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the program that started this
     print("up", flush=True)
-    while not ended:
+    end = sys.stdin.fileno()
+    while True:
         now = time.monotonic()
         due = min(way.deliver(now) for way in ways.values())
-        readable, _, _ = select.select(list(ways), [], [], max(0.0, due - time.monotonic()))
+        readable, _, _ = select.select([*ways, end], [], [], max(0.0, due - time.monotonic()))
+        if end in readable:
+            break
         for source in readable:
             ways[source].read(time.monotonic())
     late = sorted(each for way in ways.values() for each in way.late)

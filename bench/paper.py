@@ -13,10 +13,9 @@ that do nothing else (`paper_ends.py`). Kinds are the paper's `string` and `json
 `bytes`. All rows, kinds and sizes are interleaved in random order in each block, until the time is over.
 "plain again" is plain pyzmq against itself: a size counts only when that is within 5 %.
 
-Rows that cannot be run say why, and the others are measured. rosbridge is in no package registry: give
-the command that starts one, in which {port} and {host} are replaced and which finds $ROS_MASTER_URI
-(--rosbridge-start), or the address of one that runs (--rosbridge ws://127.0.0.1:9090, L-local only; its ROS
-master is $ROS_MASTER_URI).
+Rows that cannot be run say why, and the others are measured. rosbridge is in no package registry: give the
+folder of its sources (--rosbridge-sources, see `rosbridge.py`), or the address of a server that runs
+(--rosbridge ws://127.0.0.1:9090, L-local only; its ROS master is $ROS_MASTER_URI).
 """
 
 from __future__ import annotations
@@ -90,32 +89,30 @@ def measure(arguments: argparse.Namespace, scenario: str, places: Places) -> dic
     sizes = [size for size in SIZES[scenario] if size in arguments.sizes] or SIZES[scenario]
     with ExitStack() as stack:
         pairs, not_run = start_pairs(arguments.rows, places, stack)
-        longest_s, blocks = 0.0, 0
-        for blocks in itertools.count(1):
-            started = time.monotonic()
-            cells = [
-                (name, kind, size)
-                for name in (*pairs, *([AGAIN] if PLAIN in pairs else []))
-                for kind, size in itertools.product(arguments.kinds, sizes)
-            ]
+        names = (*pairs, *([AGAIN] if PLAIN in pairs else []))
+        cells = list(itertools.product(names, arguments.kinds, sizes))
+        blocks = 0
+        while pairs and blocks != (arguments.blocks or -1):
             for name, kind, size in random.sample(cells, len(cells)):
                 row = PLAIN if name == AGAIN else name
+                if blocks and time.monotonic() > ends_at:
+                    break  # the first block is always whole
                 if row not in pairs:
                     continue
                 try:
                     came = pairs[row].take(kind, size, trips(scenario, size), WARM_TRIPS[scenario])
                 except NotRunError as error:
-                    not_run[row] = f"{kind} of {size}: {error}"
+                    not_run[row] = f"no further than `{kind}` of {size} in block {blocks + 1}, {error}"
                     del pairs[row]
                 else:
                     taken.setdefault((name, kind, size), []).extend(came)
-            longest_s = max(longest_s, time.monotonic() - started)
-            if blocks == arguments.blocks or time.monotonic() + longest_s > ends_at or not pairs:
+            blocks += 1
+            if time.monotonic() > ends_at:
                 break
     return {
         "blocks": blocks,
         "not_run": not_run,
-        "cells": [cell_of(cell, seconds) for cell, seconds in taken.items() if cell[0] not in not_run],
+        "cells": [cell_of(cell, seconds) for cell, seconds in taken.items()],
     }
 
 
@@ -140,7 +137,7 @@ def cell_of(cell: Cell, seconds: Sequence[float]) -> dict[str, Any]:
 def measure_local(arguments: argparse.Namespace) -> dict[str, Any]:
     """L-local, all of it at 127.0.0.1."""
     here = ("127.0.0.1", "127.0.0.1")
-    with around(here, (), arguments.rosbridge, arguments.rosbridge_start) as places:
+    with around(here, (), arguments.rosbridge, arguments.rosbridge_sources) as places:
         return {"name": "local", "link": "loopback", **measure(arguments, "local", places)}
 
 
@@ -167,7 +164,7 @@ def inside(arguments: argparse.Namespace) -> None:
     try:
         with ExitStack() as stack:
             link = stack.enter_context(joined(wifi))
-            places = stack.enter_context(around(HOSTS, link.elsewhere, "", arguments.rosbridge_start))
+            places = stack.enter_context(around(HOSTS, link.elsewhere, "", arguments.rosbridge_sources))
             found = measure(arguments, "remote", places)
         delay = f"{wifi.delay_ms:g} ± {wifi.jitter_ms:g} ms each way"
         said = f"{delay}, {wifi.rate_mbit:g} Mbit/s, by {link.made_by}"
@@ -238,12 +235,10 @@ def asked() -> argparse.Namespace:
     )
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
     parser.add_argument("--sizes", nargs="+", type=int, default=[], help="of those that there are; else all")
-    parser.add_argument(
-        "--seconds", type=float, default=360.0, help="for all of it; a block is always finished"
-    )
+    parser.add_argument("--seconds", type=float, default=360.0, help="for all; the first block is whole")
     parser.add_argument("--blocks", type=int, default=0, help="at most; else as many as there is time for")
     parser.add_argument("--rosbridge", default="", help="the address of a running server")
-    parser.add_argument("--rosbridge-start", default="", help="a command that starts one at {host}:{port}")
+    parser.add_argument("--rosbridge-sources", default="", help="a folder with rosbridge_suite, branch ros1")
     parser.add_argument("--delay-ms", type=float, default=wifi.delay_ms, help="of the link, in one direction")
     parser.add_argument("--jitter-ms", type=float, default=wifi.jitter_ms)
     parser.add_argument("--rate-mbit", type=float, default=wifi.rate_mbit)

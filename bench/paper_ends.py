@@ -18,6 +18,7 @@ import json
 import os
 import queue
 import random
+import signal
 import sys
 import threading
 import time
@@ -306,6 +307,8 @@ class ZenohEnd(Called):
 class RospyEnd(Called):
     """rospy: std_msgs/String, and UInt8MultiArray for bytes; `place` is the ROS master."""
 
+    topics = "direct"
+
     def __init__(self, role: str, host: str, place: str) -> None:
         super().__init__(role, host, place)
         os.environ.update(ROS_MASTER_URI=place, ROS_IP=host)
@@ -320,10 +323,14 @@ class RospyEnd(Called):
         self._out, self._in = {}, {}
         for kind, message in self._types.items():
             self._out[kind] = rospy.Publisher(
-                f"{self.there}_{kind}", message, queue_size=10, tcp_nodelay=True
+                f"{self.topics}_{self.there}_{kind}", message, queue_size=10, tcp_nodelay=True
             )
             self._in[kind] = rospy.Subscriber(
-                f"{self.back}_{kind}", message, self._called, callback_args=kind, tcp_nodelay=True
+                f"{self.topics}_{self.back}_{kind}",
+                message,
+                self._called,
+                callback_args=kind,
+                tcp_nodelay=True,
             )
 
     def _called(self, message: Any, kind: str) -> None:  # noqa: ANN401 - it has no types
@@ -341,6 +348,12 @@ class RospyEnd(Called):
         self._out[kind].publish(message)
 
 
+class BridgedRospyEnd(RospyEnd):
+    """rospy whose other end is behind a rosbridge server; both rows may have one ROS master."""
+
+    topics = "bridged"
+
+
 class RoslibpyEnd(Called):
     """roslibpy, connected to the rosbridge server at `place`; bytes travel as base64."""
 
@@ -356,9 +369,9 @@ class RoslibpyEnd(Called):
         self._out, self._in = {}, {}
         for kind in KINDS:
             name = "std_msgs/UInt8MultiArray" if kind == "bytes" else "std_msgs/String"
-            self._out[kind] = roslibpy.Topic(ros, f"/{self.there}_{kind}", name)
+            self._out[kind] = roslibpy.Topic(ros, f"/{BridgedRospyEnd.topics}_{self.there}_{kind}", name)
             self._out[kind].advertise()
-            self._in[kind] = roslibpy.Topic(ros, f"/{self.back}_{kind}", name)
+            self._in[kind] = roslibpy.Topic(ros, f"/{BridgedRospyEnd.topics}_{self.back}_{kind}", name)
             self._in[kind].subscribe(self._callback(kind))
 
     def _callback(self, kind: str) -> Callable[[Any], None]:
@@ -387,7 +400,7 @@ ENDS: dict[str, tuple[type[End], type[End]]] = {
     "nep over zenoh": (NepZenohEnd, NepZenohEnd),
     "zenoh": (ZenohEnd, ZenohEnd),
     "rospy": (RospyEnd, RospyEnd),
-    "rosbridge": (RospyEnd, RoslibpyEnd),
+    "rosbridge": (BridgedRospyEnd, RoslibpyEnd),
 }
 """Each row's ping and pong."""
 
@@ -410,6 +423,7 @@ def run(end: End, answer: Callable[[dict[str, object]], None]) -> None:
 def main(arguments: Sequence[str]) -> int:
     """The end of a row; 1 when it cannot be run."""
     role, row, host, place = arguments
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the program that started this
     own = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)  # what a library prints must not be taken for an answer
 

@@ -101,6 +101,8 @@ def goals(found: Found) -> list[Goal]:
     goals = []
     for what, kind, (least, most), goal in asked:
         sizes = [size for size in local.sizes(kind) if least <= size <= most]
+        if not {least, most} <= set(sizes):
+            continue  # a part of them says nothing of the mean
         ratio = local.mean_ratio(NEP, PLAIN, kind, sizes)
         again = local.mean_ratio(AGAIN, PLAIN, kind, sizes)
         if ratio is not None and again is not None:

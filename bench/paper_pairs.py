@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import shlex
 import shutil
 import socket
 import subprocess
@@ -187,11 +186,11 @@ def ros_master(host: str, folder: Path) -> Iterator[str]:
 
 
 @contextmanager
-def rosbridge(command: str, address: str, host: str, folder: Path) -> Iterator[str]:
-    """The address of a rosbridge that `command` starts beside this ROS master. Raises `NotRunError`."""
+def rosbridge(sources: str, address: str, host: str, folder: Path) -> Iterator[str]:
+    """The address of a rosbridge server, started from its sources. Raises `NotRunError`."""
     port = free_port(host)
-    words = [word.format(port=port, host=host) for word in shlex.split(command)]
-    with started(words, address, host, folder) as process:
+    command = [sys.executable, str(HERE / "rosbridge.py"), sources, host, str(port)]
+    with started(command, address, host, folder) as process:
         until_open(process, host, port, "the rosbridge server")
         yield f"ws://{host}:{port}"
 
@@ -230,7 +229,7 @@ def until_open(process: subprocess.Popen[bytes], host: str, port: int, what: str
 
 @contextmanager
 def around(
-    hosts: tuple[str, str], elsewhere: tuple[str, ...], rosbridge_at: str, rosbridge_start: str
+    hosts: tuple[str, str], elsewhere: tuple[str, ...], rosbridge_at: str, rosbridge_sources: str
 ) -> Iterator[Places]:
     """The places where rows meet, with a ROS master and a rosbridge server where these can be had."""
     missing = {}
@@ -245,14 +244,14 @@ def around(
         if elsewhere:
             missing["nep over nanomsg"] = "nep's back end nanomsg joins the nodes of one computer only"
         try:
-            if rosbridge_start and "rospy" not in missing:
-                at = stack.enter_context(rosbridge(rosbridge_start, places.ros_master, hosts[0], folder))
+            if rosbridge_sources and "rospy" not in missing:
+                at = stack.enter_context(rosbridge(rosbridge_sources, places.ros_master, hosts[0], folder))
                 places = replace(places, rosbridge=at, rosbridge_master=places.ros_master)
             elif rosbridge_at and not elsewhere:
                 running = os.environ.get("ROS_MASTER_URI", ROS_MASTER)
                 places = replace(places, rosbridge=rosbridge_at, rosbridge_master=running)
             else:
-                missing["rosbridge"] = "no server was given"
+                missing["rosbridge"] = "no server and no sources of one were given"
         except NotRunError as error:
             missing["rosbridge"] = str(error)
         yield replace(places, missing=missing)
