@@ -67,6 +67,11 @@ def trips(scenario: str, size: int) -> int:
     return next((count for most, count in TRIPS[scenario] if size <= most), LARGE_TRIPS[scenario])
 
 
+def sizes_of(scenario: str, arguments: argparse.Namespace) -> list[int]:
+    """Its sizes that were asked for; all when none was."""
+    return [size for size in SIZES[scenario] if size in arguments.sizes or not arguments.sizes]
+
+
 def start_pairs(
     rows: Sequence[str], places: Places, stack: ExitStack
 ) -> tuple[dict[str, Pair], dict[str, str]]:
@@ -86,7 +91,7 @@ def measure(arguments: argparse.Namespace, scenario: str, places: Places) -> dic
     """All blocks of a scenario for which there is time."""
     ends_at = time.monotonic() + arguments.seconds * share(scenario, arguments.scenarios)
     taken: dict[Cell, list[float]] = {}
-    sizes = [size for size in SIZES[scenario] if size in arguments.sizes] or SIZES[scenario]
+    sizes = sizes_of(scenario, arguments)
     with ExitStack() as stack:
         pairs, not_run = start_pairs(arguments.rows, places, stack)
         names = (*pairs, *([AGAIN] if PLAIN in pairs else []))
@@ -217,6 +222,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         if scenario not in arguments.scenarios:
             continue
         try:
+            if not sizes_of(scenario, arguments):
+                raise NotRunError("it has none of the sizes that were asked for")
             found["scenarios"].append(measured(arguments))
         except NotRunError as error:
             found["not_run"][scenario] = str(error)
@@ -249,6 +256,10 @@ def asked() -> argparse.Namespace:
     arguments = parser.parse_args()
     if not (arguments.rate_mbit > 0 and arguments.delay_ms >= 0 and arguments.jitter_ms >= 0):
         parser.error("a link has a rate above 0, and neither delay nor jitter below 0")
+    if not (arguments.seconds >= 0 and arguments.blocks >= 0):
+        parser.error("neither the time nor the number of blocks is below 0")
+    if arguments.source and not arguments.source.is_file():
+        parser.error(f"there is no file '{arguments.source}'")
     unknown = set(arguments.sizes).difference(*SIZES.values())
     if unknown:
         parser.error(

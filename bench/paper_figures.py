@@ -133,6 +133,11 @@ def ms_text(ms: float) -> str:
     return f"{ms:.0f}" if ms >= 100 else f"{ms:.1f}" if ms >= 10 else f"{ms:.2f}" if ms >= 1 else f"{ms:.3f}"
 
 
+def times(ratio: float) -> str:
+    """As in "0.97" or "120" times."""
+    return f"{ratio:.0f}" if ratio >= 9.95 else f"{ratio:.1f}" if ratio >= 1.95 else f"{ratio:.2f}"
+
+
 def cell_text(cell: Found | None) -> str:
     """Its median and p95."""
     return f"{ms_text(cell['median_ms'])} ({ms_text(cell['p95_ms'])})" if cell else ""
@@ -162,7 +167,7 @@ def times_text(scenario: Scenario) -> str:
             ratios = [scenario.ratio(row, NEP, kind, size) for size in scenario.sizes(kind)]
             known = [each for each in ratios if each is not None]
             if known:
-                spans.append(f"`{kind}` {min(known):.2g} to {max(known):.2g}")
+                spans.append(f"`{kind}` {times(min(known))} to {times(max(known))}")
         if spans:
             said.append(f"- {row}: {', '.join(spans)}")
     return "\n".join(["Times the median of nep, least and most of all sizes:", "", *said]) if said else ""

@@ -68,7 +68,7 @@ class Places:
             return here, here
         endpoints = {"endpoints": [f"tcp/{self.hosts[0]}:{free_port(self.hosts[0])}"]}
         # As it comes zenoh drops what the link does not take within 50 ms: here 1 MB needs 170.
-        drop = {"wait_before_drop": 5_000_000, "max_wait_before_drop_fragments": 5_000_000}
+        drop = {"max_wait_before_drop_fragments": 5_000_000}
         link = {"link": {"tx": {"queue": {"congestion_control": {"drop": drop}}}}}
         files = []
         for what in ("listen", "connect"):
