@@ -48,10 +48,11 @@ _logger = logging.getLogger("nep")
 _POLLIN = int(zmq.POLLIN)
 _NEVER = math.inf
 LEASE_S = 0.02
-_LATE_S = 3 * LEASE_S
-"""The node's thread is called when it would come later than this after a read."""
 _WAITING_S = 0.1
 """How often the node's thread looks whether a reader still waits."""
+_LATE_S = _WAITING_S + LEASE_S
+"""The node's thread is called when it would come later than this after a read: not for each message of a
+reader that always waits again."""
 _BATCH_S = 0.005
 """Sinks and inboxes are filled 200 times a second at most."""
 _BATCH_MESSAGES = 10_000
@@ -222,13 +223,14 @@ class SocketSubscriber(Generic[R]):
             # Under the same lock: the socket was empty, so its descriptor tells of what comes next.
             waker, self._waker = self._waker or Waker(), None
             self._waiters.append(waker)
+        began = time.monotonic()
         try:
             zmq.zmq_poll([(self.fd, _POLLIN), (waker.fd, _POLLIN)], int(timeout_s * 1000) + 1)
         finally:
-            message = self._waited(waker)
+            message = self._waited(waker, began)
         return message
 
-    def _waited(self, waker: Waker) -> Message | None:
+    def _waited(self, waker: Waker, began: float) -> Message | None:
         with self._lock:
             self._waiters.remove(waker)
             if waker in self._woken:
@@ -242,7 +244,8 @@ class SocketSubscriber(Generic[R]):
                 self._changed.notify_all()
                 return None
             message = self._next()
-            self._is_brisk = message is not None
+            # Who waits longer than that would only wait twice for each message.
+            self._is_brisk = message is not None and time.monotonic() - began < SHORT_WAIT_S
             return message
 
     # ---- what it tells
@@ -323,7 +326,7 @@ class SocketSubscriber(Generic[R]):
         sink = self.spec.sink
         if now < self._leased_until and not self.is_closed:
             # Without the lock, which the reader may hold for a short wait; it may only be read too early.
-            self._io_comes_at = due = self._leased_until
+            self._io_comes_at = due = now + _WAITING_S if self._waiters else self._leased_until
             return Rest(is_quiet=True, due=due)
         with self._turn():
             if self.is_closed:
