@@ -171,6 +171,7 @@ class Graph:
             for request, call, sender, is_foreign in waiting:
                 out.extend(self.apply(request, call, now, sender, is_foreign=is_foreign))
         out.extend(self.drop(self._leases.lapsed(now)))
+        self._registry.departed.tick(now)
         self._leases.set_pace(now)
         return tuple(out)
 
@@ -456,6 +457,10 @@ class Graph:
             self._tell(record, gone, out)
 
     def _remove_publisher(self, request: RemovePublisher, out: list[Outgoing]) -> None:
+        member = self._registry.members.get(request.node_id)
+        known = member.publishers.get(request.id) if member is not None else None
+        if known is not None:
+            self._registry.reached(known, request.last_seq, known.last_stamp_ns)
         record = self._registry.remove_publisher(request.node_id, request.id)
         if record is not None:
             gone = PublisherGone(

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from nep.errors import NepError, WireError
 from nep.i18n import _
+from nep.masters.departed import Departed
 from nep.masters.pattern_index import PatternIndex
 from nep.masters.rates import Meter
 from nep.protocol.graph_view import Alert
@@ -126,7 +127,7 @@ class RegisteredNode:
     hung: set[str] = field(default_factory=set)
     cpu_ratio: float | None = None
     heard: dict[int, RegisteredPublisher] = field(default_factory=dict)
-    """Whom its subscribers can connect to, as of the revision `heard_at`. See `Registry.heard_by`."""
+    """Whose newest messages it is told of, as of the version `heard_at`. See `Registry.heard_by`."""
     heard_at: int = -1
     far: tuple[RegisteredNode, ...] = ()
     """Whose they are, as far as these are not known to be on the same computer."""
@@ -157,6 +158,7 @@ class Registry:
         self._subscribing: dict[str, dict[int, RegisteredNode]] = {}
         self._reported: dict[str, tuple[Alert, ...]] = {}
         self.patterns: PatternIndex[RegisteredNode] = PatternIndex()
+        self.departed: Departed[RegisteredPublisher] = Departed()
 
     # ---- reading
 
@@ -210,11 +212,14 @@ class Registry:
         return self._topic_revisions.get(topic, 0)
 
     def heard_by(self, member: RegisteredNode) -> dict[int, RegisteredPublisher]:
-        """Everybody who can be connected to on the topics that this node subscribes to."""
-        if member.heard_at != self.revision:
-            member.heard_at = self.revision
+        """Everybody who can be connected to on the topics that this node subscribes to, or could lately."""
+        version = self.revision + self.departed.changes
+        if member.heard_at != version:
+            member.heard_at = version
             topics = self.topics_heard_by(member)
-            member.heard = {
+            names = {subscriber.record.topic for subscriber in member.subscribers.values()}
+            member.heard = {known: gone for name in names for known, gone in self.departed.of(name).items()}
+            member.heard |= {
                 known: other.publishers[known]
                 for topic in topics
                 for known, other in self._publishing.get(topic, {}).items()
@@ -231,7 +236,10 @@ class Registry:
         return member.far
 
     def last_seqs(self, member: RegisteredNode) -> dict[int, int]:
-        """Publisher id → newest message, for all that can be connected to on this node's topics."""
+        """Publisher id → newest message, for all who can be connected to on this node's topics.
+
+        Also for those who could lately: the node may have been cut off when they ended.
+        """
         return {known: publisher.last_seq for known, publisher in self.heard_by(member).items()}
 
     # ---- changing
@@ -294,12 +302,19 @@ class Registry:
         if gone is None:
             return None
         self.publisher_owners.pop(publisher, None)
+        if gone.record.endpoints:
+            self.departed.add(self._names_of(gone.record.topic), publisher, gone)
         _take_out(self._publishing, gone.record.topic, publisher)
         if gone.record.topic not in self._publishing:
             self.patterns.topic_went(gone.record.topic)
         self._changed(gone.record.topic)
         self._forget_unused(gone.record.topic)
         return gone.record
+
+    def _names_of(self, topic: str) -> set[str]:
+        """A topic, and the wildcards by which it is heard."""
+        heard = self.patterns.subscribers_of(topic)
+        return {topic, *(member.subscribers[known].record.topic for member, known in heard)}
 
     def remove_subscriber(self, node_id: str, subscriber: int) -> None:
         """Unlist a subscriber, if there is such a one."""

@@ -126,6 +126,7 @@ class NanomsgSubSocket(ReadOneByOne):
     def connect(self, remote: RemotePublisher) -> None:
         """Connect to a publisher; twice is once. Silent ones that it replaces are left."""
         for old in self.sources.replaced_by(remote):
+            self.sources.settle(old)
             self.leave(old)
         source = self.sources.listed(remote)
         self._sub.make_room(remote.publisher.history)

@@ -49,9 +49,12 @@ class HeardPublisher:
     has_echoed: bool = False
     is_lapsed: bool = False
     ends_at: float | None = None
-    final: int = 0
     promised: int = 0
-    written_off: int = 0
+    """The newest message that the master, or its last word of it, has told of."""
+    late_from: int = 0
+    late_to: int = 0
+    """These were counted as lost because they were promised, and may still come: as long as `late_to` is the
+    last, because what follows it overtook them."""
     leapt_to: int = 0
     """The number of a message that was refused because too many would be missing before it; else 0."""
 
@@ -133,8 +136,8 @@ class HeardPublishers:
             if last is not None:
                 self.lost += seq - last - 1
             source.last = seq
-        elif source.written_off:  # it was only late
-            source.written_off -= 1
+        elif source.late_to == last and source.late_from <= seq:  # it was only late
+            source.late_from = seq + 1
             self.lost -= 1
         elif is_alone:
             return False
@@ -176,16 +179,17 @@ class HeardPublishers:
         """The master says that `seq` was sent. Nothing waits in the socket.
 
         What was promised one renewal ago and has not come since is lost. Should it come after all, it is
-        taken off again.
+        taken off again. Also of publishers that are not listed any more: they may have ended while this
+        computer was cut off.
         """
         source = self.by_id.get(publisher)
-        if source is None or source.last is None or not source.has_echoed or seq - source.last > GAP_MAX:
+        if source is None or source.last is None or seq - source.last > GAP_MAX:
             return
         if source.promised > source.last:
-            missing = source.promised - source.last
-            self.lost += missing
-            source.written_off += missing
-            source.last = source.promised
+            if source.late_to != source.last:
+                source.late_from = source.last + 1
+            self.lost += source.promised - source.last
+            source.last = source.late_to = source.promised
         source.promised = seq
 
     def dropped(self, count: int) -> None:
@@ -194,11 +198,24 @@ class HeardPublishers:
         self.lost += count
 
     def closing(self, publisher: int, final: int, now: float) -> None:
-        """A publisher has unregistered; its last message was `final`."""
+        """A publisher has unregistered, or was replaced; its last message was `final`, if that is known."""
         source = self.by_id.get(publisher)
         if source is not None and source.ends_at is None:
             source.ends_at = now + FAREWELL_S
-            source.final = final
+            source.promised = max(source.promised, final)
+
+    def lapsed(self, publisher: int, final: int) -> None:
+        """A publisher is not listed any more; `final` is the newest message that the master knew of."""
+        source = self.by_id.get(publisher)
+        if source is not None:
+            source.is_lapsed = True
+            source.promised = max(source.promised, final)
+
+    def settle(self, publisher: int) -> None:
+        """It is about to be left: what has not come of what was promised is lost for good."""
+        source = self.by_id.get(publisher)
+        if source is not None and source.last is not None:
+            self.reached(publisher, source.promised)
 
     def ended(self, now: float) -> list[int]:
         """Publishers to leave: they unregistered long ago and their bye has not come.

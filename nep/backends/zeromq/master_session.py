@@ -283,6 +283,8 @@ class MasterSession:
 
     def begin_leave(self) -> None:
         """Unregister the node with all that it has, if there is a master. Does not wait."""
+        if self._calls.is_connected and not self._is_closed:
+            self._renew()  # subscribers that do not hear the bye learn from the master what was sent last
         with self._lock:
             if self._is_closed:
                 return

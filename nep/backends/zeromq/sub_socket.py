@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import logging
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -233,14 +234,13 @@ class SubSocket:
         return bool(int(self._socket.getsockopt(_EVENTS)) & _POLLIN)
 
     def connect(self, remote: RemotePublisher) -> None:
-        """Connect to a publisher; twice is once. Silent ones that it replaces are left."""
-        for old in self.sources.replaced_by(remote):
-            self.leave(old)
+        """Connect to a publisher; twice is once. Silent ones that it replaces are left, in a while."""
+        endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
+        self._replace(remote, endpoint)
         source = self.sources.listed(remote)
         source.form = 0  # its next message is looked at: the type may be another one
         source.is_lapsed = False
         source.ends_at = None
-        endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
         if endpoint and endpoint not in (source.endpoint, source.refused):
             source.refused = source.problem = ""
             if is_endpoint(endpoint):
@@ -248,6 +248,18 @@ class SubSocket:
             else:
                 other = endpoint.startswith("nanomsg://")
                 self._refuse(source, endpoint, _("it is one of 'nanomsg'") if other else _("it is none"))
+
+    def _replace(self, remote: RemotePublisher, endpoint: str) -> None:
+        """Leave silent publishers when what they sent last was read; at once where it has their port."""
+        for old in self.sources.replaced_by(remote):
+            self.sources.closing(old, 0, time.monotonic())
+        known = self.sources.find(remote.publisher.id)
+        if not endpoint or (known is not None and known.endpoint == endpoint):
+            return
+        for old, source in self.sources.items():
+            if source.endpoint == endpoint:
+                self.sources.settle(old)
+                self.leave(old)
 
     def _connect(self, source: HeardPublisher, endpoint: str) -> None:
         if source.endpoint:  # its computer has another address now, or its master listens anew

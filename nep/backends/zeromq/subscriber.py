@@ -544,11 +544,10 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         with self._turn():
             if is_closed and self._closed_early is not None:
                 self._closed_early.add(publisher)
-            source = self._readable.sources.find(publisher)
-            if source is not None and is_closed:
+            if is_closed:
                 self._readable.sources.closing(publisher, final, time.monotonic())
-            elif source is not None:
-                source.is_lapsed = True
+            else:
+                self._readable.sources.lapsed(publisher, final)
 
     def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
         """By node, how the clocks of other computers differ from this one's: no others are known."""
@@ -565,9 +564,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 return
             sources = self._readable.sources
             for publisher in sources.ended(now):
-                source = sources.get(publisher)
-                if source.last is not None:
-                    sources.reached(publisher, source.final)
+                sources.settle(publisher)
                 self._readable.leave(publisher)
             if not self._readable.has_input:
                 for publisher, seq in last_seqs:

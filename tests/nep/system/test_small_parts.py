@@ -459,3 +459,43 @@ def test_publishers_that_died_and_do_not_come_back_are_left_beyond_a_bound() -> 
     for number in range(1, UNLISTED_MAX + 11):
         sources.listed(remote(number, name=f"N{number}")).is_lapsed = number != 5
     assert sources.ended(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]
+
+
+def test_what_was_written_off_is_found_again_only_if_it_was_really_missing() -> None:
+    sources = HeardPublishers()
+    for seq in (1, 2, 3):
+        assert sources.arrived(1, seq, is_alone=False)
+    for _ in range(2):
+        sources.promised(1, 5)
+    assert (sources.received, sources.lost) == (3, 2)
+    # A connection was made anew, and the publisher sends its whole history.
+    told = [seq for seq in (1, 2, 3, 4, 5) if sources.arrived(1, seq, is_alone=True)]
+    assert told == [4, 5]
+    assert not sources.arrived(1, 5, is_alone=True), "once"
+    assert (sources.received, sources.lost) == (5, 0)
+
+
+def test_what_comes_behind_what_was_written_off_settles_it() -> None:
+    sources = HeardPublishers()
+    sources.arrived(1, 1, is_alone=False)
+    for _ in range(2):
+        sources.promised(1, 4)
+    assert sources.arrived(1, 3, is_alone=False)
+    assert (sources.received, sources.lost) == (2, 2), "2 was overtaken, 4 may still come"
+    assert sources.arrived(1, 6, is_alone=False)
+    assert (sources.received, sources.lost) == (3, 3), "4 and 5 were overtaken"
+    assert not sources.arrived(1, 4, is_alone=True)
+    assert sources.received + sources.lost == 6
+
+
+def test_a_publisher_that_is_left_settles_what_was_promised() -> None:
+    sources = HeardPublishers()
+    sources.arrived(1, 1, is_alone=False)
+    sources.lapsed(1, 3)
+    assert sources.lost == 0, "it may only be out of reach"
+    sources.settle(1)
+    assert (sources.received, sources.lost) == (1, 2)
+    sources.closing(2, 5, now=0.0)  # nobody we know
+    sources.lapsed(2, 5)
+    sources.settle(2)
+    assert sources.lost == 2

@@ -1,0 +1,82 @@
+"""Publishers that ended are told of for a while, to those who were cut off then."""
+
+from __future__ import annotations
+
+from nep.masters.departed import Departed
+from nep.masters.graph import Graph
+from nep.protocol.requests import (
+    AddPublisher,
+    AddSubscriber,
+    Leave,
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    Renew,
+    Renewed,
+    SubscriberCount,
+    SubscriberRecord,
+)
+
+
+def test_the_newest_are_kept_for_a_minute_and_bounded() -> None:
+    departed: Departed[str] = Departed()
+    for number in range(100):
+        departed.add(("t", "**"), number, f"{number}")
+    assert list(departed.of("t")) == list(departed.of("**")) == list(range(36, 100))
+    departed.tick(10.0)
+    departed.add(("t",), 99, "again")  # it came back, and ended again
+    departed.tick(69.0)
+    assert departed.of("t")[99] == "again"
+    assert 99 not in departed.of("**")
+    before = departed.changes
+    departed.tick(70.0)
+    assert list(departed.of("t")) == [99]
+    assert departed.changes > before
+    departed.tick(129.0)
+    assert not departed.of("t")
+
+
+def test_all_of_them_are_bounded() -> None:
+    departed: Departed[int] = Departed()
+    for number in range(5000):
+        departed.add((f"topic {number}",), number, number)
+    assert sum(len(departed.of(f"topic {number}")) for number in range(5000)) == 1000
+    assert departed.of("topic 4999")
+
+
+def node(name: str) -> NodeRecord:
+    return NodeRecord(name * 16, name, "computer", 1)
+
+
+def renewed(graph: Graph, who: NodeRecord, now: float, *counts: PublisherCount) -> dict[int, int]:
+    """What a node is told with its renewal."""
+    heard = () if counts else (SubscriberCount(2, 0, 0), SubscriberCount(3, 0, 0))
+    out = graph.apply(Renew(who.id, graph.epoch, 0, counts, heard), 1, now, who.id)
+    (answer,) = (each.answer for each in out if each.call == 1)
+    assert isinstance(answer, Renewed)
+    assert not answer.again
+    return dict(answer.last_seqs)
+
+
+def test_a_renewal_tells_how_far_a_publisher_came_that_is_not_there_any_more() -> None:
+    graph = Graph(1, 0.0, learn_s=0.0)
+    sends, hears = node("a"), node("b")
+    record = PublisherRecord(1, "/robot/t", "json", "json", ("tcp://10.0.0.1:5000",))
+    graph.apply(AddPublisher(sends, record), 1, 0.0, sends.id)
+    for subscriber in (
+        SubscriberRecord(2, "/robot/*", "json", pattern=True),
+        SubscriberRecord(3, "/other", "json"),
+    ):
+        graph.apply(AddSubscriber(hears, subscriber), 1, 0.0, hears.id)
+    renewed(graph, sends, 1.0, PublisherCount(1, 7, 70, 7, 1))
+    graph.apply(Leave(sends.id), 1, 1.0, sends.id)
+    graph.tick(1.5)
+    assert renewed(graph, hears, 2.0) == {1: 7}
+    graph.apply(AddPublisher(sends, record), 1, 3.0, sends.id)
+    assert renewed(graph, hears, 3.0) == {1: 0}, "it is there again"
+    graph.apply(Leave(sends.id), 1, 3.0, sends.id)
+    graph.tick(3.5)
+    for now in range(4, 70):
+        last = renewed(graph, hears, float(now))
+        graph.tick(float(now))
+    assert last == {}
