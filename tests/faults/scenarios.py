@@ -16,6 +16,8 @@ from tests.nep.programs import eventually
 
 _BEFORE_S = 0.5
 """Traffic before a fault."""
+_RENEWED_S = 1.2
+"""In this time the master hears what was sent."""
 RATE = 500
 """Messages a second."""
 Measured = dict[str, float]
@@ -128,6 +130,35 @@ def publisher_gone(day: Day, _out_s: float) -> Measured:
     return {"back_s": back_s, "lost": balance(sent, subscriber)["lost"]}
 
 
+def closed_unheard(day: Day, out_s: float) -> Measured:
+    """The subscriber's cable is out while the publisher sends its last messages and closes."""
+    publisher, subscriber = _begin(day, "closed")
+    day.hosts.cable(subscriber.host, is_in=False)
+    _wait(_BEFORE_S)
+    return _unheard(day, publisher.ask("end")["sent"], subscriber, out_s)
+
+
+def killed_unheard(day: Day, out_s: float) -> Measured:
+    """The subscriber's cable is out when the publisher's computer vanishes, a second after it paused."""
+    publisher, subscriber = _begin(day, "killed")
+    day.hosts.cable(subscriber.host, is_in=False)
+    _wait(_BEFORE_S)
+    sent = publisher.ask("pause")["sent"]
+    _wait(_RENEWED_S)
+    publisher.host.kill()
+    return _unheard(day, sent, subscriber, out_s)
+
+
+def _unheard(day: Day, sent: int, subscriber: Part, out_s: float) -> Measured:
+    _wait(out_s)
+    day.hosts.cable(subscriber.host, is_in=True)
+    since = now()
+    balance(sent, subscriber)
+    told_s = now() - since
+    _wait(out_s)  # what the system still sends for a program that ended comes late, and is found again
+    return {"told_s": told_s, "lost": balance(sent, subscriber)["lost"]}
+
+
 def lossy_1(day: Day, out_s: float) -> Measured:
     """1 % of all packets is lost at the subscriber's cable, both ways."""
     return _lossy(day, out_s, 0.01)
@@ -210,6 +241,8 @@ SIDE_BY_SIDE = (
     address_of_publisher,
     address_of_subscriber,
     publisher_gone,
+    closed_unheard,
+    killed_unheard,
     lossy_1,
     lossy_10,
     slow_all,
