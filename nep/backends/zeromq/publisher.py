@@ -10,6 +10,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NoReturn, cast
 
 import zmq
@@ -17,6 +18,7 @@ import zmq
 from nep.backends.base import PublisherSpec, QuickPublish
 from nep.backends.zeromq.bindings import SMALL, Bindings
 from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog
+from nep.backends.zeromq.far_connection import FarConnection
 from nep.backends.zeromq.io_thread import Rest, Served
 from nep.backends.zeromq.pending_batch import SMALL_BYTES, PendingBatch
 from nep.backends.zeromq.shared.memory import SHARED_BYTES, begin_sharing, can_share
@@ -471,7 +473,8 @@ class NativePublisher(GreetedPublisher):
     def _read_subscriptions(self) -> None:
         """With the lock held: until the socket has nothing more."""
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
-            own = self._subscriptions.note(self._socket.recv(zmq.DONTWAIT), self._count)
+            event = self._socket.recv(zmq.DONTWAIT, copy=False)
+            own = self._subscriptions.note(event.bytes, self._count, partial(FarConnection.of, event))
             # First: whoever gets the echo may rely on being counted.
             self.subscribers = len(self._seen)
             self.is_heard = self._subscriptions.is_there

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 
 from nep.backends.zeromq.byte_window import SendWindow
+from nep.backends.zeromq.far_connection import FarConnection
 from nep.backends.zeromq.shared.payloads import SharedPayloads
 from nep.backends.zeromq.sockets import Refusals
 from nep.protocol.wire import Hello, parse_hello, parse_read, parse_shares, topic_part
@@ -17,7 +19,7 @@ MAX_SUBSCRIBERS = 10_000
 
 
 class Subscriptions:
-    """Who reads at a publisher's port, from the subscriptions that come in there. No sockets.
+    """Who reads at a publisher's port, from the subscriptions that come in there. It has no sockets.
 
     Those who said hello to this publisher of `topic`, and the filters of others.
 
@@ -34,6 +36,8 @@ class Subscriptions:
         self._without_batches: set[int] = set()
         self.windows: dict[int, SendWindow] = {}
         """What is under way to those that tell what they have read."""
+        self._far: dict[int, FarConnection] = {}
+        """Over which connection those on other computers said hello."""
         self.shared: SharedPayloads | None = None
         self.refusals = Refusals()
         self._id = publisher
@@ -60,10 +64,16 @@ class Subscriptions:
         self.seen.clear()
         self.hellos.clear()
         self.windows.clear()
+        self._far.clear()
         self._without_batches.clear()
 
-    def note(self, event: bytes, count: int) -> bytes | None:
-        """Somebody came or went, after `count` messages; the first part under which to greet a subscriber."""
+    def note(
+        self, event: bytes, count: int, came_by: Callable[[], FarConnection | None] = lambda: None
+    ) -> bytes | None:
+        """Somebody came or went, after `count` messages; the first part under which to greet a subscriber.
+
+        `came_by` tells over which connection, if that leads to another computer.
+        """
         is_wanted, what = event[:1] == b"\1", event[1:]
         hello = parse_hello(what)
         if hello is None:
@@ -73,7 +83,10 @@ class Subscriptions:
         if hello.topic != self._name:
             return None  # a subscriber of whoever had this port before
         if is_wanted:
-            return self._note_hello(hello, what, count)
+            own = self._note_hello(hello, what, count)
+            if own is not None:
+                self._note_connection(hello.subscriber, came_by())
+            return own
         self._leave(hello.subscriber)
         return None
 
@@ -109,10 +122,19 @@ class Subscriptions:
             self.windows[hello.subscriber] = SendWindow()  # a connection of its own: nothing is under way
         return what
 
+    def _note_connection(self, subscriber: int, connection: FarConnection | None) -> None:
+        """A subscriber has one: where it says hello over another one, nobody reads the first any more."""
+        before = self._far.pop(subscriber, None)
+        if connection is not None:
+            self._far[subscriber] = connection
+            if before is not None and before != connection:
+                before.end()
+
     def _leave(self, subscriber: int) -> None:
         self.seen.pop(subscriber, None)
         self.hellos.pop(subscriber, None)
         self.windows.pop(subscriber, None)
+        self._far.pop(subscriber, None)
         self._without_batches.discard(subscriber)
         if self.shared is not None:
             self.shared.forget(subscriber)

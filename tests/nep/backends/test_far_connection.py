@@ -1,0 +1,86 @@
+"""The connections of subscribers on other computers; that old ones are ended is tested in tests/faults."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+import zmq
+
+from nep.backends.zeromq.far_connection import FarConnection
+from nep.backends.zeromq.sockets import keep_alive
+from nep.backends.zeromq.subscriptions import Subscriptions
+from nep.protocol.wire import hello_part
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="elsewhere numbers of sockets are none of files")
+WANTED, GONE = b"\1", b"\0"
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
+    """Both ends of a connection."""
+    with ExitStack() as stack:
+        listener = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+        near = stack.enter_context(socket.create_connection(listener.getsockname()))
+        far = stack.enter_context(listener.accept()[0])
+        far.settimeout(20.0)
+        yield near, far
+
+
+def test_a_connection_is_ended_only_while_it_is_the_same(ends: tuple[socket.socket, socket.socket]) -> None:
+    near, far = ends
+    peer = near.getpeername()
+    FarConnection(near.fileno(), (peer[0], peer[1] + 1)).end()
+    near.sendall(b"!")
+    assert far.recv(1) == b"!", "its number belongs to another one by now"
+    FarConnection(near.fileno(), peer).end()
+    assert far.recv(1) == b""
+
+
+@pytest.mark.parametrize("kind", ["closed", "file", "pipe"])
+def test_a_number_that_is_no_connection_any_more_does_no_harm(kind: str) -> None:
+    ours, theirs = os.pipe()
+    with Path(os.devnull).open("rb") as file:
+        fd = {"closed": ours, "file": file.fileno(), "pipe": theirs}[kind]
+        if kind == "closed":
+            os.close(ours)
+        FarConnection(fd, ("10.0.0.1", 5)).end()
+    for each in {ours, theirs} - ({ours} if kind == "closed" else set()):
+        os.close(each)
+
+
+ENDED: list[int] = []
+
+
+class Connection(FarConnection):
+    def end(self) -> None:
+        ENDED.append(self.fd)
+
+
+def test_a_hello_over_another_connection_ends_the_one_before() -> None:
+    ENDED.clear()
+    subscriptions = Subscriptions("t", 7)
+    one, two = (Connection(number, ("10.0.0.1", number)) for number in (1, 2))
+    hello = hello_part(5, "t", batches=True)
+    for connection in (one, one, two):
+        assert subscriptions.note(WANTED + hello, 0, lambda connection=connection: connection) == hello
+    assert ENDED == [1]
+    subscriptions.note(GONE + hello, 0)
+    subscriptions.note(WANTED + hello, 0, lambda: one)
+    subscriptions.note(WANTED + hello_part(6, "t", batches=True), 0, lambda: two)
+    assert ENDED == [1], "one that left, and another subscriber's"
+    subscriptions.note(WANTED + hello_part(5, "other", batches=True), 0, lambda: two)
+    assert ENDED == [1], "no hello to this publisher"
+
+
+def test_only_connections_to_other_computers_get_an_end() -> None:
+    with zmq.Context() as context, context.socket(zmq.XPUB) as socket_:
+        seen = []
+        for host in ("127.0.0.1", "0.0.0.0", "127.0.0.1"):
+            keep_alive(socket_, f"tcp://{host}:*")
+            seen.append((socket_.getsockopt(zmq.TCP_KEEPALIVE), socket_.getsockopt(zmq.TCP_MAXRT)))
+    assert seen == [(-1, 0), (1, 15_000), (-1, 0)]
