@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -25,6 +26,7 @@ _NET = "10.88.0"
 _FIRST = "mount -t tmpfs tmpfs /dev/shm; ip link set lo up; hostname {name}; echo; exec cat"
 """Memory and abstract sockets are shared on one computer only."""
 _ANNOUNCE = "echo 1 > /proc/sys/net/ipv4/conf/eth0/arp_notify; ip link set eth0 address {number}"
+_ESTABLISHED = "01"
 _RANDOM, _EVER = 0xFFFFF038, 2**32 - 1
 _PROGRAM = "4,32 0 0 {random},37 1 0 {below},6 0 0 2,6 0 0 {pass_on},"
 """For the kernel's packet filter: a random number; above the bound the packet goes on, else it is dropped."""
@@ -77,6 +79,12 @@ class Host:
             line.split() for line in self.run("cat", "/proc/net/snmp").splitlines() if line.startswith("Tcp:")
         )
         return int(values[names.index("RetransSegs")])
+
+    def connections_to(self, address: str) -> int:
+        """How many connections of this computer lead there, as far as it knows."""
+        theirs = socket.inet_aton(address)[::-1].hex().upper()
+        lines = [line.split() for line in self.run("cat", "/proc/net/tcp").splitlines()[1:]]
+        return sum(words[2].startswith(f"{theirs}:") and words[3] == _ESTABLISHED for words in lines)
 
     def kill(self) -> None:
         """The power is cut: all its processes are killed at once, and nobody is told. It has no network then.

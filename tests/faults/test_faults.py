@@ -16,7 +16,7 @@ from tests.faults import scenarios
 from tests.faults.day import Day, day
 from tests.faults.hosts import CannotMakeHostsError, network
 
-_OUT_S, _OUT_LONG_S = 1.5, 10.0
+_OUT_S, _OUT_LONG_S = 1.0, 10.0
 """How long a fault lasts."""
 
 
