@@ -1,7 +1,8 @@
 """FarConnection: the connection over which a subscriber on another computer said hello.
 
 A computer that gets another address, or wakes up in another network, connects anew, and its old connection
-says nothing of its end. What libzmq sends to the new one it would queue there, too, until the system gives up.
+says nothing of its end. What libzmq sends to the new one it would queue there, too, until the system gives
+up.
 """
 
 from __future__ import annotations
