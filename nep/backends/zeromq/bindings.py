@@ -102,11 +102,15 @@ def in_reach(remote: RemotePublisher, master: str) -> RemotePublisher:
 
 
 class Bindings:
-    """Belongs to the owner of `socket` and is used under its lock. `may_be_local`: bind the names, too."""
+    """Belongs to the owner of `socket` and is used under its lock. `may_be_local`: bind the names, too.
 
-    def __init__(self, socket: Socket, *, may_be_local: bool) -> None:
+    `is_watched`: the owner looks after silent connections, see `keep_alive`.
+    """
+
+    def __init__(self, socket: Socket, *, may_be_local: bool, is_watched: bool = False) -> None:
         self._socket = socket
         self._may_be_local = may_be_local
+        self._is_watched = is_watched
         self._bound: dict[str, str] = {}
         self._local: dict[str, str] = {}
         """The names beside them, by host."""
@@ -133,7 +137,7 @@ class Bindings:
         for host in hosts:
             if host not in self._bound:
                 try:
-                    keep_alive(self._socket, endpoint_of(f"{host}:*"))
+                    keep_alive(self._socket, endpoint_of(f"{host}:*"), is_watched=self._is_watched)
                     self._bound[host] = bind_free_port(self._socket, host)
                     name = _bind_beside(self._socket, self._bound[host]) if self._may_be_local else ""
                     if name:

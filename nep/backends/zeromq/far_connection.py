@@ -10,13 +10,21 @@ from __future__ import annotations
 import logging
 import os
 import socket
+import struct
+import sys
 from dataclasses import dataclass
+from typing import ClassVar
 
 import zmq
+
+from nep.backends.zeromq.sockets import SILENT_MS
 
 __all__ = ["FarConnection"]
 
 _logger = logging.getLogger("nep")
+_TcpInfo = struct.Struct("=2xBB52xI")
+"""Of Linux's `tcp_info`: how often it was sent again, how often asked for room, and when it last answered."""
+_TRIES = 3
 _SRCFD = int(zmq.SRCFD)
 
 
@@ -26,6 +34,9 @@ class FarConnection:
 
     fd: int
     peer: tuple[str, int]
+
+    can_tell: ClassVar[bool] = sys.platform == "linux"
+    """Whether `is_silent` can tell."""
 
     @classmethod
     def of(cls, received: zmq.Frame) -> FarConnection | None:
@@ -39,6 +50,23 @@ class FarConnection:
         except (zmq.ZMQError, OSError):  # it has ended already
             return None
         return None if peer is None else cls(fd, peer)
+
+    def is_silent(self) -> bool:
+        """Whether its other end has answered nothing for long, though it was asked again and again.
+
+        The kernel answers for a program that a debugger holds: that it takes nothing more now.
+        """
+        if not self.can_tell:
+            return False
+        try:
+            with _same(self.fd) as connection:
+                if connection.getpeername() != self.peer:
+                    return False
+                told = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TcpInfo.size)
+            resent, asked, last_answer_ms = _TcpInfo.unpack(told)
+        except (OSError, struct.error):
+            return False
+        return bool(max(resent, asked) >= _TRIES and last_answer_ms >= SILENT_MS)
 
     def end(self) -> None:
         """End it, if it is still there: libzmq notices and lets go of what it holds for it."""

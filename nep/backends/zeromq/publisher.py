@@ -118,7 +118,9 @@ class NativePublisher(GreetedPublisher):
         self._serve_soon = serve_soon
         self._socket = socket
         send_mark(socket)
-        self._bindings = Bindings(socket, may_be_local=spec.codec.name in SMALL)
+        self._bindings = Bindings(
+            socket, may_be_local=spec.codec.name in SMALL, is_watched=FarConnection.can_tell
+        )
         # Without pyzmq's layer for routing ids and groups, which takes half of the time.
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
         self._bytes = self._settled_bytes = 0
@@ -162,8 +164,9 @@ class NativePublisher(GreetedPublisher):
             wait_until(self._changed, lambda: bool(self._seen), timeout_s)
 
     def counts(self) -> PublisherCount:
-        """The statistics for a renewal."""
+        """The statistics for a renewal: once a second, so silent connections are looked for, too."""
         with self._changed:
+            self._subscriptions.end_silent()
             return PublisherCount(
                 self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self.problem
             )

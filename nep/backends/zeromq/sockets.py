@@ -21,6 +21,7 @@ __all__ = [
     "LOOPBACK",
     "ORIGINAL_PORTS",
     "SHORT_WAIT_S",
+    "SILENT_MS",
     "Part",
     "Refusals",
     "bind",
@@ -50,8 +51,8 @@ _HELD = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE,
 _MOST = 50_000
 _LEAST = 32
 _PORT_FILES = 2
-_SILENT_S = 15
-"""What was sent to another computer and is not taken for so long ends the connection."""
+SILENT_MS = 15_000
+"""When another computer has taken nothing for so long of what was sent there, the connection ends."""
 CONNECT_MS = 3000
 """For an attempt to connect to another computer; the system alone would try ever more rarely."""
 ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
@@ -152,18 +153,19 @@ def is_far(endpoint: str) -> bool:
     return endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
 
 
-def keep_alive(owner: Socket, endpoint: str) -> None:
+def keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> None:
     """Notice within a dozen seconds when a computer behind the connections of the next endpoint has vanished.
 
     The endpoint may be one to connect to or one to bind; "*" is any port. While nothing is under way the
     kernel asks the other one's, which answers for a program that a debugger holds; a heartbeat of ZeroMQ
     would cut it off. What is under way it sends again and again, for a quarter of an hour and ever more
-    rarely: hence a limit, which a program that is held and is sent a lot may reach as well. Only for other
-    computers: on this one the kernel tells of every end.
+    rarely: hence a limit. A held program to which a lot is sent would reach that as well, so whoever sends a
+    lot looks himself (`is_watched`, see `FarConnection`), where he can. Only for other computers: on this one
+    the kernel tells of every end.
     """
     far = is_far(endpoint)
     owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if far else -1)
-    owner.setsockopt(zmq.TCP_MAXRT, _SILENT_S * 1000 if far else 0)
+    owner.setsockopt(zmq.TCP_MAXRT, SILENT_MS if far and not is_watched else 0)
     owner.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_MS if far else 0)
     if far:
         owner.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)

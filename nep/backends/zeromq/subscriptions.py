@@ -130,6 +130,12 @@ class Subscriptions:
             if before is not None and before != connection:
                 before.end()
 
+    def end_silent(self) -> None:
+        """End the connections to computers that have vanished. Their subscribers are gone soon after."""
+        for connection in self._far.values():
+            if connection.is_silent():
+                connection.end()
+
     def _leave(self, subscriber: int) -> None:
         self.seen.pop(subscriber, None)
         self.hellos.pop(subscriber, None)

@@ -83,4 +83,6 @@ def test_only_connections_to_other_computers_get_an_end() -> None:
         for host in ("127.0.0.1", "0.0.0.0", "127.0.0.1"):
             keep_alive(socket_, f"tcp://{host}:*")
             seen.append((socket_.getsockopt(zmq.TCP_KEEPALIVE), socket_.getsockopt(zmq.TCP_MAXRT)))
-    assert seen == [(-1, 0), (1, 15_000), (-1, 0)]
+            keep_alive(socket_, "tcp://0.0.0.0:*", is_watched=True)
+            seen.append((socket_.getsockopt(zmq.TCP_KEEPALIVE), socket_.getsockopt(zmq.TCP_MAXRT)))
+    assert seen == [(-1, 0), (1, 0), (1, 15_000), (1, 0), (-1, 0), (1, 0)]
