@@ -8,6 +8,8 @@ from contextlib import ExitStack, contextmanager
 from time import monotonic
 from typing import Any
 
+import psutil
+
 from tests.faults import traffic
 from tests.faults.hosts import Host, Network
 from tests.nep.programs import Program, eventually, running
@@ -31,6 +33,14 @@ class Part:
         answer: dict[str, Any] = json.loads(self._program.line())
         assert not answer.get("error"), answer["error"]
         return answer
+
+    def hold(self, *, is_held: bool) -> None:
+        """Halt the program as a debugger does, or let it go on."""
+        process = psutil.Process(self._program.process.pid).children(recursive=True)[-1]
+        if is_held:
+            process.suspend()
+        else:
+            process.resume()
 
 
 class Master:

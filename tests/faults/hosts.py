@@ -154,6 +154,15 @@ class Network:
         for way in ("egress", "ingress"):
             self._switch.run("tc", "filter", "add", "dev", port, way, "bpf", "da", "bytecode", program)
 
+    def narrow(self, host: Host, mbit: float) -> None:
+        """Let no more than this through to a host in a second; 0 takes that back."""
+        port = _port_of(host)
+        if not mbit:
+            self._switch.run("tc", "qdisc", "del", "dev", port, "root")
+            return
+        limits = ("rate", f"{mbit}mbit", "burst", "32kb", "latency", "200ms")
+        self._switch.run("tc", "qdisc", "add", "dev", port, "root", "tbf", *limits)
+
     def close(self) -> None:
         """End all hosts and what runs on them."""
         for each in (*self._hosts, self._switch):

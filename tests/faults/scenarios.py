@@ -22,6 +22,8 @@ _RENEWED_S = 1.2
 """In this time the master hears what was sent."""
 RATE = 500
 """Messages a second."""
+_LARGE = 20_000
+"""Bytes of a message that is large."""
 Measured = dict[str, float]
 Scenario = Callable[[Day, float], Measured]
 
@@ -37,10 +39,13 @@ def _back_s(subscriber: Part, since: float) -> float:
     return max(0.0, float(subscriber.ask("look")["back_at"]) - since)
 
 
-def _begin(day: Day, name: str, **more: Any) -> tuple[Part, Part]:
-    """A publisher and a subscriber on hosts of their own, with traffic between them."""
+def _begin(day: Day, name: str, size: int = 0, **more: Any) -> tuple[Part, Part]:
+    """A publisher and a subscriber on hosts of their own, with traffic between them.
+
+    `size` is that of a message, in bytes at least.
+    """
     subscriber = day.start(traffic.subscriber, day.hosts.host(f"s-{name}"), name, **more)
-    publisher = day.start(traffic.publisher, day.hosts.host(f"p-{name}"), name, rate=RATE)
+    publisher = day.start(traffic.publisher, day.hosts.host(f"p-{name}"), name, rate=RATE, size=size)
     publisher.ask("go")
     eventually(is_hearing(subscriber), WAIT_S)
     _wait(_BEFORE_S)
@@ -215,6 +220,34 @@ def slow_latest(day: Day, out_s: float) -> Measured:
     return {"sent": sent, "lost": 0, "replaced": sent - seen["read"]}
 
 
+def held(day: Day, out_s: float) -> Measured:
+    """A subscriber is held by a debugger, while more is sent to it than the system keeps for it."""
+    publisher, subscriber = _begin(day, "held", size=_LARGE)
+    subscriber.hold(is_held=True)
+    _wait(out_s)
+    subscriber.hold(is_held=False)
+    back_s = _back_s(subscriber, now())
+    return {"back_s": back_s, "lost": _close(publisher, subscriber)["lost"]}
+
+
+def held_for_long(day: Day, _out_s: float) -> Measured:
+    """The same for so long that the connection is given up."""
+    return held(day, 25.0)
+
+
+def narrow(day: Day, out_s: float) -> Measured:
+    """A cable is 100 times too slow for what is sent; then it is quick again."""
+    publisher, subscriber = _begin(day, "narrow", size=10 * _LARGE)
+    day.hosts.narrow(subscriber.host, 10 * _LARGE * RATE * 8 / 1e6 / 100)
+    _wait(out_s)
+    sent = publisher.ask("pause")["sent"]
+    day.hosts.narrow(subscriber.host, 0)
+    since = now()
+    balance(sent, subscriber)
+    told_s = now() - since
+    return {"told_s": told_s, "lost": _close(publisher, subscriber)["lost"], "sent": sent}
+
+
 def calls(day: Day, out_s: float) -> Measured:
     """A client's cable is pulled while it calls: each call is answered or raises, none is made twice."""
     server = day.start(traffic.server, day.hosts.host("p-calls"), "calls")
@@ -253,12 +286,13 @@ SIDE_BY_SIDE = (
     lossy_10,
     slow_all,
     slow_latest,
+    held,
     calls,
 )
 
 
-ALONE = (subscriber_gone,)
-"""What takes long whatever the fault is."""
+ALONE = (subscriber_gone, held_for_long, narrow)
+"""What takes long, or many bytes."""
 
 
 def master_again(day: Day, out_s: float) -> Measured:
