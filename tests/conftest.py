@@ -22,6 +22,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that starts tests in the background lets them, and all they start, ignore Ctrl+C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# Python from 3.12 on warns who forks with threads; that it goes well is what tests of forks are about.
+os.environ["PYTHONWARNINGS"] = "ignore:This process:DeprecationWarning"
 # However busy the computer is: a value may take long to make, and an example to run.
 hypothesis.settings.register_profile(
     "nep", hypothesis.settings(), deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]

@@ -302,7 +302,10 @@ class RosProcess:
 def within(call: Callable[[], object], timeout_s: float) -> bool:
     """Call it in a thread, and wait so long, whether it ended: rospy asks a master without a limit."""
     thread = threading.Thread(target=call, name="nep-ros-unregister", daemon=True)
-    thread.start()
+    try:
+        thread.start()
+    except RuntimeError:  # Python 3.12 begins none while the program ends: then rospy itself unregisters all
+        return False
     thread.join(max(_LEAST_S, timeout_s))
     return not thread.is_alive()
 

@@ -125,10 +125,10 @@ class RosServer:
         with self._changed:
             if self._unregistering is not None:
                 return
-            self._unregistering = threading.Thread(
-                target=self._unregister, name="nep-ros-unregister", daemon=True
-            )
-        self._unregistering.start()
+            thread = threading.Thread(target=self._unregister, name="nep-ros-unregister", daemon=True)
+            with contextlib.suppress(RuntimeError):  # see `process.within`
+                thread.start()
+                self._unregistering = thread
         for call in self.calls.close():
             call.answer(refusal(self.spec.service, is_closed=True))
 
