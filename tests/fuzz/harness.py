@@ -18,6 +18,7 @@ import time
 import traceback
 from collections.abc import Mapping
 from pathlib import Path
+from random import Random
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -86,6 +87,8 @@ def fuzz(target: Target, seconds: int, folder: Path) -> None:
     """Does not return: libFuzzer ends the process."""
     import atheris
 
+    from tests.fuzz.mutation import mutated
+
     name = target.name
     findings = Findings(folder / "findings", name)
     corpus, seeds = folder / "corpus" / name, folder / "seeds" / name
@@ -98,12 +101,19 @@ def fuzz(target: Target, seconds: int, folder: Path) -> None:
         "".join(f'"{_escaped(word)}"\n' for word in (*target.words, b"\xff\xff\xff\xff")), encoding="ascii"
     )
 
+    def mutate(data: bytes, most: int, seed: int) -> bytes:
+        """Half of the time another value; see `tests.fuzz.mutation`."""
+        chance = Random(seed)
+        other = mutated(data, chance) if chance.random() < 0.5 else None
+        made: bytes = atheris.Mutate(data, most) if other is None else other
+        return made[:most]
+
     def one(data: bytes) -> None:
         began = time.thread_time()
         try:
             target.try_bytes(data)
         except Exception as error:  # noqa: BLE001 - that is what is looked for
-            findings.add(place_of(error), data, traceback.format_exc())
+            findings.add(place_of(error), data, traceback.format_exc(limit=-8))
         if time.thread_time() - began > SLOW_S * target.slower**0.5:
             findings.add("slow", data, f"it took {time.thread_time() - began:.1f} s")
 
@@ -118,7 +128,9 @@ def fuzz(target: Target, seconds: int, folder: Path) -> None:
         "print_final_stats": 1,
     }
     atheris.Setup(
-        [name, *(f"-{key}={value}" for key, value in options.items()), str(corpus), str(seeds)], one
+        [name, *(f"-{key}={value}" for key, value in options.items()), str(corpus), str(seeds)],
+        one,
+        custom_mutator=mutate,
     )
     atheris.Fuzz()
 

@@ -9,7 +9,7 @@ import orjson
 from nep.cli import topic_patterns
 from nep.cli.fields import MISSING, leaves, parse_path, pick
 from nep.cli.publish import value_of as payload_of
-from nep.cli.values import ids_as_text, json_of, presented
+from nep.cli.values import json_of, presented
 from nep.errors import EncodeError, NepError, WrongTypeError
 from nep.messages.codecs import CODECS
 from nep.system.arguments import at_least, limit, one_of, period, seconds, text, within
@@ -76,7 +76,7 @@ def patterns_of_topics(data: bytes) -> None:
 )
 def values_on_a_terminal(data: bytes) -> None:
     value = value_of(data)
-    for made in (json_of(value), json_of(value, indent=True), json_of(ids_as_text(value))):
+    for made in (json_of(value), json_of(value, indent=True)):
         json.loads(made)
     for whole in (False, True):
         shown = presented(value, whole=whole)

@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 import time
+from random import Random
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.fuzz import mutation
 from tests.fuzz.cases import CASES
 from tests.fuzz.target import Target
 from tests.fuzz.targets import TARGETS
@@ -38,7 +40,14 @@ def mutated(target: Target) -> st.SearchStrategy[bytes]:
     share = st.floats(0, 1)
     once = st.builds(change, seeds, share, share, piece)
     twice = st.builds(change, once, share, st.just(0.0) | share, piece)
-    return st.binary(max_size=80) | once | twice
+
+    def other_value(seed: bytes, number: int) -> bytes:
+        chance = Random(number)
+        once = mutation.mutated(seed, chance) or seed
+        return mutation.mutated(once, chance) or once
+
+    values = st.builds(other_value, seeds, st.integers(0, 2**32))
+    return st.binary(max_size=80) | once | twice | values
 
 
 @pytest.mark.parametrize("name", sorted(TARGETS))
