@@ -41,12 +41,23 @@ _TAIL = re.compile(r" at /\S+\.rs:\d+\.?")
 
 @dataclass(frozen=True)
 class Opened:
-    """A session, its entry at the rendezvous, and what a forked child has to close (see `forks.give_up`)."""
+    """A session, its entry at the rendezvous, and what a forked child has to close (see `forks.give_up`).
+
+    `routers` are the endpoints of which one has to be connected for anybody to be met; empty where nobody
+    has to.
+    """
 
     session: Any
     meeting: Rendezvous | None = None
     entry: SessionPort | None = None
     endpoints: tuple[str, ...] = ()
+    routers: tuple[str, ...] = ()
+
+    @property
+    def is_cut_off(self) -> bool:
+        """Whether it has lost its router, which it looks for by itself."""
+        info = self.session.info
+        return bool(self.routers) and not (info.routers_zid() or info.peers_zid())
 
     def leave(self) -> None:
         """Nobody shall connect to it any more."""
@@ -95,7 +106,7 @@ def open_place(place: str, wait_s: float | None) -> Opened:
         "scouting": {"multicast": {"enabled": False}},
     }
     given = tuple(f"tcp://{each.removeprefix('tcp/')}" for each in endpoints if each.startswith("tcp/"))
-    return Opened(_open(_config(told), place), endpoints=given)
+    return Opened(_open(_config(told), place), endpoints=given, routers=endpoints)
 
 
 def _open_local(name: str) -> Opened:

@@ -31,7 +31,8 @@ from nep.backends.zenoh.publisher import ZenohPublisher
 from nep.backends.zenoh.roster import Roster
 from nep.backends.zenoh.subscriber import ZenohSubscriber
 from nep.backends.zeromq.sockets import wait_until
-from nep.errors import RequestRefusedError, WireError
+from nep.errors import NepError, RequestRefusedError, WireError
+from nep.i18n import _
 from nep.masters.graph import Graph
 from nep.masters.registry import check_record
 from nep.messages.packing import pack_saturated, unpack_bounded
@@ -284,7 +285,16 @@ class ZenohSession:
         )
 
     def look(self, timeout_s: float) -> GraphView:
-        """Everybody's records and figures of this moment; of who does not answer in time only that it is."""
+        """Everybody's records and figures of this moment; of who does not answer in time only that it is.
+
+        Raises `NepError` while the router is away.
+        """
+        if self._opened.is_cut_off:
+            raise NepError(
+                _("no router of zenoh answers at '{place}' now; start it, and it is found again").format(
+                    place=",".join(self._opened.routers)
+                )
+            )
         question = self.ask(ALL_CALLS, requests.Look(), timeout_s)
         question.wait()
         told = [_requests_in(key, answer) for key, answer in question.answers.items()]

@@ -384,6 +384,8 @@ def test_a_router_joins_programs_and_may_be_started_again(make: Make, port: int)
             assert names(node) == {"here", "peer"}
             first.kill()
             eventually(lambda: pub.subscribers == 0)
+            with pytest.raises(nep.NepError, match=f"no router of zenoh answers at '{where}' now"):
+                node.graph()
             ask(peer, "publish missed")
             with running(ROUTER, router(port)) as second:
                 second.line()
