@@ -177,6 +177,11 @@ class LiveSource:
         self._closing.set()
         self._jobs.put(None)
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether its thread runs no more."""
+        return not self._thread.is_alive()
+
     def close(self) -> None:
         """See `Source.close`."""
         self.end()

@@ -42,6 +42,10 @@ class NetworkSource(Protocol):
     def end(self) -> None:
         """End soon; waits for nothing."""
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether its thread runs no more."""
+
     def close(self) -> None:
         """End; returns when its thread has."""
 
@@ -236,7 +240,7 @@ class Networks:
     def _end(self, network: OtherNetwork) -> None:
         if network.source is not None:
             network.source.end()
-            self._ending.append(network.source)
+            self._ending = [*(each for each in self._ending if not each.has_ended), network.source]
             network.source = None
             self._alerts.resolve(f"network:{network.kind.name}")
             self._changes += network.topics.revision + network.nodes.revision + 1

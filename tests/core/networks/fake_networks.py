@@ -38,6 +38,10 @@ class Fake:
     def end(self) -> None:
         self.said.append("end")
 
+    @property
+    def has_ended(self) -> bool:
+        return "close" in self.said
+
     def close(self) -> None:
         self.said.append("close")
 

@@ -16,6 +16,7 @@ from nep.protocol.graph_view import (
     BRIDGES_TOPIC,
     GraphView,
     NodeInfo,
+    PatternInfo,
     PublisherInfo,
     SubscriberInfo,
     TopicInfo,
@@ -249,3 +250,17 @@ def test_a_bridge_is_called_one_and_says_where_its_counts_are(panel, window) -> 
     panel.refresh()
     panel.rebuild()
     assert [line[0] for line in shown(panel)] == [bridge.name]
+
+
+def test_a_subscription_with_wildcards_stands_with_its_node_and_is_no_topic(panel, window) -> None:
+    wide = PatternInfo("/robot/*/camera", "image", (SubscriberInfo(7, "3", 0, 0),))
+    window.session.nodes.update(replace(graph(2), patterns={wide.name: wide}), 1.0)
+    window.session.topics.update(replace(graph(2), patterns={wide.name: wide}), 1.0)
+    ticks(window, panel, 2)
+    panel.table.opened.emit("3  ")
+    row = next(row for row in panel.model._rows.shown if row.topic == wide.name)
+    assert generation_cell(row).text == "subscribes all that match"
+    panel.table.opened.emit(row.key)
+    assert window.opened == []
+    assert window.toasts == ["/robot/*/camera has wildcards: it stands for all topics that match"]
+    assert wide.name not in window.session.topics

@@ -143,7 +143,10 @@ class NodesPanel(NetworkTable[NodeRow]):
         row = self.model.row_at(self.model.index_of(key))
         if row is None:
             return
-        if row.topic:
+        if row.is_pattern and self.session.topic(row.topic_key) is None:
+            said = _("{pattern} has wildcards: it stands for all topics that match")
+            self.context.toast(said.format(pattern=row.topic))
+        elif row.topic:
             self.session.mark_seen(row.topic_key)
             self.context.open_topic(row.topic_key)
         else:

@@ -14,6 +14,7 @@ from app.ui.text.numbers import age_words
 from app.ui.widgets.table.model import Cell, Column, Order
 from nep.i18n import _, lazy, number, pgettext, plazy
 from nep.protocol.graph_view import BRIDGES_TOPIC
+from nep.protocol.topic_pattern import is_pattern
 
 PUBLISHES, SUBSCRIBES = lazy("publishes"), lazy("subscribes")
 INDENT = 19
@@ -54,6 +55,11 @@ class NodeRow:
     def key(self) -> str:
         """Names the row for ever."""
         return f"{self.node.key} {self.way} {self.topic}"
+
+    @property
+    def is_pattern(self) -> bool:
+        """Whether the node subscribes all topics that match, rather than one of this name."""
+        return self.way == SUBSCRIBES and is_pattern(self.topic)
 
     @property
     def topic_key(self) -> str:
@@ -158,6 +164,8 @@ def generation_cell(row: NodeRow) -> Cell:
     if row.topic:
         rate = row.rate(row.topic_key) if row.rate is not None and row.way == PUBLISHES else ""
         said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.way)
+        if row.is_pattern:
+            said = _("subscribes all that match")
         return Cell(said, role=_ink(row, "textTertiary"))
     if row.node.is_bridge:
         return Cell(pgettext("node", "bridge"), "arrow-left-right", _ink(row, "textSecondary"))
