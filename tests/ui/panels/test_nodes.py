@@ -10,7 +10,15 @@ from PySide6.QtTest import QTest
 from app.core.network.master import MasterState
 from app.core.network.nodes import NodeEntry, Nodes
 from app.ui.panels.nodes.panel import PANEL, NodesPanel
-from app.ui.panels.nodes.rows import NodeRow, cpu_words, facts_of, generation_cell, limits_of, name_cell
+from app.ui.panels.nodes.rows import (
+    NodeRow,
+    _name_tip,
+    cpu_words,
+    facts_of,
+    generation_cell,
+    limits_of,
+    name_cell,
+)
 from app.ui.widgets.table.model import CELL_ROLE
 from nep.protocol.graph_view import (
     BRIDGES_TOPIC,
@@ -259,7 +267,8 @@ def test_a_subscription_with_wildcards_stands_with_its_node_and_is_no_topic(pane
     ticks(window, panel, 2)
     panel.table.opened.emit("3  ")
     row = next(row for row in panel.model._rows.shown if row.topic == wide.name)
-    assert generation_cell(row).text == "subscribes all that match"
+    assert generation_cell(row).text == "all that match"
+    assert _name_tip(row) == "studio subscribes all topics that match /robot/*/camera"
     panel.table.opened.emit(row.key)
     assert window.opened == []
     assert window.toasts == ["/robot/*/camera has wildcards: it stands for all topics that match"]

@@ -165,7 +165,7 @@ def generation_cell(row: NodeRow) -> Cell:
         rate = row.rate(row.topic_key) if row.rate is not None and row.way == PUBLISHES else ""
         said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.way)
         if row.is_pattern:
-            said = _("subscribes all that match")
+            said = _("all that match")
         return Cell(said, role=_ink(row, "textTertiary"))
     if row.node.is_bridge:
         return Cell(pgettext("node", "bridge"), "arrow-left-right", _ink(row, "textSecondary"))
@@ -206,6 +206,9 @@ def _since(node: NodeEntry) -> str:
 def _name_tip(row: NodeRow) -> str:
     if not row.topic:
         return facts_of(row.node)
+    if row.is_pattern:
+        said = _("{node} subscribes all topics that match {pattern}")
+        return said.format(node=row.node.name, pattern=row.topic)
     said = _("{node} publishes {topic}") if row.way == PUBLISHES else _("{node} subscribes {topic}")
     return said.format(node=row.node.name, topic=row.topic)
 
