@@ -38,6 +38,8 @@ class OtherSource(LiveSource):
             address, [_keyed(kind.name, sink) for sink in sinks], post_event, thread=f"studio-{kind.name}"
         )
         self._kind = kind
+        self._members: object = None
+        self._revision = 0
 
     def join(self) -> Node:
         """See `LiveSource.join`."""
@@ -45,14 +47,22 @@ class OtherSource(LiveSource):
             return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=LOOK_S)
 
     def look(self, node: Node) -> GraphView:
-        """See `LiveSource.look`; topics have the codec and the type by which they are read."""
+        """See `LiveSource.look`; topics have the codec by which they are read.
+
+        The revision grows with every change of who is there: back ends that gather a graph anew each time
+        give two different ones the same number.
+        """
         with _in_words():
             view = node.graph(timeout_s=LOOK_S)
         topics = {
             name: info if (codec := self._kind.codec(info)) == info.codec else replace(info, codec=codec)
             for name, info in view.topics.items()
         }
-        return replace(view, topics=topics)
+        members = _members(view)
+        if members != self._members:
+            self._members = members
+            self._revision += 1
+        return replace(view, topics=topics, revision=self._revision)
 
     def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
         """See `LiveSource.subscribe`."""
@@ -60,6 +70,25 @@ class OtherSource(LiveSource):
         wanted = self._kind.reads(info) if info is not None else msg_type
         with _in_words():
             return node.new_sub(topic, wanted, sink=sink, wildcards=False, qos=self._kind.qos)
+
+
+def _members(view: GraphView) -> object:
+    """Who is there and what they have, without figures."""
+    nodes = {(each.id, each.name, each.host, each.pid, each.generation) for each in view.nodes.values()}
+    topics = {
+        (
+            each.name,
+            each.msg_type,
+            tuple((one.node_id, one.id) for one in each.publishers),
+            tuple((one.node_id, one.id) for one in each.subscribers),
+        )
+        for each in view.topics.values()
+    }
+    patterns = {
+        (each.name, tuple((one.node_id, one.id) for one in each.subscribers))
+        for each in view.patterns.values()
+    }
+    return nodes, topics, patterns, set(view.services)
 
 
 @contextmanager

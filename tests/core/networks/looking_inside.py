@@ -14,6 +14,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from app.core.network.topics import Topic
+from app.core.networks import networks, source
 from app.core.networks.source import OtherSource
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -92,6 +93,7 @@ def seen_by(session: Session, kind: str, address: str, ends: ExitStack) -> dict[
 
 if __name__ == "__main__":
     OtherSource.poll_s = 0.1
+    networks.COUNT_S, source.LOOK_S = 0.3, 0.5  # quicker than for a person
     with tempfile.TemporaryDirectory() as made:
         sys.stdout.write(json.dumps(look(sys.argv[1], Path(made))))
     threads = [each.name for each in threading.enumerate() if each.name.startswith("studio-")]

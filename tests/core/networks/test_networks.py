@@ -15,6 +15,7 @@ from app.core.network.source import GraphSeen, MasterFound, MasterLost, WatchFai
 from app.core.network.topics import Topic, Topics, key_of, split_key
 from app.core.networks.kinds import KINDS, kind_named
 from app.core.networks.networks import KEPT, by_network, lost_words
+from app.core.networks.source import OtherSource
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
@@ -253,6 +254,34 @@ def test_a_network_of_zenoh_is_seen_and_heard_beside_the_native_one(session: Ses
         assert session.networks.topics == []
         for watch in watches:
             watch.close()
+
+
+class Teller:
+    """Stands for a node whose graph is gathered anew each time."""
+
+    def __init__(self, *views: GraphView) -> None:
+        self._views = list(views)
+
+    def graph(self, timeout_s: float) -> GraphView:
+        return self._views.pop(0)
+
+
+def test_a_graph_that_is_gathered_anew_is_another_one_only_when_somebody_came_or_went() -> None:
+    views = [graph("/a"), graph("/a", rate_hz=5.0), graph("/b"), graph("/b"), GraphView(1, 1), graph("/b")]
+    source = OtherSource(KINDS[0], "", [], lambda _event: None)
+    teller = Teller(*views)
+    revisions = [source.look(teller).revision for _view in views]  # type: ignore[arg-type]
+    assert revisions == [1, 1, 2, 2, 3, 4]
+
+
+def test_what_a_library_raises_is_a_sentence() -> None:
+    class Breaks:
+        def graph(self, timeout_s: float) -> GraphView:
+            raise OSError(5, "it broke")
+
+    source = OtherSource(KINDS[2], "", [], lambda _event: None)
+    with pytest.raises(NepError, match=r"OSError: .*it broke"):
+        source.look(Breaks())  # type: ignore[arg-type]
 
 
 def test_a_missing_package_is_one_sentence(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
