@@ -206,6 +206,11 @@ def test_the_inspector_shows_messages_of_another_network(qtbot, window: Window, 
     ros.tell(MasterLost("", REASON))
     ticks(window, panel, 2)
     assert panel.live.accessibleName() == "no answer"
+    for _ in range(80):  # who is connected goes on, without a master
+        for sink in ros.sinks:
+            sink("ros /blackboard", [message("/blackboard", b'{"x": 8}')])
+        ticks(window, panel)
+    assert (panel.live.accessibleName(), panel.model.value()) == ("live", {"x": 8})
     panel.shut()
     assert ros.wanted == set()
 

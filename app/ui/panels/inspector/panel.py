@@ -321,7 +321,7 @@ def chip_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
         return pgettext("message", "frozen"), "off", "snowflake"
     if topic is None:
         return pgettext("topic", "gone"), "off", ""
-    if topic.stale:
+    if topic.stale and not (topic.counted is not None and topic.counted[0] > 0):  # nothing comes any more
         return pgettext("topic", "no answer"), "warn", ""
     if topic.gone_s is not None:
         return _("gone {seconds} s").format(seconds=int(topic.gone_s)), "off", ""
