@@ -253,7 +253,8 @@ class Backend:
 
     `master` makes a `Hybrid.master` of what a node is given as `master`, None when that is nothing; it raises
     `NepError` for what is no place where nodes of this back end meet. `codec_for` gives the codec of a
-    publisher's message type, for a back end that has types of its own. `qos`: its words for qualities of
+    publisher's message type, `codec_of_calls` that of a client's calls, for a back end that has types of its
+    own. `qos`: its words for qualities of
     service. `has_history`: its publishers keep more than the last message for subscribers that come late.
     `has_patterns`: its subscribers take topics with wildcards.
     `has_extensions`: what travels beside a payload arrives. `is_in_process`: only nodes of one process meet.
@@ -265,6 +266,7 @@ class Backend:
     aliases: tuple[str, ...] = ()
     master: Callable[[str | None], str] = master_address
     codec_for: Callable[[str], Codec] = codec_for
+    codec_of_calls: Callable[[str], Codec] | None = None
     qos: tuple[str, ...] = ()
     has_history: bool = False
     has_patterns: bool = False

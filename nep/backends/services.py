@@ -58,7 +58,10 @@ class ServerSpec:
 
 @dataclass(frozen=True)
 class ClientSpec:
-    """What a client shall be. `codec` is that of its calls and their answers."""
+    """What a client shall be. `codec` is that of its calls and their answers.
+
+    `msg_type` is what it was asked for, for back ends whose services have types.
+    """
 
     id: int
     service: str
@@ -66,6 +69,7 @@ class ClientSpec:
     configuration: Configuration
     wait_s: float | None
     number: int = 0
+    msg_type: str = "json"
 
 
 class Tally:

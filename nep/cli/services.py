@@ -58,10 +58,24 @@ _ServiceArgument = Annotated[
 ]
 
 
+_BackendOption = Annotated[
+    str | None,
+    typer.Option(
+        "--backend",
+        metavar=_("NAME"),
+        help=_("Look there, where no master is asked: 'zenoh', 'ros2', 'ros'. ADDRESS is then its place."),
+        show_default=False,
+    ),
+]
+_MASTER_VARIABLE = "NEP_MASTER"
+
+
 @app.command("list")
-def list_services(master: MasterOption = None, as_json: JsonOption = False) -> None:
+def list_services(
+    master: MasterOption = None, backend: _BackendOption = None, as_json: JsonOption = False
+) -> None:
     """List all services, with who serves and calls them."""
-    graph = view(master)
+    graph = _view(master, backend)
     services = [graph.services[name] for name in sorted(graph.services)]
     if as_json:
         show_json(ids_as_text([asdict(each) for each in services]))
@@ -74,9 +88,14 @@ def list_services(master: MasterOption = None, as_json: JsonOption = False) -> N
 
 
 @app.command("info")
-def info(service: _ServiceArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
+def info(
+    service: _ServiceArgument,
+    master: MasterOption = None,
+    backend: _BackendOption = None,
+    as_json: JsonOption = False,
+) -> None:
     """Show what is known of a service: each node that serves or calls it."""
-    graph = view(master)
+    graph = _view(master, backend)
     found = _found(service, graph)
     if as_json:
         show_json(ids_as_text(_record(graph, found)))
@@ -116,17 +135,35 @@ def call(
         ),
     ] = None,
     master: MasterOption = None,
+    backend: _BackendOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Call a service, and write its answer."""
     asked = _request(request)
-    with Node(f"nep-service-call-{os.getpid()}", master=master) as node:
+    with _node("nep-service-call", master, backend) as node:
         client = node.new_client(service, timeout_s=_TIMEOUT_S if timeout_s is None else timeout_s)
         answer = client.call(asked)
     if as_json:
         show_json(answer)
     else:
         write(f"{presented(answer, whole=True)}\n")
+
+
+def _node(name: str, master: str | None, backend: str | None) -> Node:
+    """A node over the back end. Raises `UnknownBackendError`, `BackendUnavailableError`."""
+    name = f"{name}-{os.getpid()}"
+    if backend is None:
+        return Node(name, master=master)
+    is_said = master is not None and master != os.environ.get(_MASTER_VARIABLE)
+    return Node(name, backend, master=master if is_said else None)
+
+
+def _view(master: str | None, backend: str | None) -> GraphView:
+    """Who is there. Raises `MasterUnreachable`, and as `_node` does."""
+    if backend is None:
+        return view(master)
+    with _node("nep-service", master, backend) as node:
+        return node.graph()
 
 
 def _request(text: str) -> object:

@@ -8,6 +8,7 @@ from nep.backends.base import Backend
 from nep.backends.ros2.environment import domain
 from nep.backends.ros2.message_types import MessageTypes, message_types
 from nep.backends.ros2.quality import QUALITIES
+from nep.backends.ros2.service_types import codec_of_calls
 from nep.backends.ros2.transport import Ros2Transport
 from nep.backends.ros2.type_mapping import codec_for
 
@@ -19,6 +20,7 @@ BACKEND = Backend(
     needs="cyclonedds, rosbags",
     master=domain,
     codec_for=codec_for,
+    codec_of_calls=codec_of_calls,
     qos=QUALITIES,
     has_extensions=False,
 )

@@ -10,10 +10,18 @@ from typing import Any, Protocol
 from nep.i18n import _
 from nep.text import escaped
 
-__all__ = ["RosField", "RosFieldError", "Types", "from_message", "read_definition", "to_message"]
+__all__ = [
+    "PLACEHOLDER",
+    "RosField",
+    "RosFieldError",
+    "Types",
+    "from_message",
+    "read_definition",
+    "to_message",
+]
 
 _BASE, _NAME, _ARRAY = 1, 2, 3
-_PLACEHOLDER = "structure_needs_at_least_one_member"
+PLACEHOLDER = "structure_needs_at_least_one_member"
 """What a message without fields has in DDS."""
 _BITS = {"int8": 8, "int16": 16, "int32": 32, "int64": 64}
 _RANGES = {
@@ -103,7 +111,7 @@ def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:
             if path
             else RosFieldError("", _("publish a map of the fields of '{name}'").format(name=name))
         )
-    fields = {each.name: each for each in types.fields(name) if each.name != _PLACEHOLDER}
+    fields = {each.name: each for each in types.fields(name) if each.name != PLACEHOLDER}
     for key in payload:
         if key not in fields:
             raise RosFieldError(
@@ -284,7 +292,7 @@ def from_message(types: Types, name: str, message: Any) -> dict[str, object]:  #
     return {
         each.name: _plain_field(types, each, getattr(message, each.name))
         for each in types.fields(name)
-        if each.name != _PLACEHOLDER
+        if each.name != PLACEHOLDER
     }
 
 

@@ -14,10 +14,19 @@ from itertools import islice
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.ros2.mismatches import Party, mismatches
-from nep.backends.ros2.names import dds_topic, dds_type, ros_topic, ros_type
+from nep.backends.ros2.names import (
+    dds_service,
+    dds_topic,
+    dds_type,
+    ros_service,
+    ros_topic,
+    ros_type,
+    service_type_of,
+)
 from nep.backends.ros2.participant import DdsEndpoint, Local, Participant
 from nep.backends.ros2.subscriber import id_of
 from nep.backends.ros2.type_mapping import CDR, mapping_for
+from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import NepError
 from nep.masters.graph import Graph
 from nep.messages.codecs import codec_for
@@ -32,6 +41,7 @@ from nep.protocol.requests import (
     ReportAlerts,
     SubscriberRecord,
 )
+from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
 __all__ = ["graph_of"]
 
@@ -48,7 +58,9 @@ class _Names:
     ids: set[int] = field(default_factory=set)
 
     def topic(self, endpoint: DdsEndpoint) -> str:
-        return self.topics.get(endpoint.topic) or ros_topic(endpoint.topic) or endpoint.topic
+        service = ros_service(endpoint.topic)
+        known = self.topics.get(endpoint.topic) or ros_topic(endpoint.topic)
+        return known or (endpoint.topic if service is None else topic_of(service))
 
     def msg_type(self, endpoint: DdsEndpoint) -> str:
         known = self.types.get((endpoint.topic, endpoint.type))
@@ -71,16 +83,16 @@ def graph_of(participant: Participant) -> GraphView:
         (kind, each)
         for kind in ("writer", "reader")
         for each in participant.endpoints(kind)
-        if ros_topic(each.topic) is not None
+        if ros_topic(each.topic) is not None or ros_service(each.topic) is not None
     ]
     parties: dict[str, dict[str, list[Party]]] = {}
     own = participant.own_gids()
     for kind, each in found:
-        if each.gid in own:
+        if each.gid in own and ros_service(each.topic) is None:
             _note(parties, names, Party(own[each.gid], each), kind)
     for node, kind, endpoint in islice(_foreign(participant, found, names), _MOST):
         _add_foreign(graph, node, kind, endpoint, names)
-        if endpoint is not None:
+        if endpoint is not None and ros_service(endpoint.topic) is None:
             _note(parties, names, Party(node.name, endpoint), kind)
     alerts = (
         alert
@@ -98,6 +110,7 @@ def _note(parties: dict[str, dict[str, list[Party]]], names: _Names, party: Part
 
 def _add_local(graph: Graph, local: Local, names: _Names) -> None:
     publishers, subscribers = local.publishers, local.subscribers
+    servers, clients = local.servers, local.clients
     specs: list[PublisherSpec | SubscriberSpec] = [each.spec for each in publishers]
     specs += [each.spec for each in subscribers]
     for spec in specs:
@@ -105,13 +118,21 @@ def _add_local(graph: Graph, local: Local, names: _Names) -> None:
         names.topics.setdefault(name, spec.topic)
         names.types.setdefault((name, dds_type(mapping.ros_type)), spec.msg_type)
         names.ids.add(spec.id)
+    called: list[ServerSpec | ClientSpec] = [each.spec for each in servers]
+    called += [each.spec for each in clients]
+    for asked in called:
+        names.topics.setdefault(dds_service(asked.service)[0], topic_of(asked.service))
+        names.ids.add(asked.id)
     node = local.node
     graph.apply(Join(node), 0, 0.0, node.id)
-    for publisher in publishers:
-        graph.apply(AddPublisher(node, publisher.record), 0, 0.0, node.id)
-    for subscriber in subscribers:
-        graph.apply(AddSubscriber(node, subscriber.record), 0, 0.0, node.id)
-    counts = tuple(each.counts for each in publishers), tuple(each.counts for each in subscribers)
+    for record in (*(each.record for each in publishers), *(each.record for each in servers)):
+        graph.apply(AddPublisher(node, record), 0, 0.0, node.id)
+    for heard in (*(each.record for each in subscribers), *(each.record for each in clients)):
+        graph.apply(AddSubscriber(node, heard), 0, 0.0, node.id)
+    counts = (
+        (*(each.counts for each in publishers), *(each.counts for each in servers)),
+        (*(each.counts for each in subscribers), *(each.counts for each in clients)),
+    )
     graph.apply(Renew(node.id, graph.epoch, graph.revision, *counts, local.load()), 0, 0.0, node.id)
 
 
@@ -159,11 +180,26 @@ def _add_foreign(
     if endpoint is None:
         return
     topic, msg_type, number = names.topic(endpoint), names.msg_type(endpoint), names.id(endpoint)
+    if ros_service(endpoint.topic) is not None:
+        _add_foreign_service(graph, node, kind, endpoint, topic, number)
+        return
     if kind == "writer":
         publisher = PublisherRecord(
             number, topic, msg_type, _codec_of(msg_type), ("ros2",), endpoint.is_latched
         )
         graph.apply(AddPublisher(node, publisher), 0, 0.0, node.id)
+    else:
+        graph.apply(AddSubscriber(node, SubscriberRecord(number, topic, msg_type)), 0, 0.0, node.id)
+
+
+def _add_foreign_service(
+    graph: Graph, node: NodeRecord, kind: str, endpoint: DdsEndpoint, topic: str, number: int
+) -> None:
+    """Who reads requests serves, who writes them calls."""
+    msg_type = service_type_of(endpoint.type) or SERVICE_TYPE
+    if kind == "reader":
+        server = PublisherRecord(number, topic, msg_type, SERVICE_TYPE, ("ros2",))
+        graph.apply(AddPublisher(node, server), 0, 0.0, node.id)
     else:
         graph.apply(AddSubscriber(node, SubscriberRecord(number, topic, msg_type)), 0, 0.0, node.id)
 

@@ -13,7 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from nep.backends.ros2.environment import distribution
-from nep.backends.ros2.fields import RosField, RosFieldError, from_message, read_definition, to_message
+from nep.backends.ros2.fields import (
+    PLACEHOLDER,
+    RosField,
+    RosFieldError,
+    from_message,
+    read_definition,
+    to_message,
+)
 from nep.backends.ros2.library import typesys
 from nep.backends.ros2.names import type_name
 from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
@@ -61,7 +68,7 @@ class MessageTypes:
     @property
     def names(self) -> tuple[str, ...]:
         """All types that are known, as "std_msgs/msg/String"."""
-        return tuple(sorted(self._fields))
+        return tuple(sorted(name for name in self._fields if "/msg/" in name))
 
     @property
     def gid_bytes(self) -> int:
@@ -123,6 +130,34 @@ class MessageTypes:
         """
         for wrong in self._add({type_name(name): text}).values():
             raise wrong
+
+    def add_part(self, name: str, text: str) -> None:
+        """Make known the request or answer of a service, such as "std_srvs/srv/SetBool_Request".
+
+        Raises `NepError` as `add` does.
+        """
+        package, _srv, last = name.split("/")
+        alike = f"{package}/msg/{last}"  # so that the package's own messages are found
+        try:
+            found = self._rosbags.get_types_from_msg(text, alike)[alike]
+        except Exception as error:  # its parser raises classes of its own
+            raise NepError(
+                _("the definition of '{name}' cannot be read: {error}").format(name=name, error=error)
+            ) from error
+        with self._lock:
+            fields = read_definition(found[1])[1]
+            for wrong in self._missing({name: fields}).values():
+                raise wrong
+            known = [each for each in self._fields.get(name, fields) if each.name != PLACEHOLDER]
+            if known != [each for each in fields if each.name != PLACEHOLDER]:
+                raise NepError(
+                    _("'{name}' is known with other fields; choose another name, or start anew").format(
+                        name=name
+                    )
+                )
+            if name not in self._fields:
+                self._store.register({name: found})
+                self._read_definitions()
 
     def add_folder(self, folder: Path) -> None:
         """Make known all .msg files in a folder, each in its package's `msg`: `my_robot/msg/Arm.msg`.

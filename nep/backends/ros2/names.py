@@ -10,11 +10,15 @@ from nep.i18n import _
 from nep.text import quotable
 
 __all__ = [
+    "dds_service",
     "dds_topic",
     "dds_type",
     "is_type_name",
+    "ros_service",
     "ros_topic",
     "ros_type",
+    "service_type_name",
+    "service_type_of",
     "split_node_name",
     "type_name",
     "user_data",
@@ -24,6 +28,9 @@ __all__ = [
 _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)(/msg)?/([A-Z]\w*)", re.ASCII)
 _DDS_TYPE = re.compile(r"(\w+)::msg::dds_::(\w+)_", re.ASCII)
+_SERVICE_TYPE = re.compile(r"([A-Za-z]\w*)(/srv)?/([A-Z]\w*)", re.ASCII)
+_DDS_REQUEST = re.compile(r"(\w+)::srv::dds_::(\w+)_Request_", re.ASCII)
+_REQUESTS = re.compile(r"rq(/.+)Request", re.ASCII)
 _NO_NAME = re.compile(r"\W", re.ASCII)
 
 
@@ -64,8 +71,32 @@ def type_name(msg_type: str) -> str:
 
 def dds_type(ros_type: str) -> str:
     """`std_msgs::msg::dds_::String_`."""
-    package, _msg, name = ros_type.split("/")
-    return f"{package}::msg::dds_::{name}_"
+    package, kind, name = ros_type.split("/")
+    return f"{package}::{kind}::dds_::{name}_"
+
+
+def dds_service(service: str) -> tuple[str, str]:
+    """`rq/addRequest` and `rr/addReply` for "add" and "/add". Raises `BadTopicError` as `dds_topic` does."""
+    name = dds_topic(service).removeprefix("rt/")
+    return f"rq/{name}Request", f"rr/{name}Reply"
+
+
+def ros_service(topic: str) -> str | None:
+    """`/add` for "rq/addRequest"; None for a topic that is no service's requests."""
+    found = _REQUESTS.fullmatch(topic)
+    return None if found is None else found[1]
+
+
+def service_type_of(dds_type: str) -> str | None:
+    """`std_srvs/srv/SetBool` for the name of its requests in DDS; None for any other type."""
+    found = _DDS_REQUEST.fullmatch(dds_type)
+    return None if found is None else f"{found[1]}/srv/{found[2]}"
+
+
+def service_type_name(msg_type: str) -> str | None:
+    """`std_srvs/srv/SetBool`, also for "std_srvs/SetBool"; None for what is no type of a service."""
+    found = _SERVICE_TYPE.fullmatch(msg_type)
+    return None if found is None else f"{found[1]}/srv/{found[3]}"
 
 
 def ros_type(dds_type: str) -> str:

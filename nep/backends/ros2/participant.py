@@ -23,6 +23,7 @@ from nep.backends.ros2.matches import Matches
 from nep.backends.ros2.message_types import MessageTypes, message_types
 from nep.backends.ros2.names import split_node_name, user_data, user_data_of
 from nep.backends.ros2.topics import DdsTopics, sample_of
+from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import DecodeError, NepError
 from nep.i18n import _
 from nep.protocol.requests import (
@@ -88,6 +89,14 @@ class Local(Protocol):
     def subscribers(self) -> Sequence[LocalSubscriber]:
         """Those that are open."""
 
+    @property
+    def servers(self) -> Sequence[LocalServer]:
+        """Those that are open."""
+
+    @property
+    def clients(self) -> Sequence[LocalClient]:
+        """Those that are open."""
+
     def load(self) -> float | None:
         """The share of a core that the process uses."""
 
@@ -113,6 +122,34 @@ class LocalSubscriber(Protocol):
     """A subscriber of this process."""
 
     spec: SubscriberSpec
+
+    @property
+    def record(self) -> SubscriberRecord:
+        """For the graph."""
+
+    @property
+    def counts(self) -> SubscriberCount:
+        """For the graph."""
+
+
+class LocalServer(Protocol):
+    """A server of this process."""
+
+    spec: ServerSpec
+
+    @property
+    def record(self) -> PublisherRecord:
+        """For the graph."""
+
+    @property
+    def counts(self) -> PublisherCount:
+        """For the graph."""
+
+
+class LocalClient(Protocol):
+    """A client of this process."""
+
+    spec: ClientSpec
 
     @property
     def record(self) -> SubscriberRecord:
@@ -419,6 +456,10 @@ class Participant:
 
     def _ends(self) -> bool:
         return self._is_closing
+
+    def is_in_its_thread(self) -> bool:
+        """Whether this is the thread that reads for all."""
+        return threading.current_thread() is self._thread
 
     def has_closed(self) -> bool:
         """Whether all that belongs to it is gone, or goes."""

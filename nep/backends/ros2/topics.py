@@ -36,6 +36,13 @@ class DdsTopics:
             self._topics[key] = self._dds.topic.Topic(self._entity, name, self.sample_class(ros_type))
         return self._topics[key]
 
+    def service_topic(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+        """The topic of a service's requests or answers."""
+        key = (name, ros_type)
+        if key not in self._topics:
+            self._topics[key] = self._dds.topic.Topic(self._entity, name, self.service_class(ros_type))
+        return self._topics[key]
+
     def state_writer(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         """A writer whose last sample is also read by those that come later."""
         policies = self._dds.qos.Policy
@@ -62,10 +69,21 @@ class DdsTopics:
             *kept,
         )
 
+    def service_class(self, ros_type: str) -> Any:  # noqa: ANN401 - made here
+        """The class of samples of a service's requests or answers, as rmw_cyclonedds has them.
+
+        Who calls, and the number of the call, come before the fields.
+        """
+        hints = self._dds.idl.types
+        return self._class(ros_type, {"guid": hints.uint64, "sequence_number": hints.int64})
+
     def sample_class(self, ros_type: str) -> Any:  # noqa: ANN401 - made here
         """The class of samples of a type of ROS."""
+        return self._class(ros_type, {})
+
+    def _class(self, ros_type: str, head: dict[str, Any]) -> Any:  # noqa: ANN401 - made here
         if ros_type not in self._classes:
-            members = {each.name: self._member(each) for each in self._types.fields(ros_type)}
+            members = head | {each.name: self._member(each) for each in self._types.fields(ros_type)}
             made = self._dds.idl.make_idl_struct(ros_type.rpartition("/")[2], dds_type(ros_type), members)
             made.serialize = _serialize
             made.deserialize = classmethod(_deserialize)

@@ -10,11 +10,15 @@ from contextlib import contextmanager
 
 from nep.backends.base import PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
+from nep.backends.deadlines import Deadlines
 from nep.backends.ros2.graph import graph_of
 from nep.backends.ros2.library import dds, has_forked, typesys
 from nep.backends.ros2.participant import Participant, join, leave
 from nep.backends.ros2.publisher import Ros2Publisher
+from nep.backends.ros2.service_client import Ros2Client
+from nep.backends.ros2.service_server import Ros2Server
 from nep.backends.ros2.subscriber import Ros2Subscriber
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
@@ -42,6 +46,10 @@ class Ros2Transport:
         self._lock = threading.RLock()
         self._publishers: tuple[Ros2Publisher, ...] = ()
         self._subscribers: tuple[Ros2Subscriber, ...] = ()
+        self._servers: tuple[Ros2Server, ...] = ()
+        self._clients: tuple[Ros2Client, ...] = ()
+        self._deadlines = Deadlines(node.name)
+        self._is_closing = False
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
 
@@ -116,6 +124,36 @@ class Ros2Transport:
         subscriber.close()
         raise ClosedError(f"node '{self.node.name}'")
 
+    def server(self, spec: ServerSpec) -> Ros2Server:
+        """A new server; returns when the clients that are known are matched."""
+        with self._unless_closed():
+            participant = self._joined(spec.configuration)
+            server = Ros2Server(participant, self.node.id, spec, self._forget_service)
+        with self._lock:
+            if not self._closing.is_set() and not self._is_closing:
+                self._servers = (*self._servers, server)
+                return server
+        server.close(0.0)
+        raise ClosedError(f"node '{self.node.name}'")
+
+    def client(self, spec: ClientSpec) -> Ros2Client:
+        """A new client; returns when the servers that are known are matched."""
+        with self._unless_closed():
+            participant = self._joined(spec.configuration)
+            client = Ros2Client(participant, self.node.id, spec, self._deadlines, self._forget_service)
+        with self._lock:
+            if not self._closing.is_set() and not self._is_closing:
+                self._clients = (*self._clients, client)
+                self._deadlines.watch(client)
+                return client
+        client.close()
+        raise ClosedError(f"node '{self.node.name}'")
+
+    def _forget_service(self, closed: Ros2Server | Ros2Client) -> None:
+        with self._lock:
+            self._servers = tuple(each for each in self._servers if each is not closed)
+            self._clients = tuple(each for each in self._clients if each is not closed)
+
     def _close_publisher(self, publisher: Ros2Publisher, timeout_s: float) -> None:
         publisher.finish(timeout_s)
         with self._lock:
@@ -126,15 +164,29 @@ class Ros2Transport:
         with self._lock:
             self._subscribers = tuple(each for each in self._subscribers if each is not subscriber)
 
-    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait for a message in one of `subscribers`, or for `wake`."""
+    def wait(
+        self,
+        subscribers: Sequence[SubscriberTransport],
+        timeout_s: float,
+        calls: Sequence[CallQueue] = (),
+    ) -> None:
+        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
         mine = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
-        with self.changed:
-            before = self._wakes
-            self.changed.wait_for(
-                lambda: self._wakes != before or any(len(each.inbox) or each.is_closed for each in mine),
-                timeout_s,
-            )
+        before = self._wakes
+        entered: list[CallQueue] = []
+        try:
+            for queue in calls:
+                if not queue.enter_wait(self.wake):
+                    return
+                entered.append(queue)
+            with self.changed:
+                self.changed.wait_for(
+                    lambda: self._wakes != before or any(len(each.inbox) or each.is_closed for each in mine),
+                    timeout_s,
+                )
+        finally:
+            for queue in entered:
+                queue.leave_wait(self.wake)
 
     def wake(self) -> None:
         """End all waits."""
@@ -157,12 +209,26 @@ class Ros2Transport:
         """Those that are open."""
         return self._subscribers
 
+    @property
+    def servers(self) -> tuple[Ros2Server, ...]:
+        """Those that are open."""
+        return self._servers
+
+    @property
+    def clients(self) -> tuple[Ros2Client, ...]:
+        """Those that are open."""
+        return self._clients
+
     def load(self) -> float | None:
         """The share of a core that the process uses."""
         return self._load.ratio()
 
     def begin_close(self) -> None:
-        """What is written is on its way already."""
+        """What is written is on its way already; no call is taken any more."""
+        with self._lock:
+            self._is_closing = True
+        for server in self._servers:
+            server.begin_close()
 
     def close(self, timeout_s: float) -> None:
         """Close all, leave the domain, end the thread."""
@@ -176,11 +242,16 @@ class Ros2Transport:
                 subscriber.close()
             for publisher in self._publishers:
                 publisher.close(max(0.0, deadline - time.monotonic()))
+            for client in self._clients:
+                client.close()
+            for server in self._servers:
+                server.close(max(0.0, deadline - time.monotonic()))
         finally:
             with self._lock:
                 participant, self._participant = self._participant, None
             if participant is not None:
                 leave(participant, self.node.id)
+        self._deadlines.close(timeout_s)
         self.wake()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(timeout_s)

@@ -115,9 +115,10 @@ class OwnedServices:
         return made
 
     def _client_spec(self, service: str, configuration: Configuration, msg_type: str) -> ClientSpec:
-        codec = codec_checked(self._backend.codec_for(text("msg_type", msg_type)))
+        codec_of = self._backend.codec_of_calls or self._backend.codec_for
+        codec = codec_checked(codec_of(text("msg_type", msg_type)))
         id_, number = self._new_id()
-        return ClientSpec(id_, service, codec, configuration, self._wait_s, number)
+        return ClientSpec(id_, service, codec, configuration, self._wait_s, number, msg_type)
 
     def _able(self) -> ServiceTransport:
         if not hasattr(self._transport, "server"):

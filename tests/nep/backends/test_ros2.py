@@ -64,6 +64,7 @@ def why_no_fast_dds() -> str:
         ("ros2_vendors_inside.py", "dust"),
         ("ros2_vendors_inside.py", "fast"),
         ("test_contract.py", ""),
+        ("ros2_services_inside.py", ""),
     ],
 )
 def test_in_a_network_of_its_own(file: str, chosen: str) -> None:

@@ -231,7 +231,7 @@ def test_nep_call_is_what_the_file_of_that_name_says() -> None:
 
 def test_a_type_of_ros_has_bytes_and_nan_with_msgpack() -> None:
     kind = ServiceType(
-        "a/B", "", parse("a/BRequest", "uint8[] data\nfloat64 x"), parse("a/BResponse", "uint8[] data")
+        "a/B", parse("a/BRequest", "uint8[] data\nfloat64 x"), parse("a/BResponse", "uint8[] data")
     )
     json, msgpack = CODECS["json"], CODECS["msgpack"]
     asked = msgpack.encode({"data": b"\0\xff", "x": math.nan}).data

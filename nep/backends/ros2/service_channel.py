@@ -1,0 +1,325 @@
+"""ServiceChannel: the writers and readers of a server or client, and who is at the other side.
+
+As rmw_cyclonedds has it, requests are on `rq/NAMERequest`, answers on `rr/NAMEReply`, and before the fields
+of each stand the caller's id (u64) and the number of the call (i64). What ROS has no form for, that a server
+of a type of ROS failed, programs of nep tell each other on a topic that ROS 2 does not show: the same 16
+bytes, what it is (u8), and the reason.
+"""
+
+from __future__ import annotations
+
+import secrets
+import struct
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from nep.backends.ros2.library import has_forked
+from nep.backends.ros2.matches import PREFIX_BYTES
+from nep.backends.ros2.names import dds_service, dds_type, user_data
+from nep.backends.ros2.participant import DdsEndpoint, Participant, policy
+from nep.backends.ros2.service_types import answer_of, request_of
+from nep.backends.ros2.topics import sample_of
+from nep.backends.services import CALLS_MAX
+from nep.backends.typed_services import TypedService
+from nep.errors import DecodeError, WireError
+from nep.i18n import _
+from nep.protocol.service_wire import CallKind, Reply
+
+__all__ = ["CallId", "HeardPart", "ServiceChannel"]
+
+_HEAD_BYTES, _CDR_BYTES = 20, 4
+_FAILURE_TYPE = "std_msgs/msg/UInt8MultiArray"
+_FAILED = struct.Struct("<QqB")
+_BATCH = 256
+_MOST_WRITERS = 1024
+"""So many clients are remembered."""
+_BLOCKING_NS = 100_000_000
+_GREETING_S = 0.1
+"""What another program than nep's needs to get ready after both know of each other."""
+_KINDS = (CallKind.ERROR, CallKind.REFUSED)
+
+
+class CallId(NamedTuple):
+    """Who calls, and which of its calls it is."""
+
+    guid: int
+    number: int
+
+
+class HeardPart(NamedTuple):
+    """A request or an answer: its CDR without the id, and the writer that it came from (b"": it is gone)."""
+
+    id: CallId
+    cdr: bytes
+    writer: DdsEndpoint | None
+
+
+class ServiceChannel:
+    """See the module. `guid` is the client's id; a server has none.
+
+    `hear` gets what comes, `failed` failures; both in the participant's thread.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        node_id: str,
+        service: str,
+        kind: TypedService,
+        entry_id: int,
+        *,
+        guid: int | None = None,
+        hear: Callable[[HeardPart], None],
+        failed: Callable[[CallId, Reply], None] | None = None,
+    ) -> None:
+        self.kind = kind
+        self.participant = participant
+        self.is_closed = False
+        self.node_id = node_id
+        self._hear = hear
+        self._failed = failed
+        self._is_server = is_server = guid is None
+        self._guid = guid
+        self._ready: frozenset[bytes] = frozenset()
+        self._ready_there: tuple[int, ...] = ()
+        self._is_all_ready = False
+        self._known_writers: dict[int, DdsEndpoint] = {}
+        self._first_seen: dict[bytes, float] = {}
+        rq, rr = dds_service(service)
+        types = participant.types
+        word = ".".join(f"{each:x}" for each in secrets.token_bytes(16))
+        self._told = {
+            "serviceid" if is_server else "clientid": word,
+            "nepnode": node_id,
+            "nepid": f"{entry_id:x}",
+        }
+        request, answer = request_of(kind.name), answer_of(kind.name)
+        self._topics = ((rr, answer), (rq, request)) if is_server else ((rq, request), (rr, answer))
+        self._hashes = {name: types.type_hash(name) for name in (request, answer)}
+        self._readers: list[Any] = []
+        self._writers: list[Any] = []
+        with participant.changed:
+            (out, out_type), (into, into_type) = self._topics
+            self._sample_class = participant.topics.service_class(out_type)
+            self._add_writer(participant.topics.service_topic(out, out_type), out_type)
+            self._add_reader(participant.topics.service_topic(into, into_type), into_type, self._read)
+            if not kind.is_nep:
+                self._add_failures(rq)
+
+    # ---- what belongs to it. With the participant's lock held
+
+    def _add_failures(self, rq: str) -> None:
+        name = f"nep_failures/{rq.removeprefix('rq/')}"
+        topic = self.participant.topics.topic(name, _FAILURE_TYPE)
+        self._failure_class = self.participant.topics.sample_class(_FAILURE_TYPE)
+        if self._is_server:
+            self._add_writer(topic, _FAILURE_TYPE)
+        else:
+            self._add_reader(topic, _FAILURE_TYPE, self._read_failures)
+
+    def _qos(self, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+        policies = policy(self.participant.dds)
+        type_hash = self._hashes.get(ros_type) or self.participant.types.type_hash(ros_type)
+        return self.participant.qos(
+            policies.Reliability.Reliable(_BLOCKING_NS),
+            policies.Durability.Volatile,
+            policies.History.KeepLast(CALLS_MAX),
+            policies.DataRepresentation(use_cdrv0_representation=True),
+            policies.Userdata(user_data({"typehash": type_hash} | self._told)),
+        )
+
+    def _add_writer(self, topic: Any, ros_type: str) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        participant = self.participant
+        made = participant.dds.pub.DataWriter(participant.entity, topic, self._qos(ros_type))
+        self._writers.append(made)
+        participant.assign(self.node_id, "writer", made)
+
+    def _add_reader(
+        self,
+        topic: Any,  # noqa: ANN401 - cyclonedds is not typed
+        ros_type: str,
+        read: Callable[[Any, Any], None],
+    ) -> None:
+        participant, core = self.participant, self.participant.dds.core
+        made = participant.dds.sub.DataReader(participant.entity, topic, self._qos(ros_type))
+        self._readers.append(made)
+        participant.assign(self.node_id, "reader", made)
+        ready = core.ReadCondition(made, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any)
+        participant.watch(made, ready, lambda: read(made, ready))
+
+    # ---- what comes, in the participant's thread, under its lock
+
+    def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        while samples := reader.take(_BATCH, ready):
+            for sample in samples:
+                cdr = getattr(sample, "cdr", None)
+                if cdr is None or len(cdr) < _CDR_BYTES + 16 or cdr[0] != 0 or cdr[1] > 1:
+                    continue  # a writer went, or it is none of CDR
+                guid, number = struct.unpack_from(f"{'<' if cdr[1] else '>'}Qq", cdr, _CDR_BYTES)
+                call = CallId(guid, number)
+                if self._is_wanted(call):
+                    writer = self._writer_of(reader, sample.sample_info.publication_handle)
+                    self._hear(HeardPart(call, bytes(cdr[:_CDR_BYTES] + cdr[_HEAD_BYTES:]), writer))
+            if len(samples) < _BATCH:
+                return
+
+    def _is_wanted(self, call: CallId) -> bool:
+        """Whether it is for this one: all clients hear all answers."""
+        return self._guid is None or call.guid == self._guid
+
+    def _writer_of(self, reader: Any, handle: int) -> DdsEndpoint | None:  # noqa: ANN401 - cyclonedds is not typed
+        known = self._known_writers.get(handle)
+        if known is None:
+            found = reader.get_matched_publication_data(handle)
+            if found is None:
+                return None
+            if len(self._known_writers) >= _MOST_WRITERS:
+                self._known_writers.pop(next(iter(self._known_writers)))
+            known = self._known_writers[handle] = self.participant.described(found)
+        return known
+
+    def _read_failures(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        for sample in reader.take(_BATCH, ready):
+            cdr = getattr(sample, "cdr", None)
+            if cdr is None or self._failed is None:
+                continue  # a writer went
+            try:
+                told: Any = self.participant.types.decode(_FAILURE_TYPE, cdr)
+            except DecodeError:
+                continue
+            data: bytes = told["data"]
+            if len(data) >= _FAILED.size:
+                guid, number, kind = _FAILED.unpack_from(data)
+                found = next((each for each in _KINDS if each == kind), None)
+                if found is not None and self._is_wanted(CallId(guid, number)):
+                    self._failed(CallId(guid, number), Reply(found, data[_FAILED.size :]))
+
+    # ---- what goes. Without the participant's lock
+
+    def send(self, call: CallId, cdr: bytes) -> None:
+        """Write a request or an answer. Raises `WireError`, and `DDSException` when it is closed."""
+        order = "<" if cdr[1] else ">"
+        whole = cdr[:_CDR_BYTES] + struct.pack(f"{order}Qq", *call) + cdr[_CDR_BYTES:]
+        codes = self.participant.dds.core.DDSException
+        try:
+            self._writers[0].write(sample_of(self._sample_class, whole))
+        except codes as error:
+            if error.code == codes.DDS_RETCODE_TIMEOUT:
+                raise WireError(_("the other side is too far behind to take it"), len(cdr)) from error
+            raise
+
+    def send_failure(self, call: CallId, reply: Reply) -> None:
+        """Tell programs of nep that there is no answer. Raises as `send` does."""
+        data = _FAILED.pack(*call, reply.kind) + bytes(reply.data)
+        cdr = self.participant.types.encode(_FAILURE_TYPE, {"data": data})
+        self._writers[1].write(sample_of(self._failure_class, cdr))
+
+    # ---- who is at the other side. With the participant's lock held
+
+    @property
+    def known(self) -> list[DdsEndpoint]:
+        """The writers and readers of the other side that have been found."""
+        (out, out_type), (into, into_type) = self._topics
+        found = [(each, out_type) for each in self.participant.endpoints("reader", out)] + [
+            (each, into_type) for each in self.participant.endpoints("writer", into)
+        ]
+        return [each for each, ros_type in found if each.is_of(dds_type(ros_type), self._hashes[ros_type])]
+
+    @property
+    def entities(self) -> Sequence[Any]:
+        """Its own writers and readers of requests and answers."""
+        return (self._writers[0], self._readers[0])
+
+    def _matched(self, entity: Any) -> list[DdsEndpoint]:  # noqa: ANN401 - cyclonedds is not typed
+        if hasattr(entity, "get_matched_subscriptions"):
+            handles, look = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
+        else:
+            handles, look = entity.get_matched_publications(), entity.get_matched_publication_data
+        return [self.participant.described(data) for data in map(look, handles) if data is not None]
+
+    def ready_servers(self) -> frozenset[bytes]:
+        """For a client: the writers of answers of those servers that can be called."""
+        if self.is_closed:
+            return frozenset()
+        there = self._handles()
+        if there != self._ready_there:
+            self._ready = self._find_ready()
+            self._ready_there = there if self._is_all_ready else ()
+        return self._ready
+
+    def _handles(self) -> tuple[int, ...]:
+        """All that have been found, by numbers of Cyclone DDS's."""
+        readers = (each.get_matched_publications() for each in self._readers)
+        return (*self._writers[0].get_matched_subscriptions(), -1, *(one for each in readers for one in each))
+
+    def _find_ready(self) -> frozenset[bytes]:
+        self._is_all_ready = True
+        now = time.monotonic()
+        readers, writers = self._matched(self._writers[0]), self._matched(self._readers[0])
+        failing = [self._matched(each) for each in self._readers[1:]]
+        ready: set[bytes] = set()
+        for reader in readers:
+            found = [each for each in writers if each.participant == reader.participant]
+            since = self._first_seen.setdefault(reader.gid, now) if found else now
+            if "nepid" not in reader.told:
+                is_ready = bool(found) and (now - since >= _GREETING_S or self._is_own(reader))
+            else:
+                is_ready = bool(found) and self._is_confirmed(reader, writers, failing)
+            self._is_all_ready = self._is_all_ready and is_ready
+            if is_ready:
+                ready.update(each.gid for each in found)
+        self._first_seen = {each.gid: self._first_seen.get(each.gid, now) for each in readers}
+        return frozenset(ready)
+
+    def _is_own(self, endpoint: DdsEndpoint) -> bool:
+        return bool(endpoint.gid[:PREFIX_BYTES] == self.participant.gid[:PREFIX_BYTES])
+
+    def _is_confirmed(
+        self, reader: DdsEndpoint, writers: list[DdsEndpoint], failing: list[list[DdsEndpoint]]
+    ) -> bool:
+        """Whether a server of nep has told that it has found all that belongs to this client."""
+        pairs = [(self._writers[0], [reader]), (self._readers[0], writers)]
+        pairs += zip(self._readers[1:], failing, strict=True)
+        return all(
+            any(
+                self.participant.matches.is_confirmed(own.guid.bytes, other.gid, other.participant)
+                for other in others
+                if other.participant == reader.participant
+            )
+            for own, others in pairs
+        )
+
+    def servers(self) -> frozenset[bytes]:
+        """For a client: the writers of answers that are there now."""
+        return frozenset() if self.is_closed else frozenset(e.gid for e in self._matched(self._readers[0]))
+
+    def hears_us(self, client: DdsEndpoint) -> bool:
+        """For a server: whether the client that has this writer of requests can be answered."""
+        there = [each for each in self._matched(self._writers[0]) if each.participant == client.participant]
+        word = client.told.get("clientid")
+        return any(word is None or each.told.get("clientid") in {None, word} for each in there)
+
+    # ---- the end
+
+    def finish(self, timeout_s: float) -> None:
+        """Wait until what was written is confirmed. Without the participant's lock."""
+        if not self.is_closed and not has_forked() and timeout_s > 0.0 and not self.participant.has_closed():
+            for writer in self._writers:  # not `wait_for_acks`, which fails when the time is over
+                writer._wait_for_acks(writer._ref, int(min(timeout_s, 3600.0) * 1e9))  # noqa: SLF001
+
+    def close(self) -> None:
+        """Leave the network. May be called twice."""
+        if has_forked():
+            return
+        with self.participant.changed:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            if self.participant.has_closed():
+                return
+            for reader in self._readers:
+                self.participant.unwatch(reader)
+                self.participant.withdraw(self.node_id, "reader", reader)
+            for writer in self._writers:
+                self.participant.withdraw(self.node_id, "writer", writer)

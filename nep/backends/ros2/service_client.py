@@ -1,0 +1,288 @@
+"""Ros2Client: calls a service of ROS 2. What type it has is told by its server, unless the client is told.
+
+DDS sends a request to all servers of the name; the first answer counts.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from nep.backends.deadlines import Deadlines
+from nep.backends.ros2.names import dds_service, ros_service, service_type_name, service_type_of
+from nep.backends.ros2.participant import Participant
+from nep.backends.ros2.publisher import wait_for_others
+from nep.backends.ros2.service_channel import CallId, HeardPart, ServiceChannel
+from nep.backends.ros2.service_types import known_service
+from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
+from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError
+from nep.i18n import _
+from nep.protocol.requests import SubscriberCount, SubscriberRecord, as_count
+from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
+
+__all__ = ["Ros2Client"]
+
+_logger = logging.getLogger("nep")
+_SEEK_S, _WATCH_S = 0.02, 0.1
+"""How often a server is looked for, and whether it is still there."""
+
+Then = Callable[[Outcome], None]
+
+
+@dataclass(eq=False)
+class _Call:
+    """A call that is under way; `servers` may answer it, None: it was not sent."""
+
+    number: int
+    data: bytes | memoryview
+    timeout_s: float | None
+    deadline: float
+    then: Then
+    servers: frozenset[bytes] | None = None
+
+
+class Ros2Client:
+    """A client: its calls that are under way. Raises `BadTopicError`, `NepError`."""
+
+    def __init__(
+        self,
+        participant: Participant,
+        node_id: str,
+        spec: ClientSpec,
+        deadlines: Deadlines,
+        on_close: Callable[[Ros2Client], object],
+    ) -> None:
+        self.spec = spec
+        self.is_closed = False
+        self.late = 0
+        self._participant = participant
+        self._node_id = node_id
+        self._deadlines = deadlines
+        self._on_close = on_close
+        self._requests, _answers = dds_service(spec.service)
+        self._guid = secrets.randbits(63)
+        self._lock = threading.Lock()
+        """Taken after the participant's lock, never before it."""
+        self._calls: dict[int, _Call] = {}
+        self._bytes = 0
+        self._numbers = itertools.count(1)
+        self._answered = self._failed = 0
+        self._channel: ServiceChannel | None = None
+        told = service_type_name(spec.msg_type)
+        self._told = None if told is None else known_service(participant.types, told)
+        try:
+            channel = self._open_channel()
+            if channel is not None:
+                wait_for_others(participant, channel.known, lambda: channel.entities)
+        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+            self.close()
+            raise
+
+    def _open_channel(self) -> ServiceChannel | None:
+        """It, as soon as its type is known: what the client was told, or else what the first server has."""
+        with self._participant.changed:
+            found = [
+                name
+                for each in self._participant.endpoints("reader", self._requests)
+                if (name := service_type_of(each.type)) is not None
+            ]
+            wanted = self._told.name if self._told is not None else next(iter(sorted(found)), "")
+            channel = self._channel
+            if not wanted or self.is_closed or (channel is not None and channel.kind.name == wanted):
+                return channel
+            if channel is not None:
+                channel.close()
+            self._channel = ServiceChannel(
+                self._participant,
+                self._node_id,
+                self.spec.service,
+                self._told or known_service(self._participant.types, wanted),
+                self.spec.id,
+                guid=self._guid,
+                hear=self._heard,
+                failed=self._told_failure,
+            )
+            return self._channel
+
+    @property
+    def record(self) -> SubscriberRecord:
+        """For the graph."""
+        return SubscriberRecord(self.spec.id, topic_of(self.spec.service), SERVICE_TYPE)
+
+    @property
+    def counts(self) -> SubscriberCount:
+        """For the graph."""
+        return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed))
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether there is a server that can be called."""
+        with self._participant.changed:
+            if self.is_closed:
+                return False
+            if not self._ready_servers():
+                self._open_channel()
+            return bool(self._ready_servers())
+
+    # ---- calling
+
+    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+        """See `ClientTransport.begin`."""
+        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        with self._lock:
+            if self.is_closed:
+                raise self._closed_error()
+            check_calls(self.spec.service, len(self._calls), self._bytes, len(data))
+            call = _Call(next(self._numbers), data, timeout_s, deadline, then)
+            self._calls[call.number] = call
+            self._bytes += len(data)
+        self._send_waiting()
+        self._deadlines.add(min(deadline, time.monotonic() + _SEEK_S))
+        return call
+
+    def _send_waiting(self) -> None:
+        """Send what waits for a server, if there is one."""
+        wrong: NepError | None = None
+        with self._participant.changed:
+            channel, servers = self._channel, self._ready_servers()
+            if not servers:  # looking at all that is there takes its time
+                try:
+                    channel, servers = self._open_channel(), self._ready_servers()
+                except NepError as error:  # the server has a type that is not known here
+                    wrong = error
+            with self._lock:
+                waiting = [each for each in self._calls.values() if each.servers is None]
+                for call in waiting if servers else ():
+                    call.servers = servers
+        if wrong is not None:
+            for call in waiting:
+                self._end(call, wrong)
+        elif servers and channel is not None:
+            for call in waiting:
+                self._send(channel, call)
+
+    def _ready_servers(self) -> frozenset[bytes]:
+        return frozenset() if self._channel is None else self._channel.ready_servers()
+
+    def _send(self, channel: ServiceChannel, call: _Call) -> None:
+        left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
+        try:
+            cdr = channel.kind.body_of_call(self.spec.codec, call.data, left_s)
+            channel.send(CallId(self._guid, call.number), cdr)
+        except NepError as error:
+            self._end(call, error)
+        except self._participant.dds.core.DDSException as error:
+            if not self.is_closed:
+                reason = _("the call cannot be sent: {reason}").format(reason=error)
+                self._end(call, NepError(reason))
+
+    # ---- how it ends
+
+    def _heard(self, heard: HeardPart) -> None:
+        """In the participant's thread: an answer."""
+        channel = self._channel
+        if channel is None:
+            return
+        try:
+            outcome: Outcome = channel.kind.reply_in(heard.cdr, self.spec.codec)
+        except NepError as error:
+            outcome = error
+        self._end_numbered(heard.id.number, outcome)
+
+    def _told_failure(self, call: CallId, reply: Reply) -> None:
+        """In the participant's thread: a server of nep tells that there is no answer."""
+        self._end_numbered(call.number, reply)
+
+    def _end_numbered(self, number: int, outcome: Outcome) -> None:
+        with self._lock:
+            call = self._calls.get(number)
+            self.late += call is None
+        if call is not None:
+            self._end(call, outcome)
+
+    def _end(self, call: _Call, outcome: Outcome) -> None:
+        with self._lock:
+            if not self._take(call):
+                return
+            self._answered += not isinstance(outcome, NepError)
+            self._failed += isinstance(outcome, NepError)
+        self._tell(call, outcome)
+
+    def _tell(self, call: _Call, outcome: Outcome) -> None:
+        try:
+            call.then(outcome)
+        except Exception:  # the others get theirs
+            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
+
+    def _take(self, call: _Call) -> bool:
+        """It is not under way any more; whether it was. With the lock held."""
+        if self._calls.pop(call.number, None) is None:
+            return False
+        self._bytes -= len(call.data)
+        return True
+
+    def forget(self, call: OpenCall) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            known = self._calls.get(call.number)
+            if known is not None:
+                self._take(known)
+
+    def expire(self, now: float) -> float:
+        """Send what waited for a server, and end what waited too long, or whose servers are gone."""
+        with self._lock:
+            is_waiting = any(each.servers is None for each in self._calls.values())
+        if is_waiting:
+            self._send_waiting()
+        with self._participant.changed:
+            there = self._channel.servers() if self._channel is not None else frozenset()
+        with self._lock:
+            calls = tuple(self._calls.values())
+        for call in calls:
+            if call.servers is not None and not call.servers & there:
+                self._end(call, ServerGoneError(self.spec.service))
+            elif call.deadline <= now:
+                kind = NoServerError if call.servers is None else ServiceTimeoutError
+                self._end(call, kind(self.spec.service, call.timeout_s or 0.0))
+        with self._lock:
+            dues = [
+                min(each.deadline, now + (_SEEK_S if each.servers is None else _WATCH_S))
+                for each in self._calls.values()
+            ]
+        return min(dues, default=math.inf)
+
+    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - at once
+        """The services that have a server now."""
+        found = (ros_service(each.topic) for each in self._participant.endpoints("reader"))
+        return tuple(sorted({each for each in found if each is not None}))
+
+    # ---- the end
+
+    def close(self) -> None:
+        """Calls that are under way end. May be called twice."""
+        with self._lock:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            left, self._calls = list(self._calls.values()), {}
+        self._deadlines.forget(self)
+        if self._channel is not None:
+            self._channel.close()
+        self._on_close(self)
+        for call in left:
+            self._tell(call, self._closed_error())
+
+    def forked(self) -> None:
+        """In a child. See `ClientTransport.forked`."""
+        self.is_closed = True
+        self._lock = threading.Lock()
+        self._calls = {}
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(_("client of '{service}'").format(service=self.spec.service))

@@ -1,0 +1,140 @@
+"""Ros2Server: serves a service of ROS 2. Requests are read in the participant's thread."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+
+from nep.backends.ros2.participant import Participant
+from nep.backends.ros2.publisher import wait_for_others
+from nep.backends.ros2.service_channel import CallId, HeardPart, ServiceChannel
+from nep.backends.ros2.service_types import served_type
+from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
+from nep.backends.zeromq.sockets import Refusals
+from nep.errors import NepError
+from nep.protocol.requests import PublisherCount, PublisherRecord
+from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, failure, topic_of
+
+__all__ = ["Ros2Server"]
+
+_logger = logging.getLogger("nep")
+_MEET_S = 1.0
+"""So long an answer waits for a client that can call already and cannot be answered yet."""
+_LOOK_S = 0.01
+
+
+class Ros2Server:
+    """A server: its queue. Raises `BadTopicError`, `NepError`."""
+
+    def __init__(
+        self,
+        participant: Participant,
+        node_id: str,
+        spec: ServerSpec,
+        on_close: Callable[[Ros2Server], object],
+    ) -> None:
+        self.spec = spec
+        self.calls = CallQueue()
+        self.tally = Tally()
+        self.is_closed = False
+        self.endpoints = ("ros2",)
+        self._on_close = on_close
+        self._participant = participant
+        self._refusals = Refusals()
+        self._type = served_type(participant.types, spec.msg_type)
+        self._channel = ServiceChannel(
+            participant, node_id, spec.service, self._type, spec.id, hear=self._asked
+        )
+        try:
+            wait_for_others(participant, self._channel.known, lambda: self._channel.entities)
+        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+            self._channel.close()
+            raise
+
+    @property
+    def record(self) -> PublisherRecord:
+        """For the graph."""
+        return PublisherRecord(
+            self.spec.id, topic_of(self.spec.service), self._type.name, SERVICE_TYPE, self.endpoints
+        )
+
+    @property
+    def counts(self) -> PublisherCount:
+        """For the graph."""
+        tally = self.tally
+        return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
+
+    def _asked(self, heard: HeardPart) -> None:
+        """In the participant's thread, under its lock."""
+        try:
+            asked = self._type.call_in(heard.cdr)
+        except NepError as error:
+            if self._refusals.add(str(error)):
+                _logger.warning("to '%s' came what is no call: %s", self.spec.service, error)
+            self._answer(heard, failure(CallKind.REFUSED, "", str(error)))
+            return
+        deadline = None if asked.timeout_s is None else time.monotonic() + asked.timeout_s
+        incoming = IncomingCall(
+            asked.data, asked.codec, deadline, lambda reply: self._answer(heard, fitting(reply))
+        )
+        if not self.calls.put(incoming):
+            incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+
+    def _answer(self, heard: HeardPart, reply: Reply) -> bool:
+        cdr: bytes | None = None
+        if self._type.is_nep or reply.kind == CallKind.ANSWER:
+            try:
+                cdr = self._type.body_of_reply(reply)
+            except NepError as error:  # what the callback gave is no answer of this type
+                reply = failure(CallKind.ERROR, type(error).__name__, str(error))
+        self.tally.add(reply)
+        if self._channel.is_closed:
+            return False
+        self._meet(heard)
+        try:
+            self._write(heard.id, cdr, reply)
+        except (NepError, self._participant.dds.core.DDSException) as error:
+            _logger.warning("an answer of '%s' could not be sent: %s", self.spec.service, error)
+            return False
+        return True
+
+    def _write(self, call: CallId, cdr: bytes | None, reply: Reply) -> None:
+        if cdr is not None:
+            self._channel.send(call, cdr)
+        else:  # ROS has no form for it: its clients wait until their time is up
+            self._channel.send_failure(call, reply)
+
+    def _meet(self, heard: HeardPart) -> None:
+        """Wait until the client's reader of answers is found, which need not be as quick as its writer."""
+        if heard.writer is None or "nepid" in heard.writer.told:
+            return  # it is gone, or has seen to that itself
+        deadline = time.monotonic() + _MEET_S
+        with self._participant.changed:
+            while not self._channel.is_closed and not self._channel.hears_us(heard.writer):
+                left = deadline - time.monotonic()
+                if left <= 0.0 or self._participant.is_in_its_thread():
+                    return
+                self._participant.changed.wait(min(left, _LOOK_S))
+
+    # ---- the end
+
+    def begin_close(self) -> None:
+        """Refuse the calls that wait and those that still come."""
+        for call in self.calls.close():
+            call.answer(refusal(self.spec.service, is_closed=True))
+
+    def close(self, timeout_s: float) -> None:
+        """The same, and end: answers are confirmed within `timeout_s`. May be called twice."""
+        self.begin_close()
+        if self.is_closed:
+            return
+        self._channel.finish(timeout_s)
+        self.is_closed = True
+        self._channel.close()
+        self._on_close(self)
+
+    def forked(self) -> None:
+        """In a child. See `ServerTransport.forked`."""
+        self.is_closed = True
+        self.calls.forked()

@@ -1,0 +1,135 @@
+"""Types of services of ROS 2, by their names: the common ones, and those of .srv files.
+
+`nep_msgs/srv/Call` is that by which nep itself calls nep: see `nep.backends.typed_services`.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nep.backends.ros2.message_types import FOLDERS, MessageTypes
+from nep.backends.ros2.names import service_type_name
+from nep.backends.typed_services import CALL_ANSWER, CALL_REQUEST, TypedService
+from nep.errors import NepError, WireError, did_you_mean
+from nep.i18n import _
+from nep.messages import codecs
+from nep.messages.codecs import CODECS, Codec
+
+__all__ = ["NEP_CALL", "answer_of", "codec_of_calls", "known_service", "request_of", "served_type"]
+
+NEP_CALL = "nep_msgs/srv/Call"
+_SUCCESS = "bool success\nstring message"
+_COMMON = {
+    NEP_CALL: (CALL_REQUEST, CALL_ANSWER),
+    "std_srvs/srv/Empty": ("", ""),
+    "std_srvs/srv/SetBool": ("bool data", _SUCCESS),
+    "std_srvs/srv/Trigger": ("", _SUCCESS),
+    "example_interfaces/srv/AddTwoInts": ("int64 a\nint64 b", "int64 sum"),
+    "example_interfaces/srv/SetBool": ("bool data", _SUCCESS),
+    "example_interfaces/srv/Trigger": ("", _SUCCESS),
+    "nav_msgs/srv/GetMap": ("", "nav_msgs/OccupancyGrid map"),
+    "sensor_msgs/srv/SetCameraInfo": (
+        "sensor_msgs/CameraInfo camera_info",
+        "bool success\nstring status_message",
+    ),
+    "rcl_interfaces/srv/GetParameters": ("string[] names", "ParameterValue[] values"),
+    "rcl_interfaces/srv/SetParameters": ("Parameter[] parameters", "SetParametersResult[] results"),
+    "rcl_interfaces/srv/ListParameters": ("string[] prefixes\nuint64 depth", "ListParametersResult result"),
+    "rcl_interfaces/srv/DescribeParameters": ("string[] names", "ParameterDescriptor[] descriptors"),
+    "rcl_interfaces/srv/GetParameterTypes": ("string[] names", "uint8[] types"),
+}
+_LARGEST_FILE = 2**20
+
+
+def request_of(service_type: str) -> str:
+    """The type of its requests."""
+    return f"{service_type}_Request"
+
+
+def answer_of(service_type: str) -> str:
+    """The type of its answers."""
+    return f"{service_type}_Response"
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A request or answer in CDR."""
+
+    types: MessageTypes
+    name: str
+
+    def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - whatever was given
+        return self.types.encode(self.name, payload)
+
+    def decode(self, data: bytes) -> dict[str, Any]:
+        found = self.types.decode(self.name, data)
+        if not isinstance(found, dict):
+            raise WireError(_("it is no message of ROS"), len(data))
+        return found
+
+
+def known_service(types: MessageTypes, name: str) -> TypedService:
+    """A type of services by its whole name. Raises `NepError` for one that is not known."""
+    texts = _COMMON.get(name) or _in_folders(name)
+    if texts is None:
+        raise NepError(
+            _(
+                "no type of service '{name}' is known; {did_you_mean}, or set {variable} to a folder of "
+                ".srv files"
+            ).format(
+                name=name,
+                did_you_mean=did_you_mean(name, tuple(each for each in _COMMON if each != NEP_CALL)),
+                variable=FOLDERS,
+            )
+        )
+    types.add_part(request_of(name), texts[0])
+    types.add_part(answer_of(name), texts[1])
+    return TypedService(
+        name, _Part(types, request_of(name)), _Part(types, answer_of(name)), is_nep=name == NEP_CALL
+    )
+
+
+def _in_folders(name: str) -> tuple[str, str] | None:
+    """The texts of the .srv file of this type, above and below its line."""
+    package, _srv, last = name.split("/")
+    for folder in filter(None, os.environ.get(FOLDERS, "").split(os.pathsep)):
+        for path in sorted(Path(folder).rglob(f"{last}.srv")):
+            own = path.parent.parent.name if path.parent.name == "srv" else path.parent.name
+            if own != package:
+                continue
+            if path.stat().st_size > _LARGEST_FILE:
+                raise NepError(
+                    _("'{path}' is too large; choose a folder with .srv files only").format(path=path)
+                )
+            lines = path.read_text(encoding="utf-8").splitlines()
+            bounds = [number for number, line in enumerate(lines) if line.strip() == "---"]
+            if len(bounds) != 1:
+                raise NepError(
+                    _("'{path}' is no .srv file; write '---' between the request and the answer").format(
+                        path=path
+                    )
+                )
+            return "\n".join(lines[: bounds[0]]), "\n".join(lines[bounds[0] + 1 :])
+    return None
+
+
+def served_type(types: MessageTypes, msg_type: str) -> TypedService:
+    """The type of a server or client that is made for `msg_type`. Raises `NepError`."""
+    name = service_type_name(msg_type)
+    if name is not None:
+        return known_service(types, name)
+    if msg_type not in {"json", "msgpack"}:
+        raise NepError(
+            _(
+                "a service of ROS 2 cannot have the type '{name}'; use one such as 'std_srvs/srv/SetBool'"
+            ).format(name=msg_type)
+        )
+    return known_service(types, NEP_CALL)
+
+
+def codec_of_calls(msg_type: str) -> Codec:
+    """The codec of a client's calls: a type of ROS has maps, which may have bytes and NaN."""
+    return CODECS["msgpack"] if service_type_name(msg_type) is not None else codecs.codec_for(msg_type)

@@ -1,0 +1,104 @@
+"""Services whose requests and answers have types, as ROS's have: bytes of a codec become bodies, and back.
+
+A service of a type of ROS has maps for requests and answers. Where nep itself calls nep the type is one that
+is installed nowhere:
+
+    uint16 codec
+    uint32 timeout_ms
+    uint8[] data
+    ---
+    uint8 kind
+    uint16 codec
+    uint8[] data
+
+`codec` is 1 (JSON) or 4 (msgpack), `timeout_ms` 0 for ever, `kind` 2 an answer, 3 an error, 4 refused; `data`
+of an error is JSON, see docs/services.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from nep.errors import DecodeError, WireError
+from nep.i18n import _
+from nep.messages.codecs import CODECS, Codec, codec_numbered
+from nep.protocol.service_wire import CallKind, Reply
+
+__all__ = ["CALL_ANSWER", "CALL_REQUEST", "AskedCall", "CallBody", "TypedService"]
+
+CALL_REQUEST = "uint16 codec\nuint32 timeout_ms\nuint8[] data"
+CALL_ANSWER = "uint8 kind\nuint16 codec\nuint8[] data"
+_KINDS = (CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED)
+_TIMEOUT_MAX_MS = 2**32 - 1
+
+
+class AskedCall(NamedTuple):
+    """A request as a server of nep's reads it."""
+
+    data: bytes | memoryview
+    codec: int
+    timeout_s: float | None
+
+
+class CallBody(Protocol):
+    """A request or an answer: its fields ↔ bytes."""
+
+    def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - whatever was given
+        """Raises `EncodeError`."""
+
+    def decode(self, data: bytes) -> dict[str, Any]:
+        """Raises `DecodeError`."""
+
+
+@dataclass(frozen=True)
+class TypedService:
+    """A type of services. `is_nep`: the one above."""
+
+    name: str
+    request: CallBody
+    answer: CallBody
+    is_nep: bool = False
+
+    # ---- for clients
+
+    def body_of_call(self, codec: Codec, data: bytes | memoryview, timeout_s: float | None) -> bytes:
+        """A request, which has bytes of a codec. Raises `EncodeError`, `DecodeError`."""
+        if not self.is_nep:
+            return self.request.encode(codec.decode(data, {}))
+        limit_ms = 0 if timeout_s is None else max(1, min(_TIMEOUT_MAX_MS, round(timeout_s * 1000)))
+        return self.request.encode({"codec": codec.number, "timeout_ms": limit_ms, "data": bytes(data)})
+
+    def reply_in(self, body: bytes, codec: Codec) -> Reply:
+        """An answer as bytes of a codec. Raises `DecodeError`, and `EncodeError` for what has none of it."""
+        answer = self.answer.decode(body)
+        if not self.is_nep:
+            return Reply(CallKind.ANSWER, codec.encode(answer).data, codec.number)
+        kind, number, data = answer["kind"], answer["codec"], answer["data"]
+        found = next((each for each in _KINDS if each == kind), None)
+        if found is None or not isinstance(number, int) or not isinstance(data, bytes):
+            raise WireError(_("it is no answer of a service"), len(body))
+        return Reply(found, data, number)
+
+    # ---- for servers
+
+    def call_in(self, body: bytes) -> AskedCall:
+        """A request; one of a type of ROS becomes msgpack, which has bytes and NaN. Raises `DecodeError`."""
+        asked = self.request.decode(body)
+        if not self.is_nep:
+            codec = CODECS["msgpack"]
+            return AskedCall(codec.encode(asked).data, codec.number, None)
+        number, limit_ms, data = asked["codec"], asked["timeout_ms"], asked["data"]
+        if not isinstance(number, int) or not isinstance(limit_ms, int) or not isinstance(data, bytes):
+            raise WireError(_("it is no call of a service"), len(body))
+        return AskedCall(data, number, limit_ms / 1000 if limit_ms else None)
+
+    def body_of_reply(self, reply: Reply) -> bytes:
+        """An answer; a failure only in nep's own type. Raises `EncodeError` for what is no such answer."""
+        if self.is_nep:
+            kind, data = int(reply.kind), bytes(reply.data)
+            return self.answer.encode({"kind": kind, "codec": reply.codec, "data": data})
+        codec = codec_numbered(reply.codec)
+        if codec is None or reply.kind != CallKind.ANSWER:
+            raise DecodeError(self.name, len(reply.data), _("it is no answer of a service"))
+        return self.answer.encode(codec.decode(reply.data, {}))

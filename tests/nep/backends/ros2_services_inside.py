@@ -1,0 +1,246 @@
+"""Services over ROS 2: the contract of services, and programs that have DDS alone.
+
+Run by test_ros2.py in a network of its own: see there. What DDS has no room for is left out of the contract:
+a request goes to all servers of a name.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from tests.nep.backends.ros2_programs import killed_soon
+from tests.nep.programs import eventually, running
+from tests.nep.services import test_calls as contract
+from tests.nep.services.test_calls import spin
+
+__all__ = ["spin"]
+
+Make = contract.Make
+LEFT_OUT = {
+    "test_a_server_that_closes_answers_what_it_carries_out",
+    "test_a_second_server_is_an_alert_and_takes_over",
+}
+globals().update({
+    name: test
+    for name, test in vars(contract).items()
+    if name.startswith("test_") and name not in LEFT_OUT
+})  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def there() -> Iterator[None]:
+    """A node that stays: the program looks around once, not for each test."""
+    os.environ["ROS_DOMAIN_ID"] = "200"
+    with nep.node("there", "ros2") as node:
+        node.graph()
+        yield
+    del os.environ["ROS_DOMAIN_ID"]
+
+
+@pytest.fixture
+def make() -> Iterator[Make]:
+    made: list[nep.Node] = []
+
+    def new(name: str) -> nep.Node:
+        made.append(nep.node(name, "ros2"))
+        return made[-1]
+
+    yield new
+    for node in made:
+        node.close()
+
+
+@pytest.fixture
+def registered(make: Make) -> Make:
+    """DDS knows all of them."""
+    return make
+
+
+# ---- types of ROS
+
+
+LONG_S = 60.0
+
+
+def test_common_types_travel_as_maps(make: Make) -> None:
+    def switched(request):
+        return {"success": request["data"], "message": "grüß"}
+
+    node = make("server")
+    node.new_server("/switch", switched, msg_type="std_srvs/srv/SetBool", threads=1)
+    node.new_server("/go", lambda _request: {"success": True}, msg_type="std_srvs/Trigger", threads=1)
+    node.new_server("/rest", lambda request: request, msg_type="std_srvs/Empty", threads=1)
+    node.new_server(
+        "/add", lambda asked: {"sum": asked["a"] + asked["b"]},
+        msg_type="example_interfaces/srv/AddTwoInts", threads=1,
+    )  # fmt: skip
+    other = make("client")
+    switch = other.new_client("/switch", msg_type="std_srvs/srv/SetBool", timeout_s=LONG_S)
+    assert switch.call({"data": True}) == {"success": True, "message": "grüß"}
+    assert switch.call({}) == {"success": False, "message": "grüß"}
+    add = other.new_client("/add", msg_type="example_interfaces/AddTwoInts", timeout_s=LONG_S)
+    assert add.call({"a": 2**63 - 1, "b": -1}) == {"sum": 2**63 - 2}
+    # Who is not told a type takes that of the server.
+    for service, answer in (("/go", {"success": True, "message": ""}), ("rest", {})):
+        assert other.new_client(service, timeout_s=LONG_S).call({}) == answer
+    assert make("plain").new_client("/add", timeout_s=LONG_S).call({"a": 1, "b": 2}) == {"sum": 3}
+
+
+def test_what_does_not_fit_is_told_with_its_place(make: Make) -> None:
+    make("server").new_server(
+        "/add", lambda asked: {"sum": "three"}, msg_type="example_interfaces/AddTwoInts", threads=1
+    )
+    add = make("client").new_client("/add", msg_type="example_interfaces/AddTwoInts", timeout_s=LONG_S)
+    with pytest.raises(nep.EncodeError, match="'a' is not from -9223372036854775808 to"):
+        add.call({"a": 2**63})
+    with pytest.raises(nep.EncodeError, match="'c' is no field of"):
+        add.call({"c": 1})
+    with pytest.raises(nep.ServiceError, match="'sum' is a 'str'; give a whole number"):
+        add.call({"a": 1})
+
+
+def test_programs_of_nep_tell_each_other_of_failures(make: Make) -> None:
+    def answer(_request):
+        raise LookupError("no map")
+
+    server = make("server").new_server("/x", answer, msg_type="std_srvs/Trigger", threads=1)
+    client = make("client").new_client("/x", msg_type="std_srvs/Trigger", timeout_s=LONG_S)
+    with pytest.raises(nep.ServiceError, match="LookupError: no map"):
+        client.call({})
+    assert (server.calls, server.errors) == (1, 1)
+
+
+def test_types_that_are_not_known_are_told(make: Make, tmp_path, monkeypatch) -> None:
+    node = make("node")
+    with pytest.raises(nep.NepError, match="no type of service 'std_srvs/srv/SetBol' is known; did you mean"):
+        node.new_server("/x", msg_type="std_srvs/SetBol")
+    with pytest.raises(nep.NepError, match="cannot have the type 'image'; use one such as"):
+        node.new_server("/x", msg_type="image")
+    with pytest.raises(nep.BadTopicError, match="ROS 2 allows letters of ASCII"):
+        node.new_client("/ü")
+    with pytest.raises(nep.NepError, match="'ros2' has no direct connections"):
+        node.new_client("/x", node.direct(port=7000))
+    folder = tmp_path / "my_robot" / "srv"
+    folder.mkdir(parents=True)
+    (folder / "Grip.srv").write_text("float64 force  # N\n---\nbool is_held\ngeometry_msgs/Point at\n")
+    (folder / "Bad.srv").write_text("float64 force\n")
+    monkeypatch.setenv("NEP_ROS_MSG_PATH", str(tmp_path))
+    answer = {"is_held": True, "at": {"x": 1.0, "y": 0.0, "z": 0.0}}
+    node.new_server("/grip", lambda _request: answer, msg_type="my_robot/srv/Grip", threads=1)
+    client = node.new_client("/grip", msg_type="my_robot/Grip", timeout_s=LONG_S)
+    assert client.call({"force": 2.5}) == answer
+    with pytest.raises(nep.NepError, match=r"is no \.srv file; write '---' between"):
+        node.new_client("/y", msg_type="my_robot/Bad")
+
+
+# ---- other programs
+
+
+@pytest.fixture
+def peer():
+    """Starts a program with Cyclone DDS alone, that shares no code with nep."""
+    code = Path(__file__).with_name("cyclone_service_peer.py").read_text(encoding="utf-8")
+    return lambda *words: running(code, *words)
+
+
+@pytest.mark.parametrize(
+    ("kind", "asked", "heard", "said"),
+    [
+        ("std_srvs/srv/SetBool", {"data": True}, [True], {"success": True, "message": "set to True"}),
+        ("std_srvs/srv/Trigger", {}, [0], {"success": True, "message": "grüß"}),
+        ("example_interfaces/srv/AddTwoInts", {"a": -5, "b": 2**40}, [-5, 2**40], {"sum": 2**40 - 5}),
+    ],
+)
+def test_nep_calls_a_program_with_dds_alone(make: Make, peer, kind, asked, heard, said) -> None:
+    last = kind.rpartition("/")[2]
+    with peer("serve", f"to/{last}", last) as other:  # one that was killed is there for ten seconds more
+        assert other.line() == "ready"
+        client = make("client").new_client(f"/to/{last}", msg_type=kind, timeout_s=LONG_S)
+        for _ in range(3):
+            assert client.call(asked) == said
+            assert json.loads(other.line()) == heard
+        plain = make("plain").new_client(f"/to/{last}", timeout_s=LONG_S)
+        assert plain.call(asked) == said
+        service = make("viewer").graph().services[f"/to/{last}"]
+        assert (service.msg_type, len(service.servers), len(service.clients)) == (kind, 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "asked", "answer", "said"),
+    [
+        ("std_srvs/SetBool", [True], {"data": True}, {"success": True, "message": "ok"}, [True, "ok"]),
+        ("std_srvs/Trigger", [7], {}, {"success": False, "message": ""}, [False, ""]),
+        ("example_interfaces/AddTwoInts", [2, 3], {"a": 2, "b": 3}, {"sum": -5}, [-5]),
+    ],
+)
+def test_a_program_with_dds_alone_calls_nep(make: Make, peer, kind, given, asked, answer, said) -> None:
+    seen = []
+    last = kind.rpartition("/")[2]
+    server = make("server").new_server(
+        f"/of/{last}", lambda request: seen.append(request) or answer, msg_type=kind, threads=1
+    )
+    with peer("call", f"of/{last}", last) as other:
+        assert other.line() == "ready"
+        for _ in range(3):
+            other.say(json.dumps(given))
+            assert json.loads(other.line()) == said
+        eventually(lambda: len(make("viewer").graph().services[f"/of/{last}"].clients) == 1)
+        other.end()  # it leaves: else the server would wait for it to confirm the last answer
+    assert seen == [asked] * 3
+    assert (server.calls, server.errors, server.refused) == (3, 0, 0)
+
+
+SERVER = """
+    import os, nep, sys, threading
+    node = nep.node("server", "ros2")
+    def answer(request):
+        if request == "hang":
+            print("asked")
+            threading.Event().wait()
+        return {"pid": os.getpid()}
+    node.new_server("/x", answer, threads=2)
+    print("ready")
+    sys.stdin.read()
+    node.close()
+"""
+
+
+def test_a_server_that_dies_while_it_is_called_is_reported(make: Make) -> None:
+    client = make("client").new_client("/x", timeout_s=LONG_S)
+    with running(SERVER, **killed_soon()) as program:
+        program.line()
+        future = client.call_async("hang", timeout_s=None)
+        assert program.line() == "asked"
+        assert client.call({}) == {"pid": program.process.pid}
+        assert make("viewer").graph().services["/x"].msg_type == "nep_msgs/srv/Call"
+        program.kill()
+        with pytest.raises(nep.ServerGoneError, match="the server of '/x' ended while it was called"):
+            future.result(LONG_S)
+    with running(SERVER) as program:  # and the next one is found
+        program.line()
+        assert client.call({}) == {"pid": program.process.pid}
+
+
+def test_the_commands_see_and_call_services_of_ros(make: Make) -> None:
+    make("server").new_server(
+        "/add", lambda asked: {"sum": asked["a"] + asked["b"]},
+        msg_type="example_interfaces/AddTwoInts", threads=1,
+    )  # fmt: skip
+
+    def said(*words: str) -> str:
+        told = [sys.executable, "-m", "nep", "service", *words, "--backend", "ros2"]
+        done = subprocess.run(told, capture_output=True, text=True, check=False, timeout=LONG_S)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert "/add" in [each["name"] for each in json.loads(said("list", "--json"))]
+    assert "example_interfaces/srv/AddTwoInts" in said("info", "/add", "--json")
+    assert json.loads(said("call", "/add", '{"a": 2, "b": 40}', "--json")) == {"sum": 42}
