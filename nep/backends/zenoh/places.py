@@ -29,6 +29,7 @@ CONFIG_VARIABLE = "NEP_ZENOH_CONFIG"
 """Names the configuration of nodes that are told nothing: a file, or what else `master` may be."""
 _LOCAL = re.compile(r"local(?:/([\w.-]{1,100}))?", re.ASCII)
 _ENDPOINT = re.compile(r"(?:tcp|tls|quic|udp|ws|unixsock-stream|serial|vsock)/[^\s,]{1,400}", re.ASCII)
+_SECURED = re.compile(r"\b(?:tls|quic)/")
 _FILES = (".json5", ".json", ".yaml", ".yml")
 _DEFAULT_LISTENS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]}
 _LONGEST_S = 10**6
@@ -182,11 +183,17 @@ def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh's
     try:
         return open_session(config)
     except library().ZError as error:
-        raise NepError(
-            _(
+        said = _short(error)
+        if _SECURED.search(said) is not None:
+            reason = _(
+                "zenoh cannot open a session at '{place}': {error}; is a router there, and does each side "
+                "trust the other one's certificate?"
+            )
+        else:
+            reason = _(
                 "zenoh cannot open a session at '{place}': {error}; is a router there, and may it be used?"
-            ).format(place=place, error=_short(error))
-        ) from error
+            )
+        raise NepError(reason.format(place=place, error=said)) from error
 
 
 def _short(error: Exception) -> str:

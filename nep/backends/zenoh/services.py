@@ -51,6 +51,8 @@ _logger = logging.getLogger("nep")
 _LATE_S = 30.0
 """So long after its time an answer is still heard, and counted as late."""
 _LONGEST_S = 1e9
+_GONE_S = 0.5
+"""That a server is gone is heard so long after its calls have ended, at most."""
 
 Then = Callable[[Outcome], None]
 
@@ -158,7 +160,10 @@ class ZenohServer:
 
 @dataclass(eq=False)
 class _Call:
-    """A call that is under way, sent to the server at `key`; "": it waits for one."""
+    """A call that is under way, sent to the server at `key`; "": it waits for one.
+
+    `over_at`: zenoh has said that nothing comes any more; until then it is seen whether the server is gone.
+    """
 
     number: int
     data: bytes | memoryview
@@ -166,6 +171,7 @@ class _Call:
     deadline: float
     then: Then
     key: str = ""
+    over_at: float = math.inf
 
 
 class ZenohClient:
@@ -278,8 +284,23 @@ class ZenohClient:
                 self.late += 1
 
     def _over(self, call: _Call) -> None:
-        """Nothing comes any more: the server has ended, unless it has answered."""
-        self._end(call, ServerGoneError(self.spec.service))
+        """Nothing comes any more: unless it has answered, the server has ended, or never got the call."""
+        if call.key not in self._servers:
+            self._end(call, ServerGoneError(self.spec.service))
+            return
+        call.over_at = time.monotonic() + _GONE_S
+        self._deadlines.add(call.over_at)
+
+    def _end_unanswered(self, call: _Call, now: float) -> None:
+        """A call of which zenoh has said that nothing comes any more."""
+        if call.key not in self._servers:
+            self._end(call, ServerGoneError(self.spec.service))
+        elif call.over_at <= now:
+            reason = _(
+                "the server of '{service}' is there and did not answer; it may not have understood the call, "
+                "or a router's access control forbids '{key}'"
+            )
+            self._end(call, NepError(reason.format(service=self.spec.service, key=call.key)))
 
     def _end(self, call: _Call, outcome: Outcome) -> bool:
         """Tell who waits; False when nobody does."""
@@ -330,12 +351,17 @@ class ZenohClient:
         for call in waiting:
             self._send(call, key)
         with self._lock:
+            over = [each for each in self._calls.values() if each.over_at < math.inf]
+        for call in over:
+            self._end_unanswered(call, now)
+        with self._lock:
             late = [each for each in self._calls.values() if each.deadline <= now]
         for call in late:
             kind = ServiceTimeoutError if call.key else NoServerError
             self._end(call, kind(self.spec.service, call.timeout_s or 0.0))
         with self._lock:
-            return min((each.deadline for each in self._calls.values()), default=math.inf)
+            dues = [min(each.deadline, each.over_at) for each in self._calls.values()]
+        return min(dues, default=math.inf)
 
     def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - at once
         """The services that have a server now."""
