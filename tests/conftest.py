@@ -85,16 +85,24 @@ class ByFile(LoadScopeScheduling):
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """``--driver FILE``: hold the contract of robots against the drivers of this file. ``--long``: faults."""
+    """``--driver FILE``: the drivers of this file, too. ``--long``: what takes long, too."""
     told = "a driver of yours to hold tests/robots/driver/test_contract.py against (may be given again)"
     parser.addoption(
-        "--long", action="store_true", help="let faults in tests/faults last, one after the other"
+        "--long", action="store_true", help="let faults last, one after the other; also what is marked long"
     )
     parser.addoption("--driver", action="append", default=[], metavar="FILE", help=told)
     if importlib.util.find_spec("pytestqt") is None:
         # The library's tests run without Qt too (dev.py versions): its options are known, and mean nothing.
         for name in ("qt_api", "qt_log_level_fail", "qt_log_ignore"):
             parser.addini(name, "an option of pytest-qt, which is not here", type="linelist")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """What is marked "long" runs only when it is asked for: the whole suite has little time."""
+    if config.getoption("--long"):
+        return
+    config.hook.pytest_deselected(items=[each for each in items if each.get_closest_marker("long")])
+    items[:] = [each for each in items if each.get_closest_marker("long") is None]
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:

@@ -22,5 +22,6 @@ BACKEND = Backend(
     codec_for=codec_for,
     codec_of_calls=codec_of_calls,
     qos=QUALITIES,
+    has_history=True,
     has_extensions=False,
 )

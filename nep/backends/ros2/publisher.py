@@ -89,7 +89,16 @@ class Ros2Publisher:
             self._writer: Any = library.pub.DataWriter(
                 participant.entity,
                 participant.topics.topic(name, ros_type),
-                participant.qos(*qualities(library, spec.qos, depth, is_latched=spec.is_latched, told=told)),
+                participant.qos(
+                    *qualities(
+                        library,
+                        spec.qos,
+                        depth,
+                        is_latched=spec.is_latched,
+                        told=told,
+                        history=spec.history,
+                    )
+                ),
             )
             participant.assign(node_id, "writer", self._writer)
         is_reliable = spec.qos in ("", "reliable")

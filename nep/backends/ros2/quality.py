@@ -35,18 +35,20 @@ def depth_of(quality: str, codec: str) -> int:
     return _SENSOR_DEPTH if quality == "sensor" else _DEPTHS.get(codec, _DEPTH)
 
 
-def qualities(library: Dds, quality: str, depth: int, *, is_latched: bool, told: bytes) -> tuple[Any, ...]:
-    """The policies of a writer or reader."""
+def qualities(
+    library: Dds, quality: str, depth: int, *, is_latched: bool, told: bytes, history: int = 1
+) -> tuple[Any, ...]:
+    """The policies of a writer or reader. `history`: what a writer keeps for those that come late."""
     policies = policy(library)
     is_reliable = quality in ("", "reliable")
     found = [
         policies.Reliability.Reliable(_BLOCKING_NS) if is_reliable else policies.Reliability.BestEffort,
         policies.Durability.TransientLocal if is_latched else policies.Durability.Volatile,
-        policies.History.KeepLast(depth),
+        policies.History.KeepLast(max(depth, history)),
         policies.DataRepresentation(use_cdrv0_representation=True),
         policies.Userdata(told),
     ]
     if is_latched:
-        last = policies.History.KeepLast(1)
+        last = policies.History.KeepLast(max(1, history))
         found.append(policies.DurabilityService(0, last, _NO_LIMIT, _NO_LIMIT, _NO_LIMIT))
     return tuple(found)

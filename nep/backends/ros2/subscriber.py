@@ -12,7 +12,7 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from nep.backends.base import SubscriberSpec, SubscriberTransport
@@ -24,6 +24,7 @@ from nep.backends.ros2.quality import depth_of, qualities
 from nep.backends.ros2.type_mapping import mapping_for
 from nep.backends.waking import WakingSubscriber
 from nep.errors import WireError
+from nep.messages.history import MAX_HISTORY
 from nep.messages.message import Message, MessageKind, arrived
 from nep.messages.queue import Inbox
 from nep.protocol.requests import NodeRecord, SubscriberCount, SubscriberRecord
@@ -72,6 +73,9 @@ class _Source:
     id: int
     kind: MessageKind
     newest_ns: int = -1
+    is_caught_up: bool = False
+    held: list[tuple[int, Message]] = field(default_factory=list)
+    """What came before the history, with the times."""
 
 
 class Ros2Subscriber(WakingSubscriber):
@@ -96,16 +100,15 @@ class Ros2Subscriber(WakingSubscriber):
         self._readers: list[Any] = []
         self._lost_before = 0
         self._has_latched = False
-        with participant.changed:
-            self._add_reader(is_latched=False)
         writers = [
             each
             for each in participant.endpoints("writer", self._name)
             if each.is_of(dds_type(self._mapping.ros_type), self._type_hash)
             and (each.is_reliable or spec.qos in ("best_effort", "sensor"))
         ]
-        if any(each.is_latched for each in writers):
-            with participant.changed:
+        with participant.changed:
+            self._add_reader(is_latched=False)
+            if any(each.is_latched for each in writers):
                 self._add_reader(is_latched=True)
         try:
             wait_for_others(participant, writers, lambda: self._readers)
@@ -119,7 +122,7 @@ class Ros2Subscriber(WakingSubscriber):
         self._has_latched = self._has_latched or is_latched
         library, core = participant.dds, participant.dds.core
         told = told_of(self._type_hash, self._transport.node.id, spec)
-        depth = depth_of(spec.qos, self._mapping.codec.name)
+        depth = max(depth_of(spec.qos, self._mapping.codec.name), MAX_HISTORY if is_latched else 0)
         reader = library.sub.DataReader(
             participant.entity,
             participant.topics.topic(self._name, self._mapping.ros_type),
@@ -143,22 +146,18 @@ class Ros2Subscriber(WakingSubscriber):
     def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """In the participant's thread, under its lock."""
         while samples := reader.take(_BATCH, ready):
-            came = [each for each in (self._message(reader, sample) for sample in samples) if each]
+            came = [each for sample in samples for each in self._messages(reader, sample)]
             if came:
                 self._put(came)
             if len(samples) < _BATCH:
                 return
 
-    def _message(self, reader: Any, sample: Any) -> Message | None:  # noqa: ANN401 - see above
+    def _messages(self, reader: Any, sample: Any) -> list[Message]:  # noqa: ANN401 - see above
         cdr = getattr(sample, "cdr", None)
         if cdr is None:
-            return None  # a publisher went
+            return self._last_of(sample.sample_info.publication_handle)
         info = sample.sample_info
         source = self._source(reader, info.publication_handle)
-        if source.kind.is_latched:
-            if info.source_timestamp <= source.newest_ns:
-                return None  # the other reader has it
-            source.newest_ns = info.source_timestamp
         try:
             data = self._mapping.unpack(cdr)
         except WireError as error:
@@ -168,10 +167,50 @@ class Ros2Subscriber(WakingSubscriber):
                 _logger.warning(
                     "on '%s' came what is no message (%d so far): %s", self.spec.topic, self.refused, error
                 )
-            return None
+            return []
         message = arrived(source.kind, data, info.source_timestamp, 0, source.id)
         message.seq = None  # DDS has numbers, and tells them to nobody
-        return message
+        if source.kind.is_latched:
+            return self._in_order(reader, source, message, info.source_timestamp)
+        return [message]
+
+    def _in_order(self, reader: Any, source: _Source, message: Message, stamp_ns: int) -> list[Message]:  # noqa: ANN401 - see above
+        """What of a publisher that latches is next: the history first, then what follows; none twice.
+
+        What the usual reader hears before the other one has the history waits for that.
+        """
+        if reader is not self._readers[0] or not self._has_latched:
+            came: list[tuple[int, Message]] = []
+            if self._has_latched:
+                source.is_caught_up = True
+                if source.held and stamp_ns >= source.held[0][0]:
+                    came, source.held = source.held, []
+            came.append((stamp_ns, message))
+        elif source.is_caught_up:
+            return []
+        else:
+            source.held.append((stamp_ns, message))
+            if len(source.held) <= MAX_HISTORY:
+                return []
+            came, source.held = source.held, []
+        return self._newer(source, came)
+
+    def _newer(self, source: _Source, came: list[tuple[int, Message]]) -> list[Message]:
+        """Those that were not heard."""
+        new = []
+        for stamp_ns, each in came:
+            if stamp_ns > source.newest_ns:
+                source.newest_ns = stamp_ns
+                new.append(each)
+        return new
+
+    def _last_of(self, handle: int) -> list[Message]:
+        """A publisher went: what waits comes now."""
+        source = self._sources.get(handle)
+        if source is None or not source.held:
+            return []
+        came, source.held = source.held, []
+        return self._newer(source, came)
 
     def _source(self, reader: Any, handle: int) -> _Source:  # noqa: ANN401 - see above
         known = self._sources.get(handle)

@@ -64,7 +64,10 @@ def why_no_fast_dds() -> str:
         ("ros2_vendors_inside.py", "dust"),
         ("ros2_vendors_inside.py", "fast"),
         ("test_contract.py", ""),
-        ("ros2_services_inside.py", ""),
+        ("ros2_services_inside.py", "(dds_alone and AddTwoInts) or failures"),
+        ("ros2_history_inside.py", "none_twice"),
+        pytest.param("ros2_services_inside.py", "", marks=pytest.mark.long),
+        pytest.param("ros2_history_inside.py", "", marks=pytest.mark.long),
     ],
 )
 def test_in_a_network_of_its_own(file: str, chosen: str) -> None:

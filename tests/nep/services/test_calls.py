@@ -20,7 +20,9 @@ LONG_S = 30.0
 Make = Callable[[str], nep.Node]
 
 
-@pytest.fixture(params=["zeromq", "memory", "zenoh", "direct", "tcp", "sp"])
+@pytest.fixture(
+    params=["zeromq", "memory", "zenoh", "direct", "tcp", pytest.param("sp", marks=pytest.mark.long)]
+)
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
     """Makes nodes that can meet; closes them. With "direct", "tcp" and "sp" their servers bind and no master
     is asked."""

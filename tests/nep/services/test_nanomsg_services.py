@@ -125,7 +125,7 @@ def test_what_is_no_call_is_counted(node: nep.Node, port: int, said: bytes) -> N
 # ---- bad days
 
 
-@pytest.mark.parametrize("wire", ["original", "native"])
+@pytest.mark.parametrize("wire", [pytest.param("original", marks=pytest.mark.long), "native"])
 def test_a_server_that_dies_while_it_is_called_is_reported_at_once(
     node: nep.Node, port: int, wire: str
 ) -> None:
@@ -156,8 +156,11 @@ def test_the_original_s_errors_travel_as_answers(node: nep.Node, port: int) -> N
         node.new_client("/y", node.direct("127.0.0.1", 1)).call({}, timeout_s=0.1)
 
 
-def test_a_client_that_does_not_read_holds_up_no_other(node: nep.Node, port: int) -> None:
+def test_a_client_that_does_not_read_holds_up_no_other(
+    node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It asks for large answers and reads none: the others have theirs."""
+    monkeypatch.setattr("nep.backends.nanomsg.direct_services._ANSWER_MS", 200)
     at = node.direct("127.0.0.1", port)
     node.new_server("/big", lambda n: "x" * n, at, threads=2)
     with socket.create_connection(("127.0.0.1", port)) as rude:

@@ -19,7 +19,7 @@ LONG_MS = LONG_S * 1000
 Make = Callable[[str], nep.Node]
 
 
-@pytest.fixture(params=["zeromq", "memory", "zenoh"])
+@pytest.fixture(params=["zeromq", "memory", pytest.param("zenoh", marks=pytest.mark.long)])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
     """Makes nodes that can meet; closes them."""
     made: list[nep.Node] = []

@@ -64,7 +64,7 @@ def make(place: str) -> Iterator[Make]:
         node.close()
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def routed() -> Iterator[str]:
     """Where a router of zenoh's own is reached."""
     with socket.socket() as free:
@@ -119,8 +119,8 @@ def test_behind_a_router_it_is_the_same(make: Make, routed: str) -> None:
         future = client.call_async("hang", timeout_s=None)
         assert program.line() == "asked"
         assert client.call({}) == {"pid": program.process.pid}
-        (service,) = make("viewer", routed).graph().services.values()
-        assert (service.name, len(service.servers), len(service.clients)) == ("/x", 1, 1)
+        service = make("viewer", routed).graph().services["/x"]
+        assert (len(service.servers), len(service.clients)) == (1, 1)
         program.kill()
         with pytest.raises(nep.ServerGoneError):
             future.result(LONG_S)
@@ -179,7 +179,10 @@ def test_what_is_no_call_is_counted_and_ended(make: Make, place: str, header: by
     assert make("client").new_client("/x").call({"n": 2}, timeout_s=LONG_S) == {"n": 2}
 
 
-def test_a_client_of_nep_calls_a_program_of_zenoh(make: Make, routed: str, stranger: Any) -> None:
+def test_a_client_of_nep_calls_a_program_of_zenoh(
+    make: Make, routed: str, stranger: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nep.backends.zenoh.services._GONE_S", 0.05)
     seen = []
 
     def answer(query) -> None:
@@ -219,6 +222,18 @@ def test_the_server_that_was_there_first_is_called_by_all(make: Make) -> None:
         make(f"server {number}").new_server("/x", lambda _request, said=number: said, threads=1)
     clients = [make(f"client {number}").new_client("/x", timeout_s=LONG_S) for number in range(2)]
     assert [client.call({}) for client in clients for _ in range(3)] == [0] * 6
+
+
+def test_all_respondents_are_asked_at_once(make: Make) -> None:
+    for number in range(3):
+        make(f"respondent {number}").new_respondent(
+            "/who", lambda question, said=number: [said, 1 / question], threads=1
+        )
+    surveyor = make("surveyor").new_surveyor("/who", LONG_S * 1000)
+    assert surveyor.respondents == 3
+    assert sorted(surveyor.ask(2)) == [[0, 0.5], [1, 0.5], [2, 0.5]]
+    assert surveyor.ask(0) == []
+    assert surveyor.failures == 3
 
 
 def test_a_node_calls_its_own_server(make: Make) -> None:

@@ -1,0 +1,38 @@
+"""Histories over ROS 2: the contract. Run by test_ros2.py in a network of its own: see there.
+
+DDS keeps a number of messages, whatever their size, so the bound in bytes is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import nep
+from tests.nep.backends import test_contract_history as contract
+from tests.nep.meeting import Make, meeting
+
+_DOMAIN = "6"
+LEFT_OUT = {
+    "test_the_bytes_are_bounded_and_the_newest_stays",
+    "test_the_history_of_a_program_that_is_killed_is_gone_and_of_its_successor_there",
+}
+globals().update({
+    name: test
+    for name, test in vars(contract).items()
+    if name.startswith("test_") and name not in LEFT_OUT
+})  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def somebody_who_knows_the_domain() -> Iterator[None]:
+    with nep.node("knows", "ros2", master=_DOMAIN) as node:
+        node.graph()
+        yield
+
+
+@pytest.fixture
+def make() -> Iterator[Make]:
+    with meeting("ros2", _DOMAIN) as new:
+        yield new
