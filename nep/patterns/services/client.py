@@ -21,6 +21,7 @@ from nep.errors import (
 )
 from nep.i18n import _
 from nep.messages.codecs import Codec, codec_numbered
+from nep.patterns.services.typed import UNTYPED, CallTypes
 from nep.protocol.service_wire import CallKind, read_failure
 from nep.system.arguments import seconds
 
@@ -55,11 +56,13 @@ class Client:
         codec: Codec,
         timeout_s: float | None,
         on_close: Callable[[Client], object],
+        types: CallTypes = UNTYPED,
     ) -> None:
         self._transport = transport
+        self._types = types
         self.service = service
         self.timeout_s = timeout_s
-        self._codec = codec
+        self._codec = types.request.codec(codec)
         self._on_close = on_close
         self._is_forked = False
         self._lock = threading.Lock()
@@ -176,7 +179,7 @@ class Client:
             if codec is None:
                 said = _("this version has no such codec; update nep")
                 raise DecodeError(str(outcome.codec), len(outcome.data), said)
-            return codec.decode(outcome.data, {})
+            return self._types.answer.read(codec.decode(outcome.data, {}), len(outcome.data))
         name, reason = read_failure(outcome.data)
         if outcome.kind == CallKind.ERROR:
             raise ServiceError(self.service, name, reason)

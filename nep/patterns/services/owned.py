@@ -16,6 +16,7 @@ from nep.messages.codecs import Codec, codec_numbered
 from nep.patterns.services.client import Client
 from nep.patterns.services.server import Callback, Server
 from nep.patterns.services.survey import Respondent, Surveyor
+from nep.patterns.services.typed import CallTypes
 from nep.protocol.service_wire import check_service, check_survey
 from nep.system.arguments import at_least, plain_function, seconds, text
 
@@ -56,17 +57,25 @@ class OwnedServices:
         configuration: Configuration,
         threads: int,
         msg_type: str,
+        types: CallTypes,
     ) -> Server:
         """See `Node.new_server`. Raises as the transport does, and `NepError` when that has no services."""
         text("msg_type", msg_type)
-        return self._serve(Server, check_service(service), callback, configuration, threads, msg_type)
+        return self._serve(
+            Server, check_service(service), callback, configuration, threads, types, msg_type=msg_type
+        )
 
     def respondent(
-        self, survey: str, callback: Callback | None, configuration: Configuration, threads: int
+        self,
+        survey: str,
+        callback: Callback | None,
+        configuration: Configuration,
+        threads: int,
+        types: CallTypes,
     ) -> Respondent:
         """See `Node.new_respondent`. Raises as `server` does."""
         self._able_to_survey()
-        return self._serve(Respondent, check_survey(survey), callback, configuration, threads)
+        return self._serve(Respondent, check_survey(survey), callback, configuration, threads, types)
 
     def _serve(
         self,
@@ -75,6 +84,8 @@ class OwnedServices:
         callback: Callback | None,
         configuration: Configuration,
         threads: int,
+        types: CallTypes,
+        *,
         msg_type: str = "json",
     ) -> S:
         if callback is not None:
@@ -85,7 +96,7 @@ class OwnedServices:
         able = self._able()
         id_, number = self._new_id()
         spec = ServerSpec(id_, service, configuration, self._wait_s, number, msg_type)
-        made = kind(able.server(spec), service, callback, threads, self._forget)
+        made = kind(able.server(spec), service, callback, threads, self._forget, types)
         with self._lock:
             self._servers = (*self._servers, made)
             self.has_servers = True
@@ -93,23 +104,34 @@ class OwnedServices:
         return made
 
     def client(
-        self, service: str, configuration: Configuration, msg_type: str, timeout_s: float | None
+        self,
+        service: str,
+        configuration: Configuration,
+        msg_type: str,
+        timeout_s: float | None,
+        types: CallTypes,
     ) -> Client:
         """See `Node.new_client`. Raises as `server` does."""
         spec = self._client_spec(check_service(service), configuration, msg_type)
         limit_s = seconds("timeout_s", timeout_s)
-        made = Client(self._able().client(spec), service, spec.codec, limit_s, self._forget)
+        made = Client(self._able().client(spec), service, spec.codec, limit_s, self._forget, types)
         with self._lock:
             self._clients = (*self._clients, made)
         return made
 
     def surveyor(
-        self, survey: str, configuration: Configuration, msg_type: str, timeout_s: float | None
+        self,
+        survey: str,
+        configuration: Configuration,
+        msg_type: str,
+        timeout_s: float | None,
+        types: CallTypes,
     ) -> Surveyor:
         """See `Node.new_surveyor`. Raises as `server` does."""
         spec = self._client_spec(check_survey(survey), configuration, msg_type)
         limit_s = seconds("timeout", timeout_s)
-        made = Surveyor(self._able_to_survey().survey(spec), spec.service, spec.codec, limit_s, self._forget)
+        able = self._able_to_survey()
+        made = Surveyor(able.survey(spec), spec.service, spec.codec, limit_s, self._forget, types)
         with self._lock:
             self._clients = (*self._clients, made)
         return made

@@ -12,6 +12,7 @@ from nep.backends.services import CallQueue, IncomingCall, ServerTransport
 from nep.errors import ClosedError, DecodeError, EncodeError, NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_numbered
+from nep.patterns.services.typed import UNTYPED, CallTypes
 from nep.protocol.service_wire import CallKind, Reply, failure
 from nep.system.arguments import limit, seconds
 from nep.system.log_rarely import is_logged
@@ -35,7 +36,8 @@ class Server:
     """Answers calls: by its callback, or by `listen_info` and `send_info`. May be used from any thread.
 
     A callback runs in the thread that spins its node, or with `threads` in so many threads of the server's
-    own. What it raises becomes the client's `ServiceError`, and is logged.
+    own. What it raises becomes the client's `ServiceError`, and is logged. With types of its own a request
+    that does not fit is refused, which the client gets as `RequestRefusedError`, and no callback is called.
     """
 
     def __init__(
@@ -45,8 +47,10 @@ class Server:
         callback: Callback | None,
         threads: int,
         on_close: Callable[[Server], object],
+        types: CallTypes = UNTYPED,
     ) -> None:
         self._transport = transport
+        self._types = types
         self.service = service
         self._callback = callback
         self._on_close = on_close
@@ -120,13 +124,13 @@ class Server:
             call.answer(failure(CallKind.REFUSED, "", _("nobody waits for the answer any more")))
             return
         try:
-            request = _decoded(call)
+            request = self._decoded(call)
         except DecodeError as error:
             call.answer(failure(CallKind.REFUSED, "", str(error)))
             return
         try:
             answer = self._callback(request) if self._callback is not None else None
-            reply = _encoded(answer, call.codec)
+            reply = self._encoded(answer, call.codec)
         except Exception as error:
             self._failures += 1
             if is_logged(self._failures):
@@ -138,6 +142,22 @@ class Server:
             call.answer(_failed(error))
             raise
         call.answer(reply)
+
+    def _decoded(self, call: IncomingCall) -> object:
+        codec = codec_numbered(call.codec)
+        if codec is None:
+            reason = _("this version has no such codec; update nep")
+            raise DecodeError(str(call.codec), len(call.data), reason)
+        return self._types.request.read(codec.decode(call.data, {}), len(call.data))
+
+    def _encoded(self, answer: object, number: int) -> Reply:
+        codec = codec_numbered(number)
+        if codec is None:
+            reason = _("this version has no such codec; update nep")
+            raise EncodeError(str(number), type(answer).__name__, reason)
+        its = self._types.answer
+        given = {} if answer is None and its.is_any else answer
+        return Reply(CallKind.ANSWER, its.codec(codec).encode(given).data, number)
 
     # ---- without one, as the original NEP has it
 
@@ -164,7 +184,7 @@ class Server:
                     return None
                 continue
             try:
-                request = _decoded(call)
+                request = self._decoded(call)
             except DecodeError as error:
                 call.answer(failure(CallKind.REFUSED, "", str(error)))
                 continue
@@ -181,7 +201,7 @@ class Server:
             call = self._asked
             if call is None:
                 raise NepError(_("there is no request to answer; call 'listen_info' first"))
-            reply = _encoded(answer, call.codec)
+            reply = self._encoded(answer, call.codec)
             self._asked = None
         call.answer(reply)
 
@@ -227,20 +247,6 @@ class Server:
 
     def __repr__(self) -> str:
         return f"Server({self.service!r})"
-
-
-def _decoded(call: IncomingCall) -> object:
-    codec = codec_numbered(call.codec)
-    if codec is None:
-        raise DecodeError(str(call.codec), len(call.data), _("this version has no such codec; update nep"))
-    return codec.decode(call.data, {})
-
-
-def _encoded(answer: object, number: int) -> Reply:
-    codec = codec_numbered(number)
-    if codec is None:
-        raise EncodeError(str(number), type(answer).__name__, _("this version has no such codec; update nep"))
-    return Reply(CallKind.ANSWER, codec.encode({} if answer is None else answer).data, number)
 
 
 def _failed(error: BaseException) -> Reply:

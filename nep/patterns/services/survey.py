@@ -15,6 +15,7 @@ from nep.i18n import _
 from nep.messages.codecs import Codec, codec_numbered
 from nep.patterns.services.client import SLICE_S, Limit
 from nep.patterns.services.server import Server
+from nep.patterns.services.typed import UNTYPED, CallTypes
 from nep.protocol.service_wire import SURVEY, CallKind, read_failure
 from nep.system.arguments import at_least, seconds
 from nep.system.log_rarely import is_logged
@@ -41,11 +42,13 @@ class Surveyor:
         codec: Codec,
         timeout_s: float | None,
         on_close: Callable[[Surveyor], object],
+        types: CallTypes = UNTYPED,
     ) -> None:
         self._transport = transport
+        self._types = types
         self.survey = survey.removeprefix(SURVEY)
         self.timeout_s = timeout_s
-        self._codec = codec
+        self._codec = types.request.codec(codec)
         self._on_close = on_close
         self._is_forked = False
         self._sent: Iterator[object] | None = None
@@ -131,7 +134,7 @@ class Surveyor:
             codec = codec_numbered(outcome.codec)
             if codec is None:
                 raise NepError(_("this version has no such codec; update nep"))
-            return codec.decode(outcome.data, {})
+            return self._types.answer.read(codec.decode(outcome.data, {}), len(outcome.data))
         except WaitTimeoutError:  # it may be slow: that is no failure
             raise
         except NepError as error:

@@ -13,16 +13,25 @@ _PROGRAM = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 def test_the_example_prints_what_is_said(master: Master) -> None:
     guide = (ROOT / "docs" / "services.md").read_text(encoding="utf-8")
-    program, _of_surveys = _PROGRAM.findall(guide)
+    program, _typed, _of_surveys = _PROGRAM.findall(guide)
     with running(program, NEP_MASTER=master.address) as example:
         said, _errors = example.end()
     assert f"It prints `{said.strip()}`" in guide
     assert said.strip() == "{'sum': 5}"
 
 
+def test_the_typed_example_prints_what_is_said(master: Master) -> None:
+    guide = (ROOT / "docs" / "services.md").read_text(encoding="utf-8")
+    _first, program, _of_surveys = _PROGRAM.findall(guide)
+    with running(program, NEP_MASTER=master.address) as example:
+        said, _errors = example.end()
+    assert said.startswith("AddAnswer(sum=5.0)\n")
+    assert indent(said, "    ") in guide
+
+
 def test_the_example_of_surveys_runs(master: Master) -> None:
     guide = (ROOT / "docs" / "services.md").read_text(encoding="utf-8")
-    _first, program = _PROGRAM.findall(guide)
+    _first, _typed, program = _PROGRAM.findall(guide)
     around = f"import nep\nwith nep.node('me') as node:\n{indent(program, '    ')}    print(answers)\n"
     with running(around, NEP_MASTER=master.address) as example:
         assert example.end() == ("[{'name': 'me'}]\n", "")

@@ -1,0 +1,81 @@
+"""Typed calls: requests and answers may be dataclasses or TypedDicts, and are checked where they go and come.
+
+What a type declares is looked at in `nep.messages.typed`, which is imported when the first one is given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from nep.errors import DecodeError, WrongTypeError
+from nep.i18n import _
+from nep.messages.codecs import Codec
+from nep.messages.shapes import Misfit
+from nep.system.lazy_import import lazy_module
+from nep.text import escaped, shortened
+
+if TYPE_CHECKING:
+    from nep.messages import typed
+else:
+    typed = lazy_module("nep.messages.typed")
+
+__all__ = ["UNTYPED", "CallTypes", "PayloadType", "call_types"]
+
+_SHOWN = 60
+
+
+class PayloadType:
+    """What requests, or answers, are instances of. None: anything.
+
+    Raises `ValueError` for a class that cannot be carried.
+    """
+
+    def __init__(self, declared: type | None) -> None:
+        self._declared = None if declared is None else typed.message_type(declared)
+
+    @property
+    def is_any(self) -> bool:
+        """Whether nothing is checked."""
+        return self._declared is None
+
+    def codec(self, base: Codec) -> Codec:
+        """Encodes instances as `base` does the map of their fields; all else is an `EncodeError`."""
+        return base if self._declared is None else typed.typed_codec(self._declared, base)
+
+    def read(self, plain: object, size_bytes: int) -> object:
+        """The instance of a payload that was decoded. Raises `DecodeError` that names what does not fit."""
+        if self._declared is None:
+            return plain
+        try:
+            return self._declared.shape.read(plain)
+        except Misfit as misfit:
+            reason = misfit.sentence
+        except RecursionError:
+            reason = _("it has too many levels")
+        raise DecodeError(self._declared.name, size_bytes, reason)
+
+
+@dataclass(frozen=True)
+class CallTypes:
+    """Those of a service: of its requests and of its answers."""
+
+    request: PayloadType
+    answer: PayloadType
+
+
+UNTYPED = CallTypes(PayloadType(None), PayloadType(None))
+
+
+def call_types(**given: object) -> CallTypes:
+    """Of what a program gives as the types of requests and answers, in this order. Raises `ValueError`."""
+    declared: list[PayloadType] = []
+    for name, each in given.items():
+        if each is not None and not isinstance(each, type):
+            raise WrongTypeError(
+                _("{name} is {given}, not a class; give a dataclass or a TypedDict").format(
+                    name=name, given=escaped(shortened(repr(each), _SHOWN))
+                )
+            )
+        declared.append(PayloadType(each))
+    return CallTypes(*declared) if any(not each.is_any for each in declared) else UNTYPED
