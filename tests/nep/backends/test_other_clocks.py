@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,10 +10,17 @@ from dataclasses import dataclass
 import pytest
 
 import nep
+from nep.backends.zeromq import master_session
+from nep.backends.zeromq.loss import HeardPublishers
+from nep.masters.clocks import Clocks
 from nep.masters.master import Master
+from nep.messages.clocks import SAME_CLOCK, ClockDifference
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
-from tests.nep.programs import running
+from nep.protocol.requests import PublisherRecord, RemotePublisher
+from nep.system import computer
+from nep.system.computer import computer_id
+from tests.nep.programs import eventually, running
 
 ELSEWHERE = """
     import select, sys, time
@@ -148,3 +156,78 @@ def test_typed_messages_have_the_same_latency() -> None:
         assert message.latency_uncertainty_s == 0.0
         assert message.latency_s is not None
         assert 0.0 <= message.latency_s < 10.0
+
+
+@pytest.mark.parametrize(
+    ("clocks", "times"),
+    [
+        ({"0123456789abcdef": (2**64 - 1, 5)}, ()),
+        ({"0123456789abcdef": (5,)}, ()),
+        ({"0123456789abcdef": (5, -2)}, ()),
+        ({"0123456789abcdef": (5, 2**64 - 1)}, ()),
+        ({"0123456789abcdef": ("x", 1)}, ()),
+        ({"0123456789abcdef": (float("nan"), 1)}, ()),
+        ({}, (1,)),
+        ({}, (1, 2, 3)),
+        ({}, ("x", 2)),
+    ],
+)
+def test_a_master_that_talks_nonsense_of_clocks_is_counted_and_heard_on(
+    clocks: object, times: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Clocks, "differences", lambda *_args: clocks)
+    monkeypatch.setattr(Clocks, "times", lambda *_args: times)
+    monkeypatch.setattr(master_session, "RENEW_S", 0.02)
+    with Master("127.0.0.1:0", learn_s=0.0) as master, nep.node("here", master=master.address) as node:
+        sub, pub = node.new_sub("t"), node.new_pub("t")
+        session = node._transport._sessions[master.address]
+        eventually(lambda: session._calls.refusals.count > 0)
+        pub.publish({"x": 1})
+        message = sub.receive(LONG_S)
+        assert message is not None
+        assert message.latency_uncertainty_s == 0.0
+        assert session._clock.offset() is None
+
+
+def test_differences_are_those_that_were_told_last() -> None:
+    far = RemotePublisher(PublisherRecord(7, "t", "json", "json", ("tcp://10.0.0.9:1",)), "n", "far", "far")
+    sources = HeardPublishers()
+    source = sources.listed(far)
+    assert source.clock.difference is None
+    known = ClockDifference(5, 6, 7)
+    sources.correct({"n": known, "m": ClockDifference(1, 1, 1)})
+    assert source.clock.difference is known
+    assert sources.listed(far).clock.difference is known, "it is listed again when its address changes"
+    sources.correct({})
+    assert source.clock.difference is None
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "told", "is_here"),
+    [
+        ("tcp://127.0.0.1:5", "", True),
+        ("ipc://@nep-5", "", True),
+        ("tcp://10.0.0.9:5", "", False),
+        ("tcp://127.0.0.1:5", "another", False),
+        ("tcp://10.0.0.9:5", None, True),
+        ("nonsense", "", False),
+        ("", "", False),
+    ],
+)
+def test_who_does_not_say_where_it_is_is_judged_by_its_address(
+    endpoint: str, told: str | None, is_here: bool
+) -> None:
+    endpoints = (endpoint,) if endpoint else ()
+    where = computer_id() if told is None else told
+    far = RemotePublisher(PublisherRecord(7, "t", "json", "json", endpoints), "n", "far", where)
+    assert (HeardPublishers().listed(far).clock.difference is SAME_CLOCK) is is_here
+
+
+def test_a_computer_is_known_by_what_it_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert len(computer_id()) == 16
+    assert computer.clock_name() not in computer_id()
+    monkeypatch.setattr(computer, "_NAMES", {})
+    assert computer.clock_name() == ""
+    assert computer.computer_id.__wrapped__() == ""
+    monkeypatch.setattr(computer, "_NAMES", {sys.platform: lambda: (_ for _ in ()).throw(OSError)})
+    assert computer.clock_name() == ""
