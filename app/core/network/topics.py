@@ -116,6 +116,8 @@ class Topics:
         self._first_graph = True
         self._seen = (-1, -1)
         self._view: GraphView | None = None
+        self._clocks: Mapping[str, int] = {}
+        """By node on another computer, what to add to its times for this computer's clock (ns)."""
         self._aged = 0
         self._told_at = 0.0
         self._past: set[str] = set()  # vanished long ago, but somebody still looks at them
@@ -163,15 +165,28 @@ class Topics:
         Where nobody came or went only the figures are renewed, of very many topics by and by (`age`).
         """
         seen = (view.epoch, view.revision)
+        self._clocks = self._clocks_in(view)
         if seen != self._seen:
             self._take_all(view, now)
         elif len(self._topics) <= AT_ONCE:
-            _renew(self._topics.values(), view, now)
+            _renew(self._topics.values(), view, now, self._clocks)
         self._seen, self._view, self._told_at = seen, view, now
         self.values_revision += 1
 
+    def _own_in(self, view: GraphView) -> set[str]:
+        return {id for id, node in view.nodes.items() if (node.host, node.pid) == self._own}
+
+    def _clocks_in(self, view: GraphView) -> Mapping[str, int]:
+        known = {
+            id: node.clock_offset_ns for id, node in view.nodes.items() if node.clock_offset_ns is not None
+        }
+        if not any(known.values()):
+            return {}  # all are on the master's computer
+        own = next((known[id] for id in self._own_in(view) if id in known), None)
+        return {} if own is None else {id: offset - own for id, offset in known.items() if offset != own}
+
     def _take_all(self, view: GraphView, now: float) -> None:
-        own = {id for id, node in view.nodes.items() if (node.host, node.pid) == self._own}
+        own = self._own_in(view)
         shown = {
             name: info
             for name, info in view.topics.items()
@@ -234,7 +249,7 @@ class Topics:
         begin, self._aged = self._aged, self._aged + AT_ONCE
         some = list(islice(self._topics.values(), begin, self._aged))
         if self._view is not None and len(self._topics) > AT_ONCE:
-            _renew(some, self._view, self._told_at)
+            _renew(some, self._view, self._told_at, self._clocks)
         for topic in some:
             if topic.gone_since is not None:
                 topic.gone_s = now - topic.gone_since
@@ -298,20 +313,20 @@ class Topics:
         topic.gone_since = topic.gone_s = None
         topic.stale = False
         self._past.discard(topic.name)
-        _take_figures(topic, info, now)
+        _take_figures(topic, info, now, self._clocks)
         if topic.facts() != before:
             self.revision += 1
 
 
-def _renew(topics: Iterable[Topic], view: GraphView, now: float) -> None:
+def _renew(topics: Iterable[Topic], view: GraphView, now: float, clocks: Mapping[str, int]) -> None:
     find = view.topics.get
     for topic in topics:
         info = find(topic.name)
         if info is not None and info is not topic.info and topic.gone_since is None:
-            _take_figures(topic, info, now)
+            _take_figures(topic, info, now, clocks)
 
 
-def _take_figures(topic: Topic, info: TopicInfo, now: float) -> None:
+def _take_figures(topic: Topic, info: TopicInfo, now: float, clocks: Mapping[str, int]) -> None:
     if info.last_stamp_ns is not None and (
         topic.info is None or info.last_stamp_ns != topic.info.last_stamp_ns
     ):
@@ -323,10 +338,22 @@ def _take_figures(topic: Topic, info: TopicInfo, now: float) -> None:
         topic.rate_hz, topic.bandwidth_Bps = topic.counted
     topic.lost, topic.loss_ratio = info.lost, info.loss_ratio
     stamp_ns, before = info.last_stamp_ns, topic.last_stamp_ns
-    if stamp_ns is not None and (before is None or stamp_ns > before):
+    if clocks and any(each.node_id in clocks for each in info.publishers):
+        topic.last_stamp_ns = _newest_of(info, clocks)
+    elif stamp_ns is not None and (before is None or stamp_ns > before):
         topic.last_stamp_ns = stamp_ns
     if rate_hz is not None:
         topic.rates.append(rate_hz)
+
+
+def _newest_of(info: TopicInfo, clocks: Mapping[str, int]) -> int | None:
+    """When the newest message was published, by this computer's clock."""
+    stamps = (
+        each.last_stamp_ns + clocks.get(each.node_id, 0)
+        for each in info.publishers
+        if each.last_stamp_ns is not None
+    )
+    return max(stamps, default=None)
 
 
 def _names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
@@ -337,7 +364,8 @@ def _names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
 def _age(topic: Topic, now: float, now_ns: int) -> float | None:
     stamp, newest = topic.last_stamp_ns, topic.newest
     if newest is not None and newest.stamp_ns is not None:
-        stamp = max(stamp or 0, newest.stamp_ns)
+        known = newest.kind.clock.difference
+        stamp = max(stamp or 0, newest.stamp_ns + (0 if known is None else known.add_ns))
     if stamp is not None:
         return (now_ns - stamp) / 1e9 if now_ns > stamp else 0.0
     return now - topic.last_received if topic.last_received is not None else None

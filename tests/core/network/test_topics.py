@@ -7,7 +7,8 @@ from itertools import count
 
 from app.core.network.mailbox import Batch
 from app.core.network.topics import FIGURES_LATE_S, GONE_SHOWN_S, START_S, Topics, total_rate_hz
-from nep.messages.message import Message
+from nep.messages.clocks import ClockDifference, PublisherClock
+from nep.messages.message import Message, kind_of
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 NODE = NodeInfo("n1", "camera_driver", "here", 5, "python", "native", 0)
@@ -243,3 +244,39 @@ def test_a_topic_that_never_sent_is_not_silent() -> None:
     topics.update(view(never), 0)
     topics["/a"].watched = True
     assert silence(topics, 100) is None
+
+
+def test_ages_from_other_computers_are_corrected_by_how_their_clocks_differ() -> None:
+    hour = 3600 * 10**9
+    topics = Topics(own=("mine", 7))
+    mine = replace(NODE, id="me", host="mine", pid=7, clock_offset_ns=2 * hour, clock_uncertainty_ns=5)
+    far = replace(NODE, clock_offset_ns=-hour, clock_uncertainty_ns=5)
+    seen = replace(view(info("/a")), nodes={"n1": far, "me": mine})
+    topics.update(seen, 0)
+    # Its clock is three hours ahead of ours.
+    topics.age(0, 1_000_000_000 - 3 * hour + 500_000_000)
+    assert topics["/a"].age_s == 0.5
+    newest = message(1, stamp_ns=1_200_000_000)
+    newest.kind = kind_of("/a", "json", "json", clock=PublisherClock(ClockDifference(-3 * hour, 10)))
+    topics.add("/a", Batch([newest]), 0)
+    topics.age(0, 1_000_000_000 - 3 * hour + 500_000_000)
+    assert topics["/a"].age_s == 0.3
+
+
+def test_of_publishers_on_two_computers_the_newest_message_counts() -> None:
+    topics = Topics(own=("mine", 7))
+    mine = replace(NODE, id="me", host="mine", pid=7, clock_offset_ns=0)
+    far = replace(NODE, clock_offset_ns=-(10**12))
+    near = replace(publisher(), id=2, node_id="me", last_stamp_ns=4_000_000_000)
+    both = replace(info("/a"), publishers=(replace(publisher(), last_stamp_ns=10**12), near))
+    topics.update(replace(view(both), nodes={"n1": far, "me": mine}), 0)
+    topics.age(0, 4_250_000_000)
+    assert topics["/a"].age_s == 0.25
+
+
+def test_where_ones_own_clock_is_not_known_nothing_is_corrected() -> None:
+    topics = Topics(own=("mine", 7))
+    far = replace(NODE, clock_offset_ns=-(10**12))
+    topics.update(replace(view(info("/a")), nodes={"n1": far}), 0)
+    topics.age(0, 1_500_000_000)
+    assert topics["/a"].age_s == 0.5
