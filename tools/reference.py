@@ -76,12 +76,12 @@ OWN_PAGES = ("nep.geometry", "nep.sensor")
 MADE_BY_HAND = frozenset({"Node", "Master", "Blackboard", "ImageFormat", "Encoded"})
 """Classes that programs call. Of others nep makes the instances, but for those on pages of types."""
 INTERNAL = frozenset({
-    "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.take", "Client.join", "Master.epoch",
-    "Master.submit", "Message.decoded", "Message.kind", "Message.raw", "Message.seen_ns",
-    "Node.open_parameters", "NodeParameter.as_map", "NodeParameter.with_value", "Publisher.refuse",
-    "Respondent.service",
-    "Server.join", "Server.run_one", "Server.spun", "Subscriber.decoded", "Subscriber.is_typed",
-    "Subscriber.typed", "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.take_turn",
+    "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.take", "Client.join",
+    "Master.epoch", "Master.submit", "Message.decoded", "Message.kind", "Message.raw",
+    "Message.seen_ns", "Node.open_parameters", "NodeParameter.as_map", "NodeParameter.form",
+    "NodeParameter.with_value", "Publisher.refuse", "Respondent.service", "Server.join",
+    "Server.run_one", "Server.spun", "Subscriber.decoded", "Subscriber.is_typed", "Subscriber.typed",
+    "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.take_turn",
 })  # fmt: skip
 """What other parts of nep need of these classes,"""
 INTERNAL_EVERYWHERE = frozenset({"args", "forked", "node_closes"})

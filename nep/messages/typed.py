@@ -48,7 +48,7 @@ from nep.messages.shapes import (
 from nep.system.arguments import text
 from nep.text import escaped, shortened
 
-__all__ = ["OTHER_NAME", "MessageType", "TypedReader", "message_type", "typed_codec"]
+__all__ = ["OTHER_NAME", "MessageType", "TypedReader", "message_type", "typed_codec", "value_shape"]
 
 OTHER_NAME = "nep.other_name"
 """In a field's metadata: the name that it has in messages of other programs, which is read, too."""
@@ -89,15 +89,28 @@ def message_type(declared: type) -> MessageType:
                 type=declared.__name__, name=name
             )
         )
+    return MessageType(name, _whole_shape(declared), dict if is_map else declared)
+
+
+def value_shape(declared: type) -> ValueShape | None:
+    """The shape of a dataclass, a TypedDict or an Enum, whose values are no messages; None for another class.
+
+    Raises `ValueError` when a field is of a type that has no form in JSON.
+    """
+    if not (is_dataclass(declared) or _is_typed_dict(declared) or issubclass(declared, Enum)):
+        return None
+    return _whole_shape(declared)
+
+
+def _whole_shape(declared: type) -> ValueShape:
     try:
-        shape = _shape(declared, declared.__name__, {})
+        return _shape(declared, declared.__name__, {})
     except RecursionError:
         raise ValueError(
             _("the types in '{name}' have too many levels; put a dataclass between them").format(
                 name=declared.__name__
             )
         ) from None
-    return MessageType(name, shape, dict if is_map else declared)
 
 
 # ---- publishing and reading

@@ -74,8 +74,12 @@ class Parameters:
     ) -> object:
         """A new parameter with this value, which is returned; `type` is that of `default` when it is None.
 
-        `read_only`: others cannot set it. Raises `ParameterError` for a value that its own limits refuse, and
-        for a name that there is already, and as `Node.new_pub`.
+        `type`: bool, int, float, str, list or dict, or a dataclass, TypedDict or Enum of the program's own:
+        then values are instances of that here, and others see and set the map of its fields, or the member's
+        value, which have to fit. `description`: for people. `min`: the least number, itself included. `max`:
+        the greatest. `choices`: the only values there are. `read_only`: others cannot set it. Raises
+        `ParameterError` for a value that its own limits refuse, and for a name that there is already, and as
+        `Node.new_pub`.
         """
         made = declared(
             name,
@@ -98,11 +102,11 @@ class Parameters:
                 self._topic = self._host.open_parameters(place_of(self._host.id), self._answer)
             self._known = {**self._known, name: made}
             self._tell()
-        return made.value
+        return made.typed_value
 
     def get(self, name: str) -> object:
         """The value of a parameter. Raises `ParameterError` when there is none of this name."""
-        return self.describe(name).value
+        return self.describe(name).typed_value
 
     def describe(self, name: str) -> NodeParameter:
         """A parameter with all that is known of it. Raises as `get` does."""
@@ -157,7 +161,7 @@ class Parameters:
             if not changed:
                 return
             for watcher in self._watchers:
-                said = watcher({name: each.value for name, each in changed.items()})
+                said = watcher({name: each.typed_value for name, each in changed.items()})
                 if isinstance(said, str) and said:
                     raise ParameterError(", ".join(changed), "", said)
             self._known = {**self._known, **changed}

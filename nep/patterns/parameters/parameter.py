@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import orjson
 
 from nep.errors import ParameterError
 from nep.i18n import _, listed
+from nep.patterns.parameters.form import ParameterForm, form_of
 from nep.protocol.wire import check_topic
 from nep.text import escaped, shortened
 
@@ -37,7 +38,7 @@ class NodeParameter:
 
     `kind` is "bool", "int", "float", "str", "list" or "dict". `minimum` and `maximum` bound numbers, both
     included; `choices` are the only values there are, if there are any. `is_read_only`: only its own node
-    may set it.
+    may set it. `value` and `default` are plain, as JSON has them, also where the parameter has a class.
     """
 
     name: str
@@ -49,13 +50,19 @@ class NodeParameter:
     maximum: float | None = None
     choices: tuple[object, ...] = ()
     is_read_only: bool = False
+    form: ParameterForm | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def typed_value(self) -> object:
+        """The value as a new instance of its class; of a parameter without one the value itself."""
+        return self.value if self.form is None else self.form.instance(self.value)
 
     def with_value(self, value: object) -> NodeParameter:
         """The same with another value. Raises `ParameterError` for one that it cannot have."""
         return replace(self, value=self._checked(value))
 
     def _checked(self, value: object) -> object:
-        found = self._of_kind(value)
+        found = self._of_kind(value if self.form is None else self._plain(self.form, value))
         if isinstance(found, int | float) and not isinstance(found, bool):
             if self.minimum is not None and found < self.minimum:
                 raise self._error(value, _("the least is {least}").format(least=self.minimum))
@@ -65,6 +72,12 @@ class NodeParameter:
             names = listed([shown(each) for each in self.choices], "or")
             raise self._error(value, _("use {choices}").format(choices=names))
         return found
+
+    def _plain(self, form: ParameterForm, value: object) -> object:
+        try:
+            return form.plain(value)
+        except ValueError as error:
+            raise self._error(value, str(error)) from error
 
     def _of_kind(self, value: object) -> object:
         """`value` as one of this kind; whole numbers are numbers, and 2.0 is a whole one."""
@@ -126,7 +139,10 @@ def declared(
     is_read_only: bool,
 ) -> NodeParameter:
     """A new parameter that has its default. Raises `ValueError` for what cannot be one."""
+    form = _form_of(name, type(default) if kind is None else kind, default)
     word = kind if isinstance(kind, str) else (type(default) if kind is None else kind).__name__
+    if form is not None:
+        word, choices = form.plain_kind, choices or form.choices
     if word not in KINDS:
         raise ParameterError(
             check_topic(name),
@@ -138,13 +154,23 @@ def declared(
             raise ParameterError(
                 check_topic(name), shown(default), _("only numbers have limits, and finite ones")
             )
-    bare = NodeParameter(check_topic(name), None, word, None, _told(description))
+    bare = NodeParameter(check_topic(name), None, word, None, _told(description), form=form)
     if len(choices) > _CHOICES_MAX:
         raise ParameterError(name, shown(default), _("it has too many choices"))
     allowed = tuple(bare.with_value(each).value for each in choices)
     made = replace(bare, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
     value = made.with_value(default).value
     return replace(made, value=value, default=value)
+
+
+def _form_of(name: str, kind: object, default: object) -> ParameterForm | None:
+    """The form of a class of a program's own. Raises `ParameterError` for one that cannot be carried."""
+    if not isinstance(kind, type) or kind in KINDS.values():
+        return None
+    try:
+        return form_of(kind)
+    except ValueError as error:
+        raise ParameterError(check_topic(name), shown(default), str(error)) from error
 
 
 def _told(description: object) -> str:

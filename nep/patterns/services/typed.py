@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 from nep.errors import DecodeError, WrongTypeError
 from nep.i18n import _
 from nep.messages.codecs import Codec
-from nep.messages.shapes import Misfit
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:
-    from nep.messages import typed
+    from nep.messages import shapes, typed
 else:
-    typed = lazy_module("nep.messages.typed")
+    shapes, typed = lazy_module("nep.messages.shapes"), lazy_module("nep.messages.typed")
 
 __all__ = ["UNTYPED", "CallTypes", "PayloadType", "call_types"]
 
@@ -49,7 +48,7 @@ class PayloadType:
             return plain
         try:
             return self._declared.shape.read(plain)
-        except Misfit as misfit:
+        except shapes.Misfit as misfit:
             reason = misfit.sentence
         except RecursionError:
             reason = _("it has too many levels")
