@@ -26,6 +26,7 @@ import json
 import os
 import platform
 import random
+import signal
 import statistics
 import subprocess
 import sys
@@ -41,7 +42,7 @@ from typing import Any
 from link import HOSTS, LinkError, Wifi, joined, why_no_networks
 from paper_ends import ENDS, KINDS
 from paper_figures import AGAIN, PLAIN, does_count, goals, report, write
-from paper_pairs import NotRunError, Pair, Places, around
+from paper_pairs import NotRunError, Pair, Places, around, end, guard
 
 from nep.backends.ros.library import PLACES
 
@@ -153,8 +154,14 @@ def measure_remote(_arguments: argparse.Namespace) -> dict[str, Any]:
         raise NotRunError(why)
     with tempfile.TemporaryDirectory(prefix="nep-paper-") as folder:
         result = Path(folder, "remote.json")
-        command = ["unshare", "-rn", sys.executable, __file__, *sys.argv[1:], "--inside", str(result)]
-        if subprocess.run(command, check=False).returncode or not result.exists():
+        command = [*guard(), sys.executable, __file__, *sys.argv[1:], "--inside", str(result)]
+        process = subprocess.Popen(["unshare", "-rn", *command])
+        try:
+            process.wait()
+        finally:
+            process.terminate()
+            end(process)
+        if process.returncode or not result.exists():
             raise NotRunError("the program in a network of its own failed; its words are above")
         found: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
     if "not run" in found:
@@ -272,6 +279,7 @@ def asked() -> argparse.Namespace:
 def main() -> int:
     """Measure, keep and print it; 1 when a run does not count or a goal is missed."""
     arguments = asked()
+    signal.signal(signal.SIGTERM, lambda _number, _frame: sys.exit(143))  # so that all that runs is ended
     if arguments.inside:
         inside(arguments)
         return 0

@@ -20,7 +20,9 @@ from typing import Any
 
 HERE = Path(__file__).parent
 START_S = 60.0
-END_S = 10.0
+END_S = 15.0
+ERRORS = "errors.txt"
+"""What the program of ROS that was started last says on standard error."""
 ROS_MASTER = "http://127.0.0.1:11311"
 
 
@@ -164,12 +166,20 @@ def free_port(host: str) -> int:
 
 
 def end(process: subprocess.Popen[Any]) -> None:
-    """Wait until it has ended, and no longer than ten seconds."""
+    """Wait until it has ended, and kill it when that takes longer than fifteen seconds."""
     try:
         process.wait(END_S)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+
+
+def guard() -> tuple[str, ...]:
+    """What stands before a command so that it ends with this process, however that ends (Linux).
+
+    The ends of the rows and the link do so with their standard input.
+    """
+    return ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()
 
 
 @contextmanager
@@ -181,7 +191,7 @@ def ros_master(host: str, folder: Path) -> Iterator[str]:
     port = free_port(host)
     address = f"http://{host}:{port}"
     with started([program, "--core", "-p", str(port)], address, host, folder) as process:
-        until_open(process, host, port, "the ROS master")
+        until_open(process, folder, (host, port), "the ROS master")
         yield address
 
 
@@ -191,7 +201,7 @@ def rosbridge(sources: str, address: str, host: str, folder: Path) -> Iterator[s
     port = free_port(host)
     command = [sys.executable, str(HERE / "rosbridge.py"), sources, host, str(port)]
     with started(command, address, host, folder) as process:
-        until_open(process, host, port, "the rosbridge server")
+        until_open(process, folder, (host, port), "the rosbridge server")
         yield f"ws://{host}:{port}"
 
 
@@ -201,12 +211,10 @@ def started(
 ) -> Iterator[subprocess.Popen[bytes]]:
     """A program of ROS, which ends with the block."""
     environment = {**os.environ, "ROS_MASTER_URI": ros_master, "ROS_IP": host, "ROS_LOG_DIR": str(folder)}
-    try:
+    with (folder / ERRORS).open("wb") as errors:
         process = subprocess.Popen(
-            command, env=environment, stdout=subprocess.DEVNULL, stderr=(folder / "errors.txt").open("ab")
+            (*guard(), *command), env=environment, stdout=subprocess.DEVNULL, stderr=errors
         )
-    except OSError as error:
-        raise NotRunError(f"'{command[0]}' could not be started: {error.strerror}") from None
     try:
         yield process
     finally:
@@ -214,16 +222,18 @@ def started(
         end(process)
 
 
-def until_open(process: subprocess.Popen[bytes], host: str, port: int, what: str) -> None:
+def until_open(process: subprocess.Popen[bytes], folder: Path, at: tuple[str, int], what: str) -> None:
     """Wait until somebody listens there. Raises `NotRunError`."""
     pause, deadline = threading.Event(), time.monotonic() + START_S
     while True:
-        with contextlib.suppress(OSError), socket.create_connection((host, port), 1.0):
+        with contextlib.suppress(OSError), socket.create_connection(at, 1.0):
             return
         if process.poll() is not None:
-            raise NotRunError(f"{what} ended by itself with exit code {process.returncode}")
+            words = (folder / ERRORS).read_text(encoding="utf-8", errors="replace").strip().splitlines()
+            last = f": {words[-1][:200]}" if words else ""
+            raise NotRunError(f"{what} ended by itself with exit code {process.returncode}{last}")
         if time.monotonic() > deadline:
-            raise NotRunError(f"{what} does not listen at {host}:{port}")
+            raise NotRunError(f"{what} does not listen at {at[0]}:{at[1]}")
         pause.wait(0.05)
 
 

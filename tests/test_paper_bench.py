@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -159,6 +160,12 @@ def test_linear_is_up_to_1_2_times_the_cost_from_10_to_50(
     assert fan.line((1, 10, 50), (12.0, 3.0, 2.2)) == pytest.approx((10.0, 2.0))
 
 
+def in_a_network(program: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    """A program beside the benchmarks, in a network of its own."""
+    command = ["unshare", "-rn", sys.executable, "-c", program]
+    return subprocess.run(command, cwd=BENCH, env=environment, capture_output=True, text=True, check=False)
+
+
 def need_networks(figures: ModuleType) -> None:
     import link
 
@@ -170,9 +177,7 @@ def need_networks(figures: ModuleType) -> None:
 @pytest.mark.timeout(60)
 def test_the_link_delays_and_is_no_faster_than_it_should_be(figures: ModuleType) -> None:
     need_networks(figures)
-    done = subprocess.run(
-        ["unshare", "-rn", sys.executable, "-c", LINK], cwd=BENCH, capture_output=True, text=True, check=False
-    )
+    done = in_a_network(LINK)
     if "TUN device" in done.stderr:
         pytest.skip("there is neither netem nor /dev/net/tun")
     assert not done.returncode, done.stderr
@@ -181,6 +186,26 @@ def test_the_link_delays_and_is_no_faster_than_it_should_be(figures: ModuleType)
     assert small_s >= 0.040  # 20 ms there and back
     assert large_s >= 0.040 + 200_000 * 8 / 8e6  # both ways overlap, so one of them at least
     assert made_by == "netem" or told["packets"] > 200_000 / 1500
+
+
+@pytest.mark.timeout(60)
+def test_with_netem_the_link_is_a_pair_that_tc_delays_at_both_ends(
+    figures: ModuleType, tmp_path: Path
+) -> None:
+    need_networks(figures)
+    said = tmp_path / "said"
+    tc = tmp_path / "tc"
+    tc.write_text(f'#!/bin/sh\necho "$@" >> {said}\n', encoding="utf-8")
+    tc.chmod(0o755)
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    done = in_a_network(LINK, environment)
+    assert not done.returncode, done.stderr
+    _taken, came, made_by, told = json.loads(done.stdout)
+    assert (came, made_by, told) == ([True, True], "netem", {})
+    wanted = "root netem delay 20.0ms 0.0ms rate 8.0mbit"
+    assert said.read_text(encoding="utf-8").splitlines() == [
+        f"qdisc add dev nep-own {wanted}", f"qdisc add dev nep-other {wanted}",
+    ]  # fmt: skip
 
 
 @pytest.mark.timeout(120)
