@@ -129,11 +129,11 @@ class Hub:
     def meet(self, plain_ends: Sequence[Mapping[str, str]]) -> None:
         """Connect to the plain publishers of all ends; returns when everybody hears everybody."""
         for each in plain_ends:
-            for n, end in each.items():
-                self._plain_subs[int(n)].connect(end)
+            for number, end in each.items():
+                self._plain_subs[int(number)].connect(end)
         for n, plain in self._plain_pubs.items():
             for _ in range(n):
-                if not plain.poll(WAIT_S * 1000):
+                if not plain.poll(int(WAIT_S * 1000)):
                     raise SystemExit("not all plain subscribers came")
                 plain.recv()
         pause, deadline = threading.Event(), time.monotonic() + WAIT_S

@@ -190,7 +190,7 @@ class PlainEnd(Listening):
         for kind, end in zip(KINDS, other.split(), strict=True):
             self._in[kind].connect(end)
         for each in self._out.values():
-            if not each.poll(WAIT_S * 1000):
+            if not each.poll(int(WAIT_S * 1000)):
                 raise LostError("the other end was not found")
             each.recv()
 
