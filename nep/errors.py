@@ -93,7 +93,7 @@ class WaitTimeoutError(NepError):
     """`what` did not happen within `timeout_s` seconds."""
 
     def __init__(self, what: str, timeout_s: float) -> None:
-        self.what = what
+        self.what: str = what
         self.timeout_s = timeout_s
         super().__init__(_("{what} did not come within {seconds:g} s").format(what=what, seconds=timeout_s))
 

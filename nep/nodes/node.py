@@ -94,7 +94,8 @@ class Node(ServiceNode):
     ) -> None:
         self.name = check_node_name(name)
         key = secrets.token_hex(16)
-        self.id = node_id_from(key)
+        self.id: str = node_id_from(key)
+        """What the graph knows it by: 16 hexadecimal digits, new with each start of the program."""
         self._key = key
         self._numbers = itertools.count(1)
         self._backend = backend_named(text("transport", transport))
