@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -142,8 +143,17 @@ def the_menu_of_a_tab(studio: Studio) -> None:
 
 def the_menu_of_a_block(studio: Studio) -> None:
     left, top, _, _ = studio.spot("[data-id='say Round and round'] > .blocklyPath")
-    studio.screen.click(left + 12, top + 18, RIGHT)
-    studio.spot(".blocklyContextMenu")
+
+    there = "!!document.querySelector('.blocklyContextMenu')"
+
+    def is_open() -> bool:
+        """A press opens nothing while X still takes the mouse away from the menu before: press again."""
+        studio.screen.click(left + 12, top + 18, RIGHT)
+        with suppress(AssertionError):
+            return until(lambda: bool(studio.page(there)), "it is open", 5.0)
+        return False
+
+    until(is_open, "the block's menu is open")
 
 
 def a_menu_in_the_palette(studio: Studio) -> None:
