@@ -12,7 +12,7 @@ from nep.backends.base import SubscriberSpec
 from nep.backends.nanomsg.endpoints import own_part, places_of, split_one
 from nep.backends.nanomsg.library import SOCKET_FILES, library, new_socket, queue_of
 from nep.backends.zeromq.loss import HeardPublishers
-from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals, is_far
+from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals
 from nep.backends.zeromq.sub_socket import CarefulParser, Into
 from nep.backends.zeromq.subscriber import ReadOneByOne
 from nep.errors import TooManyFilesError, WireError
@@ -175,12 +175,7 @@ class NanomsgSubSocket(ReadOneByOne):
             greeter.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
 
     def connect_again(self) -> None:
-        """Connect anew to the publishers on other computers. What was not read of them is dropped."""
-        for publisher, source in self.sources.items():
-            if source.remote is not None and is_far(source.endpoint):
-                self._unlink(publisher)
-                source.has_echoed = False
-                self.connect(source.remote)
+        """Nothing: nodes of this back end meet on one computer only."""
 
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and forget it."""
