@@ -15,7 +15,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from threading import Lock
 
 import psutil
@@ -104,13 +104,19 @@ class Host:
 
 
 class Network:
-    """Hosts that are joined by a switch. A thread may pull cables while others use other hosts."""
+    """Hosts that are joined by a switch; `stack` ends them and what runs on them.
 
-    def __init__(self) -> None:
+    A thread may pull cables while others use other hosts.
+    """
+
+    def __init__(self, stack: ExitStack) -> None:
+        self._stack = stack
         users = [] if os.geteuid() == 0 else ["unshare", "--user", "--map-root-user"]
         self._switch = Host(_SWITCH, "", users)
+        stack.callback(self._switch.end)
         self._switch.run("ip", "link", "add", _SWITCH, "type", "bridge", "forward_delay", "0")
         self._switch.run("ip", "link", "set", _SWITCH, "up")
+        self._filter("lo", _PROGRAM.format(random=_RANDOM, below=0, pass_on=_EVER))  # can this kernel do it?
         self._hosts: list[Host] = []
         self._lock = Lock()
 
@@ -120,6 +126,7 @@ class Network:
             before = [] if os.geteuid() == 0 else self._switch.inside()
             made = Host(name, address or f"{_NET}.{len(self._hosts) + 1}", before)
             self._hosts.append(made)
+            self._stack.callback(made.end)
             number = f"02:00:00:00:00:{len(self._hosts):02x}"
         port = _port_of(made)
         pid = str(made.pid)
@@ -148,11 +155,12 @@ class Network:
 
     def lose(self, host: Host, ratio: float) -> None:
         """Lose this share of all packets to a host and from it, at random."""
-        program = _PROGRAM.format(random=_RANDOM, below=int(ratio * _EVER), pass_on=_EVER)
-        port = _port_of(host)
-        self._switch.run("tc", "qdisc", "add", "dev", port, "clsact")
+        self._filter(_port_of(host), _PROGRAM.format(random=_RANDOM, below=int(ratio * _EVER), pass_on=_EVER))
+
+    def _filter(self, device: str, program: str) -> None:
+        self._switch.run("tc", "qdisc", "add", "dev", device, "clsact")
         for way in ("egress", "ingress"):
-            self._switch.run("tc", "filter", "add", "dev", port, way, "bpf", "da", "bytecode", program)
+            self._switch.run("tc", "filter", "add", "dev", device, way, "bpf", "da", "bytecode", program)
 
     def narrow(self, host: Host, mbit: float) -> None:
         """Let no more than this through to a host in a second; 0 takes that back."""
@@ -162,11 +170,6 @@ class Network:
             return
         limits = ("rate", f"{mbit}mbit", "burst", "32kb", "latency", "200ms")
         self._switch.run("tc", "qdisc", "add", "dev", port, "root", "tbf", *limits)
-
-    def close(self) -> None:
-        """End all hosts and what runs on them."""
-        for each in (*self._hosts, self._switch):
-            each.end()
 
 
 def _entering(pid: int) -> list[str]:
@@ -186,8 +189,9 @@ def network() -> Iterator[Network]:
     missing = [each for each in ("ip", "tc", "unshare", "nsenter", "setpriv") if shutil.which(each) is None]
     if missing:
         raise CannotMakeHostsError(f"these commands are missing: {', '.join(missing)}")
-    made = Network()
-    try:
+    with ExitStack() as stack:
+        try:
+            made = Network(stack)
+        except subprocess.CalledProcessError as error:
+            raise CannotMakeHostsError(str(error.stderr).strip()) from error
         yield made
-    finally:
-        made.close()
