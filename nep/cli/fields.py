@@ -16,6 +16,7 @@ MISSING = object()
 """What `pick` gives for a field that a message does not have."""
 
 _STEP = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
+_DEEPEST = 40
 _PLAIN = re.compile(r"[^.\[\]\"\s]+")
 
 
@@ -60,23 +61,23 @@ def pick(payload: object, path: Path) -> object:
 
 
 def leaves(payload: object, most: int = 200) -> Iterator[str]:
-    """The paths of all single values in a message, `most` of them at most."""
+    """The paths of all single values in a message, `most` of them at most; what is deeper is one value."""
     left = [most]
-    yield from _leaves(payload, "", left)
+    yield from _leaves(payload, "", left, _DEEPEST)
 
 
-def _leaves(value: object, so_far: str, left: list[int]) -> Iterator[str]:
+def _leaves(value: object, so_far: str, left: list[int], depth: int) -> Iterator[str]:
     if left[0] <= 0:
         return
-    if isinstance(value, Mapping) and value:
+    if depth and isinstance(value, Mapping) and value:
         for key, each in value.items():
             name = str(key)
             step = name if _PLAIN.fullmatch(name) else '["' + re.sub(r'(["\\])', r"\\\1", name) + '"]'
             joint = "." if so_far and not step.startswith("[") else ""
-            yield from _leaves(each, f"{so_far}{joint}{step}", left)
-    elif isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and value:
+            yield from _leaves(each, f"{so_far}{joint}{step}", left, depth - 1)
+    elif depth and isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and value:
         for number, each in enumerate(value[:10]):
-            yield from _leaves(each, f"{so_far}[{number}]", left)
+            yield from _leaves(each, f"{so_far}[{number}]", left, depth - 1)
     else:
         left[0] -= 1
         yield so_far or "."

@@ -335,7 +335,7 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
     np = _numpy()
     numbers = np.dtype(layout.numbers)
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
-    if len(sides) < 2 or not all(isinstance(side, int) for side in sides):
+    if len(sides) < 2 or not all(type(side) is int for side in sides):
         raise DecodeError(
             "image", data.nbytes, _("'{shape}' is no shape of a picture").format(shape=str(shape)[:60])
         )

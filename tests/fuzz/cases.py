@@ -32,7 +32,8 @@ CASES: dict[str, list[bytes]] = {
     "keys": [b"\\\\" + b"." * 1_000_000],
     # ... and with a power of the length: years.
     "patterns_of_topics": [b"*a*a*a*a*a*a*a*a*b\xff|\xff" + b"a" * 200],
-    "field_paths": [b"[" + LONG + b"]"],
+    # ... and a message of a thousand levels.
+    "field_paths": [b"[" + LONG + b"]", b".\xff|\xff" + b"[" * 1_000 + b"]" * 1_000],
     "payloads": [b"\x80"],
     # A stranger's definition: a number of 5000 digits, and a field twice.
     "definitions_of_ros": [b"uint8[" + LONG + b"] x", b"uint8[] flags\nbool[3] flags\n"],
@@ -53,5 +54,7 @@ CASES: dict[str, list[bytes]] = {
             "4c62484c02000497018700010112000300080002000300003f001230347fe5640000000049454e44ae426082"
         )
     ],
+    # `True` is an int, too, but none for numpy.
+    "raw_pictures_decoded": [b"\x82\xa5shape\x92\xc3\x02\xa8encoding\xa532FC1\xff|\xffxxxxxxxx"],
     "maps_for_ros2": [b'{"fr\\ud800ame_id": "a"}'],
 }

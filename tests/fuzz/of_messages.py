@@ -43,8 +43,9 @@ def json_codec(data: bytes) -> None:
     value = codec.decode(memoryview(data), {})
     nan_in(value)
     assert is_same(codec.decode(data, {}), value)
-    again = codec.decode(codec.encode(value).data, {})
-    assert is_same(again, value) or nan_in(value) is not None
+    made = codec.encode(value).data
+    # NaN and infinity are sent as null, however deep.
+    assert is_same(codec.decode(made, {}), value) or b"null" in made
 
 
 @TARGETS.add(DecodeError, EncodeError, seeds=lambda: ["ñandú".encode(), b""])
