@@ -5,6 +5,7 @@ DDS sends a request to all servers of the name; the first answer counts.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import logging
 import math
@@ -77,7 +78,9 @@ class Ros2Client:
         told = service_type_name(spec.msg_type)
         self._told = None if told is None else known_service(participant.types, told)
         try:
-            channel = self._open_channel()
+            channel: ServiceChannel | None = None
+            with contextlib.suppress(NepError):  # calls are told: another server may come meanwhile
+                channel = self._open_channel()
             if channel is not None:
                 wait_for_others(participant, channel.known, lambda: channel.entities)
         except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
@@ -127,7 +130,8 @@ class Ros2Client:
             if self.is_closed:
                 return False
             if not self._ready_servers():
-                self._open_channel()
+                with contextlib.suppress(NepError):  # a server's type is not known here
+                    self._open_channel()
             return bool(self._ready_servers())
 
     # ---- calling

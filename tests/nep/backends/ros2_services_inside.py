@@ -144,11 +144,15 @@ def test_types_that_are_not_known_are_told(make: Make, tmp_path, monkeypatch) ->
 # ---- other programs
 
 
-@pytest.fixture
-def peer():
-    """Starts a program with Cyclone DDS alone, that shares no code with nep."""
-    code = Path(__file__).with_name("cyclone_service_peer.py").read_text(encoding="utf-8")
-    return lambda *words: running(code, *words)
+@pytest.fixture(params=["cyclone", "dust"])
+def peer(request: pytest.FixtureRequest):
+    """Starts a program with Cyclone DDS, or another vendor's, alone, that shares no code with nep."""
+    if request.param == "dust":
+        pytest.importorskip("dust_dds", reason="needs another vendor's DDS: pip install dust-dds==0.15.0")
+        if "AddTwoInts" not in request.node.name:
+            pytest.skip("its program knows one type")
+    code = Path(__file__).with_name(f"{request.param}_service_peer.py").read_text(encoding="utf-8")
+    return lambda what, name, kind: running(code, what, f"{name}/{request.param}", kind)
 
 
 @pytest.mark.parametrize(
@@ -159,18 +163,19 @@ def peer():
         ("example_interfaces/srv/AddTwoInts", {"a": -5, "b": 2**40}, [-5, 2**40], {"sum": 2**40 - 5}),
     ],
 )
-def test_nep_calls_a_program_with_dds_alone(make: Make, peer, kind, asked, heard, said) -> None:
+def test_nep_calls_a_program_with_dds_alone(make: Make, peer, request, kind, asked, heard, said) -> None:
     last = kind.rpartition("/")[2]
+    service = f"/to/{last}/{request.node.callspec.params['peer']}"
     with peer("serve", f"to/{last}", last) as other:  # one that was killed is there for ten seconds more
         assert other.line() == "ready"
-        client = make("client").new_client(f"/to/{last}", msg_type=kind, timeout_s=LONG_S)
+        client = make("client").new_client(service, msg_type=kind, timeout_s=LONG_S)
         for _ in range(3):
             assert client.call(asked) == said
             assert json.loads(other.line()) == heard
-        plain = make("plain").new_client(f"/to/{last}", timeout_s=LONG_S)
+        plain = make("plain").new_client(service, timeout_s=LONG_S)
         assert plain.call(asked) == said
-        service = make("viewer").graph().services[f"/to/{last}"]
-        assert (service.msg_type, len(service.servers), len(service.clients)) == (kind, 1, 2)
+        seen = make("viewer").graph().services[service]
+        assert (seen.msg_type, len(seen.servers), len(seen.clients)) == (kind, 1, 2)
 
 
 @pytest.mark.parametrize(
@@ -181,18 +186,21 @@ def test_nep_calls_a_program_with_dds_alone(make: Make, peer, kind, asked, heard
         ("example_interfaces/AddTwoInts", [2, 3], {"a": 2, "b": 3}, {"sum": -5}, [-5]),
     ],
 )
-def test_a_program_with_dds_alone_calls_nep(make: Make, peer, kind, given, asked, answer, said) -> None:
+def test_a_program_with_dds_alone_calls_nep(
+    make: Make, peer, request, kind, given, asked, answer, said
+) -> None:
     seen = []
     last = kind.rpartition("/")[2]
+    service = f"/of/{last}/{request.node.callspec.params['peer']}"
     server = make("server").new_server(
-        f"/of/{last}", lambda request: seen.append(request) or answer, msg_type=kind, threads=1
+        service, lambda request: seen.append(request) or answer, msg_type=kind, threads=1
     )
     with peer("call", f"of/{last}", last) as other:
         assert other.line() == "ready"
         for _ in range(3):
             other.say(json.dumps(given))
             assert json.loads(other.line()) == said
-        eventually(lambda: len(make("viewer").graph().services[f"/of/{last}"].clients) == 1)
+        eventually(lambda: len(make("viewer").graph().services[service].clients) == 1)
         other.end()  # it leaves: else the server would wait for it to confirm the last answer
     assert seen == [asked] * 3
     assert (server.calls, server.errors, server.refused) == (3, 0, 0)
@@ -244,3 +252,81 @@ def test_the_commands_see_and_call_services_of_ros(make: Make) -> None:
     assert "/add" in [each["name"] for each in json.loads(said("list", "--json"))]
     assert "example_interfaces/srv/AddTwoInts" in said("info", "/add", "--json")
     assert json.loads(said("call", "/add", '{"a": 2, "b": 40}', "--json")) == {"sum": 42}
+
+
+STRANGER = """
+    import os, sys
+    from dataclasses import dataclass
+    from cyclonedds.domain import DomainParticipant
+    from cyclonedds.idl import IdlStruct
+    from cyclonedds.pub import DataWriter
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+    @dataclass
+    class Request(IdlStruct, typename="odd_msgs::srv::dds_::Odd_Request_"):
+        x: int
+    @dataclass
+    class Response(IdlStruct, typename="odd_msgs::srv::dds_::Odd_Response_"):
+        x: int
+    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+    reader = DataReader(participant, Topic(participant, "rq/oddRequest", Request))
+    writer = DataWriter(participant, Topic(participant, "rr/oddReply", Response))
+    print("ready")
+    sys.stdin.read()
+"""
+
+
+def test_a_server_whose_type_is_not_known_is_told_at_the_call(make: Make) -> None:
+    node = make("node")
+    client = node.new_client("/odd", timeout_s=LONG_S)
+    with running(STRANGER) as other:
+        assert other.line() == "ready"
+        eventually(lambda: "/odd" in node.graph().services)
+        assert not client.is_connected
+        with pytest.raises(
+            nep.NepError, match=r"no type of service 'odd_msgs/srv/Odd' is known; .*\.srv files"
+        ):
+            client.call({})
+        late = node.new_client("/odd")
+        with pytest.raises(nep.NepError, match="no type of service"):
+            late.call({}, timeout_s=LONG_S)
+        told = node.new_client("/odd", msg_type="std_srvs/Trigger")
+        with pytest.raises(nep.NoServerError):
+            told.call({}, timeout_s=0.2)
+
+
+def test_surveys_are_refused(make: Make) -> None:
+    node = make("node")
+    for new in (node.new_surveyor, node.new_respondent):
+        with pytest.raises(nep.NepError, match="the back end 'ros2' has no surveys; use 'zeromq' for them"):
+            new("/who")
+
+
+def test_a_forked_child_is_told_and_ends(make: Make) -> None:
+    code = """
+    import os, sys, nep
+    def say(it):
+        os.write(1, (str(it) + "\\n").encode())
+    node = nep.node("parent", "ros2")
+    server = node.new_server("/x", lambda request: node.stop_spin() or request)
+    client = node.new_client("/x", timeout_s=30.0)
+    waiting = client.call_async(2)
+    while not node._services.queues[0]._calls:
+        pass
+    child = os.fork()
+    if child == 0:
+        try:
+            client.call(1)
+        except nep.ClosedError as error:
+            say(error)
+        server.close()
+        node.close()
+        sys.exit(7)
+    say(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+    node.spin(30.0)
+    say(waiting.result(30.0))
+    node.close()
+    """
+    with running(code) as program:
+        assert "stayed with the program when it was forked" in program.line()
+        assert [program.line() for _ in range(2)] == ["7", "2"]
