@@ -47,6 +47,10 @@ class _Call:
     context: Any
     is_sent: bool = False
     thread: threading.Thread | None = field(default=None)
+    size: int = 0
+
+    def __post_init__(self) -> None:
+        self.size = len(self.data)
 
 
 class NanomsgClient:
@@ -130,7 +134,8 @@ class NanomsgClient:
         parts = self._framing.call(call.number, self.spec.codec.number, left_s, call.data)
         try:
             call.context.send(in_one(self._framing, parts))  # as soon as there is a server
-            call.is_sent = True
+            call.is_sent, call.data = True, b""  # it is heard for a while after its time
+            parts.clear()
             data = call.context.recv()
         except nng.ConnectionReset:
             return ServerGoneError(self.spec.service)
@@ -159,7 +164,7 @@ class NanomsgClient:
         """It is not under way any more; whether it was. With the lock held."""
         if self._calls.pop(call.number, None) is None:
             return False
-        self._bytes -= len(call.data)
+        self._bytes -= call.size
         return True
 
     def forget(self, call: OpenCall) -> None:

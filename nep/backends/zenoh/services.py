@@ -172,6 +172,10 @@ class _Call:
     then: Then
     key: str = ""
     over_at: float = math.inf
+    size: int = 0
+
+    def __post_init__(self) -> None:
+        self.size = len(self.data)
 
 
 class ZenohClient:
@@ -255,6 +259,7 @@ class ZenohClient:
             call.key = key
         limit_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         parts = NATIVE.call(call.number, self.spec.codec.number, limit_s, call.data)
+        call.data = b""  # it is heard for a while after its time
         heard_s = _LONGEST_S if limit_s is None else min(_LONGEST_S, limit_s + _LATE_S)
         try:
             self._session.call(
@@ -322,7 +327,7 @@ class ZenohClient:
         """It is not under way any more; whether it was. With the lock held."""
         if self._calls.pop(call.number, None) is None:
             return False
-        self._bytes -= len(call.data)
+        self._bytes -= call.size
         return True
 
     def forget(self, call: OpenCall) -> None:

@@ -235,6 +235,10 @@ def test_a_topic_that_is_denied_is_silent_and_its_losses_are_known_at_the_end(ma
     assert opened.listen(timeout_s=LONG_S) == (True, 2)
     assert secret.listen() == (False, {})
     assert secret.lost == 0
+    latched = robot.new_pub("told", latched=True)
+    latched.publish("by its hello")
+    told = guest.new_sub("told")
+    assert told.listen(timeout_s=LONG_S) == (True, "by its hello"), "hellos are allowed to guests"
     pub.close()
     eventually(lambda: secret.lost == 1)
     wanted = robot.new_sub("secret")

@@ -10,6 +10,7 @@ import pytest
 import nep
 from nep.cli.app import run
 from nep.cli.complete import complete_service
+from tests.nep.meeting import place_for
 from tests.nep.programs import eventually
 
 SERVICE = "/arm/move"
@@ -160,3 +161,26 @@ def test_names_are_completed(arm, master):
 
     assert complete_service(Context(), "/arm") == [SERVICE]
     assert complete_service(Context(), "/leg") == []
+
+
+def test_services_of_another_back_end_are_seen_and_called(type_in, monkeypatch):
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")  # of another back end: no place of this one
+    monkeypatch.setenv("NEP_ZENOH_CONFIG", place_for("zenoh", ""))
+    place = place_for("zenoh", "")
+    there = ("--backend", "zenoh", "--master", place)
+    with nep.node("arm", "zenoh", master=place) as node:
+        node.new_server(SERVICE, lambda request: {"asked": request}, threads=1)
+        code, out, err = type_in("service", "call", SERVICE, '{"n": 1}', "--json", *there)
+        assert (code, json.loads(out), err) == (0, {"asked": {"n": 1}}, "")
+        code, out, err = type_in("service", "list", *there)
+        assert (code, err) == (0, "")
+        assert [SERVICE, "arm", "–", "1", "0"] in rows(out)
+        code, out, err = type_in("service", "info", SERVICE, "--json", *there)
+        assert (code, [each["node"] for each in json.loads(out)["servers"]], err) == (0, ["arm"], "")
+        code, out, err = type_in("service", "call", "/arm/mov", "--timeout", "0.1", *there)
+        assert code == 1
+        assert "no server for '/arm/mov' within 0.1 s; did you mean '/arm/move'" in err
+    assert type_in("service", "list", "--backend", "zenoh", "--json") == (0, "[]\n", "")
+    code, _out, err = type_in("service", "list", "--backend", "zenho")
+    assert code == 1
+    assert "zenho" in err
