@@ -10,6 +10,7 @@ import pytest
 import nep
 from nep.cli.app import run
 from nep.cli.complete import complete_service
+from nep.cli.screen import UNKNOWN
 from tests.nep.meeting import place_for
 from tests.nep.programs import eventually
 
@@ -174,7 +175,7 @@ def test_services_of_another_back_end_are_seen_and_called(type_in, monkeypatch):
         assert (code, json.loads(out), err) == (0, {"asked": {"n": 1}}, "")
         code, out, err = type_in("service", "list", *there)
         assert (code, err) == (0, "")
-        assert [SERVICE, "arm", "–", "1", "0"] in rows(out)
+        assert [SERVICE, "arm", UNKNOWN, "1", "0"] in rows(out)
         code, out, err = type_in("service", "info", SERVICE, "--json", *there)
         assert (code, [each["node"] for each in json.loads(out)["servers"]], err) == (0, ["arm"], "")
         code, out, err = type_in("service", "call", "/arm/mov", "--timeout", "0.1", *there)
