@@ -28,6 +28,9 @@ __all__ = [
 _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)(/msg)?/([A-Z]\w*)", re.ASCII)
 _DDS_TYPE = re.compile(r"(\w+)::msg::dds_::(\w+)_", re.ASCII)
+_PARAMETERS = re.compile(r"(/?nep/parameters/)(\d[0-9a-f]{15})", re.ASCII)
+"""Those of a node whose id begins with a digit, which ROS 2 does not allow behind a "/"."""
+_ROS_PARAMETERS = re.compile(r"(/nep/parameters/)_(\d[0-9a-f]{15})", re.ASCII)
 _SERVICE_TYPE = re.compile(r"([A-Za-z]\w*)(/srv)?/([A-Z]\w*)", re.ASCII)
 _DDS_REQUEST = re.compile(r"(\w+)::srv::dds_::(\w+)_Request_", re.ASCII)
 _REQUESTS = re.compile(r"rq(/.+)Request", re.ASCII)
@@ -36,6 +39,9 @@ _NO_NAME = re.compile(r"\W", re.ASCII)
 
 def dds_topic(topic: str) -> str:
     """`rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError` for what ROS 2 has no name for."""
+    found = _PARAMETERS.fullmatch(topic)
+    if found is not None:
+        topic = f"{found[1]}_{found[2]}"
     if _TOPIC.fullmatch(topic) is None or "__" in topic:
         raise BadTopicError(
             topic,
@@ -49,7 +55,13 @@ def dds_topic(topic: str) -> str:
 
 def ros_topic(topic: str) -> str | None:
     """`/chatter` for "rt/chatter"; None for a topic that is none of ROS 2."""
-    return topic[2:] if topic.startswith("rt/") else None
+    return _as_nep_has_it(topic[2:]) if topic.startswith("rt/") else None
+
+
+def _as_nep_has_it(name: str) -> str:
+    """The name of a node's parameters without the "_" of `dds_topic`'s; any other name as it is."""
+    found = _ROS_PARAMETERS.fullmatch(name)
+    return name if found is None else f"{found[1]}{found[2]}"
 
 
 def is_type_name(msg_type: str) -> bool:
@@ -84,7 +96,7 @@ def dds_service(service: str) -> tuple[str, str]:
 def ros_service(topic: str) -> str | None:
     """`/add` for "rq/addRequest"; None for a topic that is no service's requests."""
     found = _REQUESTS.fullmatch(topic)
-    return None if found is None else found[1]
+    return None if found is None else _as_nep_has_it(found[1])
 
 
 def service_type_of(dds_type: str) -> str | None:

@@ -330,3 +330,21 @@ def test_a_forked_child_is_told_and_ends(make: Make) -> None:
     with running(code) as program:
         assert "stayed with the program when it was forked" in program.line()
         assert [program.line() for _ in range(2)] == ["7", "2"]
+
+
+@pytest.mark.parametrize("has_digit", [True, False])
+def test_parameters_are_read_and_set_whatever_the_node_s_id_begins_with(make: Make, has_digit: bool) -> None:
+    node = next(each for n in range(200) if (each := make(f"robot {n}")).id[0].isdigit() is has_digit)
+    node.parameters.declare("speed", 0.5, max=2)
+    code = f"""
+    import nep
+    with nep.node("tool", "ros2") as node:
+        while "/nep/parameters/{node.id}" not in node.graph().services:
+            pass
+        with node.parameters_of({node.id!r}) as parameters:
+            parameters.set("speed", 1.5)
+            print(parameters.get("speed"))
+    """
+    with running(code) as tool:
+        assert tool.line() == "1.5"
+    assert node.parameters["speed"] == 1.5

@@ -22,7 +22,19 @@ from nep.backends.ros2.environment import configuration, domain, is_loopback_onl
 from nep.backends.ros2.library import dds, typesys
 from nep.backends.ros2.message_types import MessageTypes
 from nep.backends.ros2.mismatches import Party, mismatches
-from nep.backends.ros2.names import dds_topic, dds_type, is_type_name, ros_type, split_node_name, user_data_of
+from nep.backends.ros2.names import (
+    dds_service,
+    dds_topic,
+    dds_type,
+    is_type_name,
+    ros_service,
+    ros_topic,
+    ros_type,
+    service_type_name,
+    service_type_of,
+    split_node_name,
+    user_data_of,
+)
 from nep.backends.ros2.participant import DdsEndpoint
 from nep.backends.ros2.type_mapping import mapping_for
 from nep.errors import WireError, WrongTypeError
@@ -104,6 +116,18 @@ def test_in_a_network_of_its_own(file: str, chosen: str) -> None:
 
 def test_names() -> None:
     assert dds_topic("chatter") == dds_topic("/chatter") == "rt/chatter"
+    for node_id in ("0123456789abcdef", "f123456789abcde0"):
+        place = f"/nep/parameters/{node_id}"  # ROS 2 has no names with a digit behind a "/"
+        assert ros_topic(dds_topic(place)) == place
+        assert ros_service(dds_service(place)[0]) == place
+        assert dds_topic(place).rpartition("/")[2].isidentifier()
+    assert dds_service("add") == dds_service("/add") == ("rq/addRequest", "rr/addReply")
+    assert ros_service("rt/add") is ros_service("rq/add") is ros_service("rr/addReply") is None
+    assert dds_type("std_srvs/srv/SetBool_Request") == "std_srvs::srv::dds_::SetBool_Request_"
+    assert service_type_of("std_srvs::srv::dds_::SetBool_Request_") == "std_srvs/srv/SetBool"
+    assert service_type_of("std_srvs::srv::dds_::SetBool_Response_") is None
+    assert service_type_name("std_srvs/SetBool") == "std_srvs/srv/SetBool"
+    assert not any(map(service_type_name, ("json", "std_srvs/msg/SetBool", "a/b", "", "/A", "a/srv/")))
     assert dds_type("std_msgs/msg/String") == "std_msgs::msg::dds_::String_"
     assert ros_type("std_msgs::msg::dds_::String_") == "std_msgs/msg/String"
     assert ros_type("Anything") == "Anything"
