@@ -8,7 +8,7 @@ from nep.backends.base import Backend
 from nep.backends.ros2.environment import domain
 from nep.backends.ros2.message_types import MessageTypes, message_types
 from nep.backends.ros2.quality import QUALITIES
-from nep.backends.ros2.service_types import codec_of_calls
+from nep.backends.ros2.services.definitions import codec_of_calls
 from nep.backends.ros2.transport import Ros2Transport
 from nep.backends.ros2.type_mapping import codec_for
 

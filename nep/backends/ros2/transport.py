@@ -15,8 +15,8 @@ from nep.backends.ros2.graph import graph_of
 from nep.backends.ros2.library import dds, has_forked, typesys
 from nep.backends.ros2.participant import Participant, join, leave
 from nep.backends.ros2.publisher import Ros2Publisher
-from nep.backends.ros2.service_client import Ros2Client
-from nep.backends.ros2.service_server import Ros2Server
+from nep.backends.ros2.services.client import Ros2Client
+from nep.backends.ros2.services.server import Ros2Server
 from nep.backends.ros2.subscriber import Ros2Subscriber
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec
 from nep.errors import ClosedError, NepError

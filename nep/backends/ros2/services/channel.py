@@ -18,7 +18,7 @@ from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.matches import PREFIX_BYTES
 from nep.backends.ros2.names import dds_service, dds_type, user_data
 from nep.backends.ros2.participant import DdsEndpoint, Participant, policy
-from nep.backends.ros2.service_types import answer_of, request_of
+from nep.backends.ros2.services.definitions import answer_of, request_of
 from nep.backends.ros2.topics import sample_of
 from nep.backends.services import CALLS_MAX
 from nep.backends.typed_services import TypedService

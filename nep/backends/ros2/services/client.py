@@ -19,8 +19,8 @@ from nep.backends.deadlines import Deadlines
 from nep.backends.ros2.names import dds_service, ros_service, service_type_name, service_type_of
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import wait_for_others
-from nep.backends.ros2.service_channel import CallId, HeardPart, ServiceChannel
-from nep.backends.ros2.service_types import known_service
+from nep.backends.ros2.services.channel import CallId, HeardPart, ServiceChannel
+from nep.backends.ros2.services.definitions import known_service
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
 from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _

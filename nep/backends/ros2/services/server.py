@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import wait_for_others
-from nep.backends.ros2.service_channel import CallId, HeardPart, ServiceChannel
-from nep.backends.ros2.service_types import served_type
+from nep.backends.ros2.services.channel import CallId, HeardPart, ServiceChannel
+from nep.backends.ros2.services.definitions import served_type
 from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import NepError
