@@ -18,12 +18,11 @@ import zmq
 from nep.backends.base import PublisherSpec, QuickPublish
 from nep.backends.zeromq.bindings import SMALL, Bindings
 from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog
-from nep.backends.zeromq.far_connection import FarConnection
 from nep.backends.zeromq.io_thread import Rest, Served
 from nep.backends.zeromq.pending_batch import SMALL_BYTES, PendingBatch
 from nep.backends.zeromq.shared.memory import SHARED_BYTES, begin_sharing, can_share
 from nep.backends.zeromq.shared.payloads import SharedPayloads
-from nep.backends.zeromq.sockets import Part, Refusals, Socket, send_mark, sendable, wait_until
+from nep.backends.zeromq.sockets import FarConnection, Part, Refusals, Socket, send_mark, sendable, wait_until
 from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded

@@ -6,9 +6,8 @@ import logging
 from collections.abc import Callable
 
 from nep.backends.zeromq.byte_window import SendWindow
-from nep.backends.zeromq.far_connection import FarConnection
 from nep.backends.zeromq.shared.payloads import SharedPayloads
-from nep.backends.zeromq.sockets import Refusals
+from nep.backends.zeromq.sockets import FarConnection, Refusals
 from nep.protocol.wire import Hello, parse_hello, parse_read, parse_shares, topic_part
 
 __all__ = ["MAX_SUBSCRIBERS", "Subscriptions"]

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 import zmq
 
-from nep.backends.zeromq.far_connection import FarConnection
-from nep.backends.zeromq.sockets import keep_alive
+from nep.backends.zeromq.sockets import FarConnection, keep_alive
 from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.protocol.wire import hello_part
 
