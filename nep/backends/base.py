@@ -28,6 +28,7 @@ from nep.system.plugins import discover, discover_own
 __all__ = [
     "HANDSHAKE_S",
     "Backend",
+    "GivesPayloads",
     "PublisherSpec",
     "PublisherTransport",
     "PublishesQuickly",
@@ -160,6 +161,22 @@ class PublisherTransport(Protocol):
 
     def close(self, timeout_s: float) -> None:
         """Unregister, and deliver what is on its way within `timeout_s`; what was not is logged."""
+
+
+@runtime_checkable
+class GivesPayloads(Protocol):
+    """What a `SubscriberTransport` may have besides: payloads without messages, for who wants no more.
+
+    Whoever takes from `ready` lets `restore` be called before, while there are any.
+    """
+
+    payloads: deque[Any]
+    """Payloads of messages that come before those in `ready`; to be taken from the left, in any thread."""
+    wants_payloads: bool
+    """Whether the next ones shall come here as far as that saves anything. Whoever reads says so."""
+
+    def restore(self) -> None:
+        """Make messages of the payloads that were not taken: they are the next ones in `ready`."""
 
 
 class SubscriberTransport(Protocol):

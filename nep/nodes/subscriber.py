@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from nep.backends.base import SubscriberSpec, SubscriberTransport
+from nep.backends.base import GivesPayloads, SubscriberSpec, SubscriberTransport
 from nep.errors import ClosedError, DecodeError
 from nep.messages.codecs import codec_for
 from nep.messages.message import UNDECODED, Message
@@ -23,6 +24,7 @@ __all__ = ["SLICE_S", "Subscriber"]
 SLICE_S = 0.1
 """Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
 
+_NO_PAYLOADS: deque[Any] = deque()
 _logger = logging.getLogger("nep")
 
 
@@ -43,6 +45,9 @@ class Subscriber:
         self._transport = transport
         self._spec = spec
         self._ready = transport.ready
+        self._quick = transport if isinstance(transport, GivesPayloads) else None
+        self.payloads = _NO_PAYLOADS if self._quick is None else self._quick.payloads
+        """Of messages that come next: for who wants no more of them. See `GivesPayloads`."""
         self._empty = codec_for(spec.msg_type).empty
         self._async_reader = AsyncReader(transport, self._poll_first)
         self._problem = ""
@@ -95,7 +100,12 @@ class Subscriber:
             is_wrong = True
         if is_wrong:
             seconds("timeout_s", timeout_s)
-        ready = self._ready
+        payloads, ready = self.payloads, self._ready
+        if payloads:
+            try:
+                return True, payloads.popleft()
+            except IndexError:  # another thread took the last one
+                pass
         while ready:  # read already
             try:
                 message = ready.popleft()
@@ -116,7 +126,7 @@ class Subscriber:
         limit = None if block_mode and timeout_s is None else timeout_s or 0.0
         deadline = time.monotonic() + limit if limit else None
         while True:
-            came = self.receive(limit)
+            came = self._receive_to_listen(limit)
             if came is None:
                 return False, self._empty()
             try:
@@ -136,6 +146,27 @@ class Subscriber:
             is_wrong = True
         if is_wrong:
             seconds("timeout_s", timeout_s)
+        self.want_messages()
+        return self._receive(timeout_s)
+
+    def _receive_to_listen(self, timeout_s: float | None) -> Message | None:
+        """As `receive`; of messages that come with it only the payloads are wanted."""
+        self.want_payloads()
+        return self._receive(timeout_s)
+
+    def want_payloads(self) -> None:
+        """Of what is read next only the payloads are wanted; not while there is a problem to be resolved."""
+        if self._quick is not None:
+            self._quick.wants_payloads = not (self._problem or self.is_typed)
+
+    def want_messages(self) -> None:
+        """Of what is read next whole messages are wanted, also of what was read already."""
+        if self._quick is not None:
+            self._quick.wants_payloads = False
+            if self.payloads:
+                self._quick.restore()
+
+    def _receive(self, timeout_s: float | None) -> Message | None:
         if self._ready:  # read already
             try:
                 return self._ready.popleft()
@@ -179,6 +210,7 @@ class Subscriber:
 
     def _poll_first(self) -> Message | None:
         """What was read already, or what is there. Raises `ClosedError`."""
+        self.want_messages()
         try:
             return self._ready.popleft()
         except IndexError:

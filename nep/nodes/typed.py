@@ -82,6 +82,9 @@ class TypedSubscriber(Subscriber):
         message = super().receive(timeout_s)
         return None if message is None else self._reader.typed(message)
 
+    def _receive_to_listen(self, timeout_s: float | None) -> Message | None:
+        return self.receive(timeout_s)
+
     def _poll_first(self) -> Message | None:
         message = super()._poll_first()
         return None if message is None else self._reader.typed(message)

@@ -185,25 +185,31 @@ class Work:
         has_run = self._run_timers() if self.timers else False
         if self.timers:
             until = min(until, next_due(self.timers))
-        subscriber, transport, call, with_message = callbacks[0]
-        if with_message:
+        if callbacks[0].with_message:
             return self._run_callbacks() or has_run
+        return self._run_payloads(callbacks, until) or has_run
+
+    def _run_payloads(self, callbacks: tuple[Callback, ...], until: float) -> bool:
+        """The only callback gets payloads until this time; whether there may be more."""
+        subscriber, transport, call, _with_message = callbacks[0]
         ready, clock, is_stopped = transport.ready, self.clock, self._is_stopped.is_set
-        taken, is_brisk = subscriber.taken, has_run
+        taken, payloads, is_brisk = subscriber.taken, subscriber.payloads, False
+        subscriber.want_payloads()
         while not is_stopped() and callbacks is self.callbacks:
             try:
-                message = ready.popleft()
-            except IndexError:
-                found = None if transport.is_closed else transport.poll()
-                if found is None:
-                    return is_brisk
-                message = found
-            try:
-                payload = taken(message)
-            except DecodeError:
-                continue  # it is logged and an alert
+                if payloads:
+                    payload = payloads.popleft()
+                elif ready:
+                    payload = taken(ready.popleft())
+                else:
+                    found = None if transport.is_closed else transport.poll()
+                    if found is None:
+                        return is_brisk
+                    payload = taken(found)
+            except (DecodeError, IndexError):
+                continue  # it is logged and an alert; or another thread took the last one
             call(payload)
-            if not ready:
+            if not (payloads or ready):
                 return is_brisk
             is_brisk = True  # several came together: there may be more
             if clock() >= until:
@@ -229,6 +235,8 @@ class Work:
         for subscriber, transport, call, with_message in self.callbacks:
             if is_stopped() or self.is_closed:
                 break
+            if subscriber.payloads:
+                subscriber.want_messages()
             try:  # as in `given`, which takes a third longer for each message
                 message = transport.ready.popleft()
             except IndexError:
@@ -236,7 +244,7 @@ class Work:
                 if found is None:
                     continue
                 message = found
-            if transport.ready:
+            if transport.ready or subscriber.payloads:
                 has_more = True
             if subscriber.is_typed:
                 message = subscriber.typed(message)
@@ -249,7 +257,9 @@ class Work:
 
     def given(self, callback: Callback) -> object:
         """What a callback is given next; `NOTHING` when no message is there, or it cannot be decoded."""
-        transport = callback.transport
+        subscriber, transport = callback.subscriber, callback.transport
+        if subscriber.payloads:
+            subscriber.want_messages()
         try:
             message = transport.ready.popleft()
         except IndexError:
@@ -257,7 +267,6 @@ class Work:
             if found is None:
                 return NOTHING
             message = found
-        subscriber = callback.subscriber
         if subscriber.is_typed:
             message = subscriber.typed(message)
         try:

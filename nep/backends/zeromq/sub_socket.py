@@ -20,10 +20,10 @@ from nep.backends.zeromq.byte_window import WINDOW_BYTES
 from nep.backends.zeromq.loss import HeardPublisher, HeardPublishers
 from nep.backends.zeromq.shared.payloads import SharedSources
 from nep.backends.zeromq.sockets import Refusals, Socket, is_far, keep_alive, receive_mark, wait_shortly
-from nep.errors import WireError
+from nep.errors import DecodeError, WireError
 from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for, codec_numbered
-from nep.messages.message import NOTHING, UNDECODED, Message, arrived, kind_of, new_message
+from nep.messages.message import NOTHING, UNDECODED, Message, MessageKind, arrived, kind_of, new_message
 from nep.protocol.batch import BATCH, BATCH_FORM, BATCH_MAX, entries, table_of
 from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import (
@@ -58,6 +58,8 @@ _NO_COPY_BYTES = 8_192
 """Larger ones libzmq receives into memory of their own: a kept view of one keeps nothing else alive."""
 SHARED_FORM = SHARED << 16
 _Part = bytes | memoryview
+_Run = tuple[MessageKind, int, int, tuple[int, ...], Sequence[bytes]]
+"""The messages whose payloads were read: of which kind, whose, the number of the first, stamps and bytes."""
 
 _logger = logging.getLogger("nep")
 _DONTWAIT = int(zmq.DONTWAIT)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
@@ -208,6 +210,10 @@ class SubSocket:
         self._shared = SharedSources(spec.id, self._answer)
         self._parser = CarefulParser(spec, self._hello, self.sources, self.leave, self._tell, self._shared)
         self._cut = len(self._topic)
+        self.payloads: deque[Any] = deque()
+        """See `nep.backends.base.GivesPayloads`."""
+        self.wants_payloads = False
+        self._run: _Run | None = None
         self._body = self._cut + HEADER_BYTES
         """Where header and payload of a message in one part begin."""
         # Nothing is told of the size, or what is as long may be the first part of the next message.
@@ -396,6 +402,11 @@ class SubSocket:
         sizes = numbers[1 : count + 1]
         if at + sum(sizes) != len(first):
             return self._read_batch_carefully(first, into)
+        if self.wants_payloads and not self.payloads and not into:
+            raws = [first[at : (at := at + size)] for size in sizes]
+            if self._read_payloads(source, seq, publisher, numbers[count + 1 :], raws, into):
+                return count, count
+            at = body + table.size
         kind, append = source.kind, into.append
         for size, stamp_ns in zip(sizes, numbers[count + 1 :], strict=True):
             message = new_message(Message)
@@ -408,6 +419,43 @@ class SubSocket:
             seq += 1
         source.last = seq - 1
         return count, count
+
+    def _read_payloads(
+        self,
+        source: HeardPublisher,
+        seq: int,
+        publisher: int,
+        stamps_ns: tuple[int, ...],
+        raws: Sequence[bytes],
+        into: Into,
+    ) -> bool:
+        """The first message of a batch, and the payloads of all others; False when one cannot be decoded."""
+        kind = source.kind
+        decode = kind.decode
+        try:
+            self.payloads.extend([decode(raw, NOTHING) for raw in raws[1:]])
+        except DecodeError:
+            return False
+        into.append(arrived(kind, raws[0], stamps_ns[0], seq, publisher))
+        source.last = seq + len(raws) - 1
+        self._run = kind, publisher, seq, stamps_ns, raws
+        return True
+
+    def restore(self, into: deque[Message]) -> None:
+        """Put messages of the payloads that nobody took before all others."""
+        if self._run is None:
+            return
+        kind, publisher, first, stamps_ns, raws = self._run
+        number = len(raws)
+        while True:
+            try:
+                payload = self.payloads.pop()  # from the right: others may take from the left meanwhile
+            except IndexError:
+                return
+            number -= 1
+            message = arrived(kind, raws[number], stamps_ns[number], first + number, publisher)
+            message.decoded = payload
+            into.appendleft(message)
 
     def _read_shared(self, first: bytes) -> Message | None:
         """The usual message in shared memory: the next one of its publisher. None: look carefully."""

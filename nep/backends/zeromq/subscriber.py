@@ -22,7 +22,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import zmq
 
@@ -30,7 +30,7 @@ from nep.backends.base import SubscriberSpec, Wakes
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals, wait_until
-from nep.backends.zeromq.sub_socket import Into
+from nep.backends.zeromq.sub_socket import Into, SubSocket
 from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
@@ -183,6 +183,10 @@ class SocketSubscriber(Generic[R]):
         self._keeps_all = spec.keep == "all"
         self.ready: deque[Message] = deque()
         """What was read ahead, in front of the inbox; anybody may take from its left without the lock."""
+        self._source: SubSocket | None = readable if isinstance(readable, SubSocket) else None
+        self.payloads: deque[Any] = deque() if self._source is None else self._source.payloads
+        """See `nep.backends.base.GivesPayloads`."""
+        self.wants_payloads = False
         self._ahead = _ReadAhead(spec.max_messages)
         self._moves = spec.max_messages >= 10 * _AHEAD_MOST
         """Whether a few messages more than that may wait for the reader."""
@@ -282,7 +286,13 @@ class SocketSubscriber(Generic[R]):
         self._wanted.append(None)  # as in `_turn`, which takes longer than all of this
         try:
             with self._lock:
-                if self.is_closed or self.ready or self._inbox.messages or self._readable.has_input:
+                if (
+                    self.is_closed
+                    or self.payloads
+                    or self.ready
+                    or self._inbox.messages
+                    or self._readable.has_input
+                ):
                     return False
                 self._waiters.append(waker)
                 return True
@@ -362,6 +372,7 @@ class SocketSubscriber(Generic[R]):
             if self.is_closed:
                 return
             self.is_closed = True
+            self.payloads.clear()
             self.ready.clear()
             self._wake_waiters()
         self._on_close(self.spec.id)
@@ -376,6 +387,7 @@ class SocketSubscriber(Generic[R]):
     def forked(self) -> None:
         """In a child. See `SubscriberTransport.forked`."""
         self.is_closed = True
+        self.payloads.clear()
         self.ready.clear()
 
     @contextmanager
@@ -388,9 +400,26 @@ class SocketSubscriber(Generic[R]):
         finally:
             self._wanted.pop()
 
+    def restore(self) -> None:
+        """See `GivesPayloads`."""
+        if self._source is not None:
+            with self._turn():
+                self._source.restore(self.ready)
+
     # ---- with the lock held
 
     def _next(self, *, may_wait: bool = False) -> Message | None:
+        if self._source is not None:
+            if self.payloads:
+                self._source.restore(self.ready)
+            self._source.wants_payloads = self.wants_payloads and self._moves
+        try:
+            return self._next_message(may_wait=may_wait)
+        finally:
+            if self._source is not None:
+                self._source.wants_payloads = False  # it is only for who reads now
+
+    def _next_message(self, *, may_wait: bool) -> Message | None:
         now = time.monotonic()
         self._leased_until = now + LEASE_S
         if self._io_comes_at > now + _LATE_S:
