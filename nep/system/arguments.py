@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import math
+import sys
 from collections.abc import Callable, Sequence
 from typing import TypeVar, cast
 
@@ -30,6 +31,8 @@ T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
 _LETTERS = 200
 """Of a type; the master takes no more."""
+_LONGEST_S = sys.float_info.max
+"""Whole numbers go on behind it, and no clock can add them: longer is for ever."""
 
 
 def text(name: str, value: object) -> str:
@@ -51,7 +54,9 @@ def text(name: str, value: object) -> str:
 def flag(name: str, value: object) -> bool:
     """`value` itself when it is True or False. Raises `ValueError`."""
     if not isinstance(value, bool):
-        raise WrongTypeError(_("{name} is {value}; give True or False").format(name=name, value=repr(value)))
+        raise WrongTypeError(
+            _("{name} is {value}; give True or False").format(name=name, value=_shown(value))
+        )
     return value
 
 
@@ -60,7 +65,7 @@ def one_of(name: str, value: T, allowed: Sequence[T]) -> T:
     if value not in allowed:
         raise ValueError(
             _("{name} is {value}; use {choices}").format(
-                name=name, value=repr(value), choices=listed([repr(each) for each in allowed], "or")
+                name=name, value=_shown(value), choices=listed([repr(each) for each in allowed], "or")
             )
         )
     return value
@@ -71,13 +76,13 @@ def at_least(name: str, value: object, least: int) -> int:
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} is {value}; give a whole number from {least} on").format(
-                name=name, value=repr(value), least=least
+                name=name, value=_shown(value), least=least
             )
         )
     if value < least:
         raise ValueError(
             _("{name} is {value}; give a whole number from {least} on").format(
-                name=name, value=value, least=least
+                name=name, value=_shown(value), least=least
             )
         )
     return value
@@ -88,13 +93,13 @@ def within(name: str, value: object, least: int, most: int) -> int:
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} is {value}; give a whole number from {least} to {most}").format(
-                name=name, value=repr(value), least=least, most=most
+                name=name, value=_shown(value), least=least, most=most
             )
         )
     if not least <= value <= most:
         raise ValueError(
             _("{name} is {value}; give a whole number from {least} to {most}").format(
-                name=name, value=value, least=least, most=most
+                name=name, value=_shown(value), least=least, most=most
             )
         )
     return value
@@ -106,23 +111,25 @@ def seconds(name: str, value: object) -> float | None:
         return None
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise WrongTypeError(
-            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=repr(value))
+            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=_shown(value))
         )
     if not value >= 0.0:  # also what is not a number
         raise ValueError(
-            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=value)
+            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=_shown(value))
         )
-    return None if math.isinf(value) else value
+    return None if value > _LONGEST_S else value
 
 
 def period(name: str, value: object) -> float:
     """`value` itself when it is seconds above 0, and finite. Raises `ValueError`."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise WrongTypeError(
-            _("{name} is {value}; give seconds, more than 0").format(name=name, value=repr(value))
+            _("{name} is {value}; give seconds, more than 0").format(name=name, value=_shown(value))
         )
-    if not 0.0 < value < math.inf:  # also what is not a number
-        raise ValueError(_("{name} is {value}; give seconds, more than 0").format(name=name, value=value))
+    if not 0.0 < value <= _LONGEST_S:  # also what is not a number
+        raise ValueError(
+            _("{name} is {value}; give seconds, more than 0").format(name=name, value=_shown(value))
+        )
     return value
 
 
@@ -130,8 +137,7 @@ def limit(name: str, value: object) -> float:
     """`value` itself when it is a time that ends: 0 or more seconds. Raises `ValueError`."""
     if value is None:
         raise WrongTypeError(_("{name} is None; give seconds, 0 or more").format(name=name))
-    seconds(name, value)
-    return cast("float", value)
+    return math.inf if seconds(name, value) is None else cast("float", value)
 
 
 def function(name: str, value: F) -> F:
@@ -159,6 +165,14 @@ def is_coroutine_function(call: object) -> bool:
     return inspect.iscoroutinefunction(call) or (
         callable(call) and inspect.iscoroutinefunction(call.__call__)
     )
+
+
+def _shown(value: object) -> str:
+    """The value as a sentence may have it: it may be of any size, as others may have sent it."""
+    try:
+        return escaped(shortened(repr(value), _LETTERS))
+    except (RecursionError, ValueError):  # too deep; more digits than Python writes
+        return type(value).__name__
 
 
 def _kind(value: object) -> str:

@@ -56,5 +56,7 @@ CASES: dict[str, list[bytes]] = {
     ],
     # `True` is an int, too, but none for numpy.
     "raw_pictures_decoded": [b"\x82\xa5shape\x92\xc3\x02\xa8encoding\xa532FC1\xff|\xffxxxxxxxx"],
+    # A time that no float can be, and sentences with all of a value in them.
+    "arguments": [b"1" + b"0" * 400, b"[" * 1_000 + b"]" * 1_000, b'"' + b"x" * 100_000 + b'"'],
     "maps_for_ros2": [b'{"fr\\ud800ame_id": "a"}'],
 }

@@ -112,9 +112,9 @@ def arguments(data: bytes) -> None:
         lambda: text("name", value),
         lambda: at_least("count", value, 0),
         lambda: within("count", value, 0, 9),
-        lambda: seconds("timeout_s", value),
-        lambda: period("period_s", value),
-        lambda: limit("rate", value),
+        lambda: 1.5 + (seconds("timeout_s", value) or 0.0),
+        lambda: 1.5 + period("period_s", value),
+        lambda: 1.5 + limit("rate", value),
         lambda: one_of("mode", value, ("a", "b")),
     ):
         try:
