@@ -17,7 +17,7 @@ CASES: dict[str, list[bytes]] = {
     "filters": [b"\xffhello/-000000000000001/t", b"\xffread/" + b"/".join([b"0_00000000000001"] * 4)],
     # A sentence as long as what came.
     "names": [b"t" * 1_000_000],
-    # Half a letter beside NaN, and depth, ended the gateway's thread; 1e999 became the bare word Infinity.
+    # Half a letter beside NaN, and depth, made the gateway pause; 1e999 became the bare word Infinity.
     "frames_of_originals": [
         b't {"a": NaN, "b": "\\ud800"}',
         b"[NaN, 1e999]",
@@ -30,7 +30,7 @@ CASES: dict[str, list[bytes]] = {
     ],
     # The time grew with the square of the length.
     "keys": [b"\\\\" + b"." * 1_000_000],
-    # ... and with a power of the length: years.
+    # ... and with a power of the length.
     "patterns_of_topics": [b"*a*a*a*a*a*a*a*a*b\xff|\xff" + b"a" * 200],
     # ... and a message of a thousand levels.
     "field_paths": [b"[" + LONG + b"]", b".\xff|\xff" + b"[" * 1_000 + b"]" * 1_000],
