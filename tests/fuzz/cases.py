@@ -47,6 +47,11 @@ CASES: dict[str, list[bytes]] = {
         + b"]" * 2_000
         + b"}"
     ],
+    # A recent file with a name, or of a time, that there cannot be.
+    "files_of_settings": [
+        json.dumps({"recent": [{"path": "/" + "a" * 5_000, "opened_s": 1}]}).encode(),
+        json.dumps({"recent": [{"path": "/a", "opened_s": HUGE}]}).encode(),
+    ],
     # 89 bytes took 4 GB and 3 s: a chunk that is cut off tells of 4 GB.
     "pictures_decoded": [
         bytes.fromhex(

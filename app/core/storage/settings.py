@@ -18,6 +18,8 @@ from app.errors import SettingsError
 from nep.system.replace_file import replace_file
 
 RECENT_LIMIT = 12
+_LATEST_S = 1e12
+"""No time is later: a damaged file may have a number that no clock can show."""
 T = TypeVar("T")
 
 
@@ -25,6 +27,14 @@ def home() -> Path:
     """Studio's own folder: ``$NEP_STUDIO_HOME``, else the system's place for configuration."""
     chosen = os.environ.get("NEP_STUDIO_HOME")
     return Path(chosen) if chosen else Path(platformdirs.user_config_dir("nep-studio", appauthor=False))
+
+
+def _is_file(path: Path) -> bool:
+    """Whether it is there; nothing is that has a name which no file can have."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def data_home() -> Path:
@@ -108,10 +118,12 @@ class Settings:
         entries: list[object] = self.get("recent", [])
         for entry in entries:
             if isinstance(entry, Mapping) and isinstance(entry.get("path"), str):
-                path, when = Path(entry["path"]), entry.get("opened_s", 0)
-                opened_s = float(when) if isinstance(when, int | float) else 0.0
-                name = str(entry.get("name", path.stem)) if path.parent == kept_folder() else path.stem
-                found.append(RecentFile(path, name, opened_s, path.is_file()))
+                path, when, name = Path(entry["path"]), entry.get("opened_s", 0), entry.get("name")
+                is_time = isinstance(when, int | float) and abs(when) <= _LATEST_S
+                opened_s = float(when) if is_time else 0.0
+                if not isinstance(name, str) or path.parent != kept_folder():
+                    name = path.stem
+                found.append(RecentFile(path, name, opened_s, _is_file(path)))
         return found
 
     def add_recent(self, path: Path, name: str | None = None) -> None:
