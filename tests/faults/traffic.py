@@ -79,7 +79,7 @@ class _Worker:
 
 
 def publisher() -> None:
-    """Publishes numbers, those after `after`. Commands: go, pause, look, end (closes the node)."""
+    """Publishes numbers, those after `after`. Commands: go, pause, look, told, end (closes the node)."""
     options = json.loads(sys.argv[1])
     node = nep.node(options["node"])
     pub = node.new_pub(options["topic"], latched=options.get("latched", False))
@@ -101,13 +101,18 @@ def publisher() -> None:
         worker.pause()
         return look()
 
+    def told() -> Answer:
+        """How far the master knows that it came."""
+        (known,) = node.graph().topics[options["topic"]].publishers
+        return {"sent": known.last_seq}
+
     def end() -> Answer:
         worker.end()
         said = look()
         node.close()
         return said
 
-    _talk({"go": worker.go, "pause": pause, "look": look, "end": end})
+    _talk({"go": worker.go, "pause": pause, "look": look, "told": told, "end": end})
 
 
 class _Heard:
