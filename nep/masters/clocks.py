@@ -12,6 +12,7 @@ __all__ = ["Clocks", "Differences"]
 
 Differences = dict[str, tuple[int, int]]
 """By node: what to add to its times for the clock of who asks, and how surely that is known (ns)."""
+_HERE = NodeClock(0, 0, None)
 
 
 class Clocks:
@@ -34,7 +35,7 @@ class Clocks:
         What no clock can be counts as not known.
         """
         if told is not None and self.is_here(member):
-            member.clock = NodeClock(0, 0, None)
+            member.clock = _HERE
         elif told is not None and len(told) == 2 and is_clock(*told):
             member.clock = NodeClock(*told, now)
         else:

@@ -143,6 +143,8 @@ def _clock_in(told: Any) -> tuple[int, ...] | None:  # noqa: ANN401 - what came 
     """A node's word on its clock. Raises `ValueError` when it is unusual."""
     if told is None:
         return None
+    if told == []:
+        return ()
     if type(told) not in {list, tuple} or not all(type(each) is int for each in told):
         raise ValueError(told)
     return tuple(told)
