@@ -80,7 +80,9 @@ INTERNAL = frozenset({
     "Master.epoch", "Master.submit", "Message.decoded", "Message.kind", "Message.raw",
     "Message.seen_ns", "Node.open_parameters", "NodeParameter.as_map", "NodeParameter.form",
     "NodeParameter.with_value", "Publisher.refuse", "Respondent.service", "Server.join",
-    "Server.run_one", "Server.spun", "Subscriber.decoded", "Subscriber.is_typed", "Subscriber.typed",
+    "Server.run_one", "Server.spun", "Subscriber.decoded", "Subscriber.is_typed",
+    "Subscriber.payloads", "Subscriber.taken", "Subscriber.typed", "Subscriber.want_messages",
+    "Subscriber.want_payloads",
     "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.take_turn",
 })  # fmt: skip
 """What other parts of nep need of these classes,"""
