@@ -1,4 +1,4 @@
-"""Inbox: messages that wait for their reader, bounded in number and in bytes."""
+"""Inbox: messages that wait for their reader, bounded in number and in bytes, and how many it gets."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from typing import Literal
 
 from nep.messages.message import Message
 
-__all__ = ["MAX_BYTES", "MAX_MESSAGES", "Inbox", "Keep"]
+__all__ = ["AHEAD_MOST", "MAX_BYTES", "MAX_MESSAGES", "Inbox", "Keep", "ReadAhead"]
 
 Keep = Literal["all", "latest"]
 """What a subscriber wants: every message as long as there is room, or only the newest."""
 
 MAX_MESSAGES = 10_000
 MAX_BYTES = 256 * 2**20
+_BRISK_S = 10e-6
+"""A reader that comes back sooner than this after a message gets several at once: twice as many each time."""
+AHEAD_MOST = 64
 
 
 class Inbox:
@@ -75,3 +78,28 @@ class Inbox:
 
     def __len__(self) -> int:
         return len(self.messages)
+
+
+class ReadAhead:
+    """How many messages a reader gets at once.
+
+    Reading one message when there are no more costs a failed read: only brisk readers read ahead.
+    """
+
+    def __init__(self, max_messages: int) -> None:
+        self._most = max(1, min(AHEAD_MOST, max_messages))
+        self.now = 1
+        """How many it reads at once now."""
+        self.span_s = _BRISK_S
+        """Whoever comes back sooner than this is brisk."""
+
+    def more(self) -> int:
+        """How many messages to read for a brisk reader."""
+        self.now = min(2 * self.now, self._most)
+        self.span_s = self.now * _BRISK_S
+        return self.now
+
+    def begin(self) -> None:
+        """There were not as many, or the reader takes its time: begin with one again."""
+        self.now = 1
+        self.span_s = _BRISK_S

@@ -33,16 +33,13 @@ from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals, wait_until
 from nep.backends.zeromq.sub_socket import Into, SubSocket
 from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
-from nep.messages.queue import Inbox
+from nep.messages.queue import AHEAD_MOST, Inbox, ReadAhead
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.system.wakeup import Waker
 
 __all__ = ["NativeReadable", "NativeSubscriber", "ReadOneByOne", "Readable", "SocketSubscriber"]
 
 _AHEAD_BYTES = 2**18
-_BRISK_S = 10e-6
-"""A reader that comes back sooner than this after a message gets several at once: twice as many each time."""
-_AHEAD_MOST = 64
 
 _logger = logging.getLogger("nep")
 _POLLIN = int(zmq.POLLIN)
@@ -138,31 +135,6 @@ class NativeReadable(Readable, Protocol):
         """Connect anew to the publishers on other computers. What was not read of them is dropped."""
 
 
-class _ReadAhead:
-    """How many messages a reader gets at once.
-
-    Reading one message when there are no more costs a failed read: only brisk readers read ahead.
-    """
-
-    def __init__(self, max_messages: int) -> None:
-        self._most = max(1, min(_AHEAD_MOST, max_messages))
-        self.now = 1
-        """How many it reads at once now."""
-        self.span_s = _BRISK_S
-        """Whoever comes back sooner than this is brisk."""
-
-    def more(self) -> int:
-        """How many messages to read for a brisk reader."""
-        self.now = min(2 * self.now, self._most)
-        self.span_s = self.now * _BRISK_S
-        return self.now
-
-    def begin(self) -> None:
-        """There were not as many, or the reader takes its time: begin with one again."""
-        self.now = 1
-        self.span_s = _BRISK_S
-
-
 R = TypeVar("R", bound=Readable)
 
 
@@ -187,8 +159,8 @@ class SocketSubscriber(Generic[R]):
         self.payloads: deque[Any] = deque() if self._source is None else self._source.payloads
         """See `nep.backends.base.GivesPayloads`."""
         self.wants_payloads = False
-        self._ahead = _ReadAhead(spec.max_messages)
-        self._moves = spec.max_messages >= 10 * _AHEAD_MOST
+        self._ahead = ReadAhead(spec.max_messages)
+        self._moves = spec.max_messages >= 10 * AHEAD_MOST
         """Whether a few messages more than that may wait for the reader."""
         self._read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
@@ -442,7 +414,7 @@ class SocketSubscriber(Generic[R]):
         if not self._keeps_all:
             self._fill()
         elif self._moves and self._inbox.messages:
-            self._inbox.move(self.ready, _AHEAD_MOST, _AHEAD_BYTES)
+            self._inbox.move(self.ready, AHEAD_MOST, _AHEAD_BYTES)
             return self.ready.popleft()
         return self._inbox.take()
 
