@@ -283,15 +283,16 @@ class MasterSession:
 
     def begin_leave(self) -> None:
         """Unregister the node with all that it has, if there is a master. Does not wait."""
-        if self._calls.is_connected and not self._is_closed:
-            self._renew()  # subscribers that do not hear the bye learn from the master what was sent last
         with self._lock:
             if self._is_closed:
                 return
+            self._is_closed = True  # nothing is joined from now on
+        if self._calls.is_connected:
+            self._renew()  # subscribers that do not hear the bye learn from the master what was sent last
+        with self._lock:
             self._publishers.clear()
             self._subscribers.clear()
             self._confirmed.clear()
-            self._is_closed = True
         if self._epoch != 0 and self._calls.is_connected:
             self._leaving = self._calls.begin(Leave(self._node.id))
             self._left_at = time.monotonic()
@@ -470,10 +471,12 @@ class MasterSession:
     def _join(self, now: float) -> None:
         """Register everything again, once at a time."""
         self._pace.told(RENEW_S, now)  # this master has not said anything else yet
-        if now < self._join_again_at or self._is_closed:
+        if now < self._join_again_at:
             return
         self._join_again_at = now + _JOIN_AGAIN_S
         with self._lock:
+            if self._is_closed:  # a master that hears this after the leave would list it again
+                return
             publishers = tuple(record for record, _ in self._publishers.values())
             subscribers = tuple(record for record, _ in self._subscribers.values())
             request = Join(self._node, self._epoch, publishers, subscribers)
