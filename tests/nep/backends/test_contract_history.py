@@ -99,7 +99,7 @@ def test_none_twice_none_missing_while_it_is_published_all_the_time(make: Make) 
                     assert ok
                     got.append(int(str(payload)))
                 assert got == list(range(got[0], got[0] + len(got)))
-                assert got[0] <= max(0, before - 50)
+                assert got[0] <= max(0, before - 49)  # a message may go out before it is counted
                 assert sub.lost == 0
     finally:
         is_over.set()
