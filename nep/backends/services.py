@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
+import logging
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 from nep.backends.connection import Configuration
-from nep.errors import NepError
+from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.codecs import Codec
 from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, CallKind, Reply, failure
@@ -19,6 +21,7 @@ __all__ = [
     "CALLS_MAX",
     "CALLS_MAX_BYTES",
     "CallQueue",
+    "ClientCalls",
     "ClientSpec",
     "ClientTransport",
     "IncomingCall",
@@ -35,6 +38,7 @@ __all__ = [
     "too_large",
 ]
 
+_logger = logging.getLogger("nep")
 CALLS_MAX = 1000
 """So many calls wait in a server, or are under way in a client,"""
 CALLS_MAX_BYTES = 256 * 2**20
@@ -195,6 +199,66 @@ class OpenCall(Protocol):
     @property
     def number(self) -> int:
         """Its number in its client."""
+
+
+class CallUnderWay(OpenCall, Protocol):
+    """One that a client keeps until it has ended."""
+
+    @property
+    def then(self) -> Callable[[Outcome], None]:
+        """Is told how it ended."""
+
+    @property
+    def size(self) -> int:
+        """Bytes of what was asked."""
+
+
+C = TypeVar("C", bound=CallUnderWay)
+
+
+class ClientCalls(Generic[C]):
+    """The calls of a client that are under way, guarded by `_lock`: what clients of all back ends share."""
+
+    def __init__(self, spec: ClientSpec) -> None:
+        self.spec = spec
+        self.is_closed = False
+        self.late = 0
+        """Answers that came when nobody waited for them any more."""
+        self._lock = threading.Lock()
+        self._calls: dict[int, C] = {}
+        self._bytes = 0
+        self._numbers = itertools.count(1)
+        self._answered = self._failed = 0
+
+    def _tell(self, call: C, outcome: Outcome) -> None:
+        """Without the lock."""
+        try:
+            call.then(outcome)
+        except Exception:  # the others get theirs
+            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
+
+    def _take(self, call: C) -> bool:
+        """It is not under way any more; whether it was. With the lock held."""
+        if self._calls.pop(call.number, None) is None:
+            return False
+        self._bytes -= call.size
+        return True
+
+    def forget(self, call: OpenCall) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            known = self._calls.get(call.number)
+            if known is not None:
+                self._take(known)
+
+    def forked(self) -> None:
+        """In a child. See `ClientTransport.forked`."""
+        self.is_closed = True
+        self._lock = threading.Lock()
+        self._calls = {}
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(_("client of '{service}'").format(service=self.spec.service))
 
 
 class ServerTransport(Protocol):

@@ -7,7 +7,6 @@ made it knows that nobody can know whether it was carried out.
 
 from __future__ import annotations
 
-import itertools
 import logging
 import math
 import threading
@@ -19,8 +18,8 @@ from typing import Any
 from nep.backends.deadlines import Deadlines
 from nep.backends.nanomsg.answering import close_context, in_one, in_parts
 from nep.backends.nanomsg.library import keep_for_ever, library
-from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
-from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
+from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
+from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL, Framing
 
@@ -53,7 +52,7 @@ class _Call:
         self.size = len(self.data)
 
 
-class NanomsgClient:
+class NanomsgClient(ClientCalls[_Call]):
     """Owns a REQ that is made already. See `ClientTransport`."""
 
     def __init__(
@@ -66,20 +65,14 @@ class NanomsgClient:
     ) -> None:
         if framing is ORIGINAL and spec.codec.number != _JSON:
             raise NepError(_("a call without a master is JSON; leave out msg_type, or use wire='native'"))
-        self.spec = spec
-        self.is_closed = False
-        self.late = 0
+        super().__init__(spec)
         self._socket = socket
         self._framing = framing
         self._deadlines = deadlines
         self._on_close = on_close
-        self._lock = threading.Lock()
         self._pipes: set[int] = set()
-        self._calls: dict[int, _Call] = {}
         self._left: dict[int, _Call] = {}
         """Those for which nobody waits any more, oldest first: what still comes is counted."""
-        self._bytes = 0
-        self._numbers = itertools.count(1)
         self._threads: set[threading.Thread] = set()
         socket.add_post_pipe_connect_cb(self._came)
         socket.add_post_pipe_remove_cb(self._went)
@@ -154,19 +147,6 @@ class NanomsgClient:
         if is_waited_for:
             self._tell(call, outcome)
 
-    def _tell(self, call: _Call, outcome: Outcome) -> None:
-        try:
-            call.then(outcome)
-        except Exception:  # the others get theirs
-            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
-
-    def _take(self, call: _Call) -> bool:
-        """It is not under way any more; whether it was. With the lock held."""
-        if self._calls.pop(call.number, None) is None:
-            return False
-        self._bytes -= call.size
-        return True
-
     def forget(self, call: OpenCall) -> None:
         """Nobody waits for it any more."""
         with self._lock:
@@ -232,6 +212,3 @@ class NanomsgClient:
         for call in (*self._calls.values(), *self._left.values()):
             keep_for_ever(call.context)
         self._calls = {}
-
-    def _closed_error(self) -> ClosedError:
-        return ClosedError(_("client of '{service}'").format(service=self.spec.service))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 import math
 import threading
@@ -15,8 +14,8 @@ from nep.backends.ros.master import RosMasterUnreachable
 from nep.backends.ros.process import RosProcess
 from nep.backends.ros.service_connection import ServiceConnection
 from nep.backends.ros.service_types import NEP_CALL, ServiceType, installed_service
-from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
-from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError
+from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
+from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _
 from nep.protocol.requests import SubscriberCount
 from nep.protocol.service_wire import CallKind, failure
@@ -42,27 +41,23 @@ class _Call:
     then: Then
     connection: ServiceConnection | None = None
 
+    @property
+    def size(self) -> int:
+        return len(self.data)
 
-class RosClient:
+
+class RosClient(ClientCalls[_Call]):
     """A client: its calls that are under way."""
 
     def __init__(self, process: RosProcess, spec: ClientSpec, forget: Callable[[RosClient], None]) -> None:
-        self.spec = spec
+        super().__init__(spec)
         self.process = process
         self.service = process.resolved(spec.service)
-        self.late = 0
-        """None is ever late: its connection is closed when nobody waits for it."""
-        self.is_closed = False
         self._forget_me = forget
-        self._lock = threading.Lock()
-        self._calls: dict[int, _Call] = {}
-        self._bytes = 0
-        self._numbers = itertools.count(1)
         self._waiting: list[_Call] = []
         self._is_looking = False
         self._is_over = threading.Event()
         self._threads: set[threading.Thread] = set()
-        self._answered = self._failed = 0
 
     @property
     def is_connected(self) -> bool:
@@ -162,12 +157,6 @@ class RosClient:
         if is_waited_for:
             self._tell(call, outcome)
 
-    def _tell(self, call: _Call, outcome: Outcome) -> None:
-        try:
-            call.then(outcome)
-        except Exception:
-            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
-
     def _outcome(self, call: _Call, connection: ServiceConnection) -> Outcome:
         kind = self._type_of(connection)
         with self._lock:
@@ -193,13 +182,6 @@ class RosClient:
         if connection.header.get("md5sum", "*") not in {"*", kind.md5sum}:
             raise another_version(kind.name)
         return kind
-
-    def _take(self, call: _Call) -> bool:
-        """It is not under way any more; whether it was. With the lock held."""
-        if self._calls.pop(call.number, None) is None:
-            return False
-        self._bytes -= len(call.data)
-        return True
 
     def forget(self, call: OpenCall) -> None:
         """Nobody waits for it any more."""
@@ -243,12 +225,3 @@ class RosClient:
         for thread in threads:
             if thread is not threading.current_thread():
                 thread.join(max(0.0, deadline - time.monotonic()))
-
-    def forked(self) -> None:
-        """In a child. See `ClientTransport.forked`."""
-        self.is_closed = True
-        self._lock = threading.Lock()
-        self._calls = {}
-
-    def _closed_error(self) -> ClosedError:
-        return ClosedError(_("client of '{service}'").format(service=self.spec.service))

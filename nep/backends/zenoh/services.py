@@ -6,7 +6,6 @@ whose server ends is ended by zenoh without a reply: so the client knows that it
 
 from __future__ import annotations
 
-import itertools
 import logging
 import math
 import threading
@@ -19,6 +18,7 @@ from typing import Any
 from nep.backends.deadlines import Deadlines
 from nep.backends.services import (
     CallQueue,
+    ClientCalls,
     ClientSpec,
     IncomingCall,
     OpenCall,
@@ -34,7 +34,7 @@ from nep.backends.zenoh.keys import serve_key
 from nep.backends.zenoh.library import keep_for_ever, library
 from nep.backends.zenoh.session import ZenohSession
 from nep.backends.zeromq.sockets import Refusals
-from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
+from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
 from nep.i18n import _
 from nep.protocol.requests import (
     PublisherCount,
@@ -178,7 +178,7 @@ class _Call:
         self.size = len(self.data)
 
 
-class ZenohClient:
+class ZenohClient(ClientCalls[_Call]):
     """A client, or a surveyor: its calls that are under way."""
 
     def __init__(
@@ -188,19 +188,12 @@ class ZenohClient:
         deadlines: Deadlines,
         on_close: Callable[[ZenohClient], object],
     ) -> None:
-        self.spec = spec
-        self.is_closed = False
-        self.late = 0
+        super().__init__(spec)
         self.record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE)
         self._session = session
         self._deadlines = deadlines
         self._on_close = on_close
         self._refusals = Refusals()
-        self._lock = threading.Lock()
-        self._calls: dict[int, _Call] = {}
-        self._bytes = 0
-        self._numbers = itertools.count(1)
-        self._answered = self._failed = 0
         session.check(self.record)
 
     # ---- calling
@@ -317,26 +310,6 @@ class ZenohClient:
         self._tell(call, outcome)
         return True
 
-    def _tell(self, call: _Call, outcome: Outcome) -> None:
-        try:
-            call.then(outcome)
-        except Exception:  # the others get theirs
-            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
-
-    def _take(self, call: _Call) -> bool:
-        """It is not under way any more; whether it was. With the lock held."""
-        if self._calls.pop(call.number, None) is None:
-            return False
-        self._bytes -= call.size
-        return True
-
-    def forget(self, call: OpenCall) -> None:
-        """Nobody waits for it any more."""
-        with self._lock:
-            known = self._calls.get(call.number)
-            if known is not None:
-                self._take(known)
-
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
         """Nobody waits for these any more."""
         for call in calls:
@@ -390,12 +363,3 @@ class ZenohClient:
         self._on_close(self)
         for call in left:
             self._tell(call, self._closed_error())
-
-    def forked(self) -> None:
-        """In a child. See `ClientTransport.forked`."""
-        self.is_closed = True
-        self._lock = threading.Lock()
-        self._calls = {}
-
-    def _closed_error(self) -> ClosedError:
-        return ClosedError(_("client of '{service}'").format(service=self.spec.service))

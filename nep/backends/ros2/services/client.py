@@ -6,11 +6,9 @@ DDS sends a request to all servers of the name; the first answer counts.
 from __future__ import annotations
 
 import contextlib
-import itertools
 import logging
 import math
 import secrets
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,8 +19,8 @@ from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import wait_for_others
 from nep.backends.ros2.services.channel import CallId, HeardPart, ServiceChannel
 from nep.backends.ros2.services.definitions import known_service
-from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
-from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError
+from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
+from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _
 from nep.protocol.requests import SubscriberCount, SubscriberRecord, as_count
 from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
@@ -47,9 +45,16 @@ class _Call:
     then: Then
     servers: frozenset[bytes] | None = None
 
+    @property
+    def size(self) -> int:
+        return len(self.data)
 
-class Ros2Client:
-    """A client: its calls that are under way. Raises `BadTopicError`, `NepError`."""
+
+class Ros2Client(ClientCalls[_Call]):
+    """A client: its calls that are under way. Raises `BadTopicError`, `NepError`.
+
+    `_lock` is taken after the participant's lock, never before it.
+    """
 
     def __init__(
         self,
@@ -59,21 +64,13 @@ class Ros2Client:
         deadlines: Deadlines,
         on_close: Callable[[Ros2Client], object],
     ) -> None:
-        self.spec = spec
-        self.is_closed = False
-        self.late = 0
+        super().__init__(spec)
         self._participant = participant
         self._node_id = node_id
         self._deadlines = deadlines
         self._on_close = on_close
         self._requests, _answers = dds_service(spec.service)
         self._guid = secrets.randbits(63)
-        self._lock = threading.Lock()
-        """Taken after the participant's lock, never before it."""
-        self._calls: dict[int, _Call] = {}
-        self._bytes = 0
-        self._numbers = itertools.count(1)
-        self._answered = self._failed = 0
         self._channel: ServiceChannel | None = None
         told = service_type_name(spec.msg_type)
         self._told = None if told is None else known_service(participant.types, told)
@@ -218,26 +215,6 @@ class Ros2Client:
             self._failed += isinstance(outcome, NepError)
         self._tell(call, outcome)
 
-    def _tell(self, call: _Call, outcome: Outcome) -> None:
-        try:
-            call.then(outcome)
-        except Exception:  # the others get theirs
-            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
-
-    def _take(self, call: _Call) -> bool:
-        """It is not under way any more; whether it was. With the lock held."""
-        if self._calls.pop(call.number, None) is None:
-            return False
-        self._bytes -= len(call.data)
-        return True
-
-    def forget(self, call: OpenCall) -> None:
-        """Nobody waits for it any more."""
-        with self._lock:
-            known = self._calls.get(call.number)
-            if known is not None:
-                self._take(known)
-
     def expire(self, now: float) -> float:
         """Send what waited for a server, and end what waited too long, or whose servers are gone."""
         with self._lock:
@@ -281,12 +258,3 @@ class Ros2Client:
         self._on_close(self)
         for call in left:
             self._tell(call, self._closed_error())
-
-    def forked(self) -> None:
-        """In a child. See `ClientTransport.forked`."""
-        self.is_closed = True
-        self._lock = threading.Lock()
-        self._calls = {}
-
-    def _closed_error(self) -> ClosedError:
-        return ClosedError(_("client of '{service}'").format(service=self.spec.service))
