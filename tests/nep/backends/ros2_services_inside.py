@@ -19,6 +19,7 @@ import nep
 from tests.nep.backends.ros2_programs import killed_soon
 from tests.nep.programs import eventually, running
 from tests.nep.services import test_calls as contract
+from tests.nep.services.forking import check_fork
 from tests.nep.services.test_calls import spin
 
 __all__ = ["spin"]
@@ -303,33 +304,7 @@ def test_surveys_are_refused(make: Make) -> None:
 
 
 def test_a_forked_child_is_told_and_ends(make: Make) -> None:
-    code = """
-    import os, sys, nep
-    def say(it):
-        os.write(1, (str(it) + "\\n").encode())
-    node = nep.node("parent", "ros2")
-    server = node.new_server("/x", lambda request: node.stop_spin() or request)
-    client = node.new_client("/x", timeout_s=30.0)
-    waiting = client.call_async(2)
-    while not node._services.queues[0]._calls:
-        pass
-    child = os.fork()
-    if child == 0:
-        try:
-            client.call(1)
-        except nep.ClosedError as error:
-            say(error)
-        server.close()
-        node.close()
-        sys.exit(7)
-    say(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-    node.spin(30.0)
-    say(waiting.result(30.0))
-    node.close()
-    """
-    with running(code) as program:
-        assert "stayed with the program when it was forked" in program.line()
-        assert [program.line() for _ in range(2)] == ["7", "2"]
+    check_fork("nep.node('parent', 'ros2')")
 
 
 @pytest.mark.parametrize("has_digit", [True, False])

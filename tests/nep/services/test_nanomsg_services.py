@@ -16,6 +16,7 @@ import pytest
 import nep
 from nep.masters.master import Master
 from tests.nep.programs import eventually, running
+from tests.nep.services.forking import check_fork
 
 pynng = pytest.importorskip("pynng")
 LONG_S = 30.0
@@ -212,34 +213,10 @@ def test_through_the_master_it_meets_nodes_of_zeromq(master: Master) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks here")
 def test_a_forked_child_is_told_and_ends(port: int) -> None:
-    code = f"""
-    import os, sys, nep
-    def say(it):
-        os.write(1, (str(it) + "\\n").encode())
-    node = nep.node("parent", "nanomsg", master="127.0.0.1:1")
-    at = node.direct("127.0.0.1", {port}, wire="native")
-    server = node.new_server("/x", lambda request: node.stop_spin() or request, at)
-    client = node.new_client("/x", at, timeout_s=30.0)
-    waiting = client.call_async(2)
-    while not node._services.queues[0]._calls:
-        pass
-    child = os.fork()
-    if child == 0:
-        try:
-            client.call(1)
-        except nep.ClosedError as error:
-            say(error)
-        server.close()
-        node.close()
-        sys.exit(7)
-    say(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-    node.spin(30.0)
-    say(waiting.result(30.0))
-    node.close()
-    """
-    with running(code) as program:
-        assert "stayed with the program when it was forked" in program.line()
-        assert [program.line() for _ in range(2)] == ["7", "2"]
+    check_fork(
+        "nep.node('parent', 'nanomsg', master='127.0.0.1:1')",
+        f"node.direct('127.0.0.1', {port}, wire='native')",
+    )
 
 
 def test_a_program_that_closes_nothing_ends(port: int) -> None:
