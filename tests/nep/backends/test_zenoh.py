@@ -75,6 +75,15 @@ def port() -> int:
         return int(free.getsockname()[1])
 
 
+def trouble(node: nep.Node) -> str:
+    """Why its graph cannot be had, or ""."""
+    try:
+        node.graph()
+    except nep.NepError as error:
+        return str(error)
+    return ""
+
+
 def names(node: nep.Node) -> set[str]:
     return {each.name for each in node.graph().nodes.values()}
 
@@ -384,8 +393,7 @@ def test_a_router_joins_programs_and_may_be_started_again(make: Make, port: int)
             assert names(node) == {"here", "peer"}
             first.kill()
             eventually(lambda: pub.subscribers == 0)
-            with pytest.raises(nep.NepError, match=f"no router of zenoh answers at '{where}' now"):
-                node.graph()
+            eventually(lambda: f"no router of zenoh answers at '{where}' now" in trouble(node))
             ask(peer, "publish missed")
             with running(ROUTER, router(port)) as second:
                 second.line()
@@ -407,8 +415,13 @@ def test_a_configuration_file_of_the_user_s(
         between.line()
         sub = make("b", "").new_sub("t")
         pub = make("a", "").new_pub("t")
-        pub.publish(1)
-        assert sub.listen(timeout_s=30.0) == (True, 1)
+        for number in range(1, 61):  # what is sent while the two connect directly, zenoh's router may drop
+            pub.publish(number)
+            came, first = sub.listen(timeout_s=0.5)
+            if came:
+                break
+        assert came
+        assert sub.lost < first  # those from before it was greeted do not count
         import psutil
 
         listening = [
