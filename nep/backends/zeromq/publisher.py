@@ -273,8 +273,8 @@ class NativePublisher(GreetedPublisher):
         """Through shared memory to those who read that; the payload is copied at most once."""
         shared = self._subscriptions.shared
         # Before the lock: it takes a moment for the first time.
-        opened = begin_sharing() if shared is not None and self._seen else None
-        if opened is None:
+        opened = begin_sharing() if shared is not None and self._seen and not shared.readers else None
+        if shared is not None and opened is None and not shared.readers:
             shared = None
         data = sendable(given) if shared is None or not shared.readers else None
         size = given.nbytes if isinstance(given, memoryview) else len(given)
@@ -285,12 +285,22 @@ class NativePublisher(GreetedPublisher):
             if self._flags:
                 self._greet_before(size)
             number = shared.place(given, self._seen, time.monotonic()) if shared and not self._apart else None
-            if data is None and not (number is not None and shared and shared.readers >= self._seen.keys()):
+            is_for_all = number is not None and shared is not None and shared.readers >= self._seen.keys()
+            if data is None and not is_for_all:
                 data = sendable(given)
-            self._count += 1
-            self._bytes += size
+            self._count = seq = self._count + 1
+            self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
-            self._send_all(b"" if data is None else data, extension, size, number)
+            if (
+                number is not None
+                and is_for_all
+                and total < self._settle_at
+                and not (extension or self._flags)
+            ):
+                head = pack_quickly(self._form | SHARED << 16, len(number), seq, stamp_ns, self._id)
+                self._send(b"".join((self._topic, head, number)))  # whoever shares reads one part
+            else:
+                self._send_all(b"" if data is None else data, extension, size, number)
             self._look(stamp_ns)
 
     def lend(self, size_bytes: int) -> memoryview | None:

@@ -161,11 +161,11 @@ class CarefulParser:
             return None
         if not self._sources.arrived(header.publisher, header.seq, is_alone=is_alone):
             return None
-        shared: memoryview | None = None
+        shared: bytes | memoryview | None = None
         if header.flags & SHARED:
             if self._shared is None:
                 raise WireError(_("its payload lies in shared memory, which nobody offered"))
-            shared = self._shared.take(header.publisher, payload)
+            shared = self._shared.take(header.publisher, payload, may_copy=codec.name == "bytes")
             if shared is None:
                 self._sources.dropped(1)
                 return None
@@ -468,7 +468,7 @@ class SubSocket:
             or len(first) != self._body + size
         ):
             return None
-        data = self._shared.take(publisher, first[self._body :])
+        data = self._shared.take(publisher, first[self._body :], may_copy=source.kind.codec == "bytes")
         if data is None:
             return None
         self.sources.received += 1

@@ -314,6 +314,29 @@ def test_who_keeps_all_gets_copies_and_the_publisher_keeps_its_slots(node: nep.N
     assert in_memory(message)
 
 
+def test_small_payloads_that_are_wanted_as_bytes_take_no_slots(node: nep.Node) -> None:
+    sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
+    size = shared_memory._COPIED_BYTES
+    for _ in range(begin(pub, size=size)):
+        sub.receive(LONG_S)
+    messages = []
+    for number in range(300):  # more than there are slots
+        pub.publish(bytes([number % 256]) * size)
+        messages.append(sub.receive(LONG_S))
+        assert readers(pub) == 1
+    kept = [each for each in messages if each is not None]
+    assert [each.payload[-1] for each in kept] == [number % 256 for number in range(300)]
+    assert not any(map(in_memory, kept))
+    pub.publish(bytes(size + 1))  # which takes new memory
+    sub.receive(LONG_S)
+    for _ in range(begin(pub, size=size + 1)):
+        sub.receive(LONG_S)
+    pub.publish(bytes(size + 1))
+    message = sub.receive(LONG_S)
+    assert message is not None
+    assert in_memory(message), "larger ones stay where they are until somebody wants them"
+
+
 def test_who_reads_late_gets_what_was_sent_and_losses_are_counted(node: nep.Node) -> None:
     sub = node.new_sub("t", "bytes", max_messages=20)
     pub = node.new_pub("t", "bytes")

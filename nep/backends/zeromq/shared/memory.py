@@ -15,6 +15,7 @@ import importlib
 import logging
 import os
 import stat
+import struct
 import sys
 import tempfile
 import threading
@@ -41,6 +42,9 @@ _HELD_MOST = 12
 """Payloads of a publisher that a reader keeps where they lie; more are copied, so that slots come back."""
 _HEAD = 64
 """Bytes before a payload: its number and size, and what keeps the payload aligned."""
+_NUMBERS = struct.Struct("=QQ")
+_COPIED_BYTES = 2**18
+"""Payloads up to here that are wanted as bytes are copied when they arrive: their slots come back at once."""
 _LOANS = 4
 _READERS = 64
 _SPARE_BYTES = 64 * 2**20
@@ -184,6 +188,21 @@ def room_bytes() -> int:
     return found.f_bavail * found.f_frsize
 
 
+class _Slots:
+    """Views of slots by their address: making one takes longer than to fill it. Valid as long as the port."""
+
+    def __init__(self) -> None:
+        self._views: dict[int, memoryview] = {}
+
+    def view(self, address: int, size: int) -> memoryview:
+        """The first `size` bytes of the slot that begins there, or more."""
+        found = self._views.get(address)
+        if found is None or len(found) < size:
+            found = memoryview((ctypes.c_uint8 * size).from_address(address)).cast("B")
+            self._views[address] = found
+        return found
+
+
 class Loan:
     """A slot that a payload is written into before it is sent. Given back when nobody has it any more."""
 
@@ -203,8 +222,8 @@ class Loan:
 
     def send(self, number: int) -> None:
         """Hand the payload to all readers. It must not be changed from now on."""
-        head = (ctypes.c_uint64 * 2).from_address(self.address - _HEAD)
-        head[0], head[1] = number, self.size
+        head = (ctypes.c_uint8 * _NUMBERS.size).from_address(self.address - _HEAD)
+        _NUMBERS.pack_into(head, 0, number, self.size)
         sample, self._sample = self._sample, None
         sample.assume_init().send()
 
@@ -228,6 +247,7 @@ class SharedWriter:
         self._service: Any = None
         self._port: Any = None
         self._loans: WeakValueDictionary[int, Loan] = WeakValueDictionary()
+        self._slots = _Slots()
 
     def prepare(self, size: int) -> bool:
         """Have slots for payloads of this size; whether there are. A new `generation` means new memory."""
@@ -262,15 +282,32 @@ class SharedWriter:
 
     def loan(self, size: int) -> Loan | None:
         """A slot; None when none is free: readers have not taken what is in them."""
-        if self._port is None or size > self._slot_bytes or not self._room.has(size):
-            return None
-        try:
-            sample = self._port.loan_slice_uninit(size + _HEAD)
-        except Exception:  # noqa: BLE001 - whatever it is, the payload goes through the socket
+        sample = self._sample(size)
+        if sample is None:
             return None
         made = Loan(self._port, sample, size)
         self._loans[made.address] = made
         return made
+
+    def _sample(self, size: int) -> Any:  # noqa: ANN401 - iceoryx2 has no types
+        if self._port is None or size > self._slot_bytes or not self._room.has(size):
+            return None
+        try:
+            return self._port.loan_slice_uninit(size + _HEAD)
+        except Exception:  # noqa: BLE001 - whatever it is, the payload goes through the socket
+            return None
+
+    def copy(self, data: bytes | memoryview, size: int) -> int | None:
+        """Copy a payload into a slot and hand it to the readers; its number, or None when no slot is free."""
+        sample = self._sample(size)
+        if sample is None:
+            return None
+        slot = self._slots.view(int(sample.payload_ptr), self._slot_bytes + _HEAD)
+        self.number = number = self.number + 1
+        _NUMBERS.pack_into(slot, 0, number, size)
+        slot[_HEAD : _HEAD + size] = data if isinstance(data, bytes) else data.cast("B")
+        sample.assume_init().send()
+        return number
 
     def lent(self, data: memoryview) -> Loan | None:
         """The loan whose memory `data` is, so that it need not be copied."""
@@ -297,6 +334,7 @@ class SharedWriter:
         """Give it back. What readers hold stays as it is as long as they hold it."""
         self._port = self._service = self._opened = None
         self._slot_bytes = 0
+        self._slots = _Slots()
 
 
 class _Held:
@@ -324,7 +362,8 @@ class SharedReader:
         self.generation = generation
         self._held = 0
         self._returned: deque[None] = deque()
-        self._ahead: tuple[int, Any] | None = None
+        self._ahead: tuple[int, int, Any] | None = None
+        self._slots = _Slots()
         try:
             self._service = self._opened.service(publisher, generation).open()
             self._port = self._service.subscriber_builder().buffer_size(_MOST).create()
@@ -332,29 +371,38 @@ class SharedReader:
             raise LookupError from error
         _readers[id(self)] = self
 
-    def take(self, number: int) -> memoryview | None:
-        """The payload of this number, read-only; None when it was overwritten before it was read."""
+    def take(self, number: int, *, may_copy: bool = False) -> bytes | memoryview | None:
+        """The payload of this number, read-only; None when it was overwritten before it was read.
+
+        With `may_copy` small ones are copied out of their slot.
+        """
         while True:
             found, self._ahead = self._ahead or self._next(), None
             if found is None:
                 return None
             if found[0] == number:
-                return self._payload(found[1])
+                return self._payload(*found[1:], may_copy=may_copy)
             if found[0] > number:
                 self._ahead = found
                 return None
 
-    def _next(self) -> tuple[int, Any] | None:
+    def _next(self) -> tuple[int, int, Any] | None:
+        """The number of the next one, its size, and where it lies."""
         try:
             sample = self._port.receive()
         except Exception as error:  # noqa: BLE001 - it counts as lost
             _logger.debug("a payload in shared memory was not read: %s", error)
             return None
-        return None if sample is None else (_numbers_at(sample)[0], sample)
+        if sample is None:
+            return None
+        number, size = _NUMBERS.unpack_from(self._slots.view(int(sample.payload_ptr), _NUMBERS.size))
+        return number, size, sample
 
-    def _payload(self, sample: Any) -> memoryview:  # noqa: ANN401
-        size = _numbers_at(sample)[1]
-        array = (ctypes.c_uint8 * size).from_address(int(sample.payload_ptr) + _HEAD)
+    def _payload(self, size: int, sample: Any, *, may_copy: bool) -> bytes | memoryview:  # noqa: ANN401
+        address = int(sample.payload_ptr)
+        if may_copy and size <= _COPIED_BYTES:
+            return bytes(self._slots.view(address, size + _HEAD)[_HEAD : _HEAD + size])
+        array = (ctypes.c_uint8 * size).from_address(address + _HEAD)
         while self._returned:
             self._returned.popleft()
             self._held -= 1
@@ -363,11 +411,6 @@ class SharedReader:
         self._held += 1
         array.held = _Held(sample, self._returned)  # type: ignore[attr-defined]
         return memoryview(array).cast("B").toreadonly()
-
-
-def _numbers_at(sample: Any) -> tuple[int, int]:  # noqa: ANN401
-    head = (ctypes.c_uint64 * 2).from_address(int(sample.payload_ptr))
-    return int(head[0]), int(head[1])
 
 
 _writers: WeakValueDictionary[int, SharedWriter] = WeakValueDictionary()

@@ -7,15 +7,11 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
-from nep.backends.zeromq.shared.memory import SHARED_BYTES, Loan, SharedReader, SharedWriter
+from nep.backends.zeromq.shared.memory import SHARED_BYTES, SharedReader, SharedWriter
 from nep.errors import WireError
 from nep.i18n import _
 from nep.protocol.wire import Shares
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 __all__ = ["SharedPayloads", "SharedSources"]
 
@@ -55,8 +51,14 @@ class SharedPayloads:
         size = data.nbytes if isinstance(data, memoryview) else len(data)
         if not seen or not self._is_ready(size, seen, now):
             return None
-        loan = self._loan_of(data, size, now)
-        return None if loan is None else _NUMBER.pack(self._writer.send(loan))
+        lent = self._writer.lent(data) if isinstance(data, memoryview) else None
+        number = self._writer.copy(data, size) if lent is None else self._writer.send(lent)
+        if number is None:
+            if now >= self._tidied_at + _TIDY_S:
+                self._tidied_at = now
+                self._writer.tidy()
+            return None
+        return _NUMBER.pack(number)
 
     def _has_slots(self, size: int) -> bool:
         """Whether there are slots for payloads of this size. New memory nobody has opened yet."""
@@ -67,28 +69,15 @@ class SharedPayloads:
             self._offered.clear()
         return is_there
 
-    def _is_ready(self, size: int, seen: Iterable[int], now: float) -> bool:
+    def _is_ready(self, size: int, seen: Mapping[int, int], now: float) -> bool:
         if not self._has_slots(size):
             return False
-        for each in seen:
+        for each in seen if len(self.readers) < len(seen) else ():
             times, at = self._offered.get(each, (0, float("-inf")))
             if each not in self.readers and times < _OFFERS and now >= at + _AGAIN_S:
                 self._offered[each] = (times + 1, now)
                 self._offer(each, self._writer.generation)
         return bool(self.readers)
-
-    def _loan_of(self, data: bytes | memoryview, size: int, now: float) -> Loan | None:
-        lent = self._writer.lent(data) if isinstance(data, memoryview) else None
-        if lent is not None:
-            return lent
-        loan = self._writer.loan(size)
-        if loan is None:
-            if now >= self._tidied_at + _TIDY_S:
-                self._tidied_at = now
-                self._writer.tidy()
-            return None
-        loan.buffer[:] = data if isinstance(data, bytes) else data.cast("B")
-        return loan
 
     def lend(self, size: int) -> memoryview | None:
         """Memory for a payload of this size, to be written, then published; None where nobody shares it."""
@@ -121,12 +110,17 @@ class SharedSources:
                 return
         self._answer(Shares(self._subscriber, publisher, generation))
 
-    def take(self, publisher: int, part: bytes | memoryview) -> memoryview | None:
-        """The payload that a message's part names; None when it is there no more. Raises `WireError`."""
+    def take(
+        self, publisher: int, part: bytes | memoryview, *, may_copy: bool = False
+    ) -> bytes | memoryview | None:
+        """The payload that a message's part names; None when it is there no more. Raises `WireError`.
+
+        With `may_copy` small ones are copied out of their slot.
+        """
         reader = self._readers.get(publisher)
         if len(part) != _NUMBER.size:
             raise WireError(_("it names no payload in shared memory"), len(part))
-        return None if reader is None else reader.take(_NUMBER.unpack(part)[0])
+        return None if reader is None else reader.take(_NUMBER.unpack(part)[0], may_copy=may_copy)
 
     def leave(self, publisher: int) -> None:
         """Close its memory; payloads that somebody looks at stay."""
