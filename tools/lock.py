@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 OLDEST_PYTHON = "3.10"
 PLAIN = "library"
 """The file of what nep needs without any extra."""
-LOCKED = ("studio", "dev", "test", "fuzz", PLAIN)
+LOCKED = ("studio", "dev", "test", "fuzz", "package", PLAIN)
 """The files, each with the versions of those before it; all but the last are named after their extra."""
 EDITABLE = ("editables",)
 """What hatchling asks for when it installs a checkout; it can't be told from pyproject.toml."""

@@ -1,0 +1,104 @@
+"""What of the libraries goes into a package: what Studio uses, and not what only comes with it.
+
+Qt is most of a package. The names are those of files as PyInstaller collects them, below the frozen
+program's folder; `is_wanted` decides of each. Left out is what no line of Studio asks for. A library that
+another one in the package is linked with must stay: the self-test of the packages would tell.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import PurePosixPath
+
+__all__ = ["EXCLUDED_MODULES", "is_wanted"]
+
+EXCLUDED_MODULES = (
+    "tkinter", "_tkinter", "turtle", "idlelib", "lib2to3", "pydoc_data", "ensurepip", "pip", "setuptools",
+    "wheel", "pkg_resources", "IPython", "matplotlib", "PIL", "pytest", "_pytest", "hypothesis", "mypy",
+    "babel", "numpy.f2py", "numpy.distutils",
+)  # fmt: skip
+
+_LANGUAGES = ("en", "es")
+_CHROMIUM_LANGUAGES = ("en-US", "en-GB", "es", "es-419")
+_PLUGINS = frozenset({
+    "iconengines", "imageformats", "networkinformation", "platforminputcontexts", "platforms",
+    "platformthemes", "printsupport", "styles", "texttospeech", "tls", "wayland-decoration-client",
+    "wayland-graphics-integration-client", "wayland-shell-integration", "xcbglintegrations",
+})  # fmt: skip
+_FFMPEG_OF_QT = re.compile(r"(?:lib)?(?:av(?:codec|format|util)|sw(?:scale|resample))(?:-\d+\.dll|\.)")
+"""What plays films; Studio plays tones, which need none of it."""
+_NOT_PLUGINS = re.compile(r"(?:lib)?(?:qgtk3|qtvirtualkeyboardplugin|qtexttospeech_mock|ffmpegmediaplugin)\b")
+"""Of folders that are wanted: GTK's looks, which bring all of GTK; keys on the screen; a mute voice."""
+_IMAGE_FORMATS = re.compile(r"(?:lib)?q(?:gif|ico|icns|jpeg|svg|webp)\b")
+_PLATFORMS = re.compile(r"(?:lib)?q(?:xcb|wayland|windows|cocoa|offscreen|minimal)\b")
+_UNUSED = re.compile(
+    r"""
+    (?:^|/)(?:lib)?Qt6?(?:3D|Bluetooth|Charts|DataVisualization|Designer|Graphs|Help|Labs|Location|Nfc|
+    Quick3D|QuickControls2|QuickDialogs2|QuickEffects|QuickLayouts|QuickParticles|QuickShapes|
+    QuickTemplates2|QuickTest|QuickTimeline|QuickVectorImage|RemoteObjects|Scxml|Sensors|SerialBus|SerialPort|
+    ShaderTools|SpatialAudio|Sql|StateMachine|Test|UiTools|VirtualKeyboard|WebSockets|WebView|
+    EglFS|EglFs|FFmpegStub|MultimediaQuick|MultimediaWidgets|PdfQuick|PositioningQuick|QmlCore|
+    QmlLocalStorage|QmlNetwork|QmlXmlListModel|WaylandCompositor|WaylandEglCompositorHwIntegration|
+    WebChannelQuick|WebEngineQuick|Xml)[\w.-]*$
+    """,
+    re.VERBOSE,
+)
+
+
+_OF_THE_SYSTEM = re.compile(
+    r"""
+    ^lib(?:stdc\+\+|gcc_s|
+    X11|X11-xcb|Xau|Xdmcp|Xext|Xfixes|Xrender|drm|gbm|epoxy|fontconfig|freetype|harfbuzz|fribidi|thai|datrie|
+    graphite2|pixman-1|expat|png16|jpeg|brotli\w+|
+    glib-2|gio-2|gobject-2|gmodule-2|gthread-2|gdk_pixbuf-2|gtk-3|gdk-3|atk-\S+|atspi|cairo|cairo-gobject|pango\S*|
+    pcre2-8|mount|blkid|selinux|uuid|dbus-1|systemd|udev|cap|bsd|md|lz4|
+    asound|pulse|pulsecommon-\S+|asyncns|sndfile|FLAC|ogg|opus|vorbis\w*|mp3lame|mpg123|
+    cups|avahi-\w+|gnutls|p11-kit|gcrypt|gpg-error|unistring|idn2|tasn1|nettle|hogweed|gmp|
+    gssapi_krb5|krb5|krb5support|k5crypto|com_err|keyutils|speechd|sqlite3)[.-][\d.-]*so\b
+    """,
+    re.VERBOSE,
+)
+"""Linux: what a desktop has, or a package asks for (installers/linux). A copy of ours would not know the
+graphics driver, the fonts or the printers of the computer that it runs on, or be too old for the driver."""
+
+
+def is_wanted(name: str) -> bool:
+    """Whether a collected file goes into the package; `name` has slashes of either kind."""
+    path = PurePosixPath(name.replace("\\", "/"))
+    parts = path.parts
+    if _UNUSED.search(str(path)) or _OF_THE_SYSTEM.match(str(path)):
+        return False
+    if _FFMPEG_OF_QT.match(path.name) and ("PySide6" in parts or len(parts) == 1):
+        return False
+    if parts[:2] == ("cv2", "data"):
+        return path.suffix != ".xml"  # trained classifiers, which nothing here reads
+    if "PySide6" in parts:
+        return _is_wanted_of_qt(path)
+    return path.suffix not in {".pyi", ".h", ".pxd", ".a", ".lib"}
+
+
+def _is_wanted_of_qt(path: PurePosixPath) -> bool:
+    parts = path.parts
+    if "qml" in parts or path.name.startswith(
+        ("qtwebengine_devtools_resources", "v8_context_snapshot.debug")
+    ):
+        return False
+    if path.name.endswith((".debug.bin", ".debug.pak", ".pyi")):
+        return False
+    if "qtwebengine_locales" in parts:
+        return path.stem in _CHROMIUM_LANGUAGES
+    if "translations" in parts and path.suffix == ".qm":
+        kind, _, language = path.stem.partition("_")
+        return kind in {"qtbase", "qt"} and language in _LANGUAGES
+    if "plugins" in parts:
+        return _is_wanted_plugin(parts[parts.index("plugins") + 1 :])
+    return True
+
+
+def _is_wanted_plugin(parts: tuple[str, ...]) -> bool:
+    folder, name = parts[0], parts[-1]
+    if folder == "imageformats":
+        return _IMAGE_FORMATS.match(name) is not None
+    if folder == "platforms":
+        return _PLATFORMS.match(name) is not None
+    return folder in _PLUGINS and _NOT_PLUGINS.match(name) is None

@@ -1,0 +1,95 @@
+"""Context: what is packaged, from what, and where the results go."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nep.version import __version__
+
+__all__ = ["APP", "ROOT", "SYSTEMS", "Context", "PackageError", "this_system"]
+
+ROOT = Path(__file__).resolve().parents[1]
+APP = "NEP Studio"
+"""The folder of the frozen program, and its name for people."""
+SYSTEMS = ("windows", "macos", "linux")
+
+
+class PackageError(Exception):
+    """A package can't be built here; the text says why, and what to do."""
+
+
+def this_system() -> str:
+    """The system that this is, as `SYSTEMS` says it."""
+    return {"win32": "windows", "darwin": "macos"}.get(sys.platform, "linux")
+
+
+def _machine() -> str:
+    found = platform.machine().lower()
+    return {"amd64": "x86_64", "aarch64": "arm64"}.get(found, found)
+
+
+def last_commit_s(root: Path = ROOT) -> int:
+    """The time that all files in a package have: $SOURCE_DATE_EPOCH, or that of the last commit."""
+    given = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if given.isdecimal():
+        return int(given)
+    told = subprocess.run(
+        ["git", "log", "-1", "--format=%ct"], cwd=root, capture_output=True, text=True, check=False
+    )
+    return int(told.stdout) if told.returncode == 0 else int((root / "pyproject.toml").stat().st_mtime)
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a packer needs to know.
+
+    `python` is the command of the interpreter whose environment is frozen; `work` is for what is in between.
+    """
+
+    system: str
+    python: Sequence[str] = (sys.executable,)
+    root: Path = ROOT
+    version: str = __version__
+    machine: str = field(default_factory=_machine)
+    epoch: int = field(default_factory=last_commit_s)
+
+    @property
+    def dist(self) -> Path:
+        """Where the packages go."""
+        return self.root / "dist"
+
+    @property
+    def work(self) -> Path:
+        """For what is in between."""
+        return self.root / "build" / "package" / self.system
+
+    @property
+    def frozen(self) -> Path:
+        """The frozen program: a folder that runs as it is."""
+        return self.work / "dist" / APP
+
+    @property
+    def environ(self) -> Mapping[str, str]:
+        """For programs that write files: the same files each time, as far as they can."""
+        return {
+            **os.environ,
+            "SOURCE_DATE_EPOCH": str(self.epoch),
+            "PYTHONHASHSEED": "0",
+            "LC_ALL": "C.UTF-8",
+        }
+
+    def run(self, *command: str | Path, cwd: Path | None = None) -> None:
+        """Run a program to its end. Raises `PackageError` when it fails or is not there."""
+        words = [str(each) for each in command]
+        try:
+            done = subprocess.run(words, cwd=cwd or self.root, env=dict(self.environ), check=False)
+        except OSError as error:
+            raise PackageError(f"'{words[0]}' can't be run: {error.strerror}") from error
+        if done.returncode != 0:
+            raise PackageError(f"'{Path(words[0]).name}' ended with {done.returncode}; its words are above")

@@ -1,0 +1,5 @@
+"""The command `nep` of a package."""
+
+from nep.cli import main
+
+main()

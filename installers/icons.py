@@ -1,0 +1,74 @@
+"""The program's and the document's icons as pictures, painted by Studio's own code.
+
+Run by an interpreter in whose environment Studio is installed, with no screen:
+
+    python icons.py FOLDER
+
+FOLDER gets `nep-studio-SIZE.png` and `nep-behaviour-SIZE.png` for each of `SIZES`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPolygonF
+from PySide6.QtWidgets import QApplication
+
+from app.ui.shell.bars.logo import paint_logo
+from app.ui.theme.theme import Theme
+
+SIZES = (16, 22, 24, 32, 48, 64, 128, 256, 512, 1024)
+MARGIN = 0.04
+PAPER, EDGE = "#FFFFFF", "#8A94A6"
+
+
+def paint_program(painter: QPainter, rect: QRectF, theme: Theme) -> None:
+    """The logo with a little room around it."""
+    room = rect.width() * MARGIN
+    paint_logo(painter, rect.adjusted(room, room, -room, -room), theme)
+
+
+def paint_behaviour(painter: QPainter, rect: QRectF, theme: Theme) -> None:
+    """A sheet of paper with a folded corner and the logo on it."""
+    side = rect.width()
+
+    def at(x: float, y: float) -> QPointF:
+        return QPointF(rect.left() + x * side, rect.top() + y * side)
+
+    pen = QPen(QColor(EDGE), max(1.0, side / 48))
+    pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+    painter.setPen(pen)
+    painter.setBrush(QColor(PAPER))
+    corners = ((0.16, 0.05), (0.62, 0.05), (0.84, 0.27), (0.84, 0.95), (0.16, 0.95))
+    painter.drawPolygon(QPolygonF([at(*each) for each in corners]))
+    painter.drawPolyline(QPolygonF([at(0.62, 0.05), at(0.62, 0.27), at(0.84, 0.27)]))
+    paint_logo(painter, QRectF(at(0.28, 0.38), at(0.72, 0.82)), theme)
+
+
+PICTURES = {"nep-studio": paint_program, "nep-behaviour": paint_behaviour}
+
+
+def main() -> int:
+    """Paint all; 0, or 1 when one can't be written."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    _application = QApplication(sys.argv[:1])  # the theme asks it
+    theme, folder = Theme("light"), Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    is_well = True
+    for name, picture in PICTURES.items():
+        for size in SIZES:
+            image = QImage(size, size, QImage.Format.Format_ARGB32)
+            image.fill(Qt.GlobalColor.transparent)
+            painter = QPainter(image)
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            picture(painter, QRectF(image.rect()), theme)
+            painter.end()
+            is_well = image.save(str(folder / f"{name}-{size}.png")) and is_well
+    return 0 if is_well else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,217 @@
+"""The packages for Linux: `nep-studio_VERSION_ARCH.deb` and `NEP-Studio-VERSION-linux-ARCH.tar.xz`.
+
+Both hold the same folder: the two programs, what they need, `share` with the desktop's files, `install.sh`
+for those who unpacked it in their home, the licences and the notice. An AppImage is made where `appimagetool` is.
+"""
+
+from __future__ import annotations
+
+import gzip
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from installers.context import APP, ROOT, Context, PackageError
+from installers.freeze import add_licences, freeze
+from installers.icons_of import ICON_SIZES, paint_icons
+from tools.system_packages import QT_LIBRARIES
+
+HERE = Path(__file__).resolve().parent
+NAME = "nep-studio"
+PREFIX = Path("opt") / NAME
+ARCHITECTURES = {"x86_64": "amd64", "arm64": "arm64"}
+NEEDED = (
+    *QT_LIBRARIES, "libfreetype6", "libstdc++6", "libgcc-s1", "libdrm2", "libgbm1", "libx11-6", "libxext6",
+    "libxfixes3",
+)  # fmt: skip
+"""What of Debian's the programs are linked with; one name or the other, as releases call them."""
+RECOMMENDED = (
+    "libcups2t64|libcups2", "libpulse0", "libspeechd2", "fonts-noto-color-emoji", "xdg-desktop-portal",
+)  # fmt: skip
+"""Without these it works, but for printing, sounds, voices, pictures in text, the desktop's file dialogs."""
+LIBC = re.compile(rb"GLIBC_(\d+)\.(\d+)\b")
+DESCRIPTION = """see what robots say, and tell them what to do
+ Watch the messages of robots and programs live, compose behaviours out of blocks,
+ rehearse them on a virtual robot and run them on a real one.
+"""
+
+
+def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
+    """The packages. Raises `PackageError`."""
+    if not (keep_frozen and context.frozen.is_dir()):
+        freeze(context)
+        strip(context)
+    bill = add_licences(context, context.frozen)
+    add_share(context, context.frozen)
+    made = [debian_package(context), archive(context), bill]
+    tool = shutil.which("appimagetool")
+    if tool is None:
+        print("· no AppImage: appimagetool is not on this computer", flush=True)
+        return made
+    return [*made, app_image(context, tool)]
+
+
+def strip(context: Context) -> None:
+    """Take from Python's own libraries what only a debugger reads: two thirds of them where it was built.
+
+    Other libraries come stripped, and some are damaged by doing it again.
+    """
+    tool = shutil.which("strip")
+    inside = context.frozen / "_internal"
+    if tool is None:
+        return
+    for path in (*inside.glob("libpython3*.so*"), *inside.glob("python3*/lib-dynload/*.so")):
+        if not path.is_symlink():
+            context.run(tool, "--strip-unneeded", path)
+
+
+def add_share(context: Context, folder: Path) -> None:
+    """What a desktop asks for: the menu entry, the file type, icons, and who installs them by hand."""
+    share = folder / "share"
+    shutil.rmtree(share, ignore_errors=True)
+    for source, target in (
+        ("nep-studio.desktop", "applications/nep-studio.desktop"),
+        ("nep-studio-mime.xml", "mime/packages/nep-studio.xml"),
+        ("apparmor-profile", "apparmor-profile"),
+    ):
+        (share / target).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(HERE / source, share / target)
+    painted = paint_icons(context)
+    for size in ICON_SIZES:
+        for name, kind, target in (
+            ("nep-studio", "apps", "nep-studio"),
+            ("nep-behaviour", "mimetypes", "application-x-nep-behaviour"),
+        ):
+            place = share / "icons" / "hicolor" / f"{size}x{size}" / kind / f"{target}.png"
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(painted / f"{name}-{size}.png", place)
+    shutil.copyfile(HERE / "install.sh", folder / "install.sh")
+    (folder / "install.sh").chmod(0o755)
+
+
+# ---- the archive ----------------------------------------------------------------------------------
+
+
+def archive(context: Context) -> Path:
+    """The .tar.xz: sorted, with one time and owner for all, so that the same files give the same bytes."""
+    made = context.dist / f"NEP-Studio-{context.version}-linux-{context.machine}.tar.xz"
+    top = f"NEP-Studio-{context.version}"
+    made.unlink(missing_ok=True)
+    context.run(
+        "tar", "--create", "--sort=name", f"--mtime=@{context.epoch}", "--owner=0", "--group=0",
+        "--numeric-owner", "--mode=u+rwX,go+rX,go-w", f"--transform=flags=r;s|^{APP}|{top}|",
+        "--use-compress-program=xz -6 -T2", f"--file={made}", f"--directory={context.frozen.parent}", APP,
+    )  # fmt: skip
+    return made
+
+
+# ---- the Debian package ---------------------------------------------------------------------------
+
+
+def debian_package(context: Context) -> Path:
+    """The .deb, for Debian and Ubuntu."""
+    if shutil.which("dpkg-deb") is None:
+        raise PackageError("dpkg-deb is not on this computer; the .deb is made on Debian and Ubuntu")
+    root = context.work / "deb"
+    shutil.rmtree(root, ignore_errors=True)
+    program = root / PREFIX
+    shutil.copytree(context.frozen, program, symlinks=True)
+    for each in ("applications", "mime", "icons"):  # they are where every desktop looks
+        shutil.move(program / "share" / each, root / "usr" / "share" / each)
+    (program / "install.sh").unlink()
+    (root / "usr" / "bin").mkdir(parents=True)
+    (root / "usr" / "bin" / NAME).symlink_to(f"/{PREFIX}/{NAME}")
+    _write_documents(context, root / "usr" / "share" / "doc" / NAME)
+    _set_modes(root)
+    control = root / "DEBIAN"
+    control.mkdir()
+    (control / "control").write_text(control_file(context, root, control), "utf-8")
+    for each in ("postinst", "prerm"):
+        shutil.copyfile(HERE / each, control / each)
+        (control / each).chmod(0o755)
+    (control / "md5sums").write_text("".join(_sums(root, control)), "utf-8")
+    made = context.dist / f"{NAME}_{context.version}_{_architecture(context)}.deb"
+    context.run("dpkg-deb", "--root-owner-group", "-Zxz", "-z6", "--threads-max=2", "--build", root, made)
+    return made
+
+
+def control_file(context: Context, root: Path, control: Path) -> str:
+    """The package's description for dpkg."""
+    files = [path for path in root.rglob("*") if path.is_file() and control not in path.parents]
+    size = sum(path.lstat().st_size for path in files)
+    needed = [f"libc6 (>= {libc_needed(root)})", *(_alternatives(each) for each in NEEDED)]
+    return (
+        f"Package: {NAME}\nVersion: {context.version}\nArchitecture: {_architecture(context)}\n"
+        "Maintainer: The NEP Studio authors <nep-studio@localhost>\nSection: science\nPriority: optional\n"
+        f"Installed-Size: {size // 1024}\n"
+        f"Depends: {', '.join(needed)}\n"
+        f"Recommends: {', '.join(map(_alternatives, RECOMMENDED))}\n"
+        f"Description: {DESCRIPTION}"
+    )
+
+
+def _alternatives(entry: str) -> str:
+    return " | ".join(entry.split("|"))
+
+
+def libc_needed(folder: Path) -> str:
+    """The newest version of the C library that a program or library in a folder asks for."""
+    versions = {
+        (int(major), int(minor))
+        for path in _libraries(folder)
+        for major, minor in LIBC.findall(path.read_bytes())
+    }
+    return "{}.{}".format(*max(versions)) if versions else "2.28"
+
+
+def _libraries(folder: Path) -> Iterator[Path]:
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and not path.is_symlink():
+            with path.open("rb") as file:
+                if file.read(4) == b"\x7fELF":
+                    yield path
+
+
+def _write_documents(context: Context, folder: Path) -> None:
+    folder.mkdir(parents=True)
+    shutil.copyfile(context.frozen / "NOTICE.txt", folder / "copyright")
+    changes = (ROOT / "CHANGELOG.md").read_bytes()
+    (folder / "changelog.gz").write_bytes(gzip.compress(changes, 9, mtime=context.epoch))
+
+
+def _set_modes(root: Path) -> None:
+    """Everybody may read all, and run what is run; nobody but the administrator may write."""
+    for path in [root, *root.rglob("*")]:
+        if not path.is_symlink():
+            is_run = path.is_dir() or os.access(path, os.X_OK)
+            path.chmod(0o755 if is_run else 0o644)
+
+
+def _sums(root: Path, control: Path) -> Iterable[str]:
+    files = [path for path in sorted(root.rglob("*")) if path.is_file() and not path.is_symlink()]
+    wanted = [str(path.relative_to(root)) for path in files if control not in path.parents]
+    told = subprocess.run(["md5sum", "--", *wanted], cwd=root, capture_output=True, text=True, check=True)
+    return [told.stdout]
+
+
+def _architecture(context: Context) -> str:
+    return ARCHITECTURES.get(context.machine, context.machine)
+
+
+# ---- the AppImage ---------------------------------------------------------------------------------
+
+
+def app_image(context: Context, tool: str) -> Path:
+    """The AppImage, by its own tool."""
+    folder = context.work / "NEP-Studio.AppDir"
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(context.frozen, folder, symlinks=True)
+    (folder / "AppRun").symlink_to("nep-studio")
+    shutil.copyfile(HERE / "nep-studio.desktop", folder / "nep-studio.desktop")
+    shutil.copyfile(paint_icons(context) / "nep-studio-256.png", folder / "nep-studio.png")
+    made = context.dist / f"NEP-Studio-{context.version}-linux-{context.machine}.AppImage"
+    context.run(tool, "--no-appstream", folder, made)
+    return made
