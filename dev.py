@@ -12,6 +12,7 @@ Ubuntu), the virtual environment ``.venv``, the pinned packages in it, and a vir
     screenshots    the pictures of the README
     guide-pictures the pictures of the guide, in each language
     reference      the pages of docs/api, from the docstrings
+    package        the installers of this system, into dist/; -- --system windows makes Windows' (by Wine)
     setup          only make the environment
 
 What stands behind the command goes to the program that it starts. Standard library only.
@@ -35,7 +36,7 @@ from pathlib import Path
 from tools.computer import ROOT, Computer, Trouble, end, timed, venv_python
 from tools.fuzz import fuzz
 from tools.system_packages import bring_system_packages
-from tools.versions import versions
+from tools.versions import environment, pip, versions
 
 PYTHONS = ((3, 10), (3, 13))
 SCREEN = "1600x1000x24"
@@ -187,6 +188,15 @@ def script(
         return computer.do([str(python), path, *arguments], environ, None)
 
 
+def package(computer: Computer, arguments: Sequence[str]) -> int:
+    """Make the packages out of an environment that has only what goes into them; the exit code."""
+    python = environment(computer, sys.executable, ROOT / "build" / "package" / "env", "package")
+    ours = [*pip(python), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
+    if computer.do(ours, computer.environ, None) != 0:
+        raise Trouble("Studio could not be installed; pip's own words are above")
+    return computer.do([str(python), "-m", "installers.package", *arguments], computer.environ, None)
+
+
 def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
     """Prepare this computer and run one command; the exit code of what it started."""
     lowest, highest = PYTHONS
@@ -204,6 +214,8 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
         code = versions(computer, arguments)
     elif command == "fuzz":
         code = fuzz(computer, arguments)
+    elif command == "package":
+        code = package(computer, arguments)
     elif command == "demo":
         code = demo(computer, arguments)
     else:
@@ -221,7 +233,7 @@ def main(arguments: Sequence[str] | None = None, computer: Computer | None = Non
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("command", choices=["demo", *SCRIPTS, "versions", "fuzz", "setup"])
+    parser.add_argument("command", choices=["demo", *SCRIPTS, "versions", "fuzz", "package", "setup"])
     command: str = parser.parse_args(given[:1]).command
     # A terminal that closes, or a CI that gives up, must not leave a virtual screen behind.
     for name in ("SIGTERM", "SIGHUP"):

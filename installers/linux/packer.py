@@ -1,7 +1,8 @@
 """The packages for Linux: `nep-studio_VERSION_ARCH.deb` and `NEP-Studio-VERSION-linux-ARCH.tar.xz`.
 
 Both hold the same folder: the two programs, what they need, `share` with the desktop's files, `install.sh`
-for those who unpacked it in their home, the licences and the notice. An AppImage is made where `appimagetool` is.
+for those who unpacked it in their home, the licences and the notice. Where `appimagetool` is, there is an
+AppImage, too.
 """
 
 from __future__ import annotations
