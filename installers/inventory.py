@@ -35,6 +35,7 @@ QT_WHEELS = ("pyside6", "pyside6-addons", "pyside6-essentials", "shiboken6")
 LGPL = "LGPL-3.0-only"
 EDITOR_PART = re.compile(r"^(@?[\w./-]+) (\d[\w.-]*) \(([^)\n]+)\)$", re.MULTILINE)
 HERE = Path(__file__).resolve().parent
+APACHE = HERE / "licences" / "Apache-2.0.txt"
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,8 @@ def parts_of(project: str = PROJECT, extra: str = EXTRA) -> Iterator[Part]:
                 waiting.append(needed)
         if name not in told:
             told.add(name)
-            yield Part(name, found.version, _licence(found), tuple(_texts(found)))
+            licence = _licence(found)
+            yield Part(name, found.version, licence, tuple(_texts(found)) or _common_text(licence, name))
 
 
 def _licence(found: metadata.Distribution) -> str:
@@ -80,6 +82,13 @@ def _licence(found: metadata.Distribution) -> str:
     ]
     short = [each for each in said if each and len(each) < 100 and "\n" not in each]
     return str(short[0]) if short else " OR ".join(classes)
+
+
+def _common_text(licence: str, name: str) -> tuple[tuple[str, Path], ...]:
+    """For a distribution that comes without: the text, if it is one that we have."""
+    if name in QT_WHEELS or "apache" not in licence.lower():
+        return ()
+    return ((APACHE.name, APACHE),)
 
 
 def _texts(found: metadata.Distribution) -> Iterator[tuple[str, Path]]:
@@ -100,7 +109,7 @@ def others(resources: Path) -> Iterator[Part]:
     texts = [("LICENSE.txt", each) for each in beside if each.is_file()]
     yield Part("cpython", platform.python_version(), "PSF-2.0", texts[:1], "generic")
     qt = metadata.version("PySide6-Essentials")
-    own = [(each.name, each) for each in sorted((HERE / "licences").iterdir())]
+    own = [(each.name, each) for each in sorted((HERE / "licences").glob("*GPL-*"))]
     yield Part("qt", qt, LGPL, own, "generic")
     yield Part("pyinstaller", metadata.version("pyinstaller"), "GPL-2.0-or-later WITH Bootloader-exception")
     yield from editor_parts(resources / "blockly" / "LEGAL.txt")

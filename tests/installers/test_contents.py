@@ -1,0 +1,81 @@
+"""What goes into a package, by the names that files have on each system."""
+
+from __future__ import annotations
+
+import pytest
+
+from installers.contents import is_wanted
+
+WANTED = [
+    "PySide6/Qt/lib/libQt6WebEngineCore.so.6",
+    "PySide6/Qt/lib/libQt6Widgets.so.6",
+    "PySide6/Qt/lib/libQt6Quick.so.6",
+    "PySide6/Qt/lib/libQt6QmlModels.so.6",
+    "PySide6/Qt/lib/libQt6Multimedia.so.6",
+    "PySide6/Qt/libexec/QtWebEngineProcess",
+    "PySide6/Qt/plugins/platforms/libqxcb.so",
+    "PySide6/Qt/plugins/platforms/libqwayland.so",
+    "PySide6/Qt/plugins/imageformats/libqjpeg.so",
+    "PySide6/Qt/plugins/texttospeech/libqtexttospeech_speechd.so",
+    "PySide6/Qt/resources/icudtl.dat",
+    "PySide6/Qt/resources/v8_context_snapshot.bin",
+    "PySide6/Qt/translations/qtwebengine_locales/en-US.pak",
+    "PySide6/Qt/translations/qtwebengine_locales/es.pak",
+    "PySide6/Qt/translations/qtbase_es.qm",
+    "PySide6\\plugins\\platforms\\qwindows.dll",
+    "PySide6\\plugins\\styles\\qmodernwindowsstyle.dll",
+    "PySide6\\Qt6WebEngineCore.dll",
+    "PySide6\\QtWebEngineProcess.exe",
+    "PySide6/Qt/lib/QtWebEngineCore.framework/Versions/A/QtWebEngineCore",
+    "PySide6/Qt/plugins/platforms/libqcocoa.dylib",
+    "app/_resources/blockly/editor.js",
+    "app/_resources/guide/en/start.md",
+    "cv2/cv2.abi3.so",
+    "opencv_python_headless.libs/libpng16-529cb57a.so.16.58.0",
+    "numpy.libs/libscipy_openblas64_-32a4b2a6.so",
+    "libpython3.11.so.1.0",
+    "libnss3.so",
+    "libxcb-cursor.so.0",
+    "libcrypto.so.3",
+]
+
+UNWANTED = [
+    "PySide6/Qt/lib/libQt63DRender.so.6",
+    "PySide6/Qt/lib/libQt6Quick3D.so.6",
+    "PySide6/Qt/lib/libQt6Designer.so.6",
+    "PySide6/Qt/lib/libavcodec.so.61",
+    "libavcodec.so.61",
+    "PySide6\\avcodec-61.dll",
+    "PySide6/Qt/qml/QtQuick/Controls/Basic/libqtquickcontrols2basicstyleplugin.so",
+    "PySide6/Qt/plugins/multimedia/libffmpegmediaplugin.so",
+    "PySide6/Qt/plugins/platformthemes/libqgtk3.so",
+    "PySide6/Qt/plugins/sqldrivers/libqsqlite.so",
+    "PySide6\\plugins\\sqldrivers\\qsqlite.dll",
+    "PySide6\\Qt63DCore.dll",
+    "PySide6/Qt/plugins/imageformats/libqtiff.so",
+    "PySide6/Qt/plugins/platforms/libqvnc.so",
+    "PySide6/Qt/resources/qtwebengine_devtools_resources.pak",
+    "PySide6/Qt/translations/qtwebengine_locales/de.pak",
+    "PySide6/Qt/translations/qtbase_de.qm",
+    "PySide6/Qt/translations/designer_es.qm",
+    "cv2/data/haarcascade_eye.xml",
+    "libstdc++.so.6",
+    "libX11.so.6",
+    "libX11-xcb.so.1",
+    "libglib-2.0.so.0",
+    "libpulsecommon-16.1.so",
+    "libatk-bridge-2.0.so.0",
+    "libcups.so.2",
+    "libfontconfig.so.1",
+    "libharfbuzz.so.0",
+]
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_what_studio_uses_goes_in(name: str) -> None:
+    assert is_wanted(name)
+
+
+@pytest.mark.parametrize("name", UNWANTED)
+def test_what_only_comes_with_it_stays_out(name: str) -> None:
+    assert not is_wanted(name)
