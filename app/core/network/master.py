@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from app.core.own_process import module_command
 from nep.errors import NepError
 from nep.masters.master import is_running, start_process
 from nep.protocol.graph_view import GraphView
@@ -111,7 +112,7 @@ class MasterStart:
             return f"{hindered.sentence} {hindered.mend}"
         self.first = True
         try:
-            self._process = start_process(self._address, owner_pid=os.getpid())
+            self._process = start_process(self._address, owner_pid=os.getpid(), command=module_command("nep"))
         except (NepError, OSError) as error:
             return str(error)
         return ""

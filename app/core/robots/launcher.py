@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -15,6 +14,7 @@ from dataclasses import dataclass
 from typing import IO, Protocol
 
 from app.core.network.master import MasterStart
+from app.core.own_process import module_command
 from app.robots.identity import Identity
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
@@ -51,13 +51,6 @@ class LaunchFailed:
     sentence: str
     detail: str
     is_robot: bool = True
-
-
-def module_command(module: str) -> list[str]:
-    """The command that runs one of our modules as a process of its own, also from a frozen build."""
-    if getattr(sys, "frozen", False):
-        return [sys.executable, "--module", module]
-    return [sys.executable, "-m", module]
 
 
 class Process(Protocol):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import socket
+import sys
+from pathlib import Path
 
 import psutil
 import pytest
@@ -12,6 +14,8 @@ import nep
 from app.core.network.master import AGAIN_AT_MOST_S, LEARNING_S, MasterChange, MasterStart
 from nep.protocol.graph_view import GraphView
 from tests.nep.programs import eventually
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -56,11 +60,17 @@ def test_a_master_that_runs_is_joined(master) -> None:
     assert (told, start.runs, start.first) == ([], False, False)
 
 
-def test_one_is_started_when_nobody_is_there(monkeypatch) -> None:
+@pytest.fixture
+def free(monkeypatch) -> str:
+    """An address at which nobody is, and a master would meet no other."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
     monkeypatch.setenv("NEP_GATEWAY", "0")
+    return address
+
+
+def the_one_started(address: str) -> None:
     told: list[str] = []
     start = MasterStart(address, told.append)
     start.ensure()
@@ -73,6 +83,21 @@ def test_one_is_started_when_nobody_is_there(monkeypatch) -> None:
     assert start._process is not None
     start._process.terminate()
     start._process.wait(10)
+
+
+def test_one_is_started_when_nobody_is_there(free) -> None:
+    the_one_started(free)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a program of one line is a shell's")
+def test_a_frozen_studio_starts_itself_as_the_master(free, monkeypatch, tmp_path: Path) -> None:
+    """It has no Python that knows "-m nep": it is the only program there, and takes Studio's options."""
+    studio = tmp_path / "nep-studio"
+    studio.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -m app "$@"\n', "utf-8")
+    studio.chmod(0o700)
+    monkeypatch.setattr(sys, "frozen", True, raising=False)
+    monkeypatch.setattr(sys, "executable", str(studio))
+    the_one_started(free)
 
 
 def view(epoch: int) -> GraphView:
