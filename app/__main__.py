@@ -22,7 +22,7 @@ from nep.errors import NepError
 from nep.i18n import _, begin
 from nep.system.addresses import MASTER_VARIABLE, master_address
 from nep.system.descriptors import allow_many
-from nep.system.streams import close_streams, prepare_streams, words_given
+from nep.system.streams import close_streams, prepare_streams, tell, words_given
 from nep.version import __version__
 
 PROCESSES = ("app.blocks.runtime.child", "app.robots.simulated", "app.robots.turtle", "nep")
@@ -50,6 +50,15 @@ def window_parser() -> argparse.ArgumentParser:
     made.add_argument("--theme", choices=("light", "dark", "system"), help=_("its colours"))
     made.add_argument(
         "--self-drive", metavar="DIR", type=Path, help=_("do the main job alone; screenshots go to DIR")
+    )
+    made.add_argument(
+        "--selftest",
+        metavar="DIR",
+        type=Path,
+        help=_("try whether all of Studio works; a report goes to DIR"),
+    )
+    made.add_argument(
+        "--no-web", dest="web", action="store_false", help=_("with --selftest: without the block editor")
     )
     return made
 
@@ -93,7 +102,8 @@ def _main(given: Sequence[str]) -> int:
         return hand_over(given[1], given[2:])
     from app.core.storage.settings import Settings  # noqa: PLC0415  the processes of a frozen build need none
 
-    begin(Settings().get("language", ""))
+    tests_itself = any(word.startswith("--selft") for word in given)  # it leaves a person's settings alone
+    begin("" if tests_itself else Settings().get("language", ""))
     if given[:1] == ["run"]:
         return run_behaviour(given[1:])
     parser = window_parser()
@@ -103,6 +113,10 @@ def _main(given: Sequence[str]) -> int:
             os.environ[MASTER_VARIABLE] = master_address(options.master)
         except NepError as error:
             parser.error(str(error))
+    if options.selftest is not None:
+        return end_process(self_test(options.selftest, web=options.web))
+    if not options.web:
+        parser.error(_("--no-web belongs to --selftest"))
     gc.disable()  # a tenth of the time to start; the window enables it again (`app.ui.startup.interpreter`)
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")
@@ -113,6 +127,34 @@ def _main(given: Sequence[str]) -> int:
         Options(tuple(options.files), options.demo, options.theme, options.self_drive, options.new_window)
     )
     return end_process(code)
+
+
+def self_test(folder: Path, *, web: bool) -> int:
+    """Try in the real window whether all of Studio works; what came out is in ``folder``.
+
+    0 when all went well, 1 when something did not (the report says what), 2 when ``folder`` can't be written.
+    """
+    from app.core.self_test import SelfTest, UnwritableFolderError, prepare  # noqa: PLC0415  for this alone
+
+    try:
+        is_root = hasattr(os, "geteuid") and os.geteuid() == 0
+        test = SelfTest(prepare(folder, os.environ, is_root=is_root), {"web": web})
+    except UnwritableFolderError as error:
+        tell(f"nep-studio: {error}")
+        return 2
+
+    def show() -> int:
+        test.begin("program", _("the program is loaded"))
+        importlib.import_module("app.core.session")
+        allow_many()
+        self_test = importlib.import_module("app.ui.self_test")  # what can't be loaded is in the report
+        return int(self_test.show(test, web=web))
+
+    gc.disable()  # as at every start of the window
+    code = test.run(show)
+    words = test.report.why or _("the self-test went well")
+    (sys.stderr if code else sys.stdout).write(f"{words}: {test.place.folder}\n")
+    return code
 
 
 def run_behaviour(arguments: Sequence[str]) -> int:

@@ -39,9 +39,10 @@ from nep.i18n import ENGLISH, _, language
 
 LOG_EVERY_MS = 500
 BEGUN = "begun"  # kept since the first start
+WEB_VIEW = "app.ui.blockly.view"
 SOON = (
     "app.ui.shell.dialogs.command_palette",
-    "app.ui.blockly.view",
+    WEB_VIEW,
     "app.ui.shell.dialogs.settings",
     "app.ui.shell.dialogs.shortcuts",
 )
@@ -59,11 +60,15 @@ class Options:
     theme: str | None = None
     self_drive: Path | None = None
     new_window: bool = False
+    drive: Callable[[MainWindow], SelfDrive] | None = None
+    """Drives the window, from before it is shown until it closes, and tells whether all went well."""
+    web: bool = True
+    """Whether the block editor's page is wanted: without, nothing of the web engine is loaded."""
 
     @property
     def alone(self) -> bool:
         """Whether this window shares nothing with others: neither files of later starts nor tabs."""
-        return self.new_window or self.self_drive is not None
+        return self.new_window or self.self_drive is not None or self.drive is not None
 
 
 def make_application() -> QApplication:
@@ -98,10 +103,10 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
     return translator
 
 
-def steps_after(window: MainWindow) -> list[Callable[[], object]]:
+def steps_after(window: MainWindow, *, web: bool = True) -> list[Callable[[], object]]:
     """What a person needs a moment later: the panels, and the editor, which has then only to be started."""
     panels = window.panels.steps() if isinstance(window.panels, PanelRegistry) else ()
-    modules = (partial(importlib.import_module, name) for name in SOON)
+    modules = (partial(importlib.import_module, name) for name in SOON if web or name != WEB_VIEW)
     return [*panels, *modules, *window.steps_ahead()]
 
 
@@ -227,7 +232,8 @@ def run(options: Options) -> int:
     hearing.timeout.connect(lambda: log.take(session.console.add))
     hearing.start(LOG_EVERY_MS)
     speaker = session.voices.speaker = QtSpeaker()
-    soon = DeferredSteps(window, steps_after(window))
+    soon = DeferredSteps(window, steps_after(window, web=options.web))
+    driver = options.drive(window) if options.drive is not None else None
     window.show()
     window.activateWindow()  # keys go there at once, also where no window manager sees to it
     first = first_steps(window, options)
@@ -241,7 +247,8 @@ def run(options: Options) -> int:
     IncomingFiles(window, window.commands.files.open_all)
     if isinstance(application, Application):
         application.open_files_with(window.commands.files.open_all)
-    driver = SelfDrive(window, options.self_drive) if options.self_drive is not None else None
+    if driver is None and options.self_drive is not None:
+        driver = SelfDrive(window, options.self_drive)
     code = application.exec()
     speaker.close()
     if driver is not None and not driver.well:

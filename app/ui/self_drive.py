@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
@@ -22,7 +23,11 @@ SETTLE_S = 0.6
 
 @dataclass(frozen=True)
 class Step:
-    """What to do, what must be seen afterwards, within which time, and the picture's name ("": none)."""
+    """What to do, what must be seen afterwards, within which time, and the picture's name ("": none).
+
+    ``wrong`` says why it can't be seen any more, "" while it can: then nobody waits for the rest of the time.
+    ``said`` tells what exactly was seen, ``name`` is what a report calls the step.
+    """
 
     what: str
     do: Callable[[], object]
@@ -30,15 +35,57 @@ class Step:
     within_s: float = 20.0
     picture: str = ""
     settle_s: float = SETTLE_S
+    wrong: Callable[[], str] = lambda: ""
+    said: Callable[[], str] = lambda: ""
+    name: str = ""
+
+
+class Listener(Protocol):
+    """Who is told how the steps go."""
+
+    def begun(self, step: Step) -> None:
+        """This step is taken now."""
+
+    def seen(self, step: Step) -> None:
+        """What it must show was seen, and is in its picture."""
+
+    def ended(self, well: bool, words: str) -> None:
+        """All were seen, or one was not and ``words`` say which; the window closes now."""
+
+
+class SaysEnd:
+    """Says at the end how it went, where a command says such things."""
+
+    def begun(self, step: Step) -> None:
+        """Nothing is said of single steps."""
+
+    def seen(self, step: Step) -> None:
+        """Nothing is said of single steps."""
+
+    def ended(self, well: bool, words: str) -> None:
+        """The line on stdout, or on stderr."""
+        (sys.stdout if well else sys.stderr).write(words + "\n")
 
 
 class SelfDrive(QObject):
     """Does the steps one after the other, then closes the window; ``well`` tells whether all were seen."""
 
-    def __init__(self, window: MainWindow, folder: Path, steps: Sequence[Step] | None = None) -> None:
-        """Begin at once; ``steps`` replace the main job."""
+    def __init__(
+        self,
+        window: MainWindow,
+        folder: Path,
+        steps: Sequence[Step] | None = None,
+        listener: Listener | None = None,
+        failed_picture: str = "failed",
+    ) -> None:
+        """Begin at once; ``steps`` replace the main job. ``listener`` is told, by default who reads stdout.
+
+        ``failed_picture`` is the name of the picture of a step that was not seen.
+        """
         super().__init__(window)
         self._window, self._commands, self._folder = window, window.commands, folder
+        self._listener = listener if listener is not None else SaysEnd()
+        self._failed_picture = failed_picture
         self.well = False
         self.pictures: list[Path] = []
         self._steps = iter(steps if steps is not None else self._plan())
@@ -110,21 +157,42 @@ class SelfDrive(QObject):
         if self._step is None:
             self._end(True, f"the main job was done; {len(self.pictures)} pictures are in {self._folder}")
             return
-        self._step.do()
+        self._listener.begun(self._step)
+        try:
+            self._step.do()
+        except Exception as error:
+            self._miss(self._step, f"{type(error).__name__}: {error}")
+            raise
 
     def _look(self) -> None:
-        step, now = self._step, time.monotonic()
+        step = self._step
         if step is None:
             return
+        try:
+            self._look_for(step, time.monotonic())
+        except Exception as error:
+            self._miss(step, f"{type(error).__name__}: {error}")
+            raise
+
+    def _look_for(self, step: Step, now: float) -> None:
         if self._seen_at is None and step.seen():
             self._seen_at = now
         if self._seen_at is not None:
             if now - self._seen_at >= step.settle_s:
                 self._grab(step.picture)
+                self._listener.seen(step)
                 self._next()
+        elif wrong := step.wrong():
+            self._miss(step, wrong)
         elif now - self._began > step.within_s:
-            self._grab("failed")
-            self._end(False, f"not seen within {step.within_s:g} s: {step.what}")
+            self._miss(step, "")
+
+    def _miss(self, step: Step, why: str) -> None:
+        self._grab(self._failed_picture)
+        words = (
+            f"not seen: {step.what}: {why}" if why else f"not seen within {step.within_s:g} s: {step.what}"
+        )
+        self._end(False, words)
 
     def _grab(self, name: str) -> None:
         if not name:
@@ -139,7 +207,9 @@ class SelfDrive(QObject):
         self.well = well
         self._timer.stop()
         self._step = None
-        (sys.stdout if well else sys.stderr).write(words + "\n")
-        for widget in QApplication.topLevelWidgets():
-            if widget is self._window:
-                widget.close()
+        try:
+            self._listener.ended(well, words)
+        finally:  # whatever is said of it: nobody is there to close the window
+            for widget in QApplication.topLevelWidgets():
+                if widget is self._window:
+                    widget.close()

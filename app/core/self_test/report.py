@@ -1,0 +1,159 @@
+"""What a self-test leaves: a JSON file that is true at any moment, also when the process is killed."""
+
+from __future__ import annotations
+
+import json
+import platform
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from app.core.storage.atomic_file import write_atomically
+from nep.i18n import _
+from nep.version import __version__
+
+FORMAT, FORMAT_VERSION = "nep-studio-selftest", 1
+OLDEST_S = 24 * 3600.0
+"""No process is older when it begins its self-test: else its clock was set meanwhile."""
+
+
+@dataclass
+class StepReport:
+    """One step: what it is to show, and what became of it; times in ms since the process began."""
+
+    name: str
+    words: str
+    bound_s: float
+    began_ms: int
+    ms: int | None = None
+    ok: bool = False
+    said: str = ""
+
+    def to_json(self) -> dict[str, object]:
+        """As the report has it."""
+        return {
+            "name": self.name,
+            "ok": self.ok,
+            "ms": self.ms,
+            "began_ms": self.began_ms,
+            "bound_s": self.bound_s,
+            "words": self.words,
+            "said": self.said,
+        }
+
+
+def seconds_since_start() -> float:
+    """How long this process has been there, as the system says; 0 where it does not."""
+    try:
+        age = time.time() - psutil.Process().create_time()
+    except psutil.Error:
+        return 0.0
+    return age if 0.0 <= age < OLDEST_S else 0.0
+
+
+class Report:
+    """The report of one self-test; it may be told from any thread, and is written each time."""
+
+    def __init__(self, path: Path, facts: dict[str, object]) -> None:
+        """``facts`` are told with it, beside what it knows of this computer itself."""
+        self._path = path
+        self._lock = threading.RLock()
+        self._offset_s = seconds_since_start() - time.monotonic()
+        self._steps: list[StepReport] = []
+        self._marks: dict[str, int] = {}
+        self._facts: dict[str, object] = {
+            "version": __version__,
+            "system": platform.platform(),
+            "machine": platform.machine(),
+            "python": platform.python_version(),
+            "frozen": bool(getattr(sys, "frozen", False)),
+            "program": sys.executable,
+            "began": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+            **facts,
+        }
+        self._why = ""
+        self._over = False
+
+    def now_ms(self) -> int:
+        """Milliseconds since the process began."""
+        return round((time.monotonic() + self._offset_s) * 1000)
+
+    @property
+    def why(self) -> str:
+        """Why it failed, as a sentence; "" while nothing has."""
+        return self._why
+
+    @property
+    def step(self) -> StepReport | None:
+        """The step that is under way."""
+        with self._lock:
+            newest = self._steps[-1] if self._steps else None
+            return newest if newest is not None and newest.ms is None else None
+
+    def tell(self, **facts: object) -> None:
+        """Something that was found out about this computer."""
+        with self._lock:
+            self._facts.update(facts)
+
+    def mark(self, name: str) -> None:
+        """This moment, once: ``NAME_ms`` in the report."""
+        with self._lock:
+            self._marks.setdefault(f"{name}_ms", self.now_ms())
+
+    def begin(self, name: str, words: str, bound_s: float) -> None:
+        """A step begins; the one before is over."""
+        with self._lock:
+            self._steps.append(StepReport(name, words, bound_s, self.now_ms()))
+            self._write()
+
+    def seen(self, said: str = "") -> None:
+        """What the step is to show was seen."""
+        with self._lock:
+            step = self.step
+            if step is not None:
+                step.ms, step.ok, step.said = self.now_ms(), True, said
+                self._write()
+
+    def fail(self, why: str) -> None:
+        """The test has failed; the first sentence counts."""
+        with self._lock:
+            step = self.step
+            if step is not None:
+                step.ms, step.said = self.now_ms(), why
+            self._why = self._why or why
+            self._write()
+
+    def end(self) -> bool:
+        """It is over; whether all was well."""
+        with self._lock:
+            self._over = True
+            self.mark("total")
+            self._write()
+            return not self._why
+
+    def _write(self) -> None:
+        step, why = self.step, self._why
+        if not why and not self._over:
+            name = step.name if step is not None else (self._steps[-1].name if self._steps else "")
+            why = _("Studio ended in the middle of the self-test; its last step was “{step}”.").format(
+                step=name
+            )
+        told = {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "ok": self._over and not self._why,
+            "why": why,
+            **self._facts,
+            **{name: self._marks.get(name) for name in ("first_paint_ms", "editor_ready_ms", "total_ms")},
+            "steps": [each.to_json() for each in self._steps],
+        }
+        text = json.dumps(told, indent=1, ensure_ascii=False)
+        try:
+            write_atomically(self._path, text.encode("utf-8", "backslashreplace") + b"\n", durable=False)
+        except OSError as error:  # the disk is full, or the folder has gone: the exit code says that much
+            reason = (error.strerror or str(error)).lower()
+            self._why = self._why or _("The report can't be written ({reason})").format(reason=reason)

@@ -1,0 +1,88 @@
+"""Where a self-test lives: a folder, settings and a master of its own, so that it meets no other Studio."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import tempfile
+from collections.abc import MutableMapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.core.storage.atomic_file import write_atomically
+from app.errors import AppError
+from nep.i18n import _
+from nep.system.addresses import MASTER_VARIABLE
+
+REPORT, PICTURE, CRASH = "report.json", "window.png", "crash.txt"
+BEGUN = b"{}\n"
+"""A report before anything is known: no reader takes the one of an earlier test for this one's."""
+
+
+class UnwritableFolderError(AppError):
+    """The self-test's folder can't be written."""
+
+    def __init__(self, folder: Path, reason: str) -> None:
+        self.folder, self.reason = folder, reason
+        super().__init__(
+            _("the folder '{folder}' can't be written ({reason}); choose another one").format(
+                folder=folder, reason=reason
+            )
+        )
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The folder for the results, and in it the home (settings, journal, log) of this test alone."""
+
+    folder: Path
+    home: Path
+    master: str
+
+    def path(self, name: str) -> Path:
+        """One of the files of the results."""
+        return self.folder / name
+
+
+def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -> Surroundings:
+    """Make the folder and a home in it, and put them and a free port for the master into ``environ``.
+
+    What an earlier test left there under the names of the results is removed, and nothing else. Studio's
+    browser runs as root only without its sandbox: the test loads nothing but Studio's own page, and switches
+    it off for itself. Raises UnwritableFolderError.
+    """
+    folder = Path(os.path.abspath(folder))  # noqa: PTH100 - a link in it may stay, the name is told as given
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(folder / REPORT, BEGUN, durable=False)
+        for name in (PICTURE, CRASH):
+            (folder / name).unlink(missing_ok=True)
+        home = Path(tempfile.mkdtemp(prefix="home-", dir=folder))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise UnwritableFolderError(folder, str(reason).lower()) from error
+    made = Surroundings(folder, home, f"127.0.0.1:{_free_port()}")
+    environ["NEP_STUDIO_HOME"] = str(home)
+    environ["NEP_STATE_DIR"] = str(home / "state")
+    environ["NEP_GATEWAY"] = "0"  # its ports are fixed: another Studio, or another test, may have them
+    environ[MASTER_VARIABLE] = made.master
+    if is_root and sys.platform.startswith("linux"):
+        environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
+    return made
+
+
+def remove_home(made: Surroundings) -> None:
+    """Remove the test's own home, as far as that can be done: files may be held by what has just ended."""
+    for path in sorted(made.home.rglob("*"), reverse=True):
+        with suppress(OSError):
+            path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
+    with suppress(OSError):
+        made.home.rmdir()
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

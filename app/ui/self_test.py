@@ -1,0 +1,296 @@
+"""What the self-test does in the real window: a robot, the greeting, its run, Stop, a picture; then the end.
+
+Each step is seen in what a person relies on: the window was painted, the page has drawn the blocks, the robot
+itself says that it moves, and that it stands still. Without the web view the Developer layout shows all this.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Protocol, runtime_checkable
+
+import PySide6
+from PySide6.QtCore import QEvent, QObject, QTimer, qVersion
+from PySide6.QtGui import QGuiApplication, QImage
+
+from app.core.robots.robot_link import RobotLink
+from app.core.self_test import SelfTest, bounds
+from app.core.self_test.surroundings import PICTURE
+from app.core.session import Session
+from app.ui.application import Options, run, why_not
+from app.ui.self_drive import SelfDrive, Step
+from app.ui.shell.main_window import MainWindow
+from nep.i18n import _
+
+ROBOT = "Pepper"
+STATE = f"/{ROBOT}/state"
+POSE = ("theta_deg", "head_", "arm_", "elbow_")
+"""How the names of what turns begin, in the robot's state."""
+SETTLE_S = 1.0
+"""So long nothing is asked before the picture: what just changed is painted then."""
+COMPLAINTS, COMPLAINTS_KEPT = ("warn", "error"), 40
+"""What of the Console is in the report."""
+FEWEST_COLOURS = 24
+"""A window that was painted has more; an empty or a torn one has few."""
+
+
+@runtime_checkable
+class SupportsPictures(Protocol):
+    """A panel with a block editor: it can draw its blocks."""
+
+    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+        """Draw all blocks; b"" while there is no page, or nothing in it."""
+
+
+class FirstPaint(QObject):
+    """Tells once, after the first paint of a window, that it can be seen."""
+
+    def __init__(self, window: MainWindow, done: Callable[[], object]) -> None:
+        """``done`` is called when what the paint began is through."""
+        super().__init__(window)
+        self._window, self._done = window, done
+        window.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Paint and watched is self._window:
+            self._window.removeEventFilter(self)
+            QTimer.singleShot(0, self, self._done)
+        return False
+
+
+class WindowSteps:
+    """The steps of one self-test, and what they look at in the window."""
+
+    def __init__(self, window: MainWindow, test: SelfTest, *, web: bool) -> None:
+        """``web``: with the block editor's page."""
+        self._window, self._session, self._test, self._web = window, window.session, test, web
+        self._painted = False
+        self._drawn = b""
+        self._asked = False
+        self._watched = False
+        self._rest: Mapping[str, object] = {}
+        self._spoken = self._moved = ""
+        self._stopped_after: object = None
+        FirstPaint(window, self._paint_seen)
+
+    def all(self) -> list[Step]:
+        """The steps in their order."""
+        made = [
+            self._step("window", _("the window"), lambda: None, lambda: self._painted),
+            self._step("master", _("the master"), lambda: None, self._has_master, self._master_wrong),
+            self._step("robot", _("the virtual robot"), self._begin, self._has_robot, self._robot_wrong),
+            self._step("behaviour", _("the greeting, as a program"), lambda: None, self._has_program),
+        ]
+        if self._web:
+            made.append(
+                self._step("editor", _("its blocks, in the block editor"), lambda: None, self._has_blocks)
+            )
+        return [
+            *made,
+            self._step("run", _("the program runs"), self._run, self._runs, self._run_wrong),
+            self._step("moves", _("the robot speaks and moves"), lambda: None, self._moves, self._run_wrong),
+            self._step("stop", _("the robot says that it has stopped"), self._stop, self._has_stopped),
+            Step(
+                _("a picture of the window"),
+                lambda: None,
+                lambda: True,
+                bounds.STEP_S["picture"],
+                PICTURE.removesuffix(".png"),
+                SETTLE_S,
+                name="picture",
+            ),
+        ]
+
+    def _step(
+        self,
+        name: str,
+        words: str,
+        do: Callable[[], object],
+        seen: Callable[[], bool],
+        wrong: Callable[[], str] = lambda: "",
+    ) -> Step:
+        return Step(
+            words,
+            do,
+            seen,
+            bounds.STEP_S[name],
+            settle_s=0.0,
+            wrong=wrong,
+            name=name,
+            said=partial(self._said, name),
+        )
+
+    def _said(self, name: str) -> str:
+        """What exactly was seen, for the report."""
+        session = self._session
+        link = session.fleet.link(ROBOT)
+        match name:
+            case "master":
+                return session.master.address
+            case "robot":
+                return link.state_words if link is not None else ""
+            case "behaviour":
+                return session.document.name
+            case "editor":
+                return _("{count} bytes of drawing").format(count=len(self._drawn))
+            case "run":
+                return session.runs.view().title
+            case "moves":
+                return f"“{self._spoken}”, {self._moved}"
+            case "stop":
+                return session.runs.view().result or ""
+        return ""
+
+    # -- what is seen ---------------------------------------------------------------------------------
+
+    def _paint_seen(self) -> None:
+        self._painted = True
+        self._test.report.mark("first_paint")
+
+    def _has_master(self) -> bool:
+        return self._session.master.kind == "connected" and self._session.launcher.started_master
+
+    def _master_wrong(self) -> str:
+        return self._alert("companion:master")
+
+    def _begin(self) -> None:
+        if self._web:
+            self._window.commands.behaviours.demo()
+            return
+        self._session.launcher.start_virtual_robot(ROBOT)
+        self._session.documents.example(self._window.examples[0].path)
+        self._window.show_layout("developer")
+        self._window.open_panel("robot")
+
+    def _link(self) -> RobotLink | None:
+        link = self._session.fleet.link(ROBOT)
+        return link if link is not None and link.state in {"ready", "busy"} else None
+
+    def _has_robot(self) -> bool:
+        if not self._watched and self._link() is not None:
+            self._watched = True
+            self._session.watch(STATE)  # until the session ends
+        return bool(self._state())
+
+    def _robot_wrong(self) -> str:
+        return self._alert(f"companion:{ROBOT}")
+
+    def _has_program(self) -> bool:
+        program = self._session.document.newest()
+        return program is not None and ROBOT in program.robots and program.starts > 0 and not program.errors
+
+    def _has_blocks(self) -> bool:
+        editor = self._window.editor()
+        if not self._asked and isinstance(editor, SupportsPictures):
+            self._asked = True
+            editor.picture("svg", True, self._drew)
+        return bool(self._drawn)
+
+    def _drew(self, drawing: bytes) -> None:
+        self._asked, self._drawn = False, drawing
+        if drawing:
+            self._test.report.mark("editor_ready")
+
+    def _run(self) -> None:
+        self._rest = self._state()
+        self._window.commands.run("run.run")
+
+    def _runs(self) -> bool:
+        runs = self._session.runs
+        return runs.view().state == "running" and bool(runs.running_blocks)
+
+    def _run_wrong(self) -> str:
+        errors = self._session.runs.block_errors
+        return next(iter(errors.values()), "") or self._alert("program")
+
+    def _moves(self) -> bool:
+        state = self._state()
+        turned = (name for name in state if name.startswith(POSE) and state[name] != self._rest.get(name))
+        self._spoken = self._spoken or str(state.get("speech") or "")
+        self._moved = self._moved or next(
+            (f"{name} {self._rest.get(name)} → {state[name]}" for name in turned), ""
+        )
+        return bool(self._spoken and self._moved)
+
+    def _stop(self) -> None:
+        self._stopped_after = self._newest()
+        self._window.commands.run("run.stop")
+
+    def _has_stopped(self) -> bool:
+        view, state = self._session.runs.view(), self._state()
+        still = state.get("moving") is False and not state.get("speech")
+        proven = view.state == "proven" and bool(view.result) and view.result_ok is True
+        return proven and still and self._newest() is not self._stopped_after
+
+    def _newest(self) -> object:
+        topic = self._session.topics.get(STATE)
+        return topic.newest if topic is not None else None
+
+    def _state(self) -> Mapping[str, object]:
+        """What the robot said of itself last."""
+        topic = self._session.topics.get(STATE)
+        payload = topic.newest.payload if topic is not None and topic.newest is not None else None
+        return payload if isinstance(payload, Mapping) else {}
+
+    def _alert(self, id: str) -> str:
+        found = next((each for each in self._session.alerts.active if each.id == id), None)
+        return f"{found.title} {found.detail}".strip() if found is not None else ""
+
+
+class Told:
+    """Tells the self-test how the steps in the window go."""
+
+    def __init__(self, test: SelfTest, session: Session) -> None:
+        self._test, self._session = test, session
+
+    def begun(self, step: Step) -> None:
+        """It has so much time from now on."""
+        self._test.begin(step.name, step.what)
+
+    def seen(self, step: Step) -> None:
+        """It is in the report; so is a picture on which there is nothing."""
+        if not step.picture:
+            self._test.seen(step.said())
+            return
+        shown = colours(QImage(str(self._test.place.path(PICTURE))))
+        if shown < FEWEST_COLOURS:
+            self._test.fail(_("the window's picture has only {count} colours").format(count=shown))
+        else:
+            self._test.seen(_("{count} colours").format(count=shown))
+
+    def ended(self, well: bool, words: str) -> None:
+        """What was not seen is why the test fails; then the window closes, which takes its time, too."""
+        complaints = [each for each in self._session.console.records if each.level in COMPLAINTS]
+        self._test.report.tell(
+            console=[f"{each.level} {each.origin}: {each.text}" for each in complaints[-COMPLAINTS_KEPT:]]
+        )
+        if not well:
+            self._test.fail(words)
+        self._test.begin("close", _("the window closes, and the robot and the program end"))
+
+
+def colours(picture: QImage) -> int:
+    """How many colours a picture has, as far as some of its dots tell; 0 when there is none."""
+    return len(
+        {picture.pixel(x, y) for x in range(0, picture.width(), 7) for y in range(0, picture.height(), 7)}
+    )
+
+
+def show(test: SelfTest, *, web: bool) -> int:
+    """Show the window and take the steps in it; the exit code of the window. ``web``: with the page."""
+    refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
+    if refused:
+        test.fail(refused)
+        return 0
+
+    def drive(window: MainWindow) -> SelfDrive:
+        test.seen(f"Qt {qVersion()}")
+        test.report.tell(qt=qVersion(), pyside=PySide6.__version__, screen=QGuiApplication.platformName())
+        steps = WindowSteps(window, test, web=web).all()
+        told, picture = Told(test, window.session), PICTURE.removesuffix(".png")
+        return SelfDrive(window, test.place.folder, steps, told, picture)
+
+    return run(Options(drive=drive, web=web))

@@ -1,0 +1,134 @@
+"""The self-test's report and watch: true at any moment, and the end of a process in which nothing moves."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+from app.__main__ import main
+from app.core.self_test.report import Report
+from app.core.self_test.surroundings import UnwritableFolderError, prepare
+
+ROOT = Path(__file__).parents[3]
+HANGS = """
+import os, subprocess, sys, threading
+from pathlib import Path
+from app.core.self_test import SelfTest, bounds, prepare
+
+bounds.STEP_S["window"], bounds.GRACE_S = 0.2, 0.2
+test = SelfTest(prepare(Path(sys.argv[1]), os.environ, is_root=False), {})
+child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+print(child.pid, flush=True)
+
+def show():
+    test.begin("window", "the window")
+    threading.Event().wait()
+
+test.run(show)
+"""
+
+
+def told(folder: Path) -> dict:
+    return json.loads((folder / "report.json").read_text("utf-8"))
+
+
+def test_a_report_is_true_at_any_moment(tmp_path: Path) -> None:
+    path = tmp_path / "report.json"
+    report = Report(path, {"web": True})
+    report.begin("window", "the window", 5.0)
+    half = told(tmp_path)
+    assert not half["ok"]
+    assert half["why"] == "Studio ended in the middle of the self-test; its last step was “window”."
+    assert half["steps"][0]["ms"] is None
+    report.seen("it was painted")
+    report.mark("first_paint")
+    assert report.end()
+    whole = told(tmp_path)
+    assert (whole["ok"], whole["why"], whole["web"], whole["frozen"]) == (True, "", True, False)
+    step = whole["steps"][0]
+    assert (step["name"], step["ok"], step["bound_s"], step["said"]) == (
+        "window",
+        True,
+        5.0,
+        "it was painted",
+    )
+    assert 0 < step["began_ms"] <= step["ms"] <= whole["first_paint_ms"] <= whole["total_ms"]
+
+
+def test_the_first_sentence_is_why_it_failed(tmp_path: Path) -> None:
+    report = Report(tmp_path / "report.json", {})
+    report.begin("robot", "the virtual robot", 5.0)
+    report.fail("The robot is not there.")
+    report.fail("The window did not close.")
+    assert not report.end()
+    whole = told(tmp_path)
+    assert (whole["ok"], whole["why"]) == (False, "The robot is not there.")
+    assert (whole["steps"][0]["ok"], whole["steps"][0]["said"]) == (False, "The robot is not there.")
+
+
+def test_a_report_that_cannot_be_written_any_more_is_a_failure(tmp_path: Path) -> None:
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    report = Report(folder / "report.json", {})
+    report.begin("window", "the window", 5.0)
+    (folder / "report.json").unlink()
+    folder.rmdir()
+    folder.write_text("a file is there now", "utf-8")
+    assert not report.end()
+    assert report.why.startswith("The report can't be written (")
+
+
+def test_it_has_a_home_and_a_master_of_its_own(tmp_path: Path) -> None:
+    folder = tmp_path / "自己 テスト"
+    folder.mkdir()
+    (folder / "window.png").write_bytes(b"of an earlier test")
+    (folder / "mine.txt").write_text("a person's", "utf-8")
+    environ = {"NEP_STUDIO_HOME": "/a/home", "NEP_MASTER": "127.0.0.1:7780"}
+    first = prepare(folder, environ, is_root=True)
+    second = prepare(folder, dict(environ), is_root=False)
+    assert environ["NEP_STUDIO_HOME"] == str(first.home)
+    assert environ["NEP_MASTER"] == first.master
+    assert len({first.master, second.master, "127.0.0.1:7780"}) == 3
+    assert first.home.parent == second.home.parent == folder
+    assert first.home != second.home
+    assert not (folder / "window.png").exists()
+    assert (folder / "mine.txt").is_file()
+    assert told(folder) == {}
+
+
+def test_a_folder_that_cannot_be_written_is_a_sentence_and_no_window(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("", "utf-8")
+    before = dict(os.environ)
+    assert main(["--selftest", str(tmp_path / "file" / "below")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"nep-studio: the folder '{tmp_path / 'file' / 'below'}' can't be written (")
+    assert said.endswith("; choose another one\n")
+    assert os.environ == before
+    with pytest.raises(UnwritableFolderError):
+        prepare(tmp_path / "file", {}, is_root=False)
+
+
+def test_a_process_in_which_nothing_moves_is_ended_with_all_that_it_started(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", HANGS, str(tmp_path)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert done.returncode == 1, done.stderr
+    whole = told(tmp_path)
+    assert not whole["ok"]
+    assert whole["why"] == "Studio did not answer in time, and was ended. It waited for: the window"
+    assert not whole["steps"][0]["ok"]
+    assert "in show" in (tmp_path / "crash.txt").read_text("utf-8")  # where it stood
+    assert not psutil.pid_exists(int(done.stdout))

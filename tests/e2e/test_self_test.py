@@ -1,0 +1,134 @@
+"""`nep-studio --selftest DIR`: the one test of every package, with the block editor and without it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import psutil
+import pytest
+
+from tests.e2e.programs import Program
+from tests.e2e.waiting import until
+from tests.e2e.x11 import Screen
+
+pytestmark = pytest.mark.timeout(240)
+ALWAYS = ("program", "window", "master", "robot", "behaviour", "run", "moves", "stop", "picture", "close")
+NO_ROBOT = """
+import sys
+from app.core.robots import launcher
+from app.__main__ import main
+launcher.VIRTUAL_ROBOTS["pepper"] = "app.robots.nobody"
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+class Tried:
+    """One self-test in a process of its own."""
+
+    def __init__(
+        self, screen: Screen, folder: Path, *arguments: str, begin: tuple[str, ...] = ("-m", "app")
+    ) -> None:
+        self.folder, self.own = folder, folder.parent / "a person's own"
+        self.program = Program(
+            *begin,
+            "--selftest",
+            str(folder),
+            *arguments,
+            environment={
+                "DISPLAY": screen.display,
+                "QT_QPA_PLATFORM": "xcb",
+                "QT_QUICK_BACKEND": "software",
+                "NEP_STUDIO_HOME": str(self.own),
+                "NEP_STATE_DIR": str(self.own),
+            },
+        )
+
+    @property
+    def report(self) -> dict:
+        """The report that it has left."""
+        return json.loads((self.folder / "report.json").read_text("utf-8"))
+
+    def steps(self) -> dict[str, dict]:
+        """Its steps by their names."""
+        return {step["name"]: step for step in self.report["steps"]}
+
+    def left(self) -> list[psutil.Process]:
+        """The processes that still live in its home."""
+        found = []
+        for process in psutil.process_iter():
+            try:
+                home = process.environ().get("NEP_STUDIO_HOME", "")
+            except psutil.Error:
+                continue
+            if home.startswith(str(self.folder)) and process.status() != psutil.STATUS_ZOMBIE:
+                found.append(process)
+        return found
+
+    def nothing_is_left(self) -> None:
+        """Processes of the web engine end a moment after the one that they belong to."""
+        until(lambda: not self.left(), lambda: f"all have ended: {self.left()}", 20)
+
+
+@pytest.fixture(scope="module")
+def both(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Tried, Tried]]:
+    """One with the editor and one without, at the same time on the same screen."""
+    folder = tmp_path_factory.mktemp("自己 テスト")
+    web, plain = Tried(screen, folder / "with"), Tried(screen, folder / "without", "--no-web")
+    with web.program, plain.program:
+        web.program.wait(200)
+        plain.program.wait(200)
+        yield web, plain
+
+
+def went_well(tried: Tried, *names: str) -> None:
+    assert tried.program.process.returncode == 0, (tried.report["why"], tried.program.lines[-5:])
+    report, steps = tried.report, tried.steps()
+    assert (report["ok"], report["why"]) == (True, "")
+    assert tuple(steps) == names
+    assert all(step["ok"] for step in steps.values())
+    assert 0 < report["first_paint_ms"] <= steps["robot"]["ms"] <= report["total_ms"]
+    assert "Pepper stopped (" in steps["stop"]["said"]
+    tried.nothing_is_left()
+    assert {path.name for path in tried.folder.iterdir()} == {"report.json", "window.png"}
+    assert not tried.own.exists()  # it has left a person's settings alone
+
+
+def picture(tried: Tried) -> np.ndarray:
+    data = np.frombuffer((tried.folder / "window.png").read_bytes(), np.uint8)
+    return cv2.imdecode(data, cv2.IMREAD_COLOR)
+
+
+def test_with_the_editor_all_of_studio_is_tried_and_nothing_is_left(both: tuple[Tried, Tried]) -> None:
+    tried, _other = both
+    went_well(tried, *ALWAYS[:5], "editor", *ALWAYS[5:], "processes")
+    assert tried.report["first_paint_ms"] < tried.report["editor_ready_ms"] < tried.report["total_ms"]
+    blue = (picture(tried) == (189, 74, 41)).all(axis=2)  # what a robot does: those blocks have this colour
+    assert blue[200:700, 230:600].mean() > 0.1
+
+
+def test_without_the_editor_all_else_is_tried_at_the_same_time(both: tuple[Tried, Tried]) -> None:
+    _other, tried = both
+    went_well(tried, *ALWAYS, "processes")
+    assert tried.report["editor_ready_ms"] is None
+    assert not tried.report["web"]
+    assert picture(tried).shape == (900, 1440, 3)
+
+
+def test_a_step_that_fails_is_said_at_once_with_the_reason(screen: Screen, tmp_path: Path) -> None:
+    tried = Tried(screen, tmp_path / "out", "--no-web", begin=("-c", NO_ROBOT))
+    with tried.program as program:
+        assert program.wait(100) == 1, program.lines
+        assert any("The virtual robot Pepper has ended." in line for line in program.lines)
+    report, robot = tried.report, tried.steps()["robot"]
+    assert not report["ok"]
+    assert report["why"] == robot["said"]
+    assert "the virtual robot: The virtual robot Pepper has ended." in report["why"]
+    assert "app.robots.nobody" in report["why"]
+    assert not robot["ok"]
+    assert robot["ms"] - robot["began_ms"] < robot["bound_s"] * 1000  # nobody waited for the rest of the time
+    assert picture(tried).shape == (900, 1440, 3)
+    tried.nothing_is_left()
