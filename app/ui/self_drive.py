@@ -16,6 +16,7 @@ from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
 from app.ui.shell.main_window import FIRST_SIZE, MainWindow
+from nep.i18n import _, number
 
 LOOK_MS = 100
 SETTLE_S = 0.6
@@ -189,9 +190,11 @@ class SelfDrive(QObject):
 
     def _miss(self, step: Step, why: str) -> None:
         self._grab(self._failed_picture)
-        words = (
-            f"not seen: {step.what}: {why}" if why else f"not seen within {step.within_s:g} s: {step.what}"
-        )
+        if why:
+            words = _("not seen: {what}: {why}").format(what=step.what, why=why)
+        else:
+            seconds = number(step.within_s, "g")
+            words = _("not seen within {seconds} s: {what}").format(seconds=seconds, what=step.what)
         self._end(False, words)
 
     def _grab(self, name: str) -> None:

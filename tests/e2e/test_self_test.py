@@ -106,7 +106,7 @@ def test_with_the_editor_all_of_studio_is_tried_and_nothing_is_left(both: tuple[
     tried, _other = both
     went_well(tried, *ALWAYS[:5], "editor", *ALWAYS[5:], "processes")
     assert tried.report["first_paint_ms"] < tried.report["editor_ready_ms"] < tried.report["total_ms"]
-    blue = (picture(tried) == (189, 74, 41)).all(axis=2)  # what a robot does: those blocks have this colour
+    blue = (picture(tried) == (182, 76, 41)).all(axis=2)  # what a robot does: those blocks have this colour
     assert blue[200:700, 230:600].mean() > 0.1
 
 
