@@ -1,5 +1,11 @@
 """The command `nep` of a package."""
 
+import os
+
+os.environ["OPENCV_VIDEOIO_PRIORITY_FFMPEG"] = (
+    "0"  # packages come without it: installers/linux/film_libraries.py
+)
+
 from nep.cli import main
 
 main()

@@ -1,4 +1,10 @@
-"""The program `nep-studio` of a package; a frozen Studio is its own child processes, too."""
+"""The program `nep-studio` of a package; a frozen Studio is also its own child processes."""
+
+import os
+
+os.environ["OPENCV_VIDEOIO_PRIORITY_FFMPEG"] = (
+    "0"  # packages come without it: installers/linux/film_libraries.py
+)
 
 import sys
 

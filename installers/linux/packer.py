@@ -18,6 +18,7 @@ from pathlib import Path
 from installers.context import APP, ROOT, Context, PackageError
 from installers.freeze import add_licences, freeze
 from installers.icons_of import ICON_SIZES, paint_icons
+from installers.linux.film_libraries import leave_out_films
 from tools.system_packages import QT_LIBRARIES
 
 HERE = Path(__file__).resolve().parent
@@ -45,6 +46,7 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
     if not (keep_frozen and context.frozen.is_dir()):
         freeze(context)
         strip(context)
+        leave_out_films(context)
     bill = add_licences(context, context.frozen)
     add_share(context, context.frozen)
     made = [debian_package(context), archive(context), bill]

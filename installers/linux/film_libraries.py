@@ -1,0 +1,105 @@
+"""OpenCV without what plays films: it is linked with FFmpeg, and Studio never asks it for a film.
+
+The loader wants a file for each library that `cv2` names, with the names that it imports. So empty libraries
+take FFmpeg's place; their functions do nothing. The programs switch that part of OpenCV off when they start
+(`installers/entries`), so that nobody calls them. What only FFmpeg needed goes, too. That takes away 35 MB, and all
+that FFmpeg would have to be mended for. Needs gcc and readelf; without them FFmpeg stays.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from installers.context import Context
+
+__all__ = ["FILMS", "leave_out_films"]
+
+FILMS = re.compile(r"lib(?:av(?:codec|format|util)|sw(?:scale|resample))-[0-9a-f]+\.so\.")
+_IMPORTED = re.compile(r"\b(FUNC|OBJECT|NOTYPE)\s+\w+\s+\w+\s+UND\s+(\w+)@(\w+)")
+_NEEDED = re.compile(r"\(NEEDED\)\s+Shared library: \[([^\]]+)\]")
+
+
+def leave_out_films(context: Context) -> int:
+    """Put empty libraries in the place of FFmpeg's; how many bytes that took away."""
+    inside = context.frozen / "_internal"
+    folder = inside / "opencv_python_headless.libs"
+    if shutil.which("gcc") is None or shutil.which("readelf") is None or not folder.is_dir():
+        return 0
+    before = _size(folder)
+    users = [inside / "cv2" / "cv2.abi3.so"]
+    films = [path for path in sorted(folder.iterdir()) if FILMS.match(path.name)]
+    imported = _imported_by(users)
+    needed = set(_needed_by(users))
+    for path in films:
+        if path.name not in needed:
+            path.unlink()
+            continue
+        _make_empty(context, path, imported)
+    _remove_unneeded(folder, users)
+    for link in inside.iterdir():  # PyInstaller puts a link beside the program for each library
+        if link.is_symlink() and not link.exists():
+            link.unlink()
+    return before - _size(folder)
+
+
+def _size(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.iterdir())
+
+
+def _read(option: str, path: Path) -> str:
+    return subprocess.run(
+        ["readelf", "--wide", option, path], capture_output=True, text=True, check=True
+    ).stdout
+
+
+def _needed_by(paths: Iterable[Path]) -> Iterable[str]:
+    for path in paths:
+        yield from _NEEDED.findall(_read("--dynamic", path))
+
+
+def _imported_by(paths: Iterable[Path]) -> Mapping[str, set[str]]:
+    """The functions that these files import, by the version that they ask for, such as LIBAVCODEC_62."""
+    found: dict[str, set[str]] = {}
+    for path in paths:
+        for _kind, name, version in _IMPORTED.findall(_read("--dyn-syms", path)):
+            found.setdefault(version, set()).add(name)
+    return found
+
+
+def _make_empty(context: Context, path: Path, imported: Mapping[str, set[str]]) -> None:
+    """A library of the same name whose functions do nothing."""
+    versions = re.findall(r"Name: (LIB\w+)", _read("--version-info", path))
+    wanted = {version: sorted(imported.get(version, ())) for version in dict.fromkeys(versions)}
+    source, script = context.work / "empty.c", context.work / "empty.map"
+    names = [name for each in wanted.values() for name in each]
+    source.write_text("".join(f"long {name}(void) {{ return 0; }}\n" for name in names), "utf-8")
+    script.write_text(
+        "".join(
+            f"{version} {{ global: {' '.join(f'{name};' for name in each)} }};\n"
+            if each
+            else f"{version} {{ }};\n"
+            for version, each in wanted.items()
+        ),
+        "utf-8",
+    )
+    context.run(
+        "gcc", "-shared", "-fPIC", "-O1", "-w", "-fno-builtin", "-nostdlib", "-s", "-Wl,--build-id=none",
+        f"-Wl,-soname,{path.name}", f"-Wl,--version-script={script}", "-o", path, source,
+    )  # fmt: skip
+
+
+def _remove_unneeded(folder: Path, users: list[Path]) -> None:
+    """Remove what nobody is linked with any more."""
+    waiting, kept = list(users), set[str]()
+    while waiting:
+        for name in _needed_by([waiting.pop()]):
+            if name not in kept and (folder / name).is_file():
+                kept.add(name)
+                waiting.append(folder / name)
+    for path in folder.iterdir():
+        if path.name not in kept:
+            path.unlink()
