@@ -2,8 +2,8 @@
 
 The loader wants a file for each library that `cv2` names, with the names that it imports. So empty libraries
 take FFmpeg's place; their functions do nothing. The programs switch that part of OpenCV off when they start
-(`installers/entries`), so that nobody calls them. What only FFmpeg needed goes, too. That takes away 35 MB, and
-what FFmpeg would have to be mended for. Needs gcc and readelf; without them FFmpeg stays.
+(`installers/entries`), so that nobody calls them. What only FFmpeg needed goes, too. That takes away 35 MB,
+and what FFmpeg would have to be mended for. Needs gcc and readelf; without them FFmpeg stays.
 """
 
 from __future__ import annotations
