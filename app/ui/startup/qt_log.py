@@ -31,6 +31,7 @@ NOISE = re.compile(
     r"|Unable to detect GPU vendor|GBM is not supported with the current configuration"
     r"|GPUInfo not initialized on GpuInfoUpdate|Sandboxing disabled by user"
     r"|Couldn't (load|resolve) (pipewire|va)\b.* (library|symbols)$"
+    r"|Error loading text-to-speech plug-in "  # the speaker says in its own words that there is no voice
     r"|PulseAudioService: pa_context_connect\(\) failed$|Using Qt multimedia with FFmpeg "
     r"|This plugin does not support (propagateSizeHints|raise|createPlatformVulkanInstance)"
 )

@@ -25,6 +25,7 @@ from app.ui.startup.qt_log import FLAGS, Log, TerminalHandler, on_qt_message, qu
         ("initInstance: No Vulkan library available", False),
         ("Unable to detect GPU vendor for device: Mesa/X.org llvmpipe", False),
         ("Sandboxing disabled by user.", False),
+        ('Error loading text-to-speech plug-in "speechd"', False),
         ("QObject::connect: signal not found", True),
         ("The page says: Failed to load vulkan:", True),
     ],
