@@ -24,6 +24,13 @@ from app.__main__ import main
 launcher.VIRTUAL_ROBOTS["pepper"] = "app.robots.nobody"
 sys.exit(main(sys.argv[1:]))
 """
+NO_WEB = """
+import sys
+for name in ("WebChannel", "WebEngineCore", "WebEngineWidgets"):
+    sys.modules[f"PySide6.Qt{name}"] = None  # as where they can't be loaded
+from app.__main__ import main
+sys.exit(main(sys.argv[1:]))
+"""
 
 
 class Tried:
@@ -75,9 +82,10 @@ class Tried:
 
 @pytest.fixture(scope="module")
 def both(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Tried, Tried]]:
-    """One with the editor and one without, at the same time on the same screen."""
+    """One with the editor and one that can't have it, at the same time on the same screen."""
     folder = tmp_path_factory.mktemp("自己 テスト")
-    web, plain = Tried(screen, folder / "with"), Tried(screen, folder / "without", "--no-web")
+    web = Tried(screen, folder / "with")
+    plain = Tried(screen, folder / "without", "--no-web", begin=("-c", NO_WEB))
     with web.program, plain.program:
         web.program.wait(200)
         plain.program.wait(200)
@@ -115,6 +123,7 @@ def test_without_the_editor_all_else_is_tried_at_the_same_time(both: tuple[Tried
     went_well(tried, *ALWAYS, "processes")
     assert tried.report["editor_ready_ms"] is None
     assert not tried.report["web"]
+    assert not [line for line in tried.program.lines if "Traceback" in line or "a fault of Studio" in line]
     assert picture(tried).shape == (900, 1440, 3)
 
 
