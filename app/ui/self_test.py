@@ -279,7 +279,7 @@ def colours(picture: QImage) -> int:
     )
 
 
-def show(test: SelfTest, *, web: bool) -> int:
+def show_steps(test: SelfTest, *, web: bool) -> int:
     """Show the window and take the steps in it; the exit code of the window. ``web``: with the page."""
     refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
     if refused:
