@@ -9,6 +9,7 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, QSize, Qt
 from PySide6.QtGui import (
     QAction,
+    QActionEvent,
     QFontMetricsF,
     QGuiApplication,
     QIcon,
@@ -35,6 +36,7 @@ from app.ui.widgets.paint import RIGHT, box, width_of, words
 CUT_ON = frozenset({"xcb"})
 MARK, LARGEST_MARK, TEXT_LEFT = 15, 22, 33
 SCROLLER = 22  # px, as the style sheet has it
+GUESSED = QAction.MenuRole.TextHeuristicRole
 LEAST_WIDTH = 160  # px; a narrower menu says too little, and rather covers Stop
 
 
@@ -103,13 +105,27 @@ class Menu(QMenu):
     """A menu in the design's look: icons and checks in one column, shortcuts quiet at the right.
 
     Each entry is chosen by a letter, too. It is underlined for who opened the menu by keys.
+
+    On a Mac every entry stays where it is, but for those that were given a role.
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None, title: str = "") -> None:
         super().__init__(title, parent)
         self._theme = theme
         self._by_keys = False
+        self.menuAction().setMenuRole(QAction.MenuRole.NoRole)
         make_round(self)
+
+    def actionEvent(self, event: QActionEvent) -> None:
+        """Let no Mac guess by its words what an entry is for.
+
+        A file, a layout or a robot may be called "About us", "Quit" or "Setup", and would go to the menu with the
+        program's name.
+        """
+        action = event.action()
+        if event.type() == QEvent.Type.ActionAdded and action.menuRole() == GUESSED:
+            action.setMenuRole(QAction.MenuRole.NoRole)
+        super().actionEvent(event)
 
     def letters(self) -> dict[QAction, int]:
         """The place in its words of the letter that chooses each entry; -1 for none."""
