@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import configparser
-import plistlib
 import re
 import shutil
 import subprocess
@@ -42,15 +41,6 @@ def test_linux_knows_the_type_by_its_suffix() -> None:
     (kind,) = ET.parse(FOLDER / "linux" / "nep-studio-mime.xml").getroot().iter(f"{MIME}mime-type")
     assert kind.get("type") == TYPE
     assert [glob.get("pattern") for glob in kind.iter(f"{MIME}glob")] == [f"*{SUFFIX}"]
-
-
-def test_macos_knows_the_type_and_who_opens_it() -> None:
-    content = plistlib.loads((FOLDER / "macos" / "Info.plist").read_bytes())
-    (exported,) = content["UTExportedTypeDeclarations"]
-    (document,) = content["CFBundleDocumentTypes"]
-    assert document["LSItemContentTypes"] == [exported["UTTypeIdentifier"]]
-    tags = exported["UTTypeTagSpecification"]
-    assert tags == {"public.filename-extension": [SUFFIX.lstrip(".")], "public.mime-type": TYPE}
 
 
 def test_windows_opens_the_file_as_one_argument() -> None:

@@ -119,8 +119,8 @@ class Menu(QMenu):
     def actionEvent(self, event: QActionEvent) -> None:
         """Let no Mac guess by its words what an entry is for.
 
-        A file, a layout or a robot may be called "About us", "Quit" or "Setup", and would go to the menu with the
-        program's name.
+        A file, a layout or a robot may be called "About us", "Quit" or "Setup", and would go to the menu
+        with the program's name.
         """
         action = event.action()
         if event.type() == QEvent.Type.ActionAdded and action.menuRole() == GUESSED:

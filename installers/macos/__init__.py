@@ -1,0 +1,1 @@
+"""The package for macOS: an application in a disk image, signed when the owner's name is given."""

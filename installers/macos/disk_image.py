@@ -1,0 +1,90 @@
+"""The disk image: the application, the Applications folder, and an arrow from one to the other."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+from installers.context import APP, Context, PackageError, this_system
+
+__all__ = ["APPLICATIONS_AT", "APP_AT", "ICON_SIDE", "VOLUME", "WINDOW", "dmg", "hfs_image", "settings"]
+
+VOLUME = APP
+WINDOW = (640, 400)
+ICON_SIDE = 128
+APP_AT, APPLICATIONS_AT = (170, 190), (470, 190)
+_CORNER = (200, 120)
+
+
+def settings(app: Path, background: Path, icon: Path) -> dict[str, Any]:
+    """What dmgbuild is told; a picture beside ``background`` with @2x in its name is for Retina screens."""
+    return {
+        "format": "UDZO",
+        "filesystem": "HFS+",
+        "files": [(str(app), app.name)],
+        "symlinks": {"Applications": "/Applications"},
+        "hide_extensions": [app.name],
+        "icon": str(icon),
+        "background": str(background),
+        "window_rect": (_CORNER, WINDOW),
+        "icon_size": float(ICON_SIDE),
+        "text_size": 13.0,
+        "icon_locations": {app.name: APP_AT, "Applications": APPLICATIONS_AT},
+    }
+
+
+def dmg(target: Path, app: Path, background: Path, icon: Path) -> Path:
+    """Make the disk image with macOS' own hdiutil. Raises `PackageError`."""
+    if this_system() != "macos":
+        raise PackageError("a .dmg can be made on a Mac only: it needs hdiutil")
+    import dmgbuild  # noqa: PLC0415  asks at once which macOS this is, and fails where it is none
+
+    target.unlink(missing_ok=True)
+    try:
+        dmgbuild.build_dmg(str(target), VOLUME, settings=settings(app, background, icon))
+    except dmgbuild.DMGError as error:
+        raise PackageError(f"the disk image could not be made: {error}") from error
+    return target
+
+
+def hfs_image(context: Context, target: Path, app: Path, background: Path, icon: Path) -> Path:
+    """The same window as an image of HFS+, by xorrisofs on any computer: to look into, not to give away.
+
+    It is not compressed, and the Finder does not show the background: where it is, only a Mac that has the
+    image open can write down. Raises `PackageError`.
+    """
+    from ds_store import DSStore  # noqa: PLC0415  comes with dmgbuild, which only who makes packages has
+
+    inside = context.work / "image"
+    shutil.rmtree(inside, ignore_errors=True)
+    inside.mkdir(parents=True)
+    shutil.copytree(app, inside / app.name, symlinks=True)
+    (inside / "Applications").symlink_to("/Applications")
+    shutil.copyfile(icon, inside / ".VolumeIcon.icns")
+    shutil.copyfile(background, inside / f".background{background.suffix}")
+    left, top = _CORNER
+    wide, high = WINDOW
+    with DSStore.open(str(inside / ".DS_Store"), "w+") as store:
+        store["."]["vSrn"] = ("long", 1)
+        store["."]["icvl"] = ("type", b"icnv")
+        store["."]["bwsp"] = {
+            "WindowBounds": f"{{{{{left}, {top}}}, {{{wide}, {high}}}}}",
+            "ShowSidebar": False,
+            "ShowToolbar": False,
+            "ShowStatusBar": False,
+        }
+        store["."]["icvp"] = {
+            "viewOptionsVersion": 1,
+            "arrangeBy": "none",
+            "backgroundType": 0,
+            "iconSize": float(ICON_SIDE),
+            "textSize": 13.0,
+            "gridSpacing": 100.0,
+            "labelOnBottom": True,
+        }
+        store[app.name]["Iloc"] = APP_AT
+        store["Applications"]["Iloc"] = APPLICATIONS_AT
+    target.unlink(missing_ok=True)
+    context.run("xorrisofs", "-quiet", "-V", VOLUME, "-hfsplus", "-r", "-o", target, inside)
+    return target

@@ -1,0 +1,170 @@
+"""Whether an application's folder is as macOS, codesign and Apple's notaries want it."""
+
+from __future__ import annotations
+
+import os
+import plistlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from installers.macos.information import LANGUAGES, OLDEST_MACOS, information
+from installers.macos.mach_o import read
+
+__all__ = ["BUNDLES", "WEB_PROCESS", "check", "compiled", "is_bundle", "made_for_newer"]
+
+BUNDLES = frozenset({".app", ".framework", ".bundle", ".plugin", ".xpc"})
+WEB_PROCESS = "QtWebEngineProcess.app"
+_IN_CONTENTS = frozenset(
+    {"Info.plist", "PkgInfo", "MacOS", "Frameworks", "Resources", "_CodeSignature", "CodeResources"}
+)
+_CODE_FOLDERS = ("MacOS", "Frameworks")
+_WEB_FILES = ("icudtl.dat", "qtwebengine_resources.pak", "qtwebengine_locales/en-US.pak")
+
+
+def is_bundle(path: Path) -> bool:
+    """Whether a folder is signed as one thing."""
+    return path.suffix in BUNDLES and path.is_dir() and not path.is_symlink()
+
+
+def compiled(folder: Path) -> Iterator[Path]:
+    """Every file of compiled code below a folder, in order; links are not followed."""
+    return (path for path in _files(folder) if not path.is_symlink() and read(path))
+
+
+def check(app: Path, version: str, machine: str) -> list[str]:
+    """A sentence for everything that is wrong; none when nothing is. Raises OSError."""
+    contents = app / "Contents"
+    found = [f"{name} is beside Contents" for name in _names(app) if name != "Contents"]
+    found += [f"{name} has no place in Contents" for name in _names(contents) if name not in _IN_CONTENTS]
+    found += _check_information(contents, version)
+    found += _check_links(app)
+    found += _check_places(contents)
+    for framework in sorted(contents.rglob("*.framework")):
+        if is_bundle(framework):
+            found += _check_framework(framework, app)
+    found += _check_web(contents)
+    for path in compiled(contents):
+        machines = {each.machine for each in read(path)}
+        if machine not in machines:
+            found.append(f"{_of(path, app)} is made for {' and '.join(sorted(machines))}, not for {machine}")
+    return found
+
+
+def made_for_newer(app: Path) -> dict[Path, str]:
+    """What says that it was made for a newer macOS than the application wants, and for which.
+
+    A library that says so is loaded all the same, and fails only when it uses something that is not there
+    yet: whether it does is to be tried on the oldest macOS.
+    """
+    oldest = tuple(int(each) for each in OLDEST_MACOS.split("."))
+    wanted = {
+        path: max(each.oldest_macos or (0, 0) for each in read(path)) for path in compiled(app / "Contents")
+    }
+    return {path: f"{wants[0]}.{wants[1]}" for path, wants in wanted.items() if wants > oldest}
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for at, folders, names in os.walk(folder):
+        folders.sort()
+        yield from (Path(at, name) for name in sorted(names))
+
+
+def _names(folder: Path) -> list[str]:
+    return sorted(each.name for each in folder.iterdir()) if folder.is_dir() else []
+
+
+def _of(path: Path, app: Path) -> str:
+    return str(path.relative_to(app))
+
+
+def _check_information(contents: Path, version: str) -> Iterator[str]:
+    try:
+        told = plistlib.loads((contents / "Info.plist").read_bytes())
+    except (OSError, ValueError, plistlib.InvalidFileException) as error:
+        yield f"Contents/Info.plist can't be read: {error}"
+        return
+    for key, value in information(version).items():
+        if told.get(key) != value:
+            yield f"Contents/Info.plist has {told.get(key)!r} for {key}, not {value!r}"
+    program = contents / "MacOS" / str(told.get("CFBundleExecutable", ""))
+    if not program.is_file() or not any(each.is_program for each in read(program)):
+        yield f"Contents/MacOS has no program '{program.name}'"
+    elif not os.access(program, os.X_OK):
+        yield f"Contents/MacOS/{program.name} may not be started"
+    yield from _check_resources(contents / "Resources", told)
+
+
+def _check_resources(resources: Path, told: Mapping[str, object]) -> Iterator[str]:
+    documents = told.get("CFBundleDocumentTypes")
+    icons = [told.get("CFBundleIconFile")]
+    icons += [each.get("CFBundleTypeIconFile") for each in documents] if isinstance(documents, list) else []
+    for icon in icons:
+        path = resources / str(icon)
+        head = path.read_bytes()[:8] if path.is_file() else b""
+        if head[:4] != b"icns" or int.from_bytes(head[4:], "big") != path.stat().st_size:
+            yield f"Contents/Resources has no icon '{icon}'"
+    for language in LANGUAGES:
+        if not (resources / f"{language}.lproj" / "InfoPlist.strings").is_file():
+            yield f"Contents/Resources has no words for '{language}'"
+
+
+def _check_links(app: Path) -> Iterator[str]:
+    root = app.resolve()
+    for at, folders, names in os.walk(app):
+        for path in (Path(at, name) for name in sorted([*folders, *names])):
+            if not path.is_symlink():
+                continue
+            target = path.readlink()
+            if target.is_absolute():
+                yield f"{_of(path, app)} is a link to the absolute '{target}'"
+            elif not path.resolve().is_relative_to(root):
+                yield f"{_of(path, app)} leads out of the application"
+            elif not path.exists():
+                yield f"{_of(path, app)} leads nowhere"
+
+
+def _check_places(contents: Path) -> Iterator[str]:
+    """Code belongs into MacOS and Frameworks, and nothing else into them; folders there have no dots."""
+    app = contents.parent
+    for path in compiled(contents / "Resources"):
+        yield f"{_of(path, app)} is code among the resources, which codesign does not sign"
+    for name in _CODE_FOLDERS:
+        for at, folders, names in os.walk(contents / name):
+            inside = [Path(at, each) for each in folders]
+            folders[:] = sorted(path.name for path in inside if not is_bundle(path))
+            for path in inside:
+                if "." in path.name and not path.is_symlink() and not is_bundle(path):
+                    yield f"{_of(path, app)} has a dot in its name, so codesign takes it for a bundle"
+            for path in (Path(at, each) for each in sorted(names)):
+                if not path.is_symlink() and not read(path):
+                    yield f"{_of(path, app)} is no code, so its signature would be lost when it is copied"
+
+
+def _check_framework(framework: Path, app: Path) -> Iterator[str]:
+    name = framework.stem
+    for each in sorted(framework.iterdir()):
+        if each.name != "Versions" and not each.is_symlink():
+            yield f"{_of(each, app)} is beside Versions and no link into it"
+    current = framework / "Versions" / "Current"
+    if not current.is_symlink():
+        yield f"{_of(framework, app)} has no link Versions/Current"
+    elif not (current / name).is_file() or not read(current / name):
+        yield f"{_of(framework, app)} has no library '{name}'"
+    elif not (current / "Resources" / "Info.plist").is_file():
+        yield f"{_of(framework, app)} has no Resources/Info.plist"
+
+
+def _check_web(contents: Path) -> Iterator[str]:
+    """What the block editor's browser needs where Qt looks for it."""
+    found = [path for path in contents.rglob("QtWebEngineCore.framework") if is_bundle(path)]
+    if len(found) != 1:
+        yield f"there are {len(found)} QtWebEngineCore.framework, not 1"
+        return
+    process = found[0] / "Helpers" / WEB_PROCESS / "Contents" / "MacOS" / "QtWebEngineProcess"
+    if not process.is_file() or not read(process):
+        yield f"{_of(found[0], contents.parent)} has no Helpers/{WEB_PROCESS}"
+    elif not os.access(process, os.X_OK):
+        yield f"{_of(process, contents.parent)} may not be started"
+    for name in _WEB_FILES:
+        if not (found[0] / "Resources" / name).is_file():
+            yield f"{_of(found[0], contents.parent)} has no Resources/{name}"

@@ -1,0 +1,77 @@
+"""What a compiled file of macOS is: a program or a library, for which processors, and since which macOS."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+__all__ = ["Slice", "read"]
+
+_THIN = {0xFEEDFACF: ">", 0xCFFAEDFE: "<", 0xFEEDFACE: ">", 0xCEFAEDFE: "<"}
+_WIDE = {0xFEEDFACF, 0xCFFAEDFE}
+_FAT, _FAT_64 = 0xCAFEBABE, 0xCAFEBABF
+_MOST_SLICES = 8
+"""A Java class begins with the same four bytes as a fat file, and its version follows: 45 and more."""
+_MACHINES = {0x01000007: "x86_64", 0x0100000C: "arm64"}
+_PROGRAM = 2
+_VERSION_MIN_MACOS, _BUILD_VERSION = 0x24, 0x32
+
+
+@dataclass(frozen=True)
+class Slice:
+    """The code for one processor."""
+
+    machine: str
+    """ "arm64" or "x86_64"; another one's number."""
+    is_program: bool
+    """Whether it can be started; else it is a library or a plug-in."""
+    oldest_macos: tuple[int, int] | None
+    """The macOS for which it was made; None when it does not say."""
+
+
+def read(path: Path) -> tuple[Slice, ...]:
+    """The slices of a file; () when it is no compiled code of macOS. Raises OSError."""
+    with path.open("rb") as file:
+        try:
+            return tuple(_slices(file))
+        except struct.error:  # ends in the middle of a header
+            return ()
+
+
+def _slices(file: BinaryIO) -> Iterator[Slice]:
+    (magic,) = struct.unpack(">I", file.read(4))
+    if magic in _THIN:
+        yield _slice(file, 0)
+    elif magic in {_FAT, _FAT_64}:
+        (count,) = struct.unpack(">I", file.read(4))
+        layout, size = (">5I", 20) if magic == _FAT else (">2I2Q2I", 32)
+        if count <= _MOST_SLICES:
+            entries = [struct.unpack(layout, file.read(size)) for _each in range(count)]
+            for entry in entries:
+                yield _slice(file, entry[2])
+
+
+def _slice(file: BinaryIO, start: int) -> Slice:
+    file.seek(start)
+    (magic,) = struct.unpack(">I", file.read(4))
+    order = _THIN.get(magic)
+    if order is None:
+        raise struct.error("no Mach-O at the place that the fat header tells")
+    cpu, _sub, kind, count, _size, _flags = struct.unpack(f"{order}6I", file.read(24))
+    if magic in _WIDE:
+        file.read(4)
+    return Slice(_MACHINES.get(cpu, hex(cpu)), kind == _PROGRAM, _oldest(file, order, count))
+
+
+def _oldest(file: BinaryIO, order: str, count: int) -> tuple[int, int] | None:
+    for _each in range(count):
+        command, size = struct.unpack(f"{order}2I", file.read(8))
+        body = file.read(max(size - 8, 0))
+        if command in {_VERSION_MIN_MACOS, _BUILD_VERSION}:
+            place = 0 if command == _VERSION_MIN_MACOS else 4
+            (packed,) = struct.unpack_from(f"{order}I", body, place)
+            return packed >> 16, packed >> 8 & 0xFF
+    return None

@@ -1,0 +1,96 @@
+"""The packer for macOS: from what PyInstaller has frozen to a disk image."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from installers.context import APP, Context, PackageError, this_system
+from installers.macos import disk_image, layout, signing
+from installers.macos.information import APP_ICON, DOCUMENT_ICON, write_information, write_sentences
+
+__all__ = ["application", "build", "finish", "prepare"]
+
+_BACKGROUND = "background.png"
+
+
+def application(context: Context) -> Path:
+    """Where PyInstaller puts the application."""
+    return context.frozen.with_name(f"{APP}.app")
+
+
+def prepare(context: Context) -> Mapping[str, str]:
+    """Make what is needed before freezing; the variables that the specification of PyInstaller reads.
+
+    Raises `PackageError`.
+    """
+    pictures = _pictures(context)
+    pictures.mkdir(parents=True, exist_ok=True)
+    context.run(*context.python, "-m", "installers.macos.pictures", pictures)
+    information = write_information(context.work / "Info.plist", context.version)
+    return {
+        "NEP_PACKAGE_ICON": str(pictures / APP_ICON),
+        "NEP_PACKAGE_INFO_PLIST": str(information),
+    }
+
+
+def build(context: Context) -> list[Path]:
+    """The disk image of the frozen application, signed and notarised as far as names are given.
+
+    Raises `PackageError`, also where this is no Mac.
+    """
+    if this_system() != "macos":
+        raise PackageError(
+            "the package for macOS can be made on a Mac only: "
+            "PyInstaller freezes for the computer that it runs on"
+        )
+    identity = signing.identity_of(os.environ)
+    app = application(context)
+    finish(context, app, identity)
+    context.dist.mkdir(parents=True, exist_ok=True)
+    target = context.dist / f"NEP-Studio-{context.version}-macos-{context.machine}.dmg"
+    pictures = _pictures(context)
+    disk_image.dmg(target, app, pictures / _BACKGROUND, pictures / APP_ICON)
+    signing.sign_image(context, target, identity)
+    if identity.notary:
+        signing.notarise(context, target, identity)
+        signing.assess(context, target)
+    return [target]
+
+
+def finish(context: Context, app: Path, identity: signing.Identity) -> None:
+    """Complete a frozen application, look whether it is as it should be, sign it, and have it notarised.
+
+    What is left out for want of a name is said in one line. Raises `PackageError`.
+    """
+    if not app.is_dir():
+        raise PackageError(f"the frozen application is not in '{app}'")
+    resources = app / "Contents" / "Resources"
+    shutil.copyfile(_pictures(context) / DOCUMENT_ICON, resources / DOCUMENT_ICON)
+    write_sentences(resources)
+    if wrong := layout.check(app, context.version, context.machine):
+        raise PackageError(f"'{app.name}' is not as macOS wants it:\n  " + "\n  ".join(wrong))
+    newer = layout.made_for_newer(app)
+    if newer:
+        _say(f"made for macOS {max(newer.values())}: {len(newer)} libraries; try this on the oldest macOS")
+    signing.sign(context, app, identity)
+    signing.verify(context, app)
+    if identity.notary:
+        signing.notarise(context, app, identity)
+        signing.assess(context, app)
+    elif identity.is_known:
+        _say("notarising: skipped, as NEP_MACOS_NOTARY_PROFILE is not given (installers/README.md)")
+    else:
+        _say("signing and notarising: skipped, as NEP_MACOS_IDENTITY is not given (installers/README.md)")
+
+
+def _pictures(context: Context) -> Path:
+    return context.work / "pictures"
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(f"· {line}\n")
+    sys.stdout.flush()

@@ -1,0 +1,140 @@
+"""The pictures of the package, from Studio's own logo: the icons, and the ground of the disk image's window.
+
+QT_QPA_PLATFORM=offscreen python -m installers.macos.pictures FOLDER
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from PySide6.QtCore import QBuffer, QIODevice, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPolygonF
+from PySide6.QtWidgets import QApplication
+
+from app.ui.shell.bars.logo import paint_logo
+from app.ui.theme.theme import Theme
+from installers.macos.disk_image import APP_AT, APPLICATIONS_AT, ICON_SIDE, WINDOW
+from installers.macos.information import APP_ICON, DOCUMENT_ICON
+
+__all__ = ["BACKGROUND", "SIDES", "icns", "write_pictures"]
+
+BACKGROUND = "background.png"
+SIDES: Mapping[bytes, int] = {
+    b"ic04": 16, b"ic11": 32, b"ic05": 32, b"ic12": 64, b"ic07": 128, b"ic13": 256,
+    b"ic08": 256, b"ic14": 512, b"ic09": 512, b"ic10": 1024,
+}  # fmt: skip
+"""The kinds of an icon and their pixels: 16, 32, 128, 256 and 512 points, each also for Retina screens."""
+_RAW = frozenset({b"ic04", b"ic05"})
+"""Kinds that are no PNG but four channels, one after the other, as Apple's iconutil writes them."""
+_LONGEST_RUN = 128
+
+Paint = Callable[[QPainter, float, Theme], None]
+
+
+def paint_app(painter: QPainter, side: float, theme: Theme) -> None:
+    """The logo with the margin that Apple's icons have: 824 of 1024 pixels are the shape."""
+    margin = round(side * 100 / 1024)
+    paint_logo(painter, QRectF(margin, margin, side - 2 * margin, side - 2 * margin), theme)
+
+
+def paint_document(painter: QPainter, side: float, theme: Theme) -> None:
+    """A sheet with a folded corner and the logo on it."""
+    left, right, top, low = side * 0.17, side * 0.83, side * 0.06, side * 0.94
+    fold = side * 0.2
+    sheet = QPainterPath(QPointF(left, top))
+    for x, y in ((right - fold, top), (right, top + fold), (right, low), (left, low)):
+        sheet.lineTo(x, y)
+    sheet.closeSubpath()
+    edge = QPen(QColor("#b9bdc6"), max(1.0, side / 128))
+    edge.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+    painter.setPen(edge)
+    painter.setBrush(QColor("#ffffff"))
+    painter.drawPath(sheet)
+    painter.setBrush(QColor("#e6e8ec"))
+    corner = [QPointF(right - fold, top), QPointF(right - fold, top + fold), QPointF(right, top + fold)]
+    painter.drawPolygon(QPolygonF(corner))
+    logo = side * 0.4
+    paint_logo(painter, QRectF((side - logo) / 2, side * 0.42, logo, logo), theme)
+
+
+def paint_background(painter: QPainter, scale: float, theme: Theme) -> None:
+    """A light ground with an arrow from the application to the folder; words would be in one language."""
+    painter.scale(scale, scale)
+    painter.fillRect(QRectF(0, 0, *WINDOW), QColor("#f4f5f7"))
+    room = ICON_SIDE / 2 + 26
+    start, end = APP_AT[0] + room, APPLICATIONS_AT[0] - room
+    line = QPen(theme.colour("accent"), 7)
+    line.setCapStyle(Qt.PenCapStyle.RoundCap)
+    line.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+    painter.setPen(line)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    middle = float(APP_AT[1])
+    painter.drawLine(QPointF(start, middle), QPointF(end, middle))
+    tip = [QPointF(end - 22, middle - 20), QPointF(end, middle), QPointF(end - 22, middle + 20)]
+    painter.drawPolyline(QPolygonF(tip))
+
+
+def _painted(wide: int, high: int, paint: Paint, size: float, theme: Theme) -> QImage:
+    image = QImage(wide, high, QImage.Format.Format_ARGB32)
+    image.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(image)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    paint(painter, size, theme)
+    painter.end()
+    return image
+
+
+def _argb(image: QImage) -> bytes:
+    """All pixels' opacity, then all red, green and blue, in runs that each say one less than their length."""
+    converted = image.convertToFormat(QImage.Format.Format_RGBA8888)  # it must live as long as its bits
+    pixels = bytes(converted.constBits())
+    made = bytearray(b"ARGB")
+    for channel in (pixels[3::4], pixels[0::4], pixels[1::4], pixels[2::4]):
+        for start in range(0, len(channel), _LONGEST_RUN):
+            run = channel[start : start + _LONGEST_RUN]
+            made.append(len(run) - 1)
+            made += run
+    return bytes(made)
+
+
+def _png(image: QImage) -> bytes:
+    buffer = QBuffer()
+    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    # PySide knows the type of a picture as bytes, its stubs as text.
+    if not image.save(buffer, "PNG"):  # type: ignore[call-overload]
+        raise OSError("Qt can write no PNG")
+    return bytes(buffer.data().data())
+
+
+def icns(paint: Paint, theme: Theme) -> bytes:
+    """An icon of all `SIDES`, as files ending in .icns have it."""
+    pieces = []
+    for kind, side in SIDES.items():
+        image = _painted(side, side, paint, side, theme)
+        content = _argb(image) if kind in _RAW else _png(image)
+        pieces.append(kind + struct.pack(">I", len(content) + 8) + content)
+    body = b"".join(pieces)
+    return b"icns" + struct.pack(">I", len(body) + 8) + body
+
+
+def write_pictures(folder: Path) -> None:
+    """Write both icons and the background, for plain screens and (@2x) for Retina screens."""
+    folder.mkdir(parents=True, exist_ok=True)
+    theme = Theme("light")
+    (folder / APP_ICON).write_bytes(icns(paint_app, theme))
+    (folder / DOCUMENT_ICON).write_bytes(icns(paint_document, theme))
+    wide, high = WINDOW
+    for scale, name in ((1, BACKGROUND), (2, BACKGROUND.replace(".", "@2x."))):
+        picture = _painted(wide * scale, high * scale, paint_background, scale, theme)
+        (folder / name).write_bytes(_png(picture))
+    theme.deleteLater()
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    _application = QApplication([])
+    write_pictures(Path(sys.argv[1]))

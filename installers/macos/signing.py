@@ -1,0 +1,189 @@
+"""Signing and notarising, with the names that the owner gives; without them the package is for trying only.
+
+NEP_MACOS_IDENTITY         the certificate: "Developer ID Application: Ana Pérez (ABCDE12345)"
+NEP_MACOS_NOTARY_PROFILE   what `xcrun notarytool store-credentials` has stored; or these three:
+NEP_MACOS_NOTARY_KEY       the file of an App Store Connect key (.p8)
+NEP_MACOS_NOTARY_KEY_ID    its id
+NEP_MACOS_NOTARY_ISSUER    the id of who issued it
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import plistlib
+import subprocess
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from installers.context import Context, PackageError
+from installers.macos import entitlements
+from installers.macos.layout import WEB_PROCESS, compiled, is_bundle
+from installers.macos.mach_o import read
+
+__all__ = [
+    "AD_HOC",
+    "Identity",
+    "Piece",
+    "assess",
+    "identity_of",
+    "notarise",
+    "pieces",
+    "sign",
+    "sign_image",
+    "verify",
+]
+
+AD_HOC = "-"
+"""codesign's name for no name: what Apple silicon needs to start a program at all."""
+_AT_ONCE = 50
+_KEY_PARTS = ("NEP_MACOS_NOTARY_KEY", "NEP_MACOS_NOTARY_KEY_ID", "NEP_MACOS_NOTARY_ISSUER")
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who signs, and how Apple's notaries are asked."""
+
+    name: str
+    notary: tuple[str, ...] = ()
+    """The arguments of notarytool; () when it is not to be notarised."""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether Apple knows who signs."""
+        return self.name != AD_HOC
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What gets a signature of its own."""
+
+    path: Path
+    allowed: str = ""
+    """ "studio" or "web": which entitlements it gets; "" for none."""
+
+
+def identity_of(environ: Mapping[str, str]) -> Identity:
+    """Who signs, by the variables above. Raises `PackageError` when only a part of them is given."""
+    name, profile = environ.get("NEP_MACOS_IDENTITY", ""), environ.get("NEP_MACOS_NOTARY_PROFILE", "")
+    given = [part for part in _KEY_PARTS if environ.get(part)]
+    if given and len(given) < len(_KEY_PARTS):
+        missing = ", ".join(part for part in _KEY_PARTS if part not in given)
+        raise PackageError(f"to notarise with a key, give also {missing}")
+    if not name:
+        if profile or given:
+            raise PackageError("what is not signed can't be notarised; give also NEP_MACOS_IDENTITY")
+        return Identity(AD_HOC)
+    if profile:
+        return Identity(name, ("--keychain-profile", profile))
+    if given:
+        key, key_id, issuer = (environ[part] for part in _KEY_PARTS)
+        return Identity(name, ("--key", key, "--key-id", key_id, "--issuer", issuer))
+    return Identity(name)
+
+
+def pieces(app: Path) -> list[Piece]:
+    """Everything that is to be signed, from the inside out: what is in a bundle before the bundle."""
+    programs = {app / "Contents" / "MacOS"}
+    bundles = [path for path in sorted(app.rglob("*")) if is_bundle(path)]
+    mains = {_main(bundle) for bundle in (app, *bundles)}
+    found = [
+        Piece(path, "studio" if path.parent in programs and _is_program(path) else "")
+        for path in compiled(app)
+        if path not in mains
+    ]
+    found += [Piece(_signed(bundle), "web" if bundle.name == WEB_PROCESS else "") for bundle in bundles]
+    found.sort(key=lambda piece: (-len(piece.path.parts), bool(piece.allowed), str(piece.path)))
+    return [*found, Piece(app, "studio")]
+
+
+def sign(context: Context, app: Path, identity: Identity) -> None:
+    """Sign the application and everything in it anew. Raises `PackageError`."""
+    context.work.mkdir(parents=True, exist_ok=True)
+    allowed = {
+        "studio": entitlements.write(context.work / "studio.entitlements", entitlements.STUDIO),
+        "web": entitlements.write(context.work / "web-process.entitlements", entitlements.WEB_PROCESS),
+    }
+    for kind, group in itertools.groupby(pieces(app), lambda piece: piece.allowed):
+        extra = ("--entitlements", str(allowed[kind])) if kind else ()
+        paths = [piece.path for piece in group]
+        for start in range(0, len(paths), _AT_ONCE):
+            context.run("codesign", *_how(identity), *extra, *paths[start : start + _AT_ONCE])
+
+
+def sign_image(context: Context, image: Path, identity: Identity) -> None:
+    """Sign a disk image; one that nobody known signs stays as it is. Raises `PackageError`."""
+    if identity.is_known:
+        context.run("codesign", "--force", "--sign", identity.name, "--timestamp", image)
+
+
+def notarise(context: Context, path: Path, identity: Identity) -> None:
+    """Let Apple's notaries see an application or a disk image, and staple their answer to it.
+
+    It takes some minutes. Raises `PackageError` with what they found when they refuse.
+    """
+    sent = path
+    if path.suffix == ".app":
+        sent = context.work / f"{path.stem}.zip"
+        context.run("ditto", "-c", "-k", "--keepParent", path, sent)
+    submit = ("xcrun", "notarytool", "submit", str(sent), *identity.notary)
+    answer = _asked(context, *submit, "--wait", "--output-format", "json")
+    try:
+        told = json.loads(answer)
+    except ValueError:
+        raise PackageError(f"notarytool answered what can't be read: {answer.strip()}") from None
+    if told.get("status") != "Accepted":
+        log = _asked(context, "xcrun", "notarytool", "log", str(told.get("id", "")), *identity.notary)
+        raise PackageError(f"Apple did not notarise '{path.name}' ({told.get('status')}): {log.strip()}")
+    context.run("xcrun", "stapler", "staple", path)
+    context.run("xcrun", "stapler", "validate", path)
+
+
+def verify(context: Context, app: Path) -> None:
+    """Look whether every signature of an application holds. Raises `PackageError`."""
+    context.run("codesign", "--verify", "--deep", "--strict", "--verbose=2", app)
+
+
+def assess(context: Context, path: Path) -> None:
+    """Look whether Gatekeeper lets people open what is notarised. Raises `PackageError`."""
+    how = ("execute",) if path.suffix == ".app" else ("open", "--context", "context:primary-signature")
+    context.run("spctl", "--assess", "--type", *how, "--verbose=2", path)
+
+
+def _how(identity: Identity) -> Iterator[str]:
+    yield from ("--force", "--sign", identity.name)
+    # The hardened runtime loads no library without a known name, so what nobody signs must do without.
+    yield from ("--options", "runtime", "--timestamp") if identity.is_known else ("--timestamp=none",)
+
+
+def _asked(context: Context, *command: str) -> str:
+    try:
+        done = subprocess.run(
+            command, cwd=context.root, env=dict(context.environ), capture_output=True, text=True, check=False
+        )
+    except OSError as error:
+        raise PackageError(f"'{command[0]}' can't be run: {error.strerror}") from error
+    if done.returncode != 0:
+        raise PackageError(f"'{' '.join(command[:3])}' ended with {done.returncode}: {done.stderr.strip()}")
+    return done.stdout
+
+
+def _is_program(path: Path) -> bool:
+    return any(each.is_program for each in read(path))
+
+
+def _main(bundle: Path) -> Path:
+    """The program or library whose signature is that of its bundle."""
+    if bundle.suffix == ".framework":
+        return _signed(bundle) / bundle.stem
+    try:
+        told = plistlib.loads((bundle / "Contents" / "Info.plist").read_bytes())
+    except (OSError, ValueError, plistlib.InvalidFileException) as error:
+        raise PackageError(f"'{bundle.name}' has no Info.plist that can be read: {error}") from error
+    return bundle / "Contents" / "MacOS" / str(told.get("CFBundleExecutable", bundle.stem))
+
+
+def _signed(bundle: Path) -> Path:
+    """What codesign is given: of a framework its version."""
+    return (bundle / "Versions" / "Current").resolve() if bundle.suffix == ".framework" else bundle

@@ -1,0 +1,52 @@
+"""What the hardened runtime must allow: documented keys alone, and as few as can be."""
+
+from __future__ import annotations
+
+import plistlib
+import sys
+from pathlib import Path
+
+import PySide6
+import pytest
+
+from installers.macos.entitlements import DOCUMENTED, QT_WEB_PROCESS, STUDIO, WEB_PROCESS, problems, write
+
+CS = "com.apple.security.cs."
+
+
+@pytest.mark.parametrize("allowed", [STUDIO, WEB_PROCESS])
+def test_every_key_is_one_that_apple_documents(allowed: dict[str, str], tmp_path: Path) -> None:
+    read = plistlib.loads(write(tmp_path / "a.entitlements", allowed).read_bytes())
+    assert read == dict.fromkeys(allowed, True)
+    assert read.keys() <= DOCUMENTED.keys()
+    assert all(allowed.values()), "each has its reason"
+
+
+def test_a_misspelt_key_is_found(tmp_path: Path) -> None:
+    wrong = f"{CS}disable-executable-apge-protection"
+    assert problems({wrong: True}) == [f"Apple documents no '{wrong}'"]
+    with pytest.raises(ValueError, match="apge"):
+        write(tmp_path / "a.entitlements", {wrong: "a reason"})
+    assert not (tmp_path / "a.entitlements").exists()
+
+
+@pytest.mark.parametrize("value", [False, "true", 1])
+def test_a_key_is_true_or_not_there(value: object) -> None:
+    assert problems({f"{CS}allow-jit": value}) == [f"'{CS}allow-jit' must be true or left out"]
+
+
+def test_the_web_process_gets_what_qt_gives_it_but_for_libraries_of_strangers() -> None:
+    assert set(WEB_PROCESS) == QT_WEB_PROCESS - {f"{CS}disable-library-validation"}
+
+
+def test_studio_gives_away_less_than_its_web_process() -> None:
+    assert set(STUDIO) < set(WEB_PROCESS)
+    assert not any(".device." in key or ".personal-information." in key for key in STUDIO)
+
+
+@pytest.mark.skipif(sys.platform != "darwin", reason="only Qt for macOS has a list of its own")
+def test_what_we_know_of_qt_is_what_it_ships() -> None:
+    (path,) = Path(PySide6.__file__).parent.glob(
+        "Qt/lib/QtWebEngineCore.framework/Helpers/QtWebEngineProcess.app/Contents/Resources/*.entitlements"
+    )
+    assert plistlib.loads(path.read_bytes()) == dict.fromkeys(QT_WEB_PROCESS, True)

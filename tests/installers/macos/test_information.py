@@ -1,0 +1,100 @@
+"""What the application tells macOS about itself."""
+
+from __future__ import annotations
+
+import plistlib
+import re
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.documents.file_format import SUFFIX
+from installers.macos.information import (
+    LANGUAGES,
+    apple_version,
+    information,
+    sentences,
+    write_information,
+    write_sentences,
+)
+from nep.version import __version__
+
+
+def test_macos_knows_our_type_and_who_opens_it() -> None:
+    told = information(__version__)
+    (exported,) = told["UTExportedTypeDeclarations"]
+    (document,) = told["CFBundleDocumentTypes"]
+    assert document["LSItemContentTypes"] == [exported["UTTypeIdentifier"]]
+    assert document["CFBundleTypeRole"] == "Editor"
+    tags = exported["UTTypeTagSpecification"]
+    assert tags == {
+        "public.filename-extension": [SUFFIX.lstrip(".")],
+        "public.mime-type": "application/x-nep-behaviour",
+    }
+
+
+def test_recordings_are_known_but_studio_does_not_claim_to_open_them() -> None:
+    told = information(__version__)
+    (recording,) = told["UTImportedTypeDeclarations"]
+    assert recording["UTTypeTagSpecification"] == {"public.filename-extension": ["mcap"]}
+    opened = [kind for each in told["CFBundleDocumentTypes"] for kind in each["LSItemContentTypes"]]
+    assert recording["UTTypeIdentifier"] not in opened
+
+
+def test_the_version_is_that_of_nep(tmp_path: Path) -> None:
+    read = plistlib.loads(write_information(tmp_path / "Info.plist", __version__).read_bytes())
+    assert read == information(__version__)
+    assert read["CFBundleShortVersionString"] == read["CFBundleVersion"] == apple_version(__version__)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [("0.1.0", "0.1.0"), ("1.2", "1.2"), ("0.2.0rc1", "0.2.0"), ("1.2.3.dev4+g12", "1.2.3")],
+)
+def test_macos_gets_up_to_three_numbers(given: str, told: str) -> None:
+    assert apple_version(given) == told
+
+
+def test_a_version_without_a_number_is_an_error() -> None:
+    with pytest.raises(ValueError, match="no version 'new'"):
+        apple_version("new")
+
+
+def test_the_application_is_seen_and_looks_sharp() -> None:
+    told = information(__version__)
+    assert told["LSBackgroundOnly"] is False
+    assert told["NSHighResolutionCapable"] is True
+    assert told["LSMinimumSystemVersion"] == "13.0"
+
+
+def test_every_permission_that_macos_asks_for_has_a_sentence_in_each_language(tmp_path: Path) -> None:
+    asked = {key for key in information(__version__) if key.endswith("UsageDescription")}
+    assert asked >= {
+        "NSLocalNetworkUsageDescription",
+        "NSCameraUsageDescription",
+        "NSMicrophoneUsageDescription",
+    }
+    write_sentences(tmp_path)
+    for language in LANGUAGES:
+        read = plistlib.loads((tmp_path / f"{language}.lproj" / "InfoPlist.strings").read_bytes())
+        assert read == sentences(language)
+        assert asked <= read.keys()
+        for key in asked:
+            assert re.fullmatch(r"[^.]+\.", read[key]), read[key]
+    english, spanish = (sentences(language) for language in ("en", "es"))
+    assert english.keys() == spanish.keys()
+    assert all(english[key] != spanish[key] for key in english)
+
+
+def test_the_names_of_types_are_said_in_each_language() -> None:
+    told = information(__version__)
+    for kind in (*told["UTExportedTypeDeclarations"], *told["UTImportedTypeDeclarations"]):
+        assert sentences("en")[kind["UTTypeDescription"]] == kind["UTTypeDescription"]
+        assert sentences("es")[kind["UTTypeDescription"]]
+
+
+def test_the_languages_are_those_of_studio() -> None:
+    folder = Path(nep.__file__).parent / "locale"
+    translated = {each.name for each in folder.iterdir() if (each / "LC_MESSAGES").is_dir()} - {"qps"}
+    assert set(LANGUAGES) == {"en", *translated}

@@ -1,0 +1,156 @@
+"""The check of an application's folder: it passes what PyInstaller makes, and finds what is wrong."""
+
+from __future__ import annotations
+
+import plistlib
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from installers.macos.information import information
+from installers.macos.layout import check, made_for_newer
+from tests.installers.macos.made_up_app import (
+    LIBRARY,
+    PROGRAM,
+    VERSION,
+    fat,
+    framework,
+    header,
+    link,
+    made_up_app,
+    put,
+)
+
+QT = Path("Contents/Frameworks/PySide6/Qt/lib")
+WEB = QT / "QtWebEngineCore.framework/Versions/A"
+PROCESS = WEB / "Helpers/QtWebEngineProcess.app/Contents/MacOS/QtWebEngineProcess"
+
+
+def spoil_information(app: Path) -> None:
+    told = information(VERSION)
+    told["LSBackgroundOnly"] = True
+    put(app / "Contents/Info.plist", plistlib.dumps(told))
+
+
+def link_to_the_builder(app: Path) -> None:
+    link(app / "Contents/Resources/python", "/usr/bin/python3")
+
+
+def link_out(app: Path) -> None:
+    link(app / "Contents/Resources/notes", "../../../notes")
+
+
+def library_without_program(app: Path) -> None:
+    """What is left of a framework when its library is not wanted, but the rest is."""
+    root = framework(app / QT, "QtXml")
+    (root / "Versions/A/QtXml").unlink()
+    (root / "QtXml").unlink()
+
+
+def file_beside_versions(app: Path) -> None:
+    put(app / QT / "QtCore.framework/QtCore.prl")
+
+
+SPOILED: dict[str, tuple[Callable[[Path], object], str]] = {
+    "hidden from the Dock": (
+        spoil_information,
+        "Contents/Info.plist has True for LSBackgroundOnly, not False",
+    ),
+    "no Info.plist": (
+        lambda app: (app / "Contents/Info.plist").unlink(),
+        "Contents/Info.plist can't be read",
+    ),
+    "no program": (lambda app: (app / "Contents/MacOS/nep-studio").unlink(), "has no program 'nep-studio'"),
+    "a library in its place": (
+        lambda app: put(app / "Contents/MacOS/nep-studio", header(LIBRARY)),
+        "has no program 'nep-studio'",
+    ),
+    "not executable": (lambda app: (app / "Contents/MacOS/nep-studio").chmod(0o644), "may not be started"),
+    "no icon": (
+        lambda app: (app / "Contents/Resources/nep-studio.icns").unlink(),
+        "no icon 'nep-studio.icns'",
+    ),
+    "half an icon": (
+        lambda app: put(app / "Contents/Resources/behaviour.icns", b"icns\0\0\1\0"),
+        "no icon 'behaviour.icns'",
+    ),
+    "no Spanish": (lambda app: shutil.rmtree(app / "Contents/Resources/es.lproj"), "no words for 'es'"),
+    "beside Contents": (lambda app: put(app / "readme.txt"), "readme.txt is beside Contents"),
+    "beside MacOS": (lambda app: put(app / "Contents/readme.txt"), "readme.txt has no place in Contents"),
+    "an absolute link": (link_to_the_builder, "is a link to the absolute '/usr/bin/python3'"),
+    "a link out": (link_out, "leads out of the application"),
+    "a broken link": (
+        lambda app: link(app / "Contents/Resources/x", "y"),
+        "Contents/Resources/x leads nowhere",
+    ),
+    "code among resources": (
+        lambda app: put(app / "Contents/Resources/cv2/cv2.so", header()),
+        "cv2.so is code among the resources",
+    ),
+    "data among code": (lambda app: put(app / "Contents/Frameworks/cv2/config.py"), "config.py is no code"),
+    "a dot in a folder": (
+        lambda app: put(app / "Contents/Frameworks/numpy.libs/a.dylib", header()),
+        "numpy.libs has a dot in its name",
+    ),
+    "an emptied framework": (library_without_program, "QtXml.framework has no library 'QtXml'"),
+    "a file beside Versions": (file_beside_versions, "QtCore.prl is beside Versions"),
+    "no version of a framework": (
+        lambda app: (app / QT / "QtCore.framework/Versions/Current").unlink(),
+        "QtCore.framework has no link Versions/Current",
+    ),
+    "no Info.plist of a framework": (
+        lambda app: (app / QT / "QtCore.framework/Versions/A/Resources/Info.plist").unlink(),
+        "QtCore.framework has no Resources/Info.plist",
+    ),
+    "no web engine": (
+        lambda app: shutil.rmtree(app / WEB.parents[1]),
+        "there are 0 QtWebEngineCore.framework",
+    ),
+    "no web process": (lambda app: (app / PROCESS).unlink(), "has no Helpers/QtWebEngineProcess.app"),
+    "a web process at rest": (
+        lambda app: (app / PROCESS).chmod(0o644),
+        "QtWebEngineProcess may not be started",
+    ),
+    "no texts of Chromium": (
+        lambda app: (app / WEB / "Resources/icudtl.dat").unlink(),
+        "no Resources/icudtl.dat",
+    ),
+    "another processor": (
+        lambda app: put(app / "Contents/Frameworks/libpython3.13.dylib", header(machine="x86_64")),
+        "libpython3.13.dylib is made for x86_64, not for arm64",
+    ),
+}
+
+
+def test_what_pyinstaller_makes_is_as_macos_wants_it(tmp_path: Path) -> None:
+    assert check(made_up_app(tmp_path), VERSION, "arm64") == []
+
+
+@pytest.mark.parametrize("case", SPOILED)
+def test_each_thing_that_is_wrong_is_found(tmp_path: Path, case: str) -> None:
+    app = made_up_app(tmp_path)
+    spoil, said = SPOILED[case]
+    spoil(app)
+    found = check(app, VERSION, "arm64")
+    assert any(said in sentence for sentence in found), found
+
+
+def test_another_version_is_not_this_one(tmp_path: Path) -> None:
+    found = check(made_up_app(tmp_path), "0.2.0", "arm64")
+    assert found[0] == "Contents/Info.plist has '0.1.0' for CFBundleVersion, not '0.2.0'"
+
+
+def test_what_wants_a_newer_macos_is_told(tmp_path: Path) -> None:
+    app = made_up_app(tmp_path)
+    assert made_for_newer(app) == {}
+    newer = put(app / "Contents/Frameworks/a.so", fat(header(), header(machine="x86_64", macos=(15, 2))))
+    assert made_for_newer(app) == {newer: "15.2"}
+    assert check(app, VERSION, "arm64") == []  # it is loaded all the same
+
+
+def test_a_program_is_no_library(tmp_path: Path) -> None:
+    app = made_up_app(tmp_path)
+    put(app / "Contents/MacOS/nep-studio", fat(header(LIBRARY), header(PROGRAM)), 0o755)
+    assert check(app, VERSION, "arm64") == []

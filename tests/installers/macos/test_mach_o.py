@@ -1,0 +1,42 @@
+"""What a compiled file of macOS is, read from its first bytes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from installers.macos.mach_o import Slice, read
+from tests.installers.macos.made_up_app import PROGRAM, fat, header, put
+
+
+def test_a_program_for_one_processor(tmp_path: Path) -> None:
+    assert read(put(tmp_path / "a", header(PROGRAM, "arm64", (13, 4)))) == (Slice("arm64", True, (13, 4)),)
+
+
+def test_a_library_for_two(tmp_path: Path) -> None:
+    path = put(tmp_path / "a", fat(header(macos=(15, 0)), header(machine="x86_64")))
+    assert read(path) == (Slice("arm64", False, (15, 0)), Slice("x86_64", False, (13, 0)))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\xca\xfe",
+        b"#!/bin/sh\nexit 0\n",
+        b"\x7fELF" + bytes(60),
+        b"MZ" + bytes(60),
+        b"\xca\xfe\xba\xbe\x00\x00\x00\x41" + bytes(400),  # a class of Java 21
+        header()[:20],
+        header()[:40],
+        fat(header())[:4100],
+    ],
+)
+def test_anything_else_is_none(tmp_path: Path, content: bytes) -> None:
+    assert read(put(tmp_path / "a", content)) == ()
+
+
+def test_what_is_not_there_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        read(tmp_path / "a")

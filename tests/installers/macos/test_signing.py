@@ -1,0 +1,221 @@
+"""Signing and notarising: what is signed when and how, told by tools that only note what they are asked."""
+
+from __future__ import annotations
+
+import plistlib
+import sys
+from pathlib import Path
+
+import pytest
+
+from installers.context import PackageError
+from installers.macos import packer, signing
+from installers.macos.entitlements import STUDIO, WEB_PROCESS
+from tests.installers.macos.made_up_app import ICON, calls, context, framework, made_up_app, noting_tools, put
+
+NAME = "Developer ID Application: Ana Pérez (ABCDE12345)"
+KEY = {
+    "NEP_MACOS_NOTARY_KEY": "/keys/AuthKey.p8",
+    "NEP_MACOS_NOTARY_KEY_ID": "2X9R4HXF34",
+    "NEP_MACOS_NOTARY_ISSUER": "57246542-96fe",
+}
+QT = "Contents/Frameworks/PySide6/Qt/lib/"
+WEB = f"{QT}QtWebEngineCore.framework/Versions/A"
+PROCESS = f"{WEB}/Helpers/QtWebEngineProcess.app"
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="its tools are scripts of a Unix")
+
+
+@pytest.fixture
+def tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    log = noting_tools(tmp_path / "tools", sys.executable)
+    monkeypatch.setenv("PATH", str(log.parent))
+    return log
+
+
+def finished(folder: Path, identity: signing.Identity) -> Path:
+    made = context(folder)
+    app = made_up_app(folder)
+    put(made.work / "pictures" / "behaviour.icns", ICON)
+    packer.finish(made, app, identity)
+    return app
+
+
+def signed(log: Path, app: Path) -> list[tuple[str, str]]:
+    """What was signed, in turn, and the file with its entitlements."""
+    found = []
+    for name, *words in calls(log):
+        if name == "codesign" and "--sign" in words:
+            allowed = words.index("--entitlements") if "--entitlements" in words else None
+            with_ = Path(words[allowed + 1]).name if allowed is not None else ""
+            found += [
+                (str(Path(each).relative_to(app)), with_) for each in words if each.startswith(str(app))
+            ]
+    return found
+
+
+def test_everything_is_signed_once_and_what_is_inside_comes_first(tmp_path: Path, tools: Path) -> None:
+    app = finished(tmp_path, signing.Identity(NAME))
+    found = signed(tools, app)
+    places = [path for path, _allowed in found]
+    assert sorted(places) == sorted(
+        [
+            ".",
+            "Contents/MacOS/nep",
+            "Contents/Frameworks/libpython3.13.dylib",
+            "Contents/Frameworks/numpy/__dot__dylibs/libopenblas.dylib",
+            f"{QT}QtCore.framework/Versions/A",
+            PROCESS,
+            WEB,
+        ]
+    )
+    for inner, outer in ((PROCESS, WEB), (WEB, "."), (f"{QT}QtCore.framework/Versions/A", ".")):
+        assert places.index(inner) < places.index(outer)
+    assert places[-1] == "."
+    assert dict(found) == {
+        **dict.fromkeys(places, ""),
+        ".": "studio.entitlements",
+        "Contents/MacOS/nep": "studio.entitlements",
+        PROCESS: "web-process.entitlements",
+    }
+
+
+def test_what_is_deeper_comes_first_in_bundles_of_bundles(tmp_path: Path) -> None:
+    app = made_up_app(tmp_path)
+    web = app / WEB
+    inner = framework(web / "Frameworks", "Inner")
+    loose = put(web / "Libraries" / "libEGL.dylib", (web / "QtWebEngineCore").read_bytes(), 0o755)
+    order = [piece.path for piece in signing.pieces(app)]
+    assert order.index(inner / "Versions" / "A") < order.index(web)
+    assert order.index(loose) < order.index(web)
+    assert len(order) == len(set(order))
+
+
+def test_a_known_name_gives_the_hardened_runtime_and_a_time_stamp(tmp_path: Path, tools: Path) -> None:
+    finished(tmp_path, signing.Identity(NAME))
+    for name, *words in calls(tools):
+        if name == "codesign" and "--sign" in words:
+            assert words[:6] == ["--force", "--sign", NAME, "--options", "runtime", "--timestamp"]
+            assert "--deep" not in words  # it would give Studio's entitlements to everything
+
+
+def test_without_a_name_it_is_signed_for_trying_and_one_line_says_so(
+    tmp_path: Path, tools: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    app = finished(tmp_path, signing.identity_of({}))
+    assert signed(tools, app)[-1] == (".", "studio.entitlements")
+    for name, *words in calls(tools):
+        assert name == "codesign"
+        assert words[:4] == ["--force", "--sign", "-", "--timestamp=none"] or words[0] == "--verify"
+    assert capsys.readouterr().out == (
+        "· signing and notarising: skipped, as NEP_MACOS_IDENTITY is not given (installers/README.md)\n"
+    )
+
+
+def test_signed_but_not_notarised_is_said_too(
+    tmp_path: Path, tools: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    finished(tmp_path, signing.identity_of({"NEP_MACOS_IDENTITY": NAME}))
+    assert {name for name, *_words in calls(tools)} == {"codesign"}
+    said = capsys.readouterr().out
+    assert said == "· notarising: skipped, as NEP_MACOS_NOTARY_PROFILE is not given (installers/README.md)\n"
+
+
+def test_it_is_verified_then_notarised_stapled_and_shown_to_gatekeeper(tmp_path: Path, tools: Path) -> None:
+    app = finished(tmp_path, signing.identity_of({"NEP_MACOS_IDENTITY": NAME, **KEY}))
+    sent = str(context(tmp_path).work / "NEP Studio.zip")
+    key = ["--key", "/keys/AuthKey.p8", "--key-id", "2X9R4HXF34", "--issuer", "57246542-96fe"]
+    after = [call for call in calls(tools) if "--sign" not in call]
+    assert after == [
+        ["codesign", "--verify", "--deep", "--strict", "--verbose=2", str(app)],
+        ["ditto", "-c", "-k", "--keepParent", str(app), sent],
+        ["xcrun", "notarytool", "submit", sent, *key, "--wait", "--output-format", "json"],
+        ["xcrun", "stapler", "staple", str(app)],
+        ["xcrun", "stapler", "validate", str(app)],
+        ["spctl", "--assess", "--type", "execute", "--verbose=2", str(app)],
+    ]
+
+
+def test_a_disk_image_is_signed_notarised_and_assessed_as_one(tmp_path: Path, tools: Path) -> None:
+    image, made = put(tmp_path / "NEP-Studio.dmg"), context(tmp_path)
+    identity = signing.identity_of({"NEP_MACOS_IDENTITY": NAME, "NEP_MACOS_NOTARY_PROFILE": "school"})
+    signing.sign_image(made, image, identity)
+    signing.notarise(made, image, identity)
+    signing.assess(made, image)
+    profile = ["--keychain-profile", "school"]
+    assert calls(tools) == [
+        ["codesign", "--force", "--sign", NAME, "--timestamp", str(image)],
+        ["xcrun", "notarytool", "submit", str(image), *profile, "--wait", "--output-format", "json"],
+        ["xcrun", "stapler", "staple", str(image)],
+        ["xcrun", "stapler", "validate", str(image)],
+        ["spctl", "--assess", "--type", "open", "--context", "context:primary-signature", "--verbose=2",
+         str(image)],
+    ]  # fmt: skip
+
+
+def test_a_disk_image_that_nobody_known_signs_is_left_alone(tmp_path: Path, tools: Path) -> None:
+    signing.sign_image(context(tmp_path), put(tmp_path / "a.dmg"), signing.identity_of({}))
+    assert calls(tools) == []
+
+
+def test_what_apple_refuses_is_said_and_nothing_is_stapled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = noting_tools(tmp_path / "tools", sys.executable, status="Invalid")
+    monkeypatch.setenv("PATH", str(log.parent))
+    identity = signing.Identity(NAME, ("--keychain-profile", "school"))
+    with pytest.raises(PackageError) as caught:
+        signing.notarise(context(tmp_path), put(tmp_path / "a.dmg"), identity)
+    assert str(caught.value) == (
+        "Apple did not notarise 'a.dmg' (Invalid): the signature has no secure time stamp"
+    )
+    assert [call[1:3] for call in calls(log)] == [["notarytool", "submit"], ["notarytool", "log"]]
+
+
+def test_a_signature_that_fails_ends_the_packaging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = noting_tools(tmp_path / "tools", sys.executable, fails="codesign")
+    monkeypatch.setenv("PATH", str(log.parent))
+    with pytest.raises(PackageError, match="'codesign' ended with 3"):
+        finished(tmp_path, signing.Identity(NAME, ("--keychain-profile", "school")))
+    assert [call[0] for call in calls(log)] == ["codesign"]
+
+
+def test_a_notary_that_can_not_be_reached_ends_the_packaging(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = noting_tools(tmp_path / "tools", sys.executable, fails="xcrun")
+    monkeypatch.setenv("PATH", str(log.parent))
+    with pytest.raises(PackageError, match="'xcrun notarytool submit' ended with 3"):
+        signing.notarise(context(tmp_path), put(tmp_path / "a.dmg"), signing.Identity(NAME, ("--key", "k")))
+
+
+def test_an_application_that_is_not_right_is_not_signed(tmp_path: Path, tools: Path) -> None:
+    made, app = context(tmp_path), made_up_app(tmp_path)
+    put(made.work / "pictures" / "behaviour.icns", ICON)
+    put(app / "Contents" / "Frameworks" / "notes.txt")
+    with pytest.raises(PackageError, match=r"notes\.txt is no code"):
+        packer.finish(made, app, signing.Identity(NAME))
+    assert calls(tools) == []
+
+
+@pytest.mark.parametrize(
+    ("environ", "said"),
+    [
+        ({"NEP_MACOS_NOTARY_PROFILE": "school"}, "give also NEP_MACOS_IDENTITY"),
+        (KEY, "give also NEP_MACOS_IDENTITY"),
+        (
+            {"NEP_MACOS_IDENTITY": NAME, "NEP_MACOS_NOTARY_KEY": "k"},
+            "give also NEP_MACOS_NOTARY_KEY_ID, NEP_MACOS_NOTARY_ISSUER",
+        ),
+    ],
+)
+def test_half_a_name_is_an_error_at_once(environ: dict[str, str], said: str) -> None:
+    with pytest.raises(PackageError, match=said):
+        signing.identity_of(environ)
+
+
+def test_the_entitlements_are_written_as_codesign_reads_them(tmp_path: Path, tools: Path) -> None:
+    finished(tmp_path, signing.Identity(NAME))
+    work = context(tmp_path).work
+    for name, allowed in (("studio", STUDIO), ("web-process", WEB_PROCESS)):
+        assert plistlib.loads((work / f"{name}.entitlements").read_bytes()) == dict.fromkeys(allowed, True)
