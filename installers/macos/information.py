@@ -26,8 +26,8 @@ __all__ = [
 
 BUNDLE_ID = "org.nep.studio"
 PROGRAM = "nep-studio"
-OLDEST_MACOS = "13.0"
-"""What Qt 6.11 is built for; `layout.check` holds every library to it."""
+OLDEST_MACOS: Mapping[str, str] = {"arm64": "13.0", "x86_64": "14.0"}
+"""The oldest macOS by processor: Qt 6.11 is made for 13, OpenCV 4.14 for Intel only for 14."""
 APP_ICON, DOCUMENT_ICON = "nep-studio.icns", "behaviour.icns"
 LANGUAGES = ("en", "es")
 
@@ -82,8 +82,8 @@ def sentences(language: str) -> dict[str, str]:
     return {key: words[place] for key, words in _WORDS.items()}
 
 
-def information(version: str) -> dict[str, Any]:
-    """The content of Info.plist.
+def information(version: str, machine: str) -> dict[str, Any]:
+    """The content of Info.plist of the application for a processor; KeyError when there is none for it.
 
     Recordings of messages (.mcap) are a type that is known, so that the Finder has a name for them. Studio
     opens none yet, so they are not among the documents that it opens.
@@ -103,7 +103,7 @@ def information(version: str) -> dict[str, Any]:
         "LSApplicationCategoryType": "public.app-category.education",
         # PyInstaller hides an application beside which there is a program for terminals.
         "LSBackgroundOnly": False,
-        "LSMinimumSystemVersion": OLDEST_MACOS,
+        "LSMinimumSystemVersion": OLDEST_MACOS[machine],
         "NSHighResolutionCapable": True,
         "NSPrincipalClass": "NSApplication",
         "NSSupportsAutomaticGraphicsSwitching": True,
@@ -140,9 +140,9 @@ def information(version: str) -> dict[str, Any]:
     }
 
 
-def write_information(path: Path, version: str) -> Path:
+def write_information(path: Path, version: str, machine: str) -> Path:
     """Write Info.plist."""
-    path.write_bytes(plistlib.dumps(information(version)))
+    path.write_bytes(plistlib.dumps(information(version, machine)))
     return path
 
 

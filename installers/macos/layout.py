@@ -36,7 +36,7 @@ def check(app: Path, version: str, machine: str) -> list[str]:
     contents = app / "Contents"
     found = [f"{name} is beside Contents" for name in _names(app) if name != "Contents"]
     found += [f"{name} has no place in Contents" for name in _names(contents) if name not in _IN_CONTENTS]
-    found += _check_information(contents, version)
+    found += _check_information(contents, version, machine)
     found += _check_links(app)
     found += _check_places(contents)
     for framework in sorted(contents.rglob("*.framework")):
@@ -50,15 +50,18 @@ def check(app: Path, version: str, machine: str) -> list[str]:
     return found
 
 
-def made_for_newer(app: Path) -> dict[Path, str]:
+def made_for_newer(app: Path, machine: str) -> dict[Path, str]:
     """What says that it was made for a newer macOS than the application wants, and for which.
 
     A library that says so is loaded all the same, and fails only when it uses something that is not there
     yet: whether it does is to be tried on the oldest macOS.
     """
-    oldest = tuple(int(each) for each in OLDEST_MACOS.split("."))
+    oldest = tuple(int(each) for each in OLDEST_MACOS[machine].split("."))
     wanted = {
-        path: max(each.oldest_macos or (0, 0) for each in read(path)) for path in compiled(app / "Contents")
+        path: max(
+            (each.oldest_macos or (0, 0) for each in read(path) if each.machine == machine), default=(0, 0)
+        )
+        for path in compiled(app / "Contents")
     }
     return {path: f"{wants[0]}.{wants[1]}" for path, wants in wanted.items() if wants > oldest}
 
@@ -77,13 +80,13 @@ def _of(path: Path, app: Path) -> str:
     return str(path.relative_to(app))
 
 
-def _check_information(contents: Path, version: str) -> Iterator[str]:
+def _check_information(contents: Path, version: str, machine: str) -> Iterator[str]:
     try:
         told = plistlib.loads((contents / "Info.plist").read_bytes())
     except (OSError, ValueError, plistlib.InvalidFileException) as error:
         yield f"Contents/Info.plist can't be read: {error}"
         return
-    for key, value in information(version).items():
+    for key, value in information(version, machine).items():
         if told.get(key) != value:
             yield f"Contents/Info.plist has {told.get(key)!r} for {key}, not {value!r}"
     program = contents / "MacOS" / str(told.get("CFBundleExecutable", ""))

@@ -30,7 +30,7 @@ def prepare(context: Context) -> Mapping[str, str]:
     pictures = _pictures(context)
     pictures.mkdir(parents=True, exist_ok=True)
     context.run(*context.python, "-m", "installers.macos.pictures", pictures)
-    information = write_information(context.work / "Info.plist", context.version)
+    information = write_information(context.work / "Info.plist", context.version, context.machine)
     return {
         "NEP_PACKAGE_ICON": str(pictures / APP_ICON),
         "NEP_PACKAGE_INFO_PLIST": str(information),
@@ -73,7 +73,7 @@ def finish(context: Context, app: Path, identity: signing.Identity) -> None:
     write_sentences(resources)
     if wrong := layout.check(app, context.version, context.machine):
         raise PackageError(f"'{app.name}' is not as macOS wants it:\n  " + "\n  ".join(wrong))
-    newer = layout.made_for_newer(app)
+    newer = layout.made_for_newer(app, context.machine)
     if newer:
         _say(f"made for macOS {max(newer.values())}: {len(newer)} libraries; try this on the oldest macOS")
     signing.sign(context, app, identity)

@@ -83,7 +83,7 @@ def web_engine(folder: Path) -> Path:
 def made_up_app(folder: Path) -> Path:
     app = folder / "NEP Studio.app"
     contents = app / "Contents"
-    put(contents / "Info.plist", plistlib.dumps(information(VERSION)))
+    put(contents / "Info.plist", plistlib.dumps(information(VERSION, "arm64")))
     put(contents / "MacOS" / "nep-studio", header(PROGRAM), 0o755)
     put(contents / "MacOS" / "nep", header(PROGRAM), 0o755)
     frameworks, resources = contents / "Frameworks", contents / "Resources"

@@ -22,7 +22,7 @@ from nep.version import __version__
 
 
 def test_macos_knows_our_type_and_who_opens_it() -> None:
-    told = information(__version__)
+    told = information(__version__, "arm64")
     (exported,) = told["UTExportedTypeDeclarations"]
     (document,) = told["CFBundleDocumentTypes"]
     assert document["LSItemContentTypes"] == [exported["UTTypeIdentifier"]]
@@ -35,7 +35,7 @@ def test_macos_knows_our_type_and_who_opens_it() -> None:
 
 
 def test_recordings_are_known_but_studio_does_not_claim_to_open_them() -> None:
-    told = information(__version__)
+    told = information(__version__, "arm64")
     (recording,) = told["UTImportedTypeDeclarations"]
     assert recording["UTTypeTagSpecification"] == {"public.filename-extension": ["mcap"]}
     opened = [kind for each in told["CFBundleDocumentTypes"] for kind in each["LSItemContentTypes"]]
@@ -43,8 +43,8 @@ def test_recordings_are_known_but_studio_does_not_claim_to_open_them() -> None:
 
 
 def test_the_version_is_that_of_nep(tmp_path: Path) -> None:
-    read = plistlib.loads(write_information(tmp_path / "Info.plist", __version__).read_bytes())
-    assert read == information(__version__)
+    read = plistlib.loads(write_information(tmp_path / "Info.plist", __version__, "arm64").read_bytes())
+    assert read == information(__version__, "arm64")
     assert read["CFBundleShortVersionString"] == read["CFBundleVersion"] == apple_version(__version__)
 
 
@@ -62,14 +62,23 @@ def test_a_version_without_a_number_is_an_error() -> None:
 
 
 def test_the_application_is_seen_and_looks_sharp() -> None:
-    told = information(__version__)
+    told = information(__version__, "arm64")
     assert told["LSBackgroundOnly"] is False
     assert told["NSHighResolutionCapable"] is True
-    assert told["LSMinimumSystemVersion"] == "13.0"
+
+
+@pytest.mark.parametrize(("machine", "oldest"), [("arm64", "13.0"), ("x86_64", "14.0")])
+def test_the_oldest_macos_is_that_of_the_libraries_for_the_processor(machine: str, oldest: str) -> None:
+    assert information(__version__, machine)["LSMinimumSystemVersion"] == oldest
+
+
+def test_there_is_no_package_for_another_processor() -> None:
+    with pytest.raises(KeyError, match="ppc"):
+        information(__version__, "ppc")
 
 
 def test_every_permission_that_macos_asks_for_has_a_sentence_in_each_language(tmp_path: Path) -> None:
-    asked = {key for key in information(__version__) if key.endswith("UsageDescription")}
+    asked = {key for key in information(__version__, "arm64") if key.endswith("UsageDescription")}
     assert asked >= {
         "NSLocalNetworkUsageDescription",
         "NSCameraUsageDescription",
@@ -88,7 +97,7 @@ def test_every_permission_that_macos_asks_for_has_a_sentence_in_each_language(tm
 
 
 def test_the_names_of_types_are_said_in_each_language() -> None:
-    told = information(__version__)
+    told = information(__version__, "arm64")
     for kind in (*told["UTExportedTypeDeclarations"], *told["UTImportedTypeDeclarations"]):
         assert sentences("en")[kind["UTTypeDescription"]] == kind["UTTypeDescription"]
         assert sentences("es")[kind["UTTypeDescription"]]

@@ -29,7 +29,7 @@ PROCESS = WEB / "Helpers/QtWebEngineProcess.app/Contents/MacOS/QtWebEngineProces
 
 
 def spoil_information(app: Path) -> None:
-    told = information(VERSION)
+    told = information(VERSION, "arm64")
     told["LSBackgroundOnly"] = True
     put(app / "Contents/Info.plist", plistlib.dumps(told))
 
@@ -144,9 +144,9 @@ def test_another_version_is_not_this_one(tmp_path: Path) -> None:
 
 def test_what_wants_a_newer_macos_is_told(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
-    assert made_for_newer(app) == {}
-    newer = put(app / "Contents/Frameworks/a.so", fat(header(), header(machine="x86_64", macos=(15, 2))))
-    assert made_for_newer(app) == {newer: "15.2"}
+    assert made_for_newer(app, "arm64") == {}
+    newer = put(app / "Contents/Frameworks/a.so", fat(header(macos=(15, 2)), header(machine="x86_64")))
+    assert made_for_newer(app, "arm64") == {newer: "15.2"}
     assert check(app, VERSION, "arm64") == []  # it is loaded all the same
 
 

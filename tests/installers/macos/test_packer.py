@@ -31,7 +31,7 @@ def test_what_pyinstaller_needs_is_made_before(tmp_path: Path) -> None:
     assert told.keys() == {"NEP_PACKAGE_ICON", "NEP_PACKAGE_INFO_PLIST"}
     icon, plist = Path(told["NEP_PACKAGE_ICON"]), Path(told["NEP_PACKAGE_INFO_PLIST"])
     content = plistlib.loads(plist.read_bytes())
-    assert content == information(VERSION)
+    assert content == information(VERSION, "arm64")
     assert icon.name == content["CFBundleIconFile"]  # PyInstaller keeps its name
     assert icon.read_bytes()[:4] == b"icns"
     for word in told:

@@ -54,7 +54,9 @@ def test_a_mac_guesses_nothing_by_words(window: MainWindow) -> None:
     assert [action.text() for action in found if action.menuRole() == Role.TextHeuristicRole] == []
 
 
-@pytest.mark.parametrize("words", ["About us", "Quit", "Setup", "Preferences of Ana", "Configuración", "Exit"])
+@pytest.mark.parametrize(
+    "words", ["About us", "Quit", "Setup", "Preferences of Ana", "Configuración", "Exit"]
+)
 def test_a_name_that_sounds_like_a_command_stays_in_its_menu(qtbot, theme: Theme, words: str) -> None:
     place = QWidget()
     qtbot.addWidget(place)
