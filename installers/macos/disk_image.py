@@ -20,7 +20,7 @@ _CORNER = (200, 120)
 def settings(app: Path, background: Path, icon: Path) -> dict[str, Any]:
     """What dmgbuild is told; a picture beside ``background`` with @2x in its name is for Retina screens."""
     return {
-        "format": "UDZO",
+        "format": "ULMO",  # the smallest; macOS 10.15 and later open it
         "filesystem": "HFS+",
         "files": [(str(app), app.name)],
         "symlinks": {"Applications": "/Applications"},

@@ -1,20 +1,24 @@
-"""The packer for macOS: from what PyInstaller has frozen to a disk image."""
+"""The package for macOS: `NEP-Studio-VERSION-macos-ARCH.dmg`, with the application in it."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from installers.context import APP, Context, PackageError, this_system
+from installers.freeze import add_licences, freeze
 from installers.macos import disk_image, layout, signing
 from installers.macos.information import APP_ICON, DOCUMENT_ICON, write_information, write_sentences
 
-__all__ = ["application", "build", "finish", "prepare"]
+__all__ = ["application", "build", "finish", "pack", "prepare"]
 
 _BACKGROUND = "background.png"
+
+MakeImage = Callable[[Path, Path, Path, Path], Path]
+"""Makes the first file of the application, a background and an icon."""
 
 
 def application(context: Context) -> Path:
@@ -37,8 +41,8 @@ def prepare(context: Context) -> Mapping[str, str]:
     }
 
 
-def build(context: Context) -> list[Path]:
-    """The disk image of the frozen application, signed and notarised as far as names are given.
+def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
+    """The disk image, signed and notarised as far as names are given, and the bill of materials.
 
     Raises `PackageError`, also where this is no Mac.
     """
@@ -47,18 +51,28 @@ def build(context: Context) -> list[Path]:
             "the package for macOS can be made on a Mac only: "
             "PyInstaller freezes for the computer that it runs on"
         )
-    identity = signing.identity_of(os.environ)
+    return pack(context, signing.identity_of(os.environ), disk_image.dmg, keep_frozen=keep_frozen)
+
+
+def pack(
+    context: Context, identity: signing.Identity, make_image: MakeImage, *, keep_frozen: bool
+) -> Sequence[Path]:
+    """`build` with somebody who signs and a way to make the disk image. Raises `PackageError`."""
+    os.environ.update(prepare(context))  # the specification reads them
     app = application(context)
-    finish(context, app, identity)
+    if not (keep_frozen and app.is_dir()):
+        freeze(context)
     context.dist.mkdir(parents=True, exist_ok=True)
-    target = context.dist / f"NEP-Studio-{context.version}-macos-{context.machine}.dmg"
+    bill = add_licences(context, app / "Contents" / "Resources")
+    finish(context, app, identity)
     pictures = _pictures(context)
-    disk_image.dmg(target, app, pictures / _BACKGROUND, pictures / APP_ICON)
+    target = context.dist / f"NEP-Studio-{context.version}-macos-{context.machine}.dmg"
+    make_image(target, app, pictures / _BACKGROUND, pictures / APP_ICON)
     signing.sign_image(context, target, identity)
     if identity.notary:
         signing.notarise(context, target, identity)
         signing.assess(context, target)
-    return [target]
+    return [target, bill]
 
 
 def finish(context: Context, app: Path, identity: signing.Identity) -> None:

@@ -12,11 +12,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import QBuffer, QIODevice, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPolygonF
+from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QApplication
 
 from app.ui.shell.bars.logo import paint_logo
 from app.ui.theme.theme import Theme
+from installers.icons import paint_behaviour
 from installers.macos.disk_image import APP_AT, APPLICATIONS_AT, ICON_SIDE, WINDOW
 from installers.macos.information import APP_ICON, DOCUMENT_ICON
 
@@ -42,23 +43,8 @@ def paint_app(painter: QPainter, side: float, theme: Theme) -> None:
 
 
 def paint_document(painter: QPainter, side: float, theme: Theme) -> None:
-    """A sheet with a folded corner and the logo on it."""
-    left, right, top, low = side * 0.17, side * 0.83, side * 0.06, side * 0.94
-    fold = side * 0.2
-    sheet = QPainterPath(QPointF(left, top))
-    for x, y in ((right - fold, top), (right, top + fold), (right, low), (left, low)):
-        sheet.lineTo(x, y)
-    sheet.closeSubpath()
-    edge = QPen(QColor("#b9bdc6"), max(1.0, side / 128))
-    edge.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
-    painter.setPen(edge)
-    painter.setBrush(QColor("#ffffff"))
-    painter.drawPath(sheet)
-    painter.setBrush(QColor("#e6e8ec"))
-    corner = [QPointF(right - fold, top), QPointF(right - fold, top + fold), QPointF(right, top + fold)]
-    painter.drawPolygon(QPolygonF(corner))
-    logo = side * 0.4
-    paint_logo(painter, QRectF((side - logo) / 2, side * 0.42, logo, logo), theme)
+    """The sheet of paper of all systems."""
+    paint_behaviour(painter, QRectF(0, 0, side, side), theme)
 
 
 def paint_background(painter: QPainter, scale: float, theme: Theme) -> None:

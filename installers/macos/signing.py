@@ -186,4 +186,5 @@ def _main(bundle: Path) -> Path:
 
 def _signed(bundle: Path) -> Path:
     """What codesign is given: of a framework its version."""
-    return (bundle / "Versions" / "Current").resolve() if bundle.suffix == ".framework" else bundle
+    versions = bundle / "Versions"
+    return versions / (versions / "Current").readlink() if bundle.suffix == ".framework" else bundle

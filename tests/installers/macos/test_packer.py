@@ -1,41 +1,118 @@
-"""What is made before freezing, and how the application is completed."""
+"""The package as a whole, with tools that only note: what is made before freezing, and what comes after."""
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import plistlib
 import sys
 from pathlib import Path
 
 import pytest
 
-from installers.context import ROOT, Context, PackageError
+from installers.context import ROOT, PackageError
 from installers.macos import packer, signing
 from installers.macos.information import information
-from tests.installers.macos.made_up_app import VERSION, context
+from tests.installers.macos.made_up_app import ICON, VERSION, calls, context, noting_tools, put
 
+NAME = "Developer ID Application: Ana Pérez (ABCDE12345)"
+MADE = ("NEP_PACKAGE_ICON", "NEP_PACKAGE_INFO_PLIST")
 
-class Elsewhere(Context):
-    """Its results go into a folder of the test, not into the checkout."""
+PYTHON = """#!{python}
+import json, os, shutil, sys
+from pathlib import Path
+sys.path.insert(0, {root!r})
+from tests.installers.macos.made_up_app import ICON, made_up_app, put
+words = sys.argv[1:]
+with open({log!r}, "a", encoding="utf-8") as file:
+    file.write(json.dumps(["python", *words[:2]]) + "\\n")
+if words[1] == "installers.macos.pictures":
+    for name in ("nep-studio.icns", "behaviour.icns", "background.png"):
+        put(Path(words[2]) / name, ICON)
+elif words[1] == "PyInstaller":
+    assert all(Path(os.environ[name]).is_file() for name in {made!r})
+    folder = Path(words[words.index("--distpath") + 1])
+    (folder / "NEP Studio").mkdir(parents=True)
+    app = made_up_app(folder)
+    for language in ("en", "es"):
+        shutil.rmtree(app / "Contents" / "Resources" / f"{{language}}.lproj")
+    (app / "Contents" / "Resources" / "behaviour.icns").unlink()
+else:
+    put(Path(words[3]) / "NOTICE.txt")
+    put(Path(words[4]))
+"""
 
-    place: Path
-
-    @property
-    def work(self) -> Path:
-        return self.place
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="its tools are scripts of a Unix")
 
 
 def test_what_pyinstaller_needs_is_made_before(tmp_path: Path) -> None:
-    made = Elsewhere("macos", python=(sys.executable,), root=ROOT, version=VERSION, machine="arm64", epoch=1)
-    object.__setattr__(made, "place", tmp_path)
+    made = dataclasses.replace(context(tmp_path), python=(sys.executable,))
+    (tmp_path / "installers").symlink_to(ROOT / "installers")
+    for name in ("app", "nep", "resources"):
+        (tmp_path / name).symlink_to(ROOT / name)
     told = packer.prepare(made)
-    assert told.keys() == {"NEP_PACKAGE_ICON", "NEP_PACKAGE_INFO_PLIST"}
-    icon, plist = Path(told["NEP_PACKAGE_ICON"]), Path(told["NEP_PACKAGE_INFO_PLIST"])
+    assert tuple(told) == MADE
+    icon, plist = (Path(told[name]) for name in MADE)
     content = plistlib.loads(plist.read_bytes())
     assert content == information(VERSION, "arm64")
     assert icon.name == content["CFBundleIconFile"]  # PyInstaller keeps its name
     assert icon.read_bytes()[:4] == b"icns"
     for word in told:
         assert word in (ROOT / "installers" / "nep-studio.spec").read_text("utf-8")
+
+
+def test_first_it_is_frozen_then_signed_and_only_then_put_into_the_image(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = noting_tools(tmp_path / "tools", sys.executable)
+    monkeypatch.setenv("PATH", str(log.parent))
+    for name in MADE:
+        monkeypatch.setenv(name, "")
+    text = PYTHON.format(python=sys.executable, root=str(ROOT), log=str(log), made=MADE)
+    python = put(tmp_path / "python", text.encode(), 0o755)
+    made = dataclasses.replace(context(tmp_path), python=(str(python),))
+
+    def image(target: Path, app: Path, background: Path, icon: Path) -> Path:
+        with log.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(["image", app.name, background.name, icon.name]) + "\n")
+        return put(target)
+
+    identity = signing.Identity(NAME, ("--keychain-profile", "school"))
+    packages = packer.pack(made, identity, image, keep_frozen=False)
+    assert [path.name for path in packages] == [
+        "NEP-Studio-0.1.0-macos-arm64.dmg",
+        "NEP-Studio-0.1.0-macos.cdx.json",
+    ]
+    steps = [
+        " ".join([call[0], *(word for word in call[1:3] if not word.startswith("/"))]) for call in calls(log)
+    ]
+    in_turn = list(dict.fromkeys(steps))
+    assert in_turn == [
+        "python -m installers.macos.pictures",
+        "python -m PyInstaller",
+        "python macos",
+        "codesign --force --sign",
+        "codesign --verify --deep",
+        "ditto -c -k",
+        "xcrun notarytool submit",
+        "xcrun stapler staple",
+        "xcrun stapler validate",
+        "spctl --assess --type",
+        "image NEP Studio.app background.png",
+    ]
+    assert steps[-5:] == [
+        "codesign --force --sign",
+        "xcrun notarytool submit",
+        "xcrun stapler staple",
+        "xcrun stapler validate",
+        "spctl --assess --type",
+    ]  # of the image
+    resources = packer.application(made) / "Contents" / "Resources"
+    assert (resources / "NOTICE.txt").is_file()
+    assert (resources / "behaviour.icns").read_bytes() == ICON
+    log.write_text("")
+    packer.pack(made, signing.Identity(signing.AD_HOC), image, keep_frozen=True)
+    assert ["python", "-m", "PyInstaller"] not in calls(log)
 
 
 def test_what_was_not_frozen_can_not_be_packed(tmp_path: Path) -> None:
