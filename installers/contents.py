@@ -66,7 +66,8 @@ def is_wanted(name: str) -> bool:
     """Whether a collected file goes into the package; `name` has slashes of either kind."""
     path = PurePosixPath(name.replace("\\", "/"))
     parts = path.parts
-    if _UNUSED.search(str(path)) or _OF_THE_SYSTEM.match(str(path)):
+    # Each part: of a framework of macOS its folder is named so, and a rest of it could not be signed.
+    if any(_UNUSED.search(part) for part in parts) or _OF_THE_SYSTEM.match(str(path)):
         return False
     if _FFMPEG_OF_QT.match(path.name) and ("PySide6" in parts or len(parts) == 1):
         return False

@@ -1,0 +1,33 @@
+"""A framework goes into the package as a whole or not at all: codesign refuses what is left of one."""
+
+from __future__ import annotations
+
+import pytest
+
+from installers.contents import is_wanted
+
+PARTS = (
+    "Versions/A/{name}",
+    "Versions/A/Resources/Info.plist",
+    "Versions/Current",
+    "{name}",
+    "Resources",
+    "Resources/Info.plist",
+)
+"""What PyInstaller collects of one."""
+
+
+def wanted(name: str) -> set[bool]:
+    return {is_wanted(f"PySide6/Qt/lib/{name}.framework/{part.format(name=name)}") for part in PARTS}
+
+
+@pytest.mark.parametrize("name", ["QtVirtualKeyboard", "QtQuickControls2", "QtCharts", "QtSql", "Qt3DCore"])
+def test_of_what_is_not_used_nothing_stays(name: str) -> None:
+    assert wanted(name) == {False}
+
+
+@pytest.mark.parametrize(
+    "name", ["QtCore", "QtWidgets", "QtWebEngineCore", "QtQuick", "QtQml", "QtMultimedia"]
+)
+def test_what_is_used_stays_whole(name: str) -> None:
+    assert wanted(name) == {True}
