@@ -18,6 +18,7 @@ _IN_CONTENTS = frozenset(
     {"Info.plist", "PkgInfo", "MacOS", "Frameworks", "Resources", "_CodeSignature", "CodeResources"}
 )
 _CODE_FOLDERS = ("MacOS", "Frameworks")
+_OF_MACOS = ("/usr/lib/", "/System/")
 _WEB_FILES = ("icudtl.dat", "qtwebengine_resources.pak", "qtwebengine_locales/en-US.pak")
 
 
@@ -43,6 +44,7 @@ def check(app: Path, version: str, machine: str) -> list[str]:
         if is_bundle(framework):
             found += _check_framework(framework, app)
     found += _check_web(contents)
+    found += _check_linked(contents)
     for path in compiled(contents):
         machines = {each.machine for each in read(path)}
         if machine not in machines:
@@ -141,6 +143,19 @@ def _check_places(contents: Path) -> Iterator[str]:
             for path in (Path(at, each) for each in sorted(names)):
                 if not path.is_symlink() and not read(path):
                     yield f"{_of(path, app)} is no code, so its signature would be lost when it is copied"
+
+
+def _check_linked(contents: Path) -> Iterator[str]:
+    """Every library that something is linked with is in the application, or is one of macOS."""
+    there = {path.name for path in _files(contents)}
+    for path in compiled(contents):
+        for name in dict.fromkeys(name for each in read(path) for name in each.needs):
+            if name.startswith("/"):
+                is_there = name.startswith(_OF_MACOS)
+            else:
+                is_there = name.rpartition("/")[2] in there
+            if not is_there:
+                yield f"{_of(path, contents.parent)} is linked with '{name}', which is not there"
 
 
 def _check_framework(framework: Path, app: Path) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""What a compiled file of macOS is: a program or a library, for which processors, and since which macOS."""
+"""What a compiled file of macOS is: for which processors, since which macOS, and what it is linked with."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ _MOST_SLICES = 8
 _MACHINES = {0x01000007: "x86_64", 0x0100000C: "arm64"}
 _PROGRAM = 2
 _VERSION_MIN_MACOS, _BUILD_VERSION = 0x24, 0x32
+_LOAD, _REEXPORT = 0xC, 0x8000001F
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Slice:
     """Whether it can be started; else it is a library or a plug-in."""
     oldest_macos: tuple[int, int] | None
     """The macOS for which it was made; None when it does not say."""
+    needs: tuple[str, ...] = ()
+    """The libraries without which it is not loaded, as it names them: "@rpath/libzmq.5.dylib"."""
 
 
 def read(path: Path) -> tuple[Slice, ...]:
@@ -63,15 +66,15 @@ def _slice(file: BinaryIO, start: int) -> Slice:
     cpu, _sub, kind, count, _size, _flags = struct.unpack(f"{order}6I", file.read(24))
     if magic in _WIDE:
         file.read(4)
-    return Slice(_MACHINES.get(cpu, hex(cpu)), kind == _PROGRAM, _oldest(file, order, count))
-
-
-def _oldest(file: BinaryIO, order: str, count: int) -> tuple[int, int] | None:
+    oldest, needs = None, []
     for _each in range(count):
         command, size = struct.unpack(f"{order}2I", file.read(8))
         body = file.read(max(size - 8, 0))
         if command in {_VERSION_MIN_MACOS, _BUILD_VERSION}:
             place = 0 if command == _VERSION_MIN_MACOS else 4
             (packed,) = struct.unpack_from(f"{order}I", body, place)
-            return packed >> 16, packed >> 8 & 0xFF
-    return None
+            oldest = (packed >> 16, packed >> 8 & 0xFF)
+        elif command in {_LOAD, _REEXPORT}:
+            (place,) = struct.unpack_from(f"{order}I", body)
+            needs.append(body[place - 8 :].split(b"\0")[0].decode("utf-8", "replace"))
+    return Slice(_MACHINES.get(cpu, hex(cpu)), kind == _PROGRAM, oldest, tuple(needs))

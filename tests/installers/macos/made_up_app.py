@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import plistlib
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 
 from installers.context import Context
@@ -29,10 +30,17 @@ sys.exit({code} if name == {fails!r} else 0)
 """
 
 
-def header(kind: int = LIBRARY, machine: str = "arm64", macos: tuple[int, int] = (13, 0)) -> bytes:
+def header(
+    kind: int = LIBRARY, machine: str = "arm64", macos: tuple[int, int] = (13, 0), needs: Sequence[str] = ()
+) -> bytes:
     version = macos[0] << 16 | macos[1] << 8
-    command = struct.pack("<6I", 0x32, 24, 1, version, version, 0)
-    return struct.pack("<8I", 0xFEEDFACF, CPUS[machine], 0, kind, 1, len(command), 0, 0) + command
+    commands = struct.pack("<6I", 0x32, 24, 1, version, version, 0)
+    for name in ("/usr/lib/libSystem.B.dylib", *needs):
+        text = name.encode() + b"\0"
+        text += bytes(-len(text) % 8)
+        commands += struct.pack("<6I", 0xC, 24 + len(text), 24, 2, 0, 0) + text
+    head = (0xFEEDFACF, CPUS[machine], 0, kind, 2 + len(needs), len(commands), 0, 0)
+    return struct.pack("<8I", *head) + commands
 
 
 def fat(*slices: bytes) -> bytes:
@@ -84,7 +92,8 @@ def made_up_app(folder: Path) -> Path:
     app = folder / "NEP Studio.app"
     contents = app / "Contents"
     put(contents / "Info.plist", plistlib.dumps(information(VERSION, "arm64")))
-    put(contents / "MacOS" / "nep-studio", header(PROGRAM), 0o755)
+    needs = ["@rpath/libpython3.13.dylib", "@rpath/QtCore.framework/Versions/A/QtCore"]
+    put(contents / "MacOS" / "nep-studio", header(PROGRAM, needs=needs), 0o755)
     put(contents / "MacOS" / "nep", header(PROGRAM), 0o755)
     frameworks, resources = contents / "Frameworks", contents / "Resources"
     put(frameworks / "libpython3.13.dylib", header(), 0o755)

@@ -117,6 +117,14 @@ SPOILED: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda app: (app / WEB / "Resources/icudtl.dat").unlink(),
         "no Resources/icudtl.dat",
     ),
+    "a library that was left out": (
+        lambda app: put(app / "Contents/Frameworks/a.so", header(needs=["@rpath/libzmq.5.dylib"])),
+        "a.so is linked with '@rpath/libzmq.5.dylib', which is not there",
+    ),
+    "a library of the builder": (
+        lambda app: put(app / "Contents/Frameworks/a.so", header(needs=["/opt/homebrew/lib/libpng.dylib"])),
+        "a.so is linked with '/opt/homebrew/lib/libpng.dylib', which is not there",
+    ),
     "another processor": (
         lambda app: put(app / "Contents/Frameworks/libpython3.13.dylib", header(machine="x86_64")),
         "libpython3.13.dylib is made for x86_64, not for arm64",

@@ -9,14 +9,17 @@ import pytest
 from installers.macos.mach_o import Slice, read
 from tests.installers.macos.made_up_app import PROGRAM, fat, header, put
 
+SYSTEM = ("/usr/lib/libSystem.B.dylib",)
+
 
 def test_a_program_for_one_processor(tmp_path: Path) -> None:
-    assert read(put(tmp_path / "a", header(PROGRAM, "arm64", (13, 4)))) == (Slice("arm64", True, (13, 4)),)
+    path = put(tmp_path / "a", header(PROGRAM, "arm64", (13, 4), ["@rpath/libzmq.5.dylib"]))
+    assert read(path) == (Slice("arm64", True, (13, 4), (*SYSTEM, "@rpath/libzmq.5.dylib")),)
 
 
 def test_a_library_for_two(tmp_path: Path) -> None:
     path = put(tmp_path / "a", fat(header(macos=(15, 0)), header(machine="x86_64")))
-    assert read(path) == (Slice("arm64", False, (15, 0)), Slice("x86_64", False, (13, 0)))
+    assert read(path) == (Slice("arm64", False, (15, 0), SYSTEM), Slice("x86_64", False, (13, 0), SYSTEM))
 
 
 @pytest.mark.parametrize(
