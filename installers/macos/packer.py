@@ -11,6 +11,7 @@ from pathlib import Path
 from installers.context import APP, Context, PackageError, this_system
 from installers.freeze import add_licences, freeze
 from installers.macos import disk_image, layout, signing
+from installers.macos.film_libraries import leave_out_films
 from installers.macos.information import APP_ICON, DOCUMENT_ICON, write_information, write_sentences
 
 __all__ = ["application", "build", "finish", "pack", "prepare"]
@@ -62,6 +63,7 @@ def pack(
     app = application(context)
     if not (keep_frozen and app.is_dir()):
         freeze(context)
+        leave_out_films(context, app)
     context.dist.mkdir(parents=True, exist_ok=True)
     bill = add_licences(context, app / "Contents" / "Resources")
     finish(context, app, identity)

@@ -1,0 +1,100 @@
+"""OpenCV without what plays films, as on Linux (`installers.linux.film_libraries`).
+
+On Apple silicon OpenCV's wheel brings an FFmpeg with x264, x265, Rubber Band and vid.stab, which is under the
+GNU General Public License. Studio never asks for a film, so empty libraries take its place, and what only
+FFmpeg needed goes. The programs switch that part of OpenCV off when they start (`installers/entries`).
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+from installers.context import Context, PackageError, this_system
+from installers.macos.information import OLDEST_MACOS
+from installers.macos.layout import compiled
+from installers.macos.mach_o import read
+
+__all__ = ["FILMS", "leave_out_films"]
+
+FILMS = re.compile(r"lib(?:av(?:codec|device|filter|format|util)|sw(?:scale|resample)|postproc)\.")
+_IMPORTED = re.compile(r"\(undefined\).* external _(\w+) \(from (lib\w+)")
+
+
+def leave_out_films(context: Context, app: Path) -> int:
+    """Put empty libraries in the place of FFmpeg's; how many bytes that took away, 0 where there is none.
+
+    Raises `PackageError`, also when there is no compiler: with that FFmpeg all of the package would have to
+    be under its licence.
+    """
+    films = [path for path in compiled(app) if FILMS.match(path.name)]
+    if not films:
+        return 0
+    folder = films[0].parent
+    user = folder.parent / "cv2.abi3.so"
+    if {path.parent for path in films} != {folder} or not user.is_file():
+        raise PackageError(f"FFmpeg is not where OpenCV brings it, but in '{folder}'")
+    before = _size(folder)
+    imported = _imported_by(user)
+    needed = _needed_by(user)
+    for path in films:
+        if path.name in needed:
+            _make_empty(context, path, imported.get(path.name.split(".")[0], set()))
+        else:
+            path.unlink()
+    _remove_unneeded(folder, user)
+    for link in sorted(app.rglob("*")):  # PyInstaller puts links to libraries into other folders
+        if link.is_symlink() and not link.exists():
+            link.unlink()
+    return before - _size(folder)
+
+
+def _size(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.iterdir())
+
+
+def _needed_by(path: Path) -> set[str]:
+    return {name.rpartition("/")[2] for each in read(path) for name in each.needs}
+
+
+def _imported_by(path: Path) -> Mapping[str, set[str]]:
+    """The functions that a file imports, by the library that it wants them of."""
+    tool = "nm" if this_system() == "macos" else "llvm-nm"
+    try:
+        told = subprocess.run([tool, "-m", "-u", path], capture_output=True, text=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise PackageError(f"'{tool}' can't tell what '{path.name}' imports: {error}") from error
+    found: dict[str, set[str]] = {}
+    for name, library in _IMPORTED.findall(told):
+        found.setdefault(library, set()).add(name)
+    return found
+
+
+def _make_empty(context: Context, path: Path, names: set[str]) -> None:
+    """A library of the same name whose functions do nothing."""
+    source = context.work / "empty.c"
+    source.parent.mkdir(parents=True, exist_ok=True)
+    source.write_text("".join(f"long {name}(void) {{ return 0; }}\n" for name in sorted(names)), "utf-8")
+    machine = context.machine
+    # Elsewhere, to try it: LLVM's linker, and no system library, which only a Mac has.
+    elsewhere = () if this_system() == "macos" else ("-fuse-ld=lld", "-mlinker-version=705", "-nostdlib")
+    context.run(
+        "clang", f"--target={machine}-apple-macos{OLDEST_MACOS[machine]}", "-dynamiclib", "-O1",
+        "-fno-builtin", *elsewhere, "-install_name", f"@rpath/{path.name}", "-compatibility_version", "999",
+        "-current_version", "999", "-o", path, source,
+    )  # fmt: skip
+
+
+def _remove_unneeded(folder: Path, user: Path) -> None:
+    """Remove what nobody is linked with any more."""
+    waiting, kept = [user], set[str]()
+    while waiting:
+        for name in _needed_by(waiting.pop()):
+            if name not in kept and (folder / name).is_file():
+                kept.add(name)
+                waiting.append(folder / name)
+    for path in folder.iterdir():
+        if path.name not in kept:
+            path.unlink()
