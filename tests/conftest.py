@@ -54,6 +54,7 @@ LONG_S = {
     "tests/core/robots/test_refused_stop.py": 25.0,
     "tests/core/network/test_no_network.py": 21.0,
     "tests/faults/test_faults.py": 25.0,
+    "tests/test_distribution.py": 25.0,
     "tests/blocks/compiler/test_expressions.py": 20.0,
     "tests/blocks/compiler/test_hostile.py": 20.0,
     "tests/robots/driver/test_contract_of_any_file.py": 16.0,

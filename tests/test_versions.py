@@ -128,6 +128,18 @@ def test_a_step_that_fails_is_named_and_the_tests_run_all_the_same(
     assert f"Python {HERE}  FAILED: {told}" in capsys.readouterr().err
 
 
+def test_a_file_that_was_built_is_installed_instead_of_this_folder(tmp_path: Path) -> None:
+    built = tmp_path / "nep_studio-1.0.0-py3-none-any.whl"
+    system = Pythons(here())
+    with pytest.raises(Trouble, match=f"there is no file {re.escape(str(built))}"):
+        versions(system.computer(), ["--plain", "--install", str(built)], tmp_path, tmp_path)
+    assert system.ran == []
+    built.touch()
+    assert versions(system.computer(), ["--plain", "--install", str(built)], tmp_path, tmp_path) == 0
+    (ours,) = (command for command in system.ran if "--force-reinstall" in command)
+    assert ours[-1] == str(built)
+
+
 def test_an_environment_that_failed_is_made_again_and_tests_that_fail_are_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,13 +3,16 @@
     python -I tools/library_alone.py     run by `python3 dev.py versions`; -I keeps this folder's sources out
 
 Messages of each plain type over a master of its own and without one, a service, a picture that asks for its
-extra in one sentence, the command line, and that none of it loads Qt or asks for what is not installed.
+extra in one sentence, the command line, also in Spanish, and that no module of it needs Qt or anything else
+that is not installed.
 """
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
+import pkgutil
 import subprocess
 import sys
 from pathlib import Path
@@ -35,6 +38,19 @@ def installed() -> list[str]:
     faults = [f"{name} is installed" for name in ABSENT if importlib.util.find_spec(name)]
     if not Path(nep.__file__).is_relative_to(sys.prefix):
         faults.append(f"nep was imported from {nep.__file__}, not from {sys.prefix}")
+    return faults
+
+
+def modules() -> list[str]:
+    """Each module of nep is imported, those of back ends too: none may need what is not installed."""
+    faults = []
+    for found in pkgutil.walk_packages(nep.__path__, "nep."):
+        if found.name == "nep.__main__":  # which is the command itself
+            continue
+        try:
+            importlib.import_module(found.name)
+        except ImportError as error:
+            faults.append(f"{found.name} is not imported: {error}")
     return faults
 
 
@@ -86,22 +102,29 @@ def sentences(master: str) -> list[str]:
 
 def command_line(master: str) -> list[str]:
     """The command `nep` answers, as the installed script."""
-    script = Path(sys.executable).with_name("nep.exe" if sys.platform == "win32" else "nep")
     faults = []
     for arguments in (["--help"], ["--master", master, "topic", "list"], ["--master", master, "doctor"]):
-        done = subprocess.run(
-            [str(script), *arguments],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=2 * WAIT_S,
-            env={**os.environ, "NEP_LANG": "en"},
-        )
+        done = _said(arguments)
         # The doctor may well have something to say about this computer.
         allowed = {0, 1} if "doctor" in arguments else {0}
         if "Traceback" in done.stderr or done.returncode not in allowed:
             faults.append(f"nep {' '.join(arguments)} ended with {done.returncode}: {done.stderr[-500:]}")
+    if _said(["--help"], "es").stdout == _said(["--help"]).stdout:
+        faults.append("nep --help says the same in Spanish and in English: its translations are missing")
     return faults
+
+
+def _said(arguments: list[str], language: str = "en") -> subprocess.CompletedProcess[str]:
+    """What the installed script says in a language."""
+    script = Path(sys.executable).with_name("nep.exe" if sys.platform == "win32" else "nep")
+    return subprocess.run(
+        [str(script), *arguments],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+        timeout=2 * WAIT_S,
+        env={**os.environ, "NEP_LANG": language, "PYTHONUTF8": "1"},
+    )
 
 
 def main() -> int:
@@ -109,6 +132,7 @@ def main() -> int:
     with nep.master("127.0.0.1:0", learn_s=0.0) as master:
         faults = [
             *installed(),
+            *modules(),
             *messages(None),
             *messages(master.address),
             *services(master.address),

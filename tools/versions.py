@@ -3,6 +3,7 @@
     python3 dev.py versions                            each Python of this computer, one after the other
     python3 dev.py versions --only 3.10 --only 3.13    these
     python3 dev.py versions --plain                    only what nep is without any extra: no tests
+    python3 dev.py versions --plain --install FILE     a wheel or source distribution that was built before
     python3 dev.py versions -- tests/nep/protocol -x   what comes after -- goes to pytest
 
 Each Python gets two environments of the pinned packages in `build/versions`, neither of which has Qt: one
@@ -108,10 +109,10 @@ def pip(python: Path) -> list[str]:
 # ---- what is tried in them ------------------------------------------------------------------------
 
 
-def try_plain(computer: Computer, python: str, folder: Path) -> list[str]:
+def try_plain(computer: Computer, python: str, folder: Path, distribution: str = ".") -> list[str]:
     """Install the distribution with no extra, and use it from elsewhere; what failed."""
     made = environment(computer, python, folder, "library")
-    ours = [*pip(made), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
+    ours = [*pip(made), "--no-deps", "--no-build-isolation", "--force-reinstall", distribution]
     # -I: what is tried is what was installed, not the sources here.
     use = [str(made), "-I", str(ROOT / "tools" / "library_alone.py")]
     for what, step in (("install", ours), ("pip check", [str(made), "-m", "pip", "check"]), ("use", use)):
@@ -142,9 +143,17 @@ def versions(
     )
     parser.add_argument("--only", action="append", choices=PROMISED, help="this Python (may be given again)")
     parser.add_argument("--plain", action="store_true", help="only the library without any extra, no tests")
+    parser.add_argument(
+        "--install", metavar="FILE", help="this wheel or source distribution, not this folder"
+    )
     parser.add_argument("pytest_arguments", nargs="*", help="arguments for pytest, after --")
     options = parser.parse_args(given)
     wanted = [each for each in PROMISED if each in (options.only or PROMISED)]
+    if options.install and not Path(options.install).is_file():
+        raise Trouble(
+            f"there is no file {options.install}; python -m build makes dist/*.whl and dist/*.tar.gz"
+        )
+    distribution = str(Path(options.install).resolve()) if options.install else "."
     have = {version: python for version, python in found(computer, home).items() if version in wanted}
     absent = [version for version in wanted if version not in have]
     if absent:
@@ -154,7 +163,7 @@ def versions(
     outcomes = []
     for version, python in have.items():
         print(f"\n=== Python {version} ({python})", flush=True)
-        failed = try_plain(computer, python, folder / f"{version}-plain")
+        failed = try_plain(computer, python, folder / f"{version}-plain", distribution)
         if not options.plain:
             failed += try_tests(computer, python, folder / version, options.pytest_arguments)
         outcomes.append(Outcome(version, failed))
