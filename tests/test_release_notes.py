@@ -1,0 +1,85 @@
+"""tools/release_notes.py: the section of one version, and no notes for what is no release."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from nep.version import __version__
+from tools.release_notes import CHANGELOG, RefusedError, checked_version, main, section, with_links
+
+TEXT = """# Changelog
+
+The newest is on top.
+
+## Unreleased
+
+### Added
+
+- What nobody has yet.
+
+## [1.10.0] - 2026-12-01
+
+### Added
+
+- Pictures, see [the guide](docs/guide.md).
+
+## 1.1.0 (2026-11-01)
+
+- An older thing.
+
+## 1.0.0
+"""
+
+
+def test_a_section_ends_where_the_next_begins() -> None:
+    assert section(TEXT, "1.10.0") == "### Added\n\n- Pictures, see [the guide](docs/guide.md).\n"
+    assert section(TEXT, "1.1.0") == "- An older thing.\n"
+
+
+@pytest.mark.parametrize("version", ["1.1", "10.0", "1.10.0rc1", "2026-12-01", "1.10"])
+def test_what_only_looks_alike_is_another_version(version: str) -> None:
+    with pytest.raises(RefusedError, match="no section '## "):
+        section(TEXT, version)
+
+
+def test_a_section_without_a_word_is_refused() -> None:
+    with pytest.raises(RefusedError, match=r"says nothing of 1\.0\.0"):
+        section(TEXT, "1.0.0")
+
+
+def test_a_tag_must_be_the_version_of_the_sources() -> None:
+    assert checked_version("v1.2.3", "1.2.3") == checked_version("1.2.3", "1.2.3") == "1.2.3"
+    for tag in ("v1.2.4", "v1.2", "vv1.2.3", "release-1.2.3", ""):
+        with pytest.raises(RefusedError, match=r"is not the version of nep/version\.py"):
+            checked_version(tag, "1.2.3")
+
+
+def test_links_to_files_become_whole_and_others_stay() -> None:
+    text = "[guide](docs/guide.md), [there](https://example.org/a.md), [below](#added), [x](mailto:a@b.org)"
+    assert with_links(text, "https://example.org/blob/v1/") == text.replace(
+        "](docs/", "](https://example.org/blob/v1/docs/"
+    )
+
+
+def test_the_command_prints_the_notes_or_says_why_not(
+    tmp_path: Path, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    changelog = tmp_path / "CHANGELOG.md"
+    changelog.write_text(f"# Changelog\n\n## {__version__}\n\n- Ñandú, [how](docs/x.md)\n", encoding="utf-8")
+    assert main([f"v{__version__}", "--links", "https://example.org"], changelog) == 0
+    assert capfdbinary.readouterr().out == "- Ñandú, [how](https://example.org/docs/x.md)\n".encode()
+    changelog.write_text("# Changelog\n\n## Unreleased\n\n- x\n", encoding="utf-8")
+    for tag in (f"v{__version__}", "v99.0.0"):
+        assert main([tag], changelog) == 1
+        said = capfdbinary.readouterr()
+        assert said.out == b""
+        assert said.err.startswith(b"release notes: ")
+
+
+def test_the_newest_section_of_our_changelog_is_found() -> None:
+    text = CHANGELOG.read_text(encoding="utf-8")
+    newest = re.findall(r"^## (\S+)", text, re.MULTILINE)[0]
+    assert section(text, newest).startswith("### ")
