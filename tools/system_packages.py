@@ -1,7 +1,11 @@
-"""The system packages that Studio needs on Debian and Ubuntu: which are missing, and bringing them."""
+"""The system packages that Studio needs on Debian and Ubuntu: which are missing, and bringing them.
+
+`sudo python3 -B -m tools.system_packages` does only that; dev.py does it by itself when it is root.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 
 from tools.computer import ROOT, Computer, Trouble, timed
@@ -109,3 +113,17 @@ def apt_install(computer: Computer, missing: Sequence[str], names: list[str], un
     if computer.do([*install, *names], environ, log) != 0:
         words = "".join(log.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)[-12:])
         raise Trouble(f"apt could not install the system libraries ('{log}'); its last words:\n{words}")
+
+
+def main(computer: Computer | None = None) -> int:
+    """Bring what is missing; 2 and a sentence when that can't be done."""
+    try:
+        bring_system_packages(computer or Computer())
+    except Trouble as trouble:
+        print(f"system packages: {trouble}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
