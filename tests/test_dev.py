@@ -122,6 +122,14 @@ def test_an_ordinary_user_gets_the_one_line_to_type() -> None:
     assert system.ran == []
 
 
+def test_bringing_them_is_a_command_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    system = FakeSystem(installed=set(PACKAGES) - {"libnss3"}, listed={"libnss3"})
+    assert system_packages.main(system.computer(root=False)) == 2
+    assert "sudo apt-get install" in capsys.readouterr().err
+    assert system_packages.main(system.computer()) == 0
+    assert "libnss3" in system.installed
+
+
 def test_other_systems_are_left_alone() -> None:
     system = FakeSystem()
     for platform in ("win32", "darwin"):

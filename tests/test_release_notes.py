@@ -68,7 +68,9 @@ def test_the_command_prints_the_notes_or_says_why_not(
     tmp_path: Path, capfdbinary: pytest.CaptureFixture[bytes]
 ) -> None:
     changelog = tmp_path / "CHANGELOG.md"
-    changelog.write_text(f"# Changelog\n\n## {__version__}\n\n- Ñandú, [how](docs/guide.md)\n", encoding="utf-8")
+    changelog.write_text(
+        f"# Changelog\n\n## {__version__}\n\n- Ñandú, [how](docs/guide.md)\n", encoding="utf-8"
+    )
     assert main([f"v{__version__}", "--links", "https://example.org"], changelog) == 0
     assert capfdbinary.readouterr().out == "- Ñandú, [how](https://example.org/docs/guide.md)\n".encode()
     changelog.write_text("# Changelog\n\n## Unreleased\n\n- x\n", encoding="utf-8")
