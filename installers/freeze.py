@@ -31,7 +31,9 @@ def freeze(context: Context) -> Path:
 
 def add_licences(context: Context, folder: Path) -> Path:
     """Put the licence texts and the notice into a folder; the bill of materials, in `dist`."""
-    bill = context.dist / f"NEP-Studio-{context.version}-{context.system}.cdx.json"
+    # A release has one of each, and two for macOS.
+    of = f"macos-{context.machine}" if context.system == "macos" else context.system
+    bill = context.dist / f"NEP-Studio-{context.version}-{of}.cdx.json"
     inventory = context.root / "installers" / "inventory.py"
     context.run(
         *context.python, inventory, context.system, str(context.epoch), folder, bill, cwd=context.work
