@@ -26,6 +26,8 @@ from nep.version import __version__
 from tools.computer import venv_python
 from tools.versions import PROMISED
 
+# Two builds and an installation, also on a busy computer.
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 ROOT = Path(__file__).parents[1]
 EDITOR = "app/blocks/editor/"
 A_TIME = "1700000000"
@@ -118,6 +120,7 @@ def test_the_source_distribution_is_what_git_knows(built: Built) -> None:
 def test_the_metadata_is_valid_and_true(built: Built) -> None:
     told = built.metadata()
     assert (told.name, str(told.version), told.license_expression) == ("nep-studio", __version__, "MIT")
+    assert f" {told.author}\n" in (ROOT / "LICENSE").read_text(encoding="utf-8")
     assert told.classifiers is not None
     assert set(told.classifiers) <= classifiers
     assert told.requires_python is not None
