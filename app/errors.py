@@ -8,6 +8,7 @@
     ├── RunnerError          a program that can't be started or reached
     ├── SettingsError        settings that can't be kept
     ├── BackpackError        a backpack that can't be read or kept
+    ├── ReportError          a report of a problem that can't be written
     ├── DescriptionError     a robot's description that can't be understood
     │   └── DeclarationError one that a driver's Python declares
     ├── RobotInputError      an action's input that the robot would refuse
@@ -78,6 +79,20 @@ class SettingsError(AppError):
 
 class BackpackError(AppError):
     """The backpack can't be read or kept, or it is full."""
+
+
+class ReportError(AppError):
+    """A report of a problem can't be written; ``path`` is where."""
+
+    def __init__(self, path: Path, reason: str, advice: str) -> None:
+        """Make the sentence from the file's name, the reason and the advice."""
+        self.path = path
+        self.reason = reason
+        super().__init__(
+            _("{file} can't be written ({reason}); {advice}").format(
+                file=path.name, reason=reason, advice=advice
+            )
+        )
 
 
 class DescriptionError(AppError):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
-__all__ = ["__version__"]
+__all__ = ["RELEASES_PAGE", "__version__"]
 
 __version__ = "0.1.0"
+
+RELEASES_PAGE = ""
+"""The page of the project's releases, "https://..."; while there is none, Studio has no entry for it."""

@@ -11,14 +11,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import FrameType
 
 from PySide6.QtCore import QCoreApplication, QLibraryInfo, QLocale, Qt, QTimer, QTranslator
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication
 
 from app import resources
-from app.core.documents.journal import left_behind
+from app.core.documents.journal import left_behind, of_newer
 from app.core.documents.versions import bring_here
+from app.core.reports.crash_reports import CrashLog, CrashReports, offer
+from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
 from app.core.storage.file_lock import FileLock
 from app.core.storage.settings import home
@@ -35,7 +38,7 @@ from app.ui.startup.file_open import Application, IncomingFiles
 from app.ui.startup.single_instance import StartRequest
 from app.ui.theme import fonts
 from app.ui.theme.theme import MODES, Theme
-from nep.i18n import ENGLISH, _, language
+from nep.i18n import ENGLISH, _, language, listed, ngettext
 
 LOG_EVERY_MS = 500
 BEGUN = "begun"  # kept since the first start
@@ -124,7 +127,53 @@ def make_window(session: Session, options: Options) -> MainWindow:
         window.resize(fitting(window.size(), window.screen().availableSize()))
     if not options.alone:
         window.commands.behaviours.come_back(left_behind(), window.banner.offer)
+        tell_of_newer(session)
     return window
+
+
+def tell_of_newer(session: Session) -> None:
+    """Say what a newer Studio keeps here: settings, and unsaved work that only that one can put back."""
+    if session.settings.notice:
+        session.alerts.put("settings:newer", "warn", session.settings.notice)
+    names = of_newer()
+    if names:
+        session.alerts.put(
+            "journal:newer",
+            "warn",
+            ngettext(
+                "Unsaved work of a newer NEP Studio is kept: {names}.",
+                "Unsaved works of a newer NEP Studio are kept: {names}.",
+                len(names),
+            ).format(names=listed([f"“{name}”" for name in names])),
+            _("Start that version to put it back."),
+        )
+
+
+def tell_of_crashes(session: Session, this_run: StudioRun) -> None:
+    """Report the runs that did not end in order, and offer once what crashed since the last start."""
+    reports = CrashReports()
+    for crash in this_run.left():
+        reports.add(crash)
+    offer(session.alerts, reports)
+
+
+def close_when_asked(window: MainWindow, this_run: StudioRun) -> None:
+    """End in order on Ctrl+C, when the system asks for it, and with the terminal or the session."""
+
+    def close(_number: int, _frame: FrameType | None) -> None:
+        this_run.expect_end()
+        QTimer.singleShot(0, window.close)
+
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        # who starts it with nohup wants it to outlive the terminal
+        if number is not None and (name != "SIGHUP" or signal.getsignal(number) == signal.SIG_DFL):
+            signal.signal(number, close)
+    application = QApplication.instance()
+    if isinstance(application, QApplication):
+        application.commitDataRequest.connect(
+            lambda _manager: this_run.expect_end(), Qt.ConnectionType.DirectConnection
+        )
 
 
 def open_asked(window: MainWindow, asked: StartRequest) -> None:
@@ -221,13 +270,25 @@ def run(options: Options) -> int:
     log = qt_log.listen()
     qt_log.quiet_chromium(os.environ)
     portal.use_portal(os.environ, sys.platform)
+    logging.getLogger().addHandler(CrashLog(CrashReports()))
     application = make_application()
+    with StudioRun() as this_run:
+        return _show(application, options, log, this_run, (meeting_place, turn))
+
+
+def _show(
+    application: QApplication,
+    options: Options,
+    log: qt_log.Log,
+    this_run: StudioRun,
+    single: tuple[str, FileLock],
+) -> int:
+    """Show the window until it is closed; the exit code."""
     session = Session()
     window = make_window(session, options)
     application.setQuitOnLastWindowClosed(False)
     window.on_shut = lambda: QTimer.singleShot(0, application.quit)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda _number, _frame: QTimer.singleShot(0, window.close))
+    close_when_asked(window, this_run)
     hearing = QTimer(window)
     hearing.timeout.connect(lambda: log.take(session.console.add))
     hearing.start(LOG_EVERY_MS)
@@ -237,7 +298,10 @@ def run(options: Options) -> int:
     window.show()
     window.activateWindow()  # keys go there at once, also where no window manager sees to it
     first = first_steps(window, options)
+    if options.self_drive is None:
+        first.append(partial(tell_of_crashes, session, this_run))
     if not options.alone:
+        meeting_place, turn = single
         first.append(
             lambda: single_instance.SingleInstanceServer(meeting_place, partial(open_asked, window), window)
         )

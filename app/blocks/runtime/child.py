@@ -38,6 +38,7 @@ from app.errors import AppError
 from app.robots.description.description import Robot, parse
 from nep.errors import NepError
 from nep.i18n import _
+from nep.system.crash_trace import say_where_it_crashes
 
 SAMPLE_S = 1 / 30
 VARIABLES_EVERY = 3
@@ -372,6 +373,7 @@ def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
 if __name__ == "__main__":
     # Ctrl+C in a terminal reaches us too; what it means is for the runner to decide.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    say_where_it_crashes()
     code = main()
     # Scripts may still hang in something of their own; nothing of them is worth waiting for.
     sys.stderr.flush()

@@ -176,6 +176,8 @@ class Backpack:
             whole = deep_json.loads(data)
         except (ValueError, RecursionError):
             return self._set_aside()
+        if isinstance(whole, dict) and _is_newer(whole.get("backpack")):
+            return self._beside()
         if not isinstance(whole, dict) or whole.get("backpack") != VERSION:
             return self._set_aside()
         entries = whole.get("items")
@@ -193,25 +195,40 @@ class Backpack:
             )
         return _Found(_sorted(item for _entry, item in made if item is not None), unknown)
 
+    def _beside(self) -> _Found:
+        """Leave the file of a newer Studio alone; from now on there is one of our own beside it."""
+        newer = self.path
+        self.path = newer.with_name(f"backpack.format-{VERSION}.json")
+        if self.path == newer:
+            return self._set_aside()
+        if not self.path.exists():
+            self._tell(
+                _(
+                    "the backpack in “{file}” is of a newer NEP Studio and is left as it is; what you put"
+                    " in here is kept beside it"
+                ).format(file=newer.name)
+            )
+        return self._read()
+
     def _set_aside(self) -> _Found:
         """Begin with an empty one: the file that is no backpack is kept under another name."""
-        place = self.path.with_name("backpack.damaged.json")
+        place = self.path.with_name(f"{self.path.stem}.damaged.json")
         again = 2
         while place.exists():
-            place = self.path.with_name(f"backpack.damaged-{again}.json")
+            place = self.path.with_name(f"{self.path.stem}.damaged-{again}.json")
             again += 1
         try:
             replace_file(self.path, place)
         except OSError as error:
             raise BackpackError(
                 _("the backpack can't be read from '{path}': {reason}").format(
-                    path=self.path, reason=_("it is damaged, or a newer Studio has written it")
+                    path=self.path, reason=_("it is damaged")
                 )
             ) from error
         self._tell(
             _(
-                "the backpack could not be read (it is damaged, or a newer Studio has written it) and begins"
-                " empty; the old one is kept in '{path}'"
+                "the backpack could not be read (it is damaged) and begins empty; the old one is kept in"
+                " '{path}'"
             ).format(path=place)
         )
         return _Found()
@@ -220,6 +237,10 @@ class Backpack:
         """Once: what stays wrong is not said with every look."""
         if sentence != self._told:
             self._trouble = self._told = sentence
+
+
+def _is_newer(version: object) -> bool:
+    return isinstance(version, int) and not isinstance(version, bool) and version > VERSION
 
 
 def _sorted(items: Iterable[Packed]) -> tuple[Packed, ...]:

@@ -83,11 +83,8 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
     )
 
 
-def write_file(path: Path, behaviour: BehaviourFile) -> None:
-    """Write a behaviour's file, atomically: the old one or the new one is there, never a part.
-
-    Raises DocumentError with what to do next; then the old file is whole.
-    """
+def file_bytes(behaviour: BehaviourFile) -> bytes:
+    """What its file has in it. Raises RecursionError for more than 4000 blocks in one stack."""
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -96,8 +93,16 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
         "robots": behaviour.robots,
         **behaviour.others,
     }
+    return deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
+
+
+def write_file(path: Path, behaviour: BehaviourFile) -> None:
+    """Write a behaviour's file, atomically: the old one or the new one is there, never a part.
+
+    Raises DocumentError with what to do next; then the old file is whole.
+    """
     try:
-        data = deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
+        data = file_bytes(behaviour)
         if len(data) > LARGEST_BYTES:
             size, most = len(data) / 1e6, LARGEST_BYTES / 1e6
             said = _("{file} would have {size} MB").format(file=path.name, size=number(size, ".1f"))

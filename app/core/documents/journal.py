@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from app.core.storage import deep_json
 from app.core.storage.atomic_file import make_private, read_whole, write_atomically
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
+FORMAT = 1
+"""Goes up when this version can't understand the journals of the next one."""
 LARGEST_JOURNAL_BYTES = 64_000_000
 """Unsaved work comes back also when it is larger than a file may be: it can be made smaller then."""
 
@@ -71,6 +73,7 @@ class Journal:
         ``others`` is what else its file says. It survives the death of this process. Raises OSError.
         """
         entry = {
+            "format": FORMAT,
             "pid": os.getpid(),
             "born_s": _own_birth(os.getpid()),
             "name": name,
@@ -100,13 +103,39 @@ def left_behind(folder: Path | None = None) -> list[Unsaved]:
     return sorted((entry for entry in found if entry is not None), key=lambda entry: -entry.edited_s)
 
 
-def _read(file: Path) -> Unsaved | None:
+def of_newer(folder: Path | None = None) -> list[str]:
+    """The names of the unsaved work that a newer Studio left behind: it is not touched."""
+    folder = folder if folder is not None else home() / "journal"
+    found = []
+    for file in folder.glob("*.json") if folder.is_dir() else ():
+        entry = _entry(file)
+        if entry is not None and _format_of(entry) > FORMAT:
+            found.append(str(entry.get("name") or file.name))
+    return sorted(found)
+
+
+def _entry(file: Path) -> dict[str, object] | None:
+    """What a journal says whose Studio is gone; None for what is none, or still written."""
     try:
         entry = deep_json.loads(read_whole(file, LARGEST_JOURNAL_BYTES).decode("utf-8", "surrogatepass"))
-        if not isinstance(entry, dict):
+        if not isinstance(entry, dict) or _alive(int(entry["pid"]), float(entry["born_s"])):
             return None
-        if _alive(int(entry["pid"]), float(entry["born_s"])):
-            return None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    return entry
+
+
+def _format_of(entry: Mapping[str, object]) -> int:
+    """The number of its format; 1 for journals from before there were numbers."""
+    found = entry.get("format", 1)
+    return found if isinstance(found, int) else 1
+
+
+def _read(file: Path) -> Unsaved | None:
+    entry: Any = _entry(file)
+    if entry is None or _format_of(entry) > FORMAT:
+        return None
+    try:
         path = entry["path"]
         return Unsaved(
             journal=file,
@@ -117,7 +146,7 @@ def _read(file: Path) -> Unsaved | None:
             robots={str(name): dict(td) for name, td in dict(entry["robots"]).items()},
             others=dict(entry.get("others", {})),
         )
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (ValueError, KeyError, TypeError):
         return None
 
 

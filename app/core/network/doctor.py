@@ -55,6 +55,13 @@ class Doctor:
         self._thread.start()
         self.revision += 1
 
+    def report(self, within_s: float) -> str:
+        """What was found, as text to be given to somebody; waits for a look that goes on. For any thread."""
+        thread = self._thread
+        if thread is not None:
+            thread.join(within_s)
+        return doctor.report(self._found)
+
     def close(self) -> None:
         """Wait for a look that goes on."""
         if self._thread is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import subprocess
 import threading
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from app.core.own_process import module_command
+from app.core.reports.crash import crash_extra, end_words, is_crash
 from nep.errors import NepError
 from nep.masters.master import is_running, start_process
 from nep.protocol.graph_view import GraphView
@@ -26,6 +28,8 @@ LEARNING_S = 1.5
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
 """After how long a master that could not be started is tried again: twice as long each time."""
 END_WAIT_S = 2.0
+
+_log = logging.getLogger("studio.master")
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +115,17 @@ class MasterStart:
         if hindered is not None:
             return f"{hindered.sentence} {hindered.mend}"
         self.first = True
+        self._look_back()
         try:
             self._process = start_process(self._address, owner_pid=os.getpid(), command=module_command("nep"))
         except (NepError, OSError) as error:
             return str(error)
         return ""
+
+    def _look_back(self) -> None:
+        """The master that was started here has gone: say so, if it crashed."""
+        code = self._process.poll() if self._process is not None else None
+        self._process = None
+        if code is not None and is_crash(code):
+            how = f"the master's process {end_words(code)}"
+            _log.error("%s", how, extra=crash_extra("master", how))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import platform
 import subprocess
@@ -13,8 +14,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import IO, Protocol
 
+from app.core.faults import IN_CONSOLE
 from app.core.network.master import MasterStart
 from app.core.own_process import module_command
+from app.core.reports.crash import crash_extra, end_words, is_crash, split_trace
 from app.robots.identity import Identity
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
@@ -22,7 +25,7 @@ from nep.masters.process import NO_CONSOLE
 END_WAIT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
 """The module of each model of virtual robot."""
-TAIL_BYTES = 2000
+TAIL_BYTES, TAIL_LETTERS = 100_000, 2000
 KNOWN_WITHIN_S = 3.0
 """How long a start waits until it is known who is there: a robot of that name may be."""
 COMING_S = 30.0
@@ -32,6 +35,8 @@ WISH_KEPT_S = 4.0
 
 RUNS_MODULE = ("-m", "--module")
 MOST_KNOWN = 1000
+
+_log = logging.getLogger("studio.launcher")
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,11 +254,15 @@ class Launcher:
                 _process, log = self._robots.pop(name)
                 self.ended |= {name}
                 self._coming.pop(name, None)
+                said, trace = split_trace(_tail(log))
+                if is_crash(code):
+                    how = f"the process of a virtual robot {end_words(code)}"
+                    _log.error("%s", how, extra={**IN_CONSOLE, **crash_extra("robot", how, f"{said}{trace}")})
                 self._post_event(
                     LaunchFailed(
                         name,
                         _("The virtual robot {robot} has ended.").format(robot=name),
-                        _tail(log) or _silent_end(code),
+                        said.strip()[-TAIL_LETTERS:] or _silent_end(code),
                     )
                 )
                 log.close()

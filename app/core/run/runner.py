@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import logging
 import queue
 import threading
 import time
@@ -15,6 +16,8 @@ from typing import Literal
 
 from app.blocks.model.program import Program
 from app.blocks.runtime.variables import VariableValue
+from app.core.faults import IN_CONSOLE
+from app.core.reports.crash import crash_extra, end_words, is_crash, split_trace
 from app.core.run.child_output import Gate, Output, text_of, texts
 from app.core.run.child_process import MOST_BYTES, ChildProcess, home
 from app.core.run.child_process import child_command as child_command
@@ -41,9 +44,11 @@ MOST_BLOCKS = 100
 MOST_CHOICES, LONGEST_CHOICE = 12, 200
 WORTH_TELLING = 10_000
 LONGEST_ERROR = 100_000
-ERRORS_KEPT = 40
+ERRORS_KEPT = 200
+"""Lines: also where each thread was when native code crashed."""
 
 _runs = itertools.count(1)
+_log = logging.getLogger("studio.runner")
 
 
 @dataclass(frozen=True)
@@ -306,7 +311,12 @@ class Runner:
         if hung:
             return _("The program lost its connection to Studio and was stopped.")
         code = child.popen.returncode
-        words = next((line for line in reversed(self._errors) if line.strip()), "")
+        said, trace = split_trace("".join(f"{line}\n" for line in self._errors))
+        if is_crash(code):
+            how = f"the program's process {end_words(code)}"
+            extra = {**IN_CONSOLE, **crash_extra("behaviour", how, f"{said}{trace}")}
+            _log.error("%s", how, extra=extra)
+        words = next((line for line in reversed(said.splitlines()) if line.strip()), "")
         if code < 0:
             how = _("The program's process was killed (signal {signal})").format(signal=-code)
         else:

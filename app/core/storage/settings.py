@@ -15,8 +15,12 @@ import platformdirs
 from app.core.storage.atomic_file import make_private, read_whole, write_atomically
 from app.core.storage.file_lock import locked
 from app.errors import SettingsError
+from nep.i18n import _
 from nep.system.replace_file import replace_file
 
+FORMAT = 1
+"""Goes up when this version can't understand what the next one keeps; what is only new needs no other number.
+The states of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are in here, too."""
 RECENT_LIMIT = 12
 _LATEST_S = 1e12
 """No time is later: a damaged file may have a number that no clock can show."""
@@ -41,6 +45,12 @@ def data_home() -> Path:
     """Where Studio keeps what is large: ``$NEP_STUDIO_HOME``, else the system's place for data."""
     chosen = os.environ.get("NEP_STUDIO_HOME")
     return Path(chosen) if chosen else Path(platformdirs.user_data_dir("nep-studio", appauthor=False))
+
+
+def state_home() -> Path:
+    """Where Studio keeps what concerns its own runs: ``$NEP_STUDIO_HOME``, else the system's place."""
+    chosen = os.environ.get("NEP_STUDIO_HOME")
+    return Path(chosen) if chosen else Path(platformdirs.user_state_dir("nep-studio", appauthor=False))
 
 
 def kept_folder() -> Path:
@@ -69,12 +79,18 @@ class ListSettings(Protocol):
 
 
 class Settings:
-    """Chosen values by name. A damaged file is kept beside (``settings.damaged.json``), never lost."""
+    """Chosen values by name. A damaged file is kept beside (``settings.damaged.json``), never lost.
+
+    The file of a newer Studio, with a format that is not known here, is left as it is: what can be read of it
+    is taken, and what is chosen is kept beside it, in ``settings.format-1.json``.
+    """
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
         """Read ``settings.json`` in ``folder`` (default: `home`); none yet is fine."""
         self.path = (folder if folder is not None else home()) / "settings.json"
         self.damaged: Path | None = None
+        self.notice = ""
+        """What a person should know of the file that was found, once, in a sentence; "" for nothing."""
         self.are_new = False
         """Whether nothing was kept here before: Studio starts for the first time."""
         self.not_kept: str | None = None
@@ -105,6 +121,10 @@ class Settings:
         with locked(self.path):
             self._values = self._of_others()
             self._write()
+
+    def all(self) -> dict[str, object]:
+        """Every value that is kept, by its name."""
+        return dict(self._values)
 
     @property
     def recent(self) -> list[RecentFile]:
@@ -163,7 +183,27 @@ class Settings:
             values = json.loads(text)
         except (ValueError, RecursionError):
             return self._set_aside()
-        return values if isinstance(values, dict) else self._set_aside()
+        if not isinstance(values, dict):
+            return self._set_aside()
+        if _format_of(values) <= FORMAT:
+            return values
+        return self._set_aside() if self.path == self._own_path() else self._beside(values)
+
+    def _own_path(self) -> Path:
+        """Where the settings are while a newer Studio has its own in their place."""
+        return self.path.with_name(f"settings.format-{FORMAT}.json")
+
+    def _beside(self, newer: dict[str, object]) -> dict[str, object]:
+        """Leave the file of a newer Studio alone; from now on there is one of our own beside it."""
+        found = self.path.name
+        self.path = self._own_path()
+        if self.path.exists():
+            return self._read()
+        self.notice = _(
+            "The settings in “{file}” are of a newer NEP Studio (format {format}). They are left as they are;"
+            " what you choose here is kept beside them."
+        ).format(file=found, format=_format_of(newer))
+        return {name: value for name, value in newer.items() if name != "format"}
 
     def _of_others(self) -> dict[str, object]:
         """What the file says now, with what is not written yet; what is known here if it can't be read."""
@@ -171,10 +211,15 @@ class Settings:
             values = json.loads(read_whole(self.path))
         except (OSError, ValueError, RecursionError):
             return self._values
-        return {**values, **self._unwritten} if isinstance(values, dict) else self._values
+        if not isinstance(values, dict):
+            return self._values
+        if _format_of(values) > FORMAT:  # a newer Studio runs on this computer, too
+            self._beside(values)
+            return self._values
+        return {**values, **self._unwritten}
 
     def _set_aside(self) -> dict[str, object]:
-        self.damaged = self.path.with_name("settings.damaged.json")
+        self.damaged = self.path.with_name(f"{self.path.stem}.damaged.json")
         try:
             replace_file(self.path, self.damaged)
         except OSError:
@@ -182,7 +227,8 @@ class Settings:
         return {}
 
     def _write(self) -> None:
-        text = json.dumps(self._values, indent=1, ensure_ascii=False, sort_keys=True)
+        values = {**self._values, "format": FORMAT}
+        text = json.dumps(values, indent=1, ensure_ascii=False, sort_keys=True)
         # A file's name that is no UTF-8 has lone surrogates: JSON has them as backslash, u and four digits.
         data = text.encode("utf-8", "backslashreplace")
         try:
@@ -193,3 +239,9 @@ class Settings:
             raise failed from error
         self.not_kept = None
         self._unwritten.clear()
+
+
+def _format_of(values: Mapping[str, object]) -> int:
+    """The number of the format; 1 for settings that were kept before there were numbers."""
+    found = values.get("format", 1)
+    return found if isinstance(found, int) and not isinstance(found, bool) else 1

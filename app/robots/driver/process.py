@@ -22,6 +22,7 @@ from app.robots.driver.declare import Kind
 from app.robots.driver.driver import Driver
 from nep.i18n import _
 from nep.system.addresses import master_address
+from nep.system.crash_trace import say_where_it_crashes
 from nep.system.terminal import Terminal, log_to
 from nep.text import escaped
 
@@ -41,6 +42,7 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--owner-pid", type=int, default=None, help=_("end when this process is gone"))
     chosen = parser.parse_args(arguments)
     ended = threading.Event()
+    say_where_it_crashes()
     _on_signals(ended)
     with Terminal(sys.stderr) as terminal:  # one that takes nothing must not stop the robot's threads
         log_to(terminal, logging.INFO)

@@ -19,6 +19,7 @@ from PySide6.QtWebEngineWidgets import QWebEngineView
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app import resources
+from app.core.reports.crash import crash_extra
 from app.ui.blockly.bridge import BlocklyBridge, Json
 from app.ui.blockly.held_keys import HeldKeys
 from app.ui.blockly.scheme import PAGE, SCHEME, RequestBlocker, SchemeHandler, register_scheme
@@ -278,8 +279,14 @@ class BlocklyHost(QWidget):
             self._had_died = False
             self.recovered.emit()
 
-    def _died(self, _status: QWebEnginePage.RenderProcessTerminationStatus, code: int) -> None:
-        _log.warning("the web process of the block editor ended (code %d); it is started again", code)
+    def _died(self, status: QWebEnginePage.RenderProcessTerminationStatus, code: int) -> None:
+        is_crash = status != QWebEnginePage.RenderProcessTerminationStatus.NormalTerminationStatus
+        how = f"the web process of the block editor ended (code {code}, {status.name})"
+        _log.warning(
+            "the web process of the block editor ended (code %d); it is started again",
+            code,
+            extra=crash_extra("editor", how) if is_crash else None,
+        )
         self._up = self._on_block = False
         self._had_died = True
         self._asked_for = ""

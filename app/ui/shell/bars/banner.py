@@ -26,7 +26,12 @@ from nep.i18n import _, ngettext
 
 FIGURES = re.compile(r"\d+")
 LEAST_HEIGHT = 52
-STEP_ICONS = {"help.doctor": "stethoscope", "robots.virtual": "bot", "file.open": "folder-open"}
+STEP_ICONS = {
+    "help.doctor": "stethoscope",
+    "help.report": "message-square-warning",
+    "robots.virtual": "bot",
+    "file.open": "folder-open",
+}
 FRESH_S = 0.5
 """So long after it came under a mouse the banner lets a press through to what was there before."""
 

@@ -12,6 +12,7 @@ from app.ui.shell.commands.behaviours import BehaviourCommands, bring_into_view
 from app.ui.shell.commands.editing import EditCommands
 from app.ui.shell.commands.menus import MenuLists
 from app.ui.shell.commands.palette_entries import PaletteEntries
+from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS, Handlers
@@ -46,6 +47,7 @@ class Commands:
             self.robots,
             self.view,
             EditCommands(shell),
+            ReportCommands(shell, session, self.files, asks),
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.why_not, keys)

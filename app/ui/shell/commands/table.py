@@ -15,6 +15,7 @@ from app.ui.shell.actions.command import ArgumentCommand, Command
 from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPlace, read_stack
 from app.ui.shell.commands.editing import Edit, EditCommands
 from app.ui.shell.commands.freeze import freezable
+from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
 from app.ui.shell.commands.shell import START, Shell
 from app.ui.shell.commands.variables import VariableCommands
@@ -22,6 +23,7 @@ from app.ui.shell.commands.view import TEXT_STEP, ViewCommands
 from app.ui.shell.documents import DocumentController
 from app.ui.theme.theme import TEXT_PERCENT
 from nep.i18n import _, lazy
+from nep.version import RELEASES_PAGE
 
 A = TypeVar("A")
 LOOK = lazy("Look")
@@ -45,6 +47,7 @@ class Handlers:
     robots: RobotCommands
     view: ViewCommands
     editing: EditCommands
+    reports: ReportCommands
 
 
 # ---- why a command can't be done now: menus grey it, the palette says the sentence ------------------
@@ -148,6 +151,16 @@ def _edit(what: Edit, text: str, key: str, icon: str, *, above: bool = False) ->
         in_palette=False,
         in_shortcuts=False,
     )
+
+
+def releases(page: str) -> tuple[C, ...]:
+    """The entry that opens the page of releases; none while the project has no such page."""
+    if not page:
+        return ()
+    return (
+        C("help.releases", lazy("Look for a new version"), lambda do: do.reports.look_for_new_version(page),
+          "Help", icon="external-link", tip=lazy("Opens the page of releases in your browser")),
+    )  # fmt: skip
 
 
 COMMANDS: tuple[C, ...] = (
@@ -282,8 +295,11 @@ COMMANDS: tuple[C, ...] = (
     C("help.shortcuts", lazy("Keyboard shortcuts"), lambda do: do.view.open_shortcuts(), "Help", ("F1",),
       "keyboard"),
     C("help.doctor", lazy("Connection doctor"), lambda do: do.view.open_doctor(), "Help", icon="stethoscope"),
+    C("help.report", lazy("Report a problem"), lambda do: do.reports.report(), "Help",
+      icon="message-square-warning", above=True),
     C("help.log", lazy("Show the log"), lambda do: do.view.show_log(), "Help", icon="folder-open"),
-    C("help.about", lazy("About NEP Studio"), lambda do: do.view.about(), "Help", icon="info"),
+    *releases(RELEASES_PAGE),
+    C("help.about", lazy("About NEP Studio"), lambda do: do.view.about(), "Help", icon="info", above=True),
 )  # fmt: skip
 
 

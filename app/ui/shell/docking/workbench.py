@@ -20,7 +20,7 @@ from nep.i18n import _
 ACROSS = Qt.Orientation.Horizontal
 DOWN = Qt.Orientation.Vertical
 AREA = Qt.DockWidgetArea.LeftDockWidgetArea
-STATE_VERSION = 1
+STATE_VERSION = 1  # with another one, app.core.storage.settings.FORMAT is another one, too
 
 
 class Workbench(QMainWindow):

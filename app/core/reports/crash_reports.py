@@ -1,0 +1,161 @@
+"""The crash reports that are kept: a text file each, the newest ten. The next start offers each once."""
+
+from __future__ import annotations
+
+import logging
+import re
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.core.alerts import Alerts
+from app.core.faults import IN_CONSOLE, RepeatFilter, log_folder
+from app.core.reports.crash import PARTS, Crash, Part
+from app.core.reports.privacy import without_home
+from app.core.storage.atomic_file import LARGEST_BYTES, read_whole, write_atomically
+from nep.i18n import _, lazy
+from nep.version import __version__
+
+MOST = 10
+MOST_LETTERS = 100_000
+ALERT = "crash"
+OFFER = "help.report"
+_STAMP = "%Y-%m-%d %H.%M.%S"
+_NAME = re.compile(
+    rf"crash (?P<stamp>\d{{4}}-\d\d-\d\d \d\d\.\d\d\.\d\d) (?P<part>{'|'.join(PARTS)})(?: \d+)?"
+    r"(?P<new>\.new)?\.txt"
+)
+TITLES: dict[Part, str] = {
+    "studio": lazy("Studio ended unexpectedly last time."),
+    "behaviour": lazy("The program of a behaviour crashed last time."),
+    "robot": lazy("A virtual robot crashed last time."),
+    "master": lazy("The master crashed last time."),
+    "editor": lazy("The block editor crashed last time."),
+}
+DETAIL = lazy("A report helps those who make Studio to mend it. Nothing is sent by itself.")
+
+_log = logging.getLogger("studio.crashes")
+
+
+@dataclass(frozen=True, slots=True)
+class CrashReport:
+    """A report that is kept: its file, which part crashed, when it was noticed, whether nobody was told."""
+
+    path: Path
+    part: Part
+    noticed_s: float
+    is_new: bool
+
+
+class CrashReports:
+    """The reports in a folder. Several Studios may use it; nothing here raises for what the disk refuses."""
+
+    def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
+        """They are in ``folder`` (default: ``crashes`` beside the log files); ``clock`` gives epoch s."""
+        self._folder = folder if folder is not None else log_folder() / "crashes"
+        self._clock = clock
+
+    def add(self, crash: Crash) -> Path | None:
+        """Keep a report, of the oldest no more than ten; its file, None when it can't be kept."""
+        now = self._clock()
+        try:
+            path = self._free(f"crash {time.strftime(_STAMP, time.localtime(now))} {crash.part}")
+            write_atomically(path, _text(crash, now).encode("utf-8", "replace"), durable=False, private=True)
+        except OSError as error:
+            _log.warning("a crash report can't be kept: %s", error, extra=IN_CONSOLE)
+            return None
+        for old in self.all()[MOST:]:
+            with suppress(OSError):  # another Studio was quicker
+                old.path.unlink(missing_ok=True)
+        return path
+
+    def _free(self, stem: str) -> Path:
+        """A file of this name that is not there, told or not."""
+        taken = {each.path.name.replace(".new.txt", ".txt") for each in self.all()}
+        names = (stem, *(f"{stem} {number}" for number in range(2, len(taken) + 3)))
+        return self._folder / f"{next(name for name in names if f'{name}.txt' not in taken)}.new.txt"
+
+    def all(self) -> list[CrashReport]:
+        """The reports that are kept, the newest first."""
+        try:
+            found = [_report(path) for path in self._folder.glob("crash *.txt")]
+        except OSError:
+            return []
+        known = [each for each in found if each is not None]
+        return sorted(known, key=lambda each: (each.noticed_s, each.path.name), reverse=True)
+
+    def take_new(self) -> list[CrashReport]:
+        """Those that nobody was told of, the newest first; nobody gets them again.
+
+        One that can't be marked as told is not returned: it would be told at each start.
+        """
+        taken = []
+        for each in self.all():
+            if each.is_new:
+                told = each.path.with_name(each.path.name.replace(".new.txt", ".txt"))
+                with suppress(OSError):  # another Studio took it, or the disk can't be written
+                    each.path.rename(told)
+                    taken.append(CrashReport(told, each.part, each.noticed_s, is_new=False))
+        return taken
+
+
+class CrashLog(logging.Handler):
+    """Makes a report of each log record that tells of a crash; of a crash that comes again, now and then."""
+
+    def __init__(self, reports: CrashReports) -> None:
+        super().__init__(logging.WARNING)
+        self._reports, self._once = reports, RepeatFilter()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a report when the record has a crash with it (`app.core.reports.crash.crash_extra`)."""
+        crash = getattr(record, "crash", None)
+        if isinstance(crash, Crash) and self._once.filter(record) is not None:
+            self._reports.add(crash)
+
+
+def offer(alerts: Alerts, reports: CrashReports) -> None:
+    """Say once what crashed since the last start, with a button that leads to the report of a problem."""
+    found = reports.take_new()
+    if found:
+        worst = min(found, key=lambda each: PARTS.index(each.part))
+        alerts.put(
+            ALERT, "warn", _(TITLES[worst.part]), _(DETAIL), button=_("Report a problem"), action=OFFER
+        )
+
+
+def texts(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
+    """The file names and the texts of reports; what can't be read is left out."""
+    found = []
+    for each in reports:
+        with suppress(OSError):
+            found.append((each.path.name.replace(".new.txt", ".txt"), read_whole(each.path, LARGEST_BYTES)))
+    return found
+
+
+def _text(crash: Crash, now_s: float) -> str:
+    """For developers, so in English."""
+    noticed = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now_s))
+    lines = (
+        f"Crash report of NEP Studio {__version__}",
+        "",
+        f"part: {crash.part}",
+        f"how: {crash.how}",
+        f"noticed: {noticed}",
+        "",
+        crash.text[-MOST_LETTERS:],
+    )
+    return without_home("\n".join(lines).rstrip() + "\n")
+
+
+def _report(path: Path) -> CrashReport | None:
+    told = _NAME.fullmatch(path.name)
+    part = next((part for part in PARTS if told is not None and told["part"] == part), None)
+    if told is None or part is None:
+        return None
+    try:
+        noticed = time.mktime(time.strptime(told["stamp"], _STAMP))
+    except (ValueError, OverflowError):
+        return None
+    return CrashReport(path, part, noticed, told["new"] is not None)

@@ -1,0 +1,195 @@
+"""The report of a problem: one zip that a person may give to somebody. Nothing is ever sent from here.
+
+What is for developers in it is in English; what goes in is said to the person before (`what_goes_in`).
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import locale
+import os
+import platform
+import sys
+import time
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.core.documents.file_format import FULL, SUFFIX
+from app.core.faults import log_folder
+from app.core.reports.crash_reports import CrashReports, texts
+from app.core.reports.privacy import shown_settings, without_home
+from app.core.storage.atomic_file import read_whole, write_atomically
+from app.errors import ReportError
+from nep.i18n import _, language, listed, ngettext, number
+from nep.system.lazy_import import lazy_module
+from nep.version import __version__
+
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = lazy_module("psutil")
+
+ENDING = ".zip"
+READ_ME = (
+    "A report of a problem, made by NEP Studio {version} because a person asked for it.\n\n"
+    "what-happened.txt  what the person wrote\n"
+    "versions.txt       what Studio is made of and runs on\n"
+    "doctor.txt         what the connection doctor found\n"
+    "settings.json      the settings; of most of them only the names\n"
+    "log/               the log files of Studio\n"
+    "crashes/           reports of crashes\n"
+    "work/              behaviours, only if the person wanted that\n"
+)
+LONGEST_NAME = 60
+
+Facts = Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Work:
+    """An open behaviour as it is now: its name, and its file's bytes."""
+
+    name: str
+    data: bytes
+
+
+@dataclass(frozen=True)
+class ReportParts:
+    """Where a report comes from: what the window knows, the folders, and ``doctor``, which may take a while.
+
+    ``facts`` are what only the window knows: of Qt and of the screen.
+    """
+
+    facts: Facts
+    settings: Mapping[str, object]
+    doctor: Callable[[], str]
+    log: Path = field(default_factory=log_folder)
+    crashes: CrashReports = field(default_factory=CrashReports)
+
+
+def file_name(now_s: float) -> str:
+    """The name that a report has at first."""
+    return f"nep-studio-report-{time.strftime('%Y-%m-%d', time.localtime(now_s))}{ENDING}"
+
+
+def what_goes_in(parts: ReportParts) -> list[str]:
+    """What a report has in it, a short line each, for the person who is to decide."""
+    size = sum(path.stat().st_size for path in _logs(parts.log)) / 1000
+    lines = [
+        _("The versions of Studio, of Python, of Qt and of this system, and the size of the screen"),
+        _("What went wrong in Studio lately: its log, {size} kB").format(size=number(size, ".0f")),
+        _("What the connection doctor finds: the programs of NEP, and the addresses of this computer"),
+        _("Your settings, such as language and look"),
+    ]
+    crashed = len(parts.crashes.all())
+    if crashed:
+        words = ngettext("{count} report of a crash", "{count} reports of crashes", crashed)
+        lines.append(words.format(count=crashed))
+    return lines
+
+
+def work_words(names: Sequence[str]) -> str:
+    """Which behaviours would go in."""
+    return _("As they are now: {names}").format(names=listed([f"“{name}”" for name in names]))
+
+
+def make_report(parts: ReportParts, happened: str, work: Sequence[Work] = ()) -> bytes:
+    """The zip. It takes a moment, and as long as the doctor: not for the window's thread."""
+    files: list[tuple[str, bytes]] = [
+        ("README.txt", READ_ME.format(version=__version__).encode()),
+        ("what-happened.txt", (happened.strip() or "(nothing was written)").encode("utf-8", "replace")),
+        ("versions.txt", _private(_versions(parts.facts))),
+        ("settings.json", _private(_settings(parts.settings))),
+        ("doctor.txt", _private(parts.doctor())),
+    ]
+    for path in _logs(parts.log):
+        with suppress(OSError):  # it was moved on, or nobody may read it: the others tell
+            files.append((f"log/{path.name}", _private(read_whole(path).decode("utf-8", "replace"))))
+    for name, data in texts(parts.crashes.all()):
+        files.append((f"crashes/{name}", _private(data.decode("utf-8", "replace"))))
+    files += _named(work)
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files:
+            archive.writestr(name, data)
+    return made.getvalue()
+
+
+def write_report(path: Path, data: bytes) -> None:
+    """Write the zip, whole or not at all. Raises ReportError with what to do next."""
+    try:
+        write_atomically(path, data)
+    except (OSError, ValueError) as error:
+        full = isinstance(error, OSError) and error.errno in FULL
+        advice = _("make room there or choose another place") if full else _("choose another place")
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ReportError(path, reason, advice) from error
+
+
+def _logs(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.glob("studio.log*") if path.is_file())
+    except OSError:
+        return []
+
+
+def _private(text: str) -> bytes:
+    return without_home(text).encode("utf-8", "replace")
+
+
+def _settings(values: Mapping[str, object]) -> str:
+    return json.dumps(shown_settings(values), indent=1, ensure_ascii=False, default=str)
+
+
+def _named(work: Sequence[Work]) -> list[tuple[str, bytes]]:
+    """The behaviours as files, each under a name of its own that every system takes."""
+    found: dict[str, bytes] = {}
+    for each in work:
+        plain = "".join(c if c.isalnum() or c in " -_," else "_" for c in each.name)[:LONGEST_NAME].strip()
+        stem, again = plain or "behaviour", 2
+        name = f"work/{stem}{SUFFIX}"
+        while name in found:
+            name, again = f"work/{stem} {again}{SUFFIX}", again + 1
+        found[name] = each.data
+    return list(found.items())
+
+
+def _versions(facts: Facts) -> str:
+    lines = [f"{name}: {value}" for name, value in (*_own_facts(), *facts)]
+    return "\n".join([*lines, "", "packages:", *_packages()]) + "\n"
+
+
+def _own_facts() -> Facts:
+    """What is known without a window."""
+    memory = psutil.virtual_memory()
+    names = ("XDG_SESSION_TYPE", "XDG_CURRENT_DESKTOP", "QT_QPA_PLATFORM", "NEP_MASTER", "NEP_LANG")
+    return (
+        ("NEP Studio", __version__),
+        ("nep", __version__),
+        ("Python", f"{platform.python_version()} ({platform.python_implementation()})"),
+        ("built as a package", "yes" if getattr(sys, "frozen", False) else "no"),
+        ("system", f"{platform.platform()} {_distribution()}".rstrip()),
+        ("machine", f"{platform.machine()}, {os.cpu_count()} processors"),
+        ("memory", f"{memory.total / 1e9:.1f} GB, {memory.available / 1e9:.1f} GB free"),
+        ("language", f"{language()} (system: {locale.getlocale()[0]})"),
+        ("encoding of file names", sys.getfilesystemencoding()),
+        *((name, os.environ[name]) for name in names if name in os.environ),
+    )
+
+
+def _distribution() -> str:
+    try:
+        return f"({platform.freedesktop_os_release().get('PRETTY_NAME', '')})"
+    except OSError:
+        return ""
+
+
+def _packages() -> list[str]:
+    found = {str(each.metadata["Name"]): each.version for each in metadata.distributions()}
+    return sorted((f"{name} {version}" for name, version in found.items()), key=str.lower)

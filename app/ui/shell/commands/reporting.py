@@ -1,0 +1,108 @@
+"""What the commands about problems do: the report of a problem, the log, and the page of new versions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QLocale, QUrl, qVersion
+from PySide6.QtGui import QDesktopServices, QGuiApplication
+from PySide6.QtWidgets import QWidget
+
+from app.core.documents.file_format import BehaviourFile, file_bytes
+from app.core.reports.crash_reports import ALERT
+from app.core.session import Session
+from app.ui.shell.commands.shell import Shell
+from app.ui.shell.documents import DocumentController
+from app.ui.widgets.file_dialogs import FileDialogs
+from nep.i18n import _
+from nep.system.lazy_import import lazy_module
+from nep.version import RELEASES_PAGE, __version__
+
+if TYPE_CHECKING:
+    from app.core.reports import problem_report
+    from app.ui.shell.dialogs import report as report_sheet
+else:
+    problem_report = lazy_module("app.core.reports.problem_report")
+    report_sheet = lazy_module("app.ui.shell.dialogs.report")
+
+DOCTOR_S = 15.0
+"""So long a report waits for the connection doctor."""
+FRESH_S = 60.0
+"""What the doctor found is true for about so long."""
+
+
+class ReportCommands:
+    """The report of a problem, and where newer versions are."""
+
+    def __init__(
+        self,
+        shell: Shell,
+        session: Session,
+        files: DocumentController,
+        asks: FileDialogs,
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        """``clock`` gives epoch seconds."""
+        self._shell, self._session, self._files, self._asks = shell, session, files, asks
+        self._clock = clock
+        self._sheet: report_sheet.ReportSheet | None = None
+
+    def report(self) -> None:
+        """Open the report of a problem, with the newest edits of the behaviours at hand."""
+        self._session.alerts.resolve(ALERT)
+        doctor = self._session.doctor
+        if doctor.looked_s is None or self._clock() - doctor.looked_s > FRESH_S:
+            doctor.look()
+        self._files.with_newest(self._open)
+
+    def _open(self) -> None:
+        shell, session = self._shell, self._session
+        if self._sheet is None:
+            self._sheet = report_sheet.ReportSheet(
+                shell.theme, shell.surface, self._asks, shell.say, self._clock
+            )
+        parts = problem_report.ReportParts(
+            qt_facts(shell.surface), session.settings.all(), lambda: session.doctor.report(DOCTOR_S)
+        )
+        documents = session.documents
+        names = [documents.title(each) for each in documents if not each.blank]
+        self._sheet.show_for(parts, names, self._work)
+
+    def _work(self) -> list[problem_report.Work]:
+        documents = self._session.documents
+        return [
+            problem_report.Work(
+                documents.title(each),
+                file_bytes(BehaviourFile(each.name, each.workspace, each.robots, each.others)),
+            )
+            for each in documents
+            if not each.blank
+        ]
+
+    def look_for_new_version(self, page: str = RELEASES_PAGE) -> None:
+        """Open the page of releases in the browser, and say which version this is. Nothing is asked here."""
+        opened = QDesktopServices.openUrl(QUrl(page))
+        words = (
+            _("This is NEP Studio {version}. Your browser shows the newest one.")
+            if opened
+            else _("This is NEP Studio {version}. Newer ones are at {page}")
+        )
+        self._shell.say(words.format(version=__version__, page=page))
+
+
+def qt_facts(window: QWidget) -> tuple[tuple[str, str], ...]:
+    """What only Qt knows: its version, the screens, the window. For developers, so in English."""
+    screens = [
+        (f"screen {place}", f"{size.width()} x {size.height()} at {each.devicePixelRatio():g}, {rate:.0f} Hz")
+        for place, each in enumerate(QGuiApplication.screens(), start=1)
+        for size, rate in ((each.size(), each.refreshRate()),)
+    ]
+    return (
+        ("Qt", qVersion() or ""),
+        ("Qt platform", QGuiApplication.platformName()),
+        *screens,
+        ("window", f"{window.width()} x {window.height()}"),
+        ("language of the system", QLocale.system().name()),
+    )

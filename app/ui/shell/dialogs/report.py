@@ -1,0 +1,237 @@
+"""Report a problem: what goes into the file, what does not, and what happened. Nothing is sent by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import QRectF, QSize, QStandardPaths, Qt, QTimer, QUrl
+from PySide6.QtGui import QDesktopServices, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
+
+from app.core.reports.privacy import without_home
+from app.core.reports.problem_report import (
+    ENDING,
+    ReportParts,
+    Work,
+    file_name,
+    make_report,
+    what_goes_in,
+    work_words,
+)
+from app.core.reports.writer import ReportWriter
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Switch, label, paint, set_role
+from app.ui.widgets.file_dialogs import FileDialogs, FileKind
+from app.ui.widgets.inputs.fields import LongText
+from nep.i18n import _, lazy
+
+WIDE, SIDE, SCROLL_BAR = 620, 19, 10
+LOOK_MS = 50
+ICON = 15
+ZIP = FileKind(lazy("Zip file"), ENDING)
+INTRODUCTION = lazy(
+    "Studio writes one file that tells how it is on this computer. Nothing is sent: you give the file to"
+    " whoever helps you."
+)
+NOT_IN_IT = (
+    lazy("Your behaviours, unless you switch them on below"),
+    lazy("Pictures, sounds, and what robots tell"),
+    lazy("Keys, passwords and access codes; your home folder stands there as ~"),
+)
+
+Behaviours = Callable[[], Sequence[Work]]
+
+
+def documents_folder() -> Path:
+    """Where this computer keeps documents; the person's own folder where it has no such place."""
+    place = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
+    return Path(place) if place and Path(place).is_dir() else Path.home()
+
+
+class ReportSheet(Overlay):
+    """Opened by the command, and by the banner after a crash. What was typed stays until it is written."""
+
+    top = 72
+
+    def __init__(
+        self,
+        theme: Theme,
+        window: QWidget,
+        asks: FileDialogs,
+        say: Callable[[str], object],
+        clock: Callable[[], float],
+    ) -> None:
+        """``say`` tells of a report that is done when the sheet is closed; ``clock`` gives epoch seconds."""
+        super().__init__(theme, window, _("Report a problem"))
+        self._asks, self._say, self._clock = asks, say, clock
+        self._parts: ReportParts | None = None
+        self._behaviours: Behaviours = tuple
+        self._writer: ReportWriter | None = None
+        self.written: Path | None = None
+        """The report that was written last."""
+        self.introduction = label(_(INTRODUCTION), "body", role="textSecondary", wrap=True)
+        self.happened = LongText(theme, _("What happened?"))
+        self.list = QVBoxLayout()
+        self.list.setSpacing(4)
+        self.work = Switch(theme, _("My open behaviours, too"))
+        self.names = label("", "small", role="textSecondary", wrap=True)
+        self.state = label("", "body", role="textSecondary", wrap=True)
+        self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.show_file = Button(theme, _("Show the file"), "folder-open", kind="primary", size="form")
+        self.write = Button(theme, _("Write the report"), "file-archive", kind="primary", size="form")
+        self._looking = QTimer(self)
+        self._looking.setInterval(LOOK_MS)
+        self._looking.timeout.connect(self._look)
+        self.write.clicked.connect(self._ask_where)
+        self.show_file.clicked.connect(self._show_file)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        self._head = self.head(label(_("Report a problem"), "heading"))
+        self._head.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._inside = QWidget()
+        self._inside.setProperty("bare", "true")
+        inside = QVBoxLayout(self._inside)
+        inside.setContentsMargins(SIDE, 0, SIDE, 4)
+        inside.setSpacing(8)
+        inside.addWidget(self.introduction)
+        inside.addWidget(label(_("What happened?"), "title"))
+        inside.addWidget(self.happened)
+        inside.addWidget(label(_("In the file"), "title"))
+        inside.addLayout(self.list)
+        inside.addWidget(label(_("Not in it"), "title"))
+        for words in NOT_IN_IT:
+            inside.addWidget(_Line(self.theme, _(words), "x"))
+        inside.addWidget(self.work)
+        inside.addWidget(self.names)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.viewport().setAutoFillBackground(False)
+        self._area.setWidget(self._inside)
+        self._foot = QHBoxLayout()
+        self._foot.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._foot.setSpacing(10)
+        self._foot.addWidget(self.state, 1)
+        self._foot.addWidget(self.write)
+        self._foot.addWidget(self.show_file)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 14, 1, 16)
+        column.setSpacing(10)
+        column.addLayout(self._head)
+        column.addWidget(self._area, 1)
+        column.addLayout(self._foot)
+
+    # -- showing ----------------------------------------------------------------------------------
+
+    def show_for(self, parts: ReportParts, names: Sequence[str], behaviours: Behaviours) -> None:
+        """Open it; ``names`` are the open behaviours, ``behaviours`` gives them when they are wanted."""
+        self._parts, self._behaviours = parts, behaviours
+        while (item := self.list.takeAt(0)) is not None:
+            line = item.widget()
+            if line is not None:
+                line.hide()
+                line.deleteLater()
+        for words in what_goes_in(parts):
+            self.list.addWidget(_Line(self.theme, words, "check"))
+        self.work.setChecked(False)
+        self.names.setText(work_words(names) if names else "")
+        for widget in (self.work, self.names):
+            paint.show_when(widget, bool(names))
+        if self._writer is None:
+            self._tell("")
+        self.open()
+
+    def first(self) -> QWidget:
+        return self.happened.edit
+
+    def wanted_size(self, room: QSize) -> QSize:
+        buttons = self.write.sizeHint().width() + self.show_file.sizeHint().width() + 2 * SIDE + 40
+        wide = min(room.width(), max(round(self.theme.scaled(WIDE)), buttons))
+        layout = self._inside.layout()
+        inner = wide - 2 - SCROLL_BAR
+        inside = layout.totalHeightForWidth(inner) if layout is not None else 0
+        foot = max(
+            self._foot.minimumHeightForWidth(wide - 2) if self._foot.hasHeightForWidth() else 0,
+            self._foot.sizeHint().height(),
+        )
+        high = inside + self._head.sizeHint().height() + foot + 14 + 2 * 10 + 16 + 4
+        return QSize(wide, min(room.height(), high))
+
+    def _tell(self, words: str, role: str = "textSecondary", path: Path | None = None) -> None:
+        """What became of it; with a ``path`` there is a file to show."""
+        self.written = path
+        set_role(self.state, role)
+        self.state.setText(words)
+        paint.show_when(self.show_file, path is not None)
+        self.write.setEnabled(self._writer is None)
+        self.write.set_kind("plain" if path is not None else "primary")
+        if self.isVisible():
+            self.place()
+            if words:
+                paint.announce(self.state, words)
+
+    # -- doing ------------------------------------------------------------------------------------
+
+    def _ask_where(self) -> None:
+        suggestion = documents_folder() / file_name(self._clock())
+        self._asks.save_as(_("Write the report"), suggestion, (ZIP,), lambda path, _kind: self._begin(path))
+
+    def _begin(self, path: Path) -> None:
+        parts = self._parts
+        if parts is None or self._writer is not None:
+            return
+        happened = self.happened.text()
+        work = tuple(self._behaviours()) if self.work.isChecked() else ()
+        # A copy: the settings of now may change while the thread reads them.
+        still = replace(parts, settings=dict(parts.settings))
+        self._writer = ReportWriter(path, lambda: make_report(still, happened, work))
+        self._tell(_("It is being written."))
+        self._looking.start()
+
+    def _look(self) -> None:
+        writer = self._writer
+        if writer is None or not writer.is_done:
+            return
+        self._looking.stop()
+        self._writer = None
+        if writer.problem:
+            self._tell(f"{writer.problem[:1].upper()}{writer.problem[1:]}.", "error")
+            said = self.state.text()
+        else:
+            said = _("The report is in {file}").format(file=without_home(str(writer.path)))
+            self._tell(said, path=writer.path)
+            self.happened.set_text("")
+        if self.isVisible():
+            (self.show_file if not writer.problem else self.write).setFocus(Qt.FocusReason.OtherFocusReason)
+        else:
+            self._say(said)
+
+    def _show_file(self) -> None:
+        if self.written is not None:
+            folder = self.written.parent
+            if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+                self._say(_("The file is in {folder}").format(folder=folder))
+
+
+class _Line(QWidget):
+    """One thing that is in the file, or is not."""
+
+    def __init__(self, theme: Theme, words: str, icon: str) -> None:
+        super().__init__()
+        self._theme, self._icon = theme, icon
+        self.words: QLabel = label(words, "body", wrap=True)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(ICON + 8, 0, 0, 0)
+        row.addWidget(self.words, 1)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        colour = self._theme.colour("ok" if self._icon == "check" else "textTertiary")
+        paint_icon(painter, QRectF(0, 2, ICON, ICON), self._icon, colour)
+        painter.end()

@@ -1,0 +1,82 @@
+"""A crash of Studio, for real: the next start offers a report of it once, which a person writes as one file."""
+
+from __future__ import annotations
+
+import signal
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.behaviours import say, started, write
+from tests.e2e.studio import END_S, Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(240)
+OFFER = "Studio ended unexpectedly last time."
+
+
+def kept(studio: Studio) -> list[str]:
+    return sorted(path.name for path in (studio.home / "log" / "crashes").glob("*.txt"))
+
+
+def crash(studio: Studio, number: int) -> None:
+    assert list((studio.home / "runs").glob("*.json")), "a run leaves a mark"
+    studio.process.send_signal(number)
+    assert studio.process.wait(END_S) == -number
+
+
+def test_a_native_crash_is_offered_once_and_its_report_is_written(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
+    documents = tmp_path / "Documents"
+    documents.mkdir()
+    path = write(tmp_path / "Mine.nepb", started(say("a secret of mine")))
+    crash(start(str(path)), signal.SIGSEGV)
+    assert kept(start_again := start()) or until(lambda: kept(start_again), "there is a report")
+    again = start_again
+    again.says(OFFER)
+    again.click("Report a problem", kind="Button")
+    again.says("1 report of a crash")
+    again.screen.type("it went away")
+    again.click("Write the report")
+    again.find(name="Name of the file")
+    again.screen.key("a", ["Ctrl"])
+    again.screen.type(str(documents / "report.zip"))
+    again.screen.key("Return")
+    again.says("The report is in")
+    with zipfile.ZipFile(documents / "report.zip") as archive:
+        found = {name: archive.read(name).decode("utf-8", "replace") for name in archive.namelist()}
+    assert found["what-happened.txt"] == "it went away"
+    told = next(text for name, text in found.items() if name.startswith("crashes/"))
+    assert "how: Fatal Python error: Segmentation fault" in told
+    assert "app.exec" in told or "application.py" in told, "where it was"
+    assert "a secret of mine" not in "".join(found.values())
+    assert found["doctor.txt"].strip()
+    again.screen.key("Escape")
+    assert again.quit() == 0
+    assert not list((again.home / "runs").iterdir()), "a run that ends in order leaves nothing"
+    third = start()
+    third.find(kind="StartPage") if not third.all(kind="Workbench") else None
+    assert not third.all(OFFER)
+    assert third.quit() == 0
+
+
+def test_an_end_by_the_system_is_told_once_and_one_that_was_asked_for_is_not(
+    start: Callable[..., Studio],
+) -> None:
+    first = start()
+    first.kill()
+    again = start()
+    again.says(OFFER)
+    report = next((again.home / "log" / "crashes").glob("*.txt")).read_text("utf-8")
+    assert "without a word" in report
+    again.click("Close this message")
+    again.process.send_signal(signal.SIGTERM)
+    assert again.process.wait(END_S) == 0
+    third = start()
+    assert not third.all(OFFER)
+    assert kept(third) == [Path(each).name for each in kept(third)]
+    assert third.quit() == 0
