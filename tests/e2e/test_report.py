@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import signal
-import time
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from app.ui.startup.single_instance import place
 from tests.e2e.behaviours import say, started, write
 from tests.e2e.studio import END_S, Studio
 from tests.e2e.waiting import until
@@ -28,6 +28,14 @@ def crash(studio: Studio, number: int) -> None:
     assert studio.process.wait(END_S) == -number
 
 
+def has_looked_back(studio: Studio) -> None:
+    """What a start does before it can be found by others."""
+    until(lambda: Path(place(studio.home)).exists(), "it can be found")
+    studio.choose("Help", "About NEP Studio")
+    studio.says("Copy the versions")
+    studio.screen.key("Escape")
+
+
 def test_a_native_crash_is_offered_once_and_its_report_is_written(
     start: Callable[..., Studio], tmp_path: Path
 ) -> None:
@@ -35,8 +43,7 @@ def test_a_native_crash_is_offered_once_and_its_report_is_written(
     documents.mkdir()
     path = write(tmp_path / "Mine.nepb", started(say("a secret of mine")))
     crash(start(str(path)), signal.SIGSEGV)
-    assert kept(start_again := start()) or until(lambda: kept(start_again), "there is a report")
-    again = start_again
+    again = start()
     again.says(OFFER)
     again.click("Report a problem", kind="Button")
     again.says("1 report of a crash")
@@ -52,14 +59,14 @@ def test_a_native_crash_is_offered_once_and_its_report_is_written(
     assert found["what-happened.txt"] == "it went away"
     told = next(text for name, text in found.items() if name.startswith("crashes/"))
     assert "how: Fatal Python error: Segmentation fault" in told
-    assert "app.exec" in told or "application.py" in told, "where it was"
+    assert "application.py" in told, "where it was"
     assert "a secret of mine" not in "".join(found.values())
     assert found["doctor.txt"].strip()
     again.screen.key("Escape")
     assert again.quit() == 0
     assert not list((again.home / "runs").iterdir()), "a run that ends in order leaves nothing"
     third = start()
-    third.find(kind="StartPage") if not third.all(kind="Workbench") else None
+    has_looked_back(third)
     assert not third.all(OFFER)
     assert third.quit() == 0
 
@@ -77,6 +84,7 @@ def test_an_end_by_the_system_is_told_once_and_one_that_was_asked_for_is_not(
     again.process.send_signal(signal.SIGTERM)
     assert again.process.wait(END_S) == 0
     third = start()
+    has_looked_back(third)
     assert not third.all(OFFER)
-    assert kept(third) == [Path(each).name for each in kept(third)]
+    assert len(kept(third)) == 1
     assert third.quit() == 0

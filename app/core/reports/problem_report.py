@@ -83,7 +83,9 @@ def what_goes_in(parts: ReportParts) -> list[str]:
     size = sum(path.stat().st_size for path in _logs(parts.log)) / 1000
     lines = [
         _("The versions of Studio, of Python, of Qt and of this system, and the size of the screen"),
-        _("What went wrong in Studio lately: its log, {size} kB").format(size=number(size, ".0f")),
+        _("What went wrong in Studio lately: its log, {size} kB").format(size=number(size, ".1f"))
+        if size
+        else _("What went wrong in Studio lately: its log, which is empty"),
         _("What the connection doctor finds: the programs of NEP, and the addresses of this computer"),
         _("Your settings, such as language and look"),
     ]

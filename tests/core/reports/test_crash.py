@@ -1,0 +1,73 @@
+"""What counts as a crash, and how a process says where it was."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from app.core.reports.crash import end_words, is_crash, split_trace
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (-11, "ended by signal 11 (SIGSEGV)"),
+        (-6, "ended by signal 6 (SIGABRT)"),
+        (-9, "ended by signal 9 (SIGKILL)"),
+        (0xC0000005, "ended with the status 0xC0000005 (access violation)"),
+        (0xC0000006, "ended with the status 0xC0000006"),
+    ],
+)
+@pytest.mark.skipif(sys.platform == "win32", reason="its signals have other numbers")
+def test_what_is_a_crash(code: int, words: str) -> None:
+    assert is_crash(code)
+    assert end_words(code) == words
+
+
+@pytest.mark.parametrize("code", [0, 1, 2, 3, 255, -signal.SIGINT, -signal.SIGTERM, 0xC000013A])
+def test_what_is_none(code: int) -> None:
+    assert not is_crash(code)
+
+
+def test_a_signal_without_a_name_has_its_number() -> None:
+    assert end_words(-250) == "ended by signal 250"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a signal")
+def test_a_process_says_where_it_crashed_behind_its_own_words() -> None:
+    code = (
+        "import os, signal, sys\n"
+        "from nep.system.crash_trace import say_where_it_crashes\n"
+        "say_where_it_crashes()\n"
+        "print('my last words', file=sys.stderr, flush=True)\n"
+        "def deep_inside(): os.kill(os.getpid(), signal.SIGSEGV)\n"
+        "deep_inside()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert is_crash(done.returncode)
+    said, trace = split_trace(done.stderr)
+    assert said == "my last words\n"
+    assert trace.startswith("Fatal Python error: Segmentation fault")
+    assert "deep_inside" in trace
+
+
+def test_what_is_no_trace_stays_whole() -> None:
+    assert split_trace("one\ntwo\n") == ("one\ntwo\n", "")
+    assert split_trace("a\nWindows fatal exception: access violation\n\nb") == (
+        "a\n",
+        "Windows fatal exception: access violation\n\nb",
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a closed stderr is another matter there")
+def test_a_process_without_an_output_for_errors_goes_on() -> None:
+    code = (
+        "import sys; sys.stderr = None\n"
+        "from nep.system.crash_trace import say_where_it_crashes\n"
+        "say_where_it_crashes(); print('well')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "well\n"

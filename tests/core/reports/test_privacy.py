@@ -1,0 +1,65 @@
+"""What leaves this computer in a report: neither the name of the home folder nor what a setting holds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import PurePosixPath, PureWindowsPath
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.core.reports.privacy import HARMLESS, LEFT_OUT, shown_settings, without_home
+
+HOME = PurePosixPath("/home/Ana María")
+WINDOWS = PureWindowsPath("C:\\Users\\Ana")
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("can't read /home/Ana María/a.nepb", "can't read ~/a.nepb"),
+        ('File "/home/Ana María", line 3', 'File "~", line 3'),
+        ("file:///home/Ana%20Mar%C3%ADa/a", "file://~/a"),
+        ("/home/Ana María", "~"),
+        ("/home/Ana Maríana/a", "/home/Ana Maríana/a"),
+        ("nothing of the kind", "nothing of the kind"),
+    ],
+)
+def test_the_home_folder_of_linux_and_macos(text: str, shown: str) -> None:
+    assert without_home(text, HOME) == shown  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("C:\\Users\\Ana\\a.nepb", "~\\a.nepb"),
+        (json.dumps({"path": "C:\\Users\\Ana\\a"}), json.dumps({"path": "~\\a"})),
+        ("file:///C:/Users/Ana/a", "file:///~/a"),
+        ("C:\\Users\\Anabel\\a", "C:\\Users\\Anabel\\a"),
+    ],
+)
+def test_the_home_folder_of_windows(text: str, shown: str) -> None:
+    assert without_home(text, WINDOWS) == shown  # type: ignore[arg-type]
+
+
+def test_the_home_of_nobody_is_no_name() -> None:
+    assert without_home("/usr/bin", PurePosixPath("/")) == "/usr/bin"  # type: ignore[arg-type]
+
+
+def test_only_settings_that_are_known_to_be_harmless_have_their_values() -> None:
+    kept = {"theme": "dark", "network_keys": {"room 3": "swordfish"}, "recent": ["/home/a/Secret.nepb"]}
+    shown = shown_settings(kept)
+    assert shown == {"network_keys": LEFT_OUT, "recent": LEFT_OUT, "theme": "dark"}
+
+
+@given(st.dictionaries(st.text(), st.text(min_size=12), max_size=5))
+def test_whatever_a_later_version_keeps_stays_here(kept: dict[str, str]) -> None:
+    told = json.dumps(shown_settings(kept), ensure_ascii=False)
+    for name, value in kept.items():
+        assert name in HARMLESS or value not in told or value in json.dumps(sorted(kept), ensure_ascii=False)
+
+
+@pytest.mark.parametrize("word", ["key", "secret", "password", "code", "token", "recent", "tabs", "networks"])
+def test_nothing_of_the_kind_is_among_the_harmless(word: str) -> None:
+    assert not [name for name in HARMLESS if word in name]

@@ -1,0 +1,198 @@
+"""Whether Studio ended in order: runs that end well leave nothing, those that crash are told once."""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.core.reports.crash_reports import CrashReports
+from app.core.reports.studio_run import StudioRun
+
+ROOT = Path(__file__).resolve().parents[3]
+BEGIN = (
+    "import os, signal, sys\n"
+    "from pathlib import Path\n"
+    "from app.core.reports.studio_run import StudioRun\n"
+    "run = StudioRun(Path(sys.argv[1]), Path(sys.argv[2]))\n"
+    "run.begin()\n"
+    "print('begun', flush=True)\n"
+)
+
+
+@pytest.fixture(autouse=True)
+def _pytest_has_its_faults_back() -> Iterator[None]:
+    yield
+    faulthandler.enable(sys.__stderr__)
+
+
+class Place:
+    def __init__(self, folder: Path) -> None:
+        self.runs, self.log = folder / "runs", folder / "log"
+
+    def run(self) -> StudioRun:
+        return StudioRun(self.runs, self.log)
+
+    def files(self) -> list[str]:
+        return sorted(path.name for folder in (self.runs, self.log) for path in folder.glob("*"))
+
+    def process(self, code: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-c", BEGIN + code, str(self.runs), str(self.log)],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+
+    def ends(self, code: str) -> int:
+        with self.process(code) as process:
+            return process.wait(60)
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    return Place(tmp_path)
+
+
+def test_a_run_that_ends_in_order_leaves_nothing(place: Place) -> None:
+    run = place.run()
+    run.begin()
+    assert run.is_noted
+    assert len(place.files()) == 3  # mark, lock, trace
+    run.end()
+    assert place.files() == []
+    assert place.run().left() == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize(
+    ("number", "how"), [("SIGSEGV", "Segmentation fault"), ("SIGABRT", "Aborted"), ("SIGBUS", "Bus error")]
+)
+def test_a_native_crash_is_told_with_its_place_once(place: Place, number: str, how: str) -> None:
+    code = f"def deep_inside(): os.kill(os.getpid(), signal.{number})\ndeep_inside()\n"
+    assert place.ends(code) == -getattr(signal, number)
+    place.log.joinpath("studio.log").write_text("the last line\n")
+    (crash,) = place.run().left()
+    assert crash.part == "studio"
+    assert how in crash.how
+    assert "deep_inside" in crash.text
+    assert "the last line" in crash.text
+    assert place.run().left() == []
+    assert place.files() == ["studio.log"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_an_end_by_the_system_is_an_end_without_a_word(place: Place) -> None:
+    assert place.ends("os.kill(os.getpid(), signal.SIGKILL)") == -signal.SIGKILL
+    (crash,) = place.run().left()
+    assert "without a word" in crash.how
+    assert place.run().left() == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_an_end_that_was_asked_for_is_none_unless_it_crashed(place: Place) -> None:
+    assert place.ends("run.expect_end(); os.kill(os.getpid(), signal.SIGKILL)") == -signal.SIGKILL
+    assert place.run().left() == []
+    assert place.ends("run.expect_end(); os.kill(os.getpid(), signal.SIGSEGV)") == -signal.SIGSEGV
+    assert len(place.run().left()) == 1
+
+
+def test_a_window_that_lives_is_none_whoever_asks(place: Place) -> None:
+    own = place.run()
+    own.begin()
+    with place.process("sys.stdin.read()") as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == "begun\n"
+        assert place.run().left() == []
+        assert own.left() == []
+        other.kill()
+        other.wait(60)
+        (crash,) = own.left()
+        assert "without a word" in crash.how
+    assert own.is_noted
+    own.end()
+    assert place.files() == []
+
+
+def entry(place: Place, **other: object) -> Path:
+    """The mark of a run whose process has gone."""
+    place.runs.mkdir(exist_ok=True)
+    said = {"pid": 2**22 + 7, "began_s": 4_000_000_000.0, "version": "0.0.9", "asked": False, **other}
+    mark = place.runs / "mark.json"
+    mark.write_text(json.dumps(said))
+    return mark
+
+
+def test_what_the_restart_of_the_computer_ended_is_no_crash(place: Place) -> None:
+    entry(place)
+    assert len(place.run().left()) == 1
+    entry(place, began_s=1000.0)
+    assert place.run().left() == []
+    assert place.files() == []
+
+
+def test_a_number_that_another_process_has_by_now_means_nothing(place: Place) -> None:
+    """On a disk without locks a process is known by its number and its age."""
+    entry(place, pid=os.getpid(), began_s=4_000_000_000.0)
+    assert place.run().left() == [], "as old as the mark says: it lives"
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as younger:
+        import psutil
+
+        entry(place, pid=younger.pid, began_s=max(psutil.boot_time(), younger_begin(younger.pid) - 100))
+        found = place.run().left()
+        younger.communicate(b"\n", 60)
+    assert len(found) == 1
+
+
+def younger_begin(pid: int) -> float:
+    import psutil
+
+    return psutil.Process(pid).create_time()
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"pid": "x", "began_s": 1}', '{"pid": 1e400}'])
+def test_a_damaged_mark_is_taken_away(place: Place, text: str) -> None:
+    place.runs.mkdir()
+    (place.runs / "mark.json").write_text(text)
+    assert place.run().left() == []
+    assert place.files() == []
+
+
+def test_an_exception_that_ends_it_is_reported_at_once_and_only_once(place: Place) -> None:
+    with pytest.raises(ZeroDivisionError), place.run():
+        raise ZeroDivisionError("by nothing")
+    (report,) = CrashReports(place.log / "crashes").all()
+    told = report.path.read_text("utf-8")
+    assert "how: ZeroDivisionError: by nothing" in told
+    assert "test_studio_run.py" in told
+    assert place.run().left() == []
+
+
+def test_leaving_by_exit_is_no_crash(place: Place) -> None:
+    with pytest.raises(SystemExit), place.run():
+        raise SystemExit(0)
+    assert CrashReports(place.log / "crashes").all() == []
+    assert place.run().left() == []
+
+
+def test_where_nothing_can_be_written_one_line_of_the_log_says_so(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "file").write_text("no folder")
+    run = StudioRun(tmp_path / "file" / "runs", tmp_path / "file" / "log")
+    run.begin()
+    run.expect_end()
+    assert not run.is_noted
+    assert run.left() == []
+    run.end()
+    assert len(caplog.records) == 1
+    assert getattr(caplog.records[0], "in_console", False), "the window does not complain"
