@@ -15,7 +15,7 @@ HARMLESS = frozenset({
 """The settings that go into a report. Of all others only the names do: what a later version keeps here, say
 keys of networks and access codes, stays here until somebody has thought about it."""
 LEFT_OUT = "(left out)"
-_END = r"""(?=[\\/'":;,)\]}>\s]|%2F|%5C|$)"""
+_END = r"""(?=[\\/'":;,)\]}>\s]|\.(?=\s|$)|%2F|%5C|$)"""
 
 
 def without_home(text: str, folder: Path | None = None) -> str:

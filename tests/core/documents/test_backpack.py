@@ -67,7 +67,7 @@ def test_emptied_and_brought_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "content", [b"{", b"\xff\xfe", b"[]", b'{"backpack": 2, "items": []}', b'{"backpack": 1}']
+    "content", [b"{", b"\xff\xfe", b"[]", b'{"backpack": 0, "items": []}', b'{"backpack": 1}']
 )
 def test_a_file_that_is_no_backpack_is_kept_aside_and_said_once(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "backpack.json").write_bytes(content)

@@ -22,6 +22,8 @@ WINDOWS = PureWindowsPath("C:\\Users\\Ana")
         ('File "/home/Ana María", line 3', 'File "~", line 3'),
         ("file:///home/Ana%20Mar%C3%ADa/a", "file://~/a"),
         ("/home/Ana María", "~"),
+        ("it is in /home/Ana María. And then", "it is in ~. And then"),
+        ("/home/Ana María.old/a", "/home/Ana María.old/a"),
         ("/home/Ana Maríana/a", "/home/Ana Maríana/a"),
         ("nothing of the kind", "nothing of the kind"),
     ],

@@ -8,12 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.core.storage.settings import Settings
+from app.core.storage.settings import FORMAT, Settings
 
 WRITER = """
 import sys
 from pathlib import Path
-from app.core.storage.settings import Settings
+from app.core.storage.settings import FORMAT, Settings
 settings = Settings(Path(sys.argv[1]))
 print("ready", flush=True)
 sys.stdin.readline()
@@ -56,7 +56,11 @@ def test_a_file_that_another_one_damaged_does_not_lose_what_is_known(tmp_path: P
     settings.set("theme", "dark")
     settings.path.write_text("{ half of")
     settings.set("layout", "developer")
-    assert json.loads(settings.path.read_text()) == {"theme": "dark", "layout": "developer"}
+    assert json.loads(settings.path.read_text()) == {
+        "theme": "dark",
+        "layout": "developer",
+        "format": FORMAT,
+    }
 
 
 def test_two_processes_that_write_at_once_lose_nothing(tmp_path: Path) -> None:

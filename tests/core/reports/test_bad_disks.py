@@ -1,0 +1,138 @@
+"""A disk that is really full, and one that can't be written: nothing half is left, and Studio goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+FULL = """
+import json, sys
+from pathlib import Path
+from app.core.reports.crash import Crash
+from app.core.reports.crash_reports import CrashReports
+from app.core.reports.problem_report import ReportParts, make_report, write_report
+from app.core.reports.studio_run import StudioRun
+from app.errors import AppError
+
+disk = Path(sys.argv[1])
+reports = CrashReports(disk / "crashes")
+reports.add(Crash("robot", "before it was full"))
+parts = ReportParts((), {}, lambda: "", disk / "log", reports)
+data = make_report(parts, "x" * 10)
+old = disk / "report.zip"
+write_report(old, data)
+with (disk / "filler").open("wb", buffering=0) as file:
+    try:
+        while True:
+            file.write(b"x" * 4096)
+    except OSError as error:
+        full = error.strerror
+told = {"full": full}
+try:
+    write_report(disk / "other.zip", data)
+except AppError as error:
+    told["report"] = str(error)
+try:
+    write_report(old, data + bytes(50_000))
+except AppError as error:
+    told["over"] = str(error)
+told["old"] = old.read_bytes() == data
+told["crash"] = str(reports.add(Crash("studio", "x" * 9000)))
+run = StudioRun(disk / "runs", disk / "log")
+run.begin()
+told["noted"] = run.is_noted
+told["left"] = [str(each) for each in run.left()]
+told["offered"] = [each.part for each in reports.take_new()]
+run.end()
+told["files"] = sorted(each.name for each in disk.rglob("*") if each.is_file())
+print(json.dumps(told))
+"""
+
+
+@pytest.fixture(scope="module")
+def disk(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
+    """``unshare``, and the command that puts a disk of 256 kB into a folder."""
+    unshare = shutil.which("unshare")
+    if unshare is None:
+        pytest.skip("a disk of one's own needs Linux with unshare")
+    folder = tmp_path_factory.mktemp("disk")
+    mount = f"mount -t tmpfs -o size=256k,mode=777 none '{folder}'"
+    if subprocess.run([unshare, "-rm", "sh", "-c", mount], check=False, capture_output=True).returncode:
+        pytest.skip("this computer does not permit disks of one's own (unshare -rm)")
+    return unshare, str(folder)
+
+
+def on_disk(disk: tuple[str, str], code: str, more: str = "") -> dict[str, object]:
+    unshare, folder = disk
+    mount = f"mount -t tmpfs -o size=256k,mode=777 none '{folder}'"
+    words = [unshare, "-rm", "sh", "-c", f'{mount} {more} && exec "$@"', "sh", sys.executable, "-c", code]
+    done = subprocess.run(
+        [*words, folder],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert isinstance(found, dict)
+    return found
+
+
+def test_on_a_full_disk_a_report_is_whole_or_not_there(disk: tuple[str, str]) -> None:
+    told = on_disk(disk, FULL)
+    advice = "make room there or choose another place"
+    assert told["report"] == f"other.zip can't be written ({told['full']}); {advice}"
+    assert told["over"] == f"report.zip can't be written ({told['full']}); {advice}"
+    assert told["old"] is True, "what was there is as it was"
+    assert told["crash"] == "None"
+    assert told["noted"] is False
+    assert told["left"] == []
+    assert told["offered"] == ["robot"], "what was kept before is told"
+    files = told["files"]
+    assert isinstance(files, list)
+    assert sorted(name for name in files if not name.startswith("crash ")) == ["filler", "report.zip"]
+
+
+READ_ONLY = """
+import json, logging, sys
+from pathlib import Path
+from app.core.reports.crash import Crash
+from app.core.reports.crash_reports import CrashReports
+from app.core.reports.studio_run import StudioRun
+
+lines = []
+class Lines(logging.Handler):
+    def emit(self, record):
+        lines.append(record.getMessage())
+logging.getLogger().addHandler(Lines())
+disk = Path(sys.argv[1])
+with StudioRun(disk / "runs", disk / "log") as run:
+    noted, left = run.is_noted, run.left()
+reports = CrashReports(disk / "log" / "crashes")
+print(json.dumps({"noted": noted, "left": len(left), "lines": len(lines), "new": len(reports.take_new()),
+                  "all": len(reports.all())}))
+"""
+BEFORE = (
+    "&& mkdir -p '{0}/log/crashes' '{0}/runs'"
+    " && echo x > '{0}/log/crashes/crash 2026-01-01 10.00.00 studio.new.txt'"
+    " && echo '{{\"pid\": 4000000, \"began_s\": 4e9}}' > '{0}/runs/a.json'"
+    " && mount -o remount,ro '{0}'"
+)
+
+
+def test_a_disk_that_can_not_be_written_is_told_in_one_line_and_no_crash_each_time(
+    disk: tuple[str, str],
+) -> None:
+    told = on_disk(disk, READ_ONLY, BEFORE.format(disk[1]))
+    # the mark and the report of before stay, as nothing can be taken away: neither is told at each start
+    assert told == {"noted": False, "left": 0, "lines": 1, "new": 0, "all": 1}

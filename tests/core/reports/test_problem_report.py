@@ -1,0 +1,157 @@
+"""The report of a problem: what goes into the zip, what never does, and disks that do not take it."""
+
+from __future__ import annotations
+
+import errno
+import io
+import json
+import os
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from app.core.documents.file_format import BehaviourFile, file_bytes, read_file
+from app.core.reports.crash import Crash
+from app.core.reports.crash_reports import CrashReports
+from app.core.reports.problem_report import (
+    ReportParts,
+    Work,
+    file_name,
+    make_report,
+    what_goes_in,
+    work_words,
+    write_report,
+)
+from app.core.reports.writer import ReportWriter
+from app.errors import ReportError
+from tests.pseudo import untranslated
+
+BLOCKS: dict[str, object] = {"blocks": {"blocks": [{"type": "events_started", "id": "mine"}]}}
+
+
+@pytest.fixture
+def parts(tmp_path: Path) -> ReportParts:
+    log = tmp_path / "log"
+    log.mkdir()
+    (log / "studio.log").write_text(f"the newest line, of {Path.home() / 'a.py'}\n", "utf-8")
+    (log / "studio.log.1").write_text("an older line\n")
+    (log / "crash-of-another.trace").write_text("not a log")
+    settings = {"theme": "dark", "room_keys": ["swordfish"], "recent": [{"path": "/a/Private.nepb"}]}
+    return ReportParts(
+        (("Qt", "6.11.3"), ("screen 1", "800 x 600")),
+        settings,
+        lambda: f"+ All is well in {Path.home()}.\n",
+        log,
+        CrashReports(log / "crashes"),
+    )
+
+
+def opened(data: bytes) -> dict[str, str]:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        assert archive.testzip() is None
+        return {name: archive.read(name).decode("utf-8") for name in archive.namelist()}
+
+
+def test_what_a_report_has_in_it(parts: ReportParts) -> None:
+    parts.crashes.add(Crash("robot", "by signal 11", "where it was"))
+    found = opened(make_report(parts, "  It stood still.\nThen it fell. ñ "))
+    assert found["what-happened.txt"] == "It stood still.\nThen it fell. ñ"
+    assert found["doctor.txt"] == "+ All is well in ~.\n"
+    assert found["log/studio.log"] == f"the newest line, of {Path('~') / 'a.py'}\n"
+    assert found["log/studio.log.1"] == "an older line\n"
+    assert json.loads(found["settings.json"]) == {
+        "recent": "(left out)",
+        "room_keys": "(left out)",
+        "theme": "dark",
+    }
+    (crash,) = [text for name, text in found.items() if name.startswith("crashes/")]
+    assert "where it was" in crash
+    for words in ("NEP Studio: ", "nep: ", "Python: ", "Qt: 6.11.3", "screen 1: 800 x 600", "system: ",
+                  "built as a package: no", "\npyzmq ", "\nPySide6"):  # fmt: skip
+        assert words in found["versions.txt"], words
+    assert set(found) == {
+        "README.txt", "what-happened.txt", "versions.txt", "settings.json", "doctor.txt", "log/studio.log",
+        "log/studio.log.1", next(name for name in found if name.startswith("crashes/")),
+    }  # fmt: skip
+
+
+def test_what_is_secret_or_the_persons_own_is_nowhere_in_it(parts: ReportParts) -> None:
+    whole = "".join(opened(make_report(parts, "")).values())
+    for words in ("swordfish", "Private", str(Path.home())):
+        assert words not in whole
+
+
+def test_work_goes_in_only_when_it_is_given_and_can_be_opened(parts: ReportParts, tmp_path: Path) -> None:
+    data = file_bytes(BehaviourFile("A/B: c", BLOCKS, {}))
+    found = make_report(parts, "", [Work("A/B: c", data), Work("A_B_ c", data), Work("...", data)])
+    names = sorted(name for name in opened(found) if name.startswith("work/"))
+    assert names == ["work/A_B_ c 2.nepb", "work/A_B_ c.nepb", "work/___.nepb"]
+    with zipfile.ZipFile(io.BytesIO(found)) as archive:
+        archive.extractall(tmp_path)
+    assert read_file(tmp_path / "work" / "A_B_ c.nepb").workspace == BLOCKS
+
+
+def test_a_report_is_made_where_there_is_no_log_yet(tmp_path: Path) -> None:
+    parts = ReportParts((), {}, lambda: "", tmp_path / "none", CrashReports(tmp_path / "none" / "crashes"))
+    found = opened(make_report(parts, ""))
+    assert "README.txt" in found
+    assert not [name for name in found if name.startswith(("log/", "crashes/"))]
+    assert "which is empty" in what_goes_in(parts)[1]
+
+
+def test_the_person_is_told_what_goes_in(pseudo: None, parts: ReportParts) -> None:
+    before = what_goes_in(parts)
+    parts.crashes.add(Crash("studio", "how"))
+    assert len(what_goes_in(parts)) == len(before) + 1
+    assert (
+        untranslated(" ".join([*what_goes_in(parts), work_words(["Mine", "Other"])]), "Mine", "Other") == []
+    )
+
+
+def test_its_name_has_the_day() -> None:
+    assert file_name(1_700_000_000.0) in {
+        "nep-studio-report-2023-11-14.zip",
+        "nep-studio-report-2023-11-15.zip",
+    }
+
+
+def test_it_is_written_whole(parts: ReportParts, tmp_path: Path) -> None:
+    writer = ReportWriter(tmp_path / "report.zip", lambda: make_report(parts, "words"))
+    assert writer.wait(60)
+    assert writer.problem == ""
+    assert opened((tmp_path / "report.zip").read_bytes())["what-happened.txt"] == "words"
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a device that is always full")
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_place_that_takes_nothing_is_said_and_nothing_is_left(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    with pytest.raises(ReportError) as raised:
+        write_report(tmp_path / "file" / "report.zip", b"zip")
+    assert str(raised.value).startswith("report.zip can't be written (")
+    assert str(raised.value).endswith("; choose another place")
+    writer = ReportWriter(tmp_path / "file" / "report.zip", lambda: b"zip")
+    assert writer.wait(60)
+    assert writer.problem == str(raised.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_full_disk_has_its_own_advice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_path: Path, _data: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("app.core.reports.problem_report.write_atomically", full)
+    with pytest.raises(ReportError, match="make room there or choose another place"):
+        write_report(tmp_path / "report.zip", b"zip")
+
+
+def test_what_goes_wrong_while_it_is_made_is_said(tmp_path: Path) -> None:
+    def fails() -> bytes:
+        raise KeyError("Name")
+
+    writer = ReportWriter(tmp_path / "report.zip", fails)
+    assert writer.wait(60)
+    assert writer.problem == "the report can't be made: KeyError: 'Name'"
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,187 @@
+"""Files of a newer Studio lose nothing here and are told in one sentence; those of an older one are read."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.core.documents.backpack import Backpack
+from app.core.documents.file_format import BehaviourFile, read_file, write_file
+from app.core.documents.journal import left_behind, of_newer
+from app.core.storage.settings import FORMAT, Settings
+from app.errors import DocumentError
+from app.ui.shell.docking.workbench import STATE_VERSION
+
+NEWER = {"format": FORMAT + 1, "theme": "dark", "language": "es", "recent": {"new": "shape"}, "later": [1]}
+JOURNAL = {
+    "pid": 2**22 + 7, "born_s": 1.0, "name": "Mine", "path": None, "edited_s": 5.0, "robots": {},
+    "workspace": {"blocks": 1},
+}  # fmt: skip
+
+
+def write(path: Path, content: object) -> bytes:
+    path.write_text(json.dumps(content))
+    return path.read_bytes()
+
+
+# ---- settings
+
+
+def test_settings_of_a_newer_studio_are_left_as_they_are(tmp_path: Path) -> None:
+    before = write(tmp_path / "settings.json", NEWER)
+    settings = Settings(tmp_path)
+    assert settings.get("theme", "light") == "dark", "what can be read of them is taken"
+    assert settings.recent == []
+    assert "newer NEP Studio (format 2)" in settings.notice
+    assert settings.notice.count(".") == 2 + settings.notice.count(".json")
+    settings.set("theme", "light")
+    settings.add_recent(tmp_path / "a.nepb")
+    assert (tmp_path / "settings.json").read_bytes() == before
+    assert not settings.are_new
+
+
+def test_what_is_chosen_then_is_kept_beside_and_the_notice_comes_once(tmp_path: Path) -> None:
+    write(tmp_path / "settings.json", NEWER)
+    Settings(tmp_path).set("theme", "light")
+    again = Settings(tmp_path)
+    assert (again.get("theme", ""), again.get("language", "")) == ("light", "es")
+    assert again.notice == ""
+    kept = json.loads((tmp_path / "settings.format-1.json").read_text())
+    assert kept["format"] == FORMAT
+    assert kept["later"] == [1]
+
+
+def test_a_newer_studio_that_writes_while_this_one_runs_loses_nothing(tmp_path: Path) -> None:
+    settings = Settings(tmp_path)
+    settings.set("theme", "light")
+    newer = write(tmp_path / "settings.json", NEWER)
+    settings.set("theme", "system")
+    settings.set("language", "en")
+    assert (tmp_path / "settings.json").read_bytes() == newer
+    again = Settings(tmp_path)
+    assert (again.get("theme", ""), again.get("language", "")) == ("system", "en")
+
+
+@pytest.mark.parametrize("format", [None, "2", 1.5, True, [], 1])
+def test_settings_of_an_older_studio_are_read_and_written_in_place(tmp_path: Path, format: object) -> None:
+    old: dict[str, object] = {"theme": "dark", "of another plug-in": 7}
+    write(tmp_path / "settings.json", old if format is None else {**old, "format": format})
+    settings = Settings(tmp_path)
+    assert (settings.get("theme", ""), settings.notice) == ("dark", "")
+    settings.set("language", "es")
+    kept = json.loads((tmp_path / "settings.json").read_text())
+    assert kept == {**old, "language": "es", "format": FORMAT}, "what it does not know is kept"
+    assert [path.name for path in tmp_path.glob("settings*.json")] == ["settings.json"]
+
+
+def test_settings_of_its_own_that_are_newer_still_are_set_aside(tmp_path: Path) -> None:
+    write(tmp_path / "settings.json", NEWER)
+    whole = write(tmp_path / "settings.format-1.json", NEWER)
+    settings = Settings(tmp_path)
+    assert settings.damaged is not None
+    assert settings.damaged.read_bytes() == whole
+    settings.set("theme", "light")
+    assert Settings(tmp_path).get("theme", "") == "light"
+
+
+def test_a_damaged_file_of_ones_own_beside_a_newer_one_is_kept(tmp_path: Path) -> None:
+    before = write(tmp_path / "settings.json", NEWER)
+    (tmp_path / "settings.format-1.json").write_text("{")
+    settings = Settings(tmp_path)
+    assert settings.damaged is not None
+    assert settings.damaged.read_text() == "{"
+    assert (tmp_path / "settings.json").read_bytes() == before
+
+
+def test_the_states_of_layouts_have_a_number_of_their_own_and_are_part_of_the_settings() -> None:
+    assert (FORMAT, STATE_VERSION) == (1, 1), "another number of layouts needs another one of settings"
+
+
+# ---- unsaved work
+
+
+def test_unsaved_work_of_a_newer_studio_is_named_and_not_touched(tmp_path: Path) -> None:
+    before = write(tmp_path / "a.json", {**JOURNAL, "format": 2, "workspace": "in another way"})
+    write(tmp_path / "b.json", {**JOURNAL, "name": "Other", "format": 1})
+    assert of_newer(tmp_path) == ["Mine"]
+    assert [each.name for each in left_behind(tmp_path)] == ["Other"]
+    assert (tmp_path / "a.json").read_bytes() == before
+
+
+def test_unsaved_work_of_an_older_studio_comes_back(tmp_path: Path) -> None:
+    write(tmp_path / "a.json", JOURNAL)
+    (found,) = left_behind(tmp_path)
+    assert (found.name, found.workspace) == ("Mine", {"blocks": 1})
+    assert of_newer(tmp_path) == []
+    assert of_newer(tmp_path / "none") == []
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"format": 2}', '{"format": 2, "pid": []}'])
+def test_what_is_no_journal_is_nobodys_work(tmp_path: Path, content: str) -> None:
+    (tmp_path / "a.json").write_text(content)
+    assert of_newer(tmp_path) == []
+    assert left_behind(tmp_path) == []
+
+
+# ---- the backpack
+
+
+def test_a_backpack_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
+    before = write(tmp_path / "backpack.json", {"backpack": 2, "things": [{"id": "x"}]})
+    backpack = Backpack(tmp_path)
+    backpack.look()
+    assert backpack.items == ()
+    assert backpack.take_trouble() == (
+        "the backpack in “backpack.json” is of a newer NEP Studio and is left as it is; what you put in here"
+        " is kept beside it"
+    )
+    backpack.put([{"type": "control_wait"}])
+    assert (tmp_path / "backpack.json").read_bytes() == before
+    again = Backpack(tmp_path)
+    again.look()
+    assert [item.block["type"] for item in again.items] == ["control_wait"]
+    assert again.take_trouble() == ""
+
+
+def test_a_backpack_of_ones_own_that_is_newer_still_is_set_aside(tmp_path: Path) -> None:
+    for name in ("backpack.json", "backpack.format-1.json"):
+        write(tmp_path / name, {"backpack": 2})
+    backpack = Backpack(tmp_path)
+    backpack.look()
+    assert "damaged" in backpack.take_trouble()
+    assert json.loads((tmp_path / "backpack.json").read_text()) == {"backpack": 2}
+    assert json.loads((tmp_path / "backpack.format-1.damaged.json").read_text()) == {"backpack": 2}
+
+
+# ---- behaviours
+
+
+def test_a_behaviour_of_a_newer_studio_is_told_in_one_sentence_and_not_touched(tmp_path: Path) -> None:
+    path = tmp_path / "Mine.nepb"
+    before = write(path, {"format": "nep-behaviour", "version": 2, "workspace": {"blocks": {}}})
+    with pytest.raises(DocumentError) as raised:
+        read_file(path)
+    assert str(raised.value) == (
+        "Mine.nepb was made by a newer NEP Studio (version 2) and is left as it is; update this one"
+    )
+    assert path.read_bytes() == before
+
+
+def test_what_a_later_program_added_to_a_behaviour_is_written_again(tmp_path: Path) -> None:
+    path = tmp_path / "Mine.nepb"
+    write(
+        path,
+        {
+            "format": "nep-behaviour",
+            "version": 1,
+            "workspace": {"later": {"inside": 1}},
+            "robots": {},
+            "later": [1],
+        },
+    )
+    found = read_file(path)
+    write_file(path, BehaviourFile("Other", found.workspace, found.robots, found.others))
+    assert json.loads(path.read_text())["later"] == [1]
+    assert json.loads(path.read_text())["workspace"] == {"later": {"inside": 1}}
