@@ -1,4 +1,4 @@
-"""A crash of Studio, for real: the next start offers a report of it once, which a person writes as one file."""
+"""A crash of Studio, for real: the next start offers a report of it once, and a person writes it."""
 
 from __future__ import annotations
 

@@ -21,7 +21,15 @@ from tests.ui.show_panels import SIZES, shown_panel
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 MEANINGLESS = {QAccessible.Role.NoRole, QAccessible.Role.Whitespace}  # Client is a painted widget of ours
-OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about", "file.earlier")
+OVER = (
+    "palette.open",
+    "help.shortcuts",
+    "settings.open",
+    "layout.keep",
+    "help.about",
+    "file.earlier",
+    "help.report",
+)
 
 
 def stops(root: QWidget) -> Iterator[QWidget]:

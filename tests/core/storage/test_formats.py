@@ -64,10 +64,10 @@ def test_a_newer_studio_that_writes_while_this_one_runs_loses_nothing(tmp_path: 
     assert (again.get("theme", ""), again.get("language", "")) == ("system", "en")
 
 
-@pytest.mark.parametrize("format", [None, "2", 1.5, True, [], 1])
-def test_settings_of_an_older_studio_are_read_and_written_in_place(tmp_path: Path, format: object) -> None:
+@pytest.mark.parametrize("said", [None, "2", 1.5, True, [], 1])
+def test_settings_of_an_older_studio_are_read_and_written_in_place(tmp_path: Path, said: object) -> None:
     old: dict[str, object] = {"theme": "dark", "of another plug-in": 7}
-    write(tmp_path / "settings.json", old if format is None else {**old, "format": format})
+    write(tmp_path / "settings.json", old if said is None else {**old, "format": said})
     settings = Settings(tmp_path)
     assert (settings.get("theme", ""), settings.notice) == ("dark", "")
     settings.set("language", "es")

@@ -13,7 +13,7 @@ from app.core.storage.settings import FORMAT, Settings
 WRITER = """
 import sys
 from pathlib import Path
-from app.core.storage.settings import FORMAT, Settings
+from app.core.storage.settings import Settings
 settings = Settings(Path(sys.argv[1]))
 print("ready", flush=True)
 sys.stdin.readline()

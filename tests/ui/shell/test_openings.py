@@ -36,7 +36,7 @@ PANELS = [
 ]  # fmt: skip
 COMMANDS = [
     "file.earlier", "settings.open", "palette.open", "layout.keep", "help.shortcuts", "help.about",
-    "network.others", "network.look",
+    "network.others", "network.look", "help.report",
 ]  # fmt: skip
 
 

@@ -110,7 +110,15 @@ OPENED = [
     a_field_in_which_one_types,
     *map(
         a_command,
-        ("palette.open", "settings.open", "help.shortcuts", "help.about", "network.others", "layout.keep"),
+        (
+            "palette.open",
+            "settings.open",
+            "help.shortcuts",
+            "help.about",
+            "help.report",
+            "network.others",
+            "layout.keep",
+        ),
     ),
 ]
 

@@ -75,7 +75,15 @@ RUNS = (
 )
 OF_QT = ("#qt_dockwidget_", "#ScrollLeftButton", "#ScrollRightButton")
 """Buttons that Qt makes itself, with its own words: in a title that we replace, at the ends of tabs."""
-OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about", "file.earlier")
+OVER = (
+    "palette.open",
+    "help.shortcuts",
+    "settings.open",
+    "layout.keep",
+    "help.about",
+    "file.earlier",
+    "help.report",
+)
 
 
 def views() -> Iterator[RunView]:

@@ -95,7 +95,31 @@ class ReportSheet(Overlay):
         self._head.setContentsMargins(SIDE, 0, SIDE, 0)
         self._inside = QWidget()
         self._inside.setProperty("bare", "true")
-        inside = QVBoxLayout(self._inside)
+        self._fill(QVBoxLayout(self._inside))
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.viewport().setAutoFillBackground(False)
+        self._area.setWidget(self._inside)
+        self._foot = QHBoxLayout()
+        self._foot.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._foot.setSpacing(10)
+        self._foot.addStretch(1)
+        self._foot.addWidget(self.write)
+        self._foot.addWidget(self.show_file)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 14, 1, 16)
+        column.setSpacing(10)
+        column.addLayout(self._head)
+        column.addWidget(self._area, 1)
+        self._said = QHBoxLayout()
+        self._said.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._said.addWidget(self.state)
+        column.addLayout(self._said)
+        column.addLayout(self._foot)
+
+    def _fill(self, inside: QVBoxLayout) -> None:
         inside.setContentsMargins(SIDE, 0, SIDE, 4)
         inside.setSpacing(6)
         inside.addWidget(self.introduction)
@@ -115,24 +139,6 @@ class ReportSheet(Overlay):
         inside.addSpacing(6)
         inside.addWidget(self.work)
         inside.addWidget(self.names)
-        self._area = QScrollArea()
-        self._area.setWidgetResizable(True)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._area.viewport().setAutoFillBackground(False)
-        self._area.setWidget(self._inside)
-        self._foot = QHBoxLayout()
-        self._foot.setContentsMargins(SIDE, 0, SIDE, 0)
-        self._foot.setSpacing(10)
-        self._foot.addWidget(self.state, 1)
-        self._foot.addWidget(self.write)
-        self._foot.addWidget(self.show_file)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(1, 14, 1, 16)
-        column.setSpacing(10)
-        column.addLayout(self._head)
-        column.addWidget(self._area, 1)
-        column.addLayout(self._foot)
 
     # -- showing ----------------------------------------------------------------------------------
 
@@ -163,10 +169,9 @@ class ReportSheet(Overlay):
         layout = self._inside.layout()
         inner = wide - 2 - SCROLL_BAR
         inside = layout.totalHeightForWidth(inner) if layout is not None else 0
-        foot = max(
-            self._foot.minimumHeightForWidth(wide - 2) if self._foot.hasHeightForWidth() else 0,
-            self._foot.sizeHint().height(),
-        )
+        foot = self._foot.sizeHint().height()
+        if self.state.text():
+            foot += self.state.heightForWidth(wide - 2 - 2 * SIDE) + 10
         high = inside + self._head.sizeHint().height() + foot + 14 + 2 * 10 + 16 + 4
         return QSize(wide, min(room.height(), high))
 
@@ -175,6 +180,7 @@ class ReportSheet(Overlay):
         self.written = path
         set_role(self.state, role)
         self.state.setText(words)
+        paint.show_when(self.state, bool(words))
         paint.show_when(self.show_file, path is not None)
         self.write.setEnabled(self._writer is None)
         self.write.set_kind("plain" if path is not None else "primary")
