@@ -38,7 +38,7 @@ from app.ui.startup.file_open import Application, IncomingFiles
 from app.ui.startup.single_instance import StartRequest
 from app.ui.theme import fonts
 from app.ui.theme.theme import MODES, Theme
-from nep.i18n import ENGLISH, _, language, listed, ngettext
+from nep.i18n import ENGLISH, _, language, listed
 
 LOG_EVERY_MS = 500
 BEGUN = "begun"  # kept since the first start
@@ -140,11 +140,9 @@ def tell_of_newer(session: Session) -> None:
         session.alerts.put(
             "journal:newer",
             "warn",
-            ngettext(
-                "Unsaved work of a newer NEP Studio is kept: {names}.",
-                "Unsaved works of a newer NEP Studio are kept: {names}.",
-                len(names),
-            ).format(names=listed([f"“{name}”" for name in names])),
+            _("A newer NEP Studio has unsaved work here: {names}.").format(
+                names=listed([f"“{name}”" for name in names])
+            ),
             _("Start that version to put it back."),
         )
 
