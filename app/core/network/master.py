@@ -125,7 +125,9 @@ class MasterStart:
     def _look_back(self) -> None:
         """The master that was started here has gone: say so, if it crashed."""
         code = self._process.poll() if self._process is not None else None
+        if code is None:
+            return
         self._process = None
-        if code is not None and is_crash(code):
+        if is_crash(code):
             how = f"the master's process {end_words(code)}"
             _log.error("%s", how, extra=crash_extra("master", how))

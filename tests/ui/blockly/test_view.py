@@ -164,6 +164,8 @@ def test_a_killed_web_process_loses_nothing(qtbot, view, person, caplog):
     with qtbot.waitSignal(view.key_pressed, timeout=WAIT_MS):
         them.press(Qt.Key_F12)
     assert "ended" in caplog.text
+    (crash,) = [each.crash for each in caplog.records if hasattr(each, "crash")]
+    assert crash.part == "editor", "a report of it is kept"
 
 
 @pytest.mark.parametrize(
