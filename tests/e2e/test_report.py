@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import psutil
 import pytest
 
 from app.ui.startup.single_instance import place
@@ -26,6 +27,12 @@ def crash(studio: Studio, number: int) -> None:
     assert list((studio.home / "runs").glob("*.json")), "a run leaves a mark"
     studio.process.send_signal(number)
     assert studio.process.wait(END_S) == -number
+
+
+def renderers_of(studio: Studio) -> list[psutil.Process]:
+    """Chromium's zygotes, Studio's own children, fork them."""
+    own = psutil.Process(studio.process.pid).children()
+    return [each for zygote in own if "--type=zygote" in zygote.cmdline() for each in zygote.children()]
 
 
 def has_looked_back(studio: Studio) -> None:
@@ -88,3 +95,25 @@ def test_an_end_by_the_system_is_told_once_and_one_that_was_asked_for_is_not(
     assert not third.all(OFFER)
     assert len(kept(third)) == 1
     assert third.quit() == 0
+
+
+def test_a_robot_and_an_editor_that_crash_are_reported_and_the_next_start_offers_that(
+    start: Callable[..., Studio],
+) -> None:
+    studio = start("--demo")
+    studio.says("Pepper is connected", within_s=END_S)
+    (robot,) = studio.children("app.robots.simulated")
+    robot.send_signal(signal.SIGSEGV)
+    studio.says("The virtual robot Pepper has ended.", within_s=END_S)
+    until(lambda: [name for name in kept(studio) if "robot" in name], "it is reported")
+    renderers = until(lambda: renderers_of(studio), "the editor's page has its process")
+    renderers[0].send_signal(signal.SIGSEGV)
+    until(lambda: [name for name in kept(studio) if "editor" in name], "it is reported")
+    assert not studio.all("A virtual robot crashed last time."), "it was told when it happened"
+    told = next((studio.home / "log" / "crashes").glob("*robot*.txt")).read_text("utf-8")
+    assert "ended by signal 11 (SIGSEGV)" in told
+    assert "Fatal Python error: Segmentation fault" in told
+    assert studio.quit() == 0
+    again = start()
+    again.says("A virtual robot crashed last time.")
+    assert again.quit() == 0
