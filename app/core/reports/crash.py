@@ -33,6 +33,7 @@ STATUS_WORDS = {
 }
 TRACE_BEGINS = ("Fatal Python error:", "Windows fatal exception:")
 """How the lines of Python's faulthandler begin."""
+MAYBE_CAUGHT = "Windows fatal exception: code "
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,3 +78,13 @@ def split_trace(said: str) -> tuple[str, str]:
         if line.startswith(TRACE_BEGINS):
             return "".join(lines[:place]), "".join(lines[place:])
     return said, ""
+
+
+def fatal_line(trace: str) -> str:
+    """The line of a trace that says how a process ended; "" when none does.
+
+    On Windows faulthandler also writes of exceptions with a number that a library of the system raises and
+    catches itself.
+    """
+    told = [line for line in trace.splitlines() if line.startswith(TRACE_BEGINS)]
+    return next((line for line in reversed(told) if not line.startswith(MAYBE_CAUGHT)), "")

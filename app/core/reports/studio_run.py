@@ -20,7 +20,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING
 
 from app.core.faults import IN_CONSOLE, error_words, log_folder
-from app.core.reports.crash import Crash
+from app.core.reports.crash import Crash, fatal_line
 from app.core.reports.crash_reports import CrashReports
 from app.core.storage.atomic_file import private_folder, read_whole, write_atomically
 from app.core.storage.file_lock import FileLock
@@ -167,12 +167,11 @@ class StudioRun:
         return self._judged(entry, began_s, trace)
 
     def _judged(self, entry: Mapping[str, object], began_s: float, trace: str) -> Crash | None:
-        if not trace.strip():
+        how = fatal_line(trace)
+        if not how:
             if entry.get("asked") is True or psutil.boot_time() > began_s + CLOCK_S:
                 return None
             how = WITHOUT_A_WORD
-        else:
-            how = trace.strip().splitlines()[0]
         began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began_s))
         text = f"It was version {entry.get('version')}, begun {began}.\n\n{trace}\n{self._end_of_log()}"
         return Crash("studio", how, text)

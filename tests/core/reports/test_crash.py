@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from app.core.reports.crash import end_words, is_crash, split_trace
+from app.core.reports.crash import end_words, fatal_line, is_crash, split_trace
 
 
 @pytest.mark.parametrize(
@@ -52,6 +52,15 @@ def test_a_process_says_where_it_crashed_behind_its_own_words() -> None:
     assert said == "my last words\n"
     assert trace.startswith("Fatal Python error: Segmentation fault")
     assert "deep_inside" in trace
+
+
+def test_the_last_fatal_line_says_how_it_ended() -> None:
+    caught = "Windows fatal exception: code 0x800706ba\n\nThread 1\n"
+    assert fatal_line("") == ""
+    assert fatal_line(caught) == "", "the system's own, which it caught"
+    violation = "Windows fatal exception: access violation"
+    assert fatal_line(f"{caught}{violation}\n\nThread 1\n{caught}") == violation
+    assert fatal_line("Fatal Python error: Aborted\n\nThread 1\n") == "Fatal Python error: Aborted"
 
 
 def test_what_is_no_trace_stays_whole() -> None:

@@ -1,0 +1,100 @@
+"""What a start tells: crashes, and what a newer Studio keeps here; and how it is asked to end."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.core.reports.crash import Crash
+from app.core.reports.crash_reports import ALERT, CrashReports
+from app.core.reports.studio_run import StudioRun
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from app.ui.application import close_when_asked, tell_of_crashes, tell_of_newer
+from app.ui.shell.main_window import MainWindow
+from tests.pseudo import untranslated
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+class Run:
+    """A run of Studio whose predecessors crashed so."""
+
+    def __init__(self, *left: Crash) -> None:
+        self._left = list(left)
+        self.is_asked = False
+
+    def left(self) -> list[Crash]:
+        return [self._left.pop() for _each in list(self._left)]
+
+    def expect_end(self) -> None:
+        self.is_asked = True
+
+
+def test_several_windows_that_one_logout_ended_are_one_offer(session: Session, home: Path) -> None:
+    tell_of_crashes(session, Run(Crash("studio", "without a word"), Crash("studio", "without a word")))
+    assert [each.id for each in session.alerts.active] == [ALERT]
+    assert len(CrashReports().all()) == 2
+    again = Session(Settings(home), journal_folder=home / "journal", start_processes=False)
+    tell_of_crashes(again, Run())
+    assert not again.alerts.active
+
+
+def test_a_run_that_ended_in_order_offers_nothing(session: Session, home: Path) -> None:
+    with StudioRun(home / "runs", home / "log"):
+        pass
+    tell_of_crashes(session, StudioRun(home / "runs", home / "log"))
+    assert not session.alerts.active
+
+
+def test_work_and_settings_of_a_newer_studio_are_told_in_the_persons_words(pseudo: None, home: Path) -> None:
+    (home / "journal").mkdir(parents=True)
+    entry = {"format": 2, "pid": 2**22 + 7, "born_s": 1.0, "name": "Mine"}
+    (home / "journal" / "a.json").write_text(json.dumps(entry))
+    (home / "settings.json").write_text(json.dumps({"format": 7}))
+    session = Session(Settings(home), journal_folder=home / "journal", start_processes=False)
+    tell_of_newer(session)
+    told = {each.id: f"{each.title} {each.detail}" for each in session.alerts.active}
+    assert set(told) == {"journal:newer", "settings:newer"}
+    assert "“Mine”" in told["journal:newer"]
+    assert "7" in told["settings:newer"]
+    assert [words for words in told.values() if untranslated(words, "Mine", "settings", "json")] == []
+
+
+def test_where_nothing_is_newer_nothing_is_told(session: Session) -> None:
+    tell_of_newer(session)
+    assert not session.alerts.active
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_who_asks_studio_to_end_ends_it_in_order(qtbot, window: MainWindow, name: str) -> None:
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    run = Run()
+    window.show()
+    try:
+        close_when_asked(window, run)
+        os.kill(os.getpid(), getattr(signal, name))
+        qtbot.waitUntil(lambda: not window.isVisible())
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert run.is_asked
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_who_lets_it_outlive_the_terminal_is_obeyed(window: MainWindow) -> None:
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    try:
+        close_when_asked(window, Run())
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
