@@ -16,6 +16,7 @@ from app.core.reports.crash import PARTS, Crash, Part
 from app.core.reports.privacy import without_home
 from app.core.storage.atomic_file import LARGEST_BYTES, read_whole, write_atomically
 from nep.i18n import _, lazy
+from nep.system.replace_file import replace_file
 from nep.version import __version__
 
 MOST = 10
@@ -96,7 +97,7 @@ class CrashReports:
             if each.is_new:
                 told = each.path.with_name(each.path.name.replace(".new.txt", ".txt"))
                 with suppress(OSError):  # another Studio took it, or the disk can't be written
-                    each.path.rename(told)
+                    replace_file(each.path, told)
                     taken.append(CrashReport(told, each.part, each.noticed_s, is_new=False))
         return taken
 

@@ -8,9 +8,11 @@ from __future__ import annotations
 import io
 import json
 import locale
+import logging
 import os
 import platform
 import sys
+import threading
 import time
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.core.documents.file_format import FULL, SUFFIX
-from app.core.faults import log_folder
+from app.core.faults import error_words, log_folder
 from app.core.reports.crash_reports import CrashReports, texts
 from app.core.reports.privacy import shown_settings, without_home
 from app.core.storage.atomic_file import read_whole, write_atomically
@@ -48,11 +50,13 @@ READ_ME = (
 )
 LONGEST_NAME = 60
 
+_log = logging.getLogger("studio.report")
+
 Facts = Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True)
-class Work:
+class ReportedWork:
     """An open behaviour as it is now: its name, and its file's bytes."""
 
     name: str
@@ -101,7 +105,7 @@ def work_words(names: Sequence[str]) -> str:
     return _("As they are now: {names}").format(names=listed([f"“{name}”" for name in names]))
 
 
-def make_report(parts: ReportParts, happened: str, work: Sequence[Work] = ()) -> bytes:
+def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:
     """The zip. It takes a moment, and as long as the doctor: not for the window's thread."""
     files: list[tuple[str, bytes]] = [
         ("README.txt", READ_ME.format(version=__version__).encode()),
@@ -134,6 +138,38 @@ def write_report(path: Path, data: bytes) -> None:
         raise ReportError(path, reason, advice) from error
 
 
+class ReportWriter:
+    """Makes and writes one report in a thread of its own, which ends with it."""
+
+    def __init__(self, path: Path, make: Callable[[], bytes]) -> None:
+        """Begin at once; ``make`` is called in the thread."""
+        self.path = path
+        self.problem = ""
+        """Why it could not be written, in a sentence without a full stop; "" while nothing is wrong."""
+        self._make = make
+        self._thread = threading.Thread(target=self._work, name="studio-report")
+        self._thread.start()
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it is written, or has failed."""
+        return not self._thread.is_alive()
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for it; whether it is done."""
+        self._thread.join(timeout_s)
+        return self.is_done
+
+    def _work(self) -> None:
+        try:
+            write_report(self.path, self._make())
+        except ReportError as error:
+            self.problem = str(error)
+        except Exception as error:  # noqa: BLE001  a report of problems must not have one that nobody hears of
+            _log.exception("can't make a report")
+            self.problem = _("the report can't be made: {error}").format(error=error_words(error))
+
+
 def _logs(folder: Path) -> list[Path]:
     try:
         return sorted(path for path in folder.glob("studio.log*") if path.is_file())
@@ -149,7 +185,7 @@ def _settings(values: Mapping[str, object]) -> str:
     return json.dumps(shown_settings(values), indent=1, ensure_ascii=False, default=str)
 
 
-def _named(work: Sequence[Work]) -> list[tuple[str, bytes]]:
+def _named(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
     """The behaviours as files, each under a name of its own that every system takes."""
     found: dict[str, bytes] = {}
     for each in work:

@@ -15,15 +15,15 @@ from app.core.documents.file_format import BehaviourFile, file_bytes, read_file
 from app.core.reports.crash import Crash
 from app.core.reports.crash_reports import CrashReports
 from app.core.reports.problem_report import (
+    ReportedWork,
     ReportParts,
-    Work,
+    ReportWriter,
     file_name,
     make_report,
     what_goes_in,
     work_words,
     write_report,
 )
-from app.core.reports.writer import ReportWriter
 from app.errors import ReportError
 from tests.pseudo import untranslated
 
@@ -84,7 +84,9 @@ def test_what_is_secret_or_the_persons_own_is_nowhere_in_it(parts: ReportParts) 
 
 def test_work_goes_in_only_when_it_is_given_and_can_be_opened(parts: ReportParts, tmp_path: Path) -> None:
     data = file_bytes(BehaviourFile("A/B: c", BLOCKS, {}))
-    found = make_report(parts, "", [Work("A/B: c", data), Work("A_B_ c", data), Work("...", data)])
+    found = make_report(
+        parts, "", [ReportedWork("A/B: c", data), ReportedWork("A_B_ c", data), ReportedWork("...", data)]
+    )
     names = sorted(name for name in opened(found) if name.startswith("work/"))
     assert names == ["work/A_B_ c 2.nepb", "work/A_B_ c.nepb", "work/___.nepb"]
     with zipfile.ZipFile(io.BytesIO(found)) as archive:

@@ -70,10 +70,10 @@ class ReportCommands:
         names = [documents.title(each) for each in documents if not each.blank]
         self._sheet.show_for(parts, names, self._work)
 
-    def _work(self) -> list[problem_report.Work]:
+    def _work(self) -> list[problem_report.ReportedWork]:
         documents = self._session.documents
         return [
-            problem_report.Work(
+            problem_report.ReportedWork(
                 documents.title(each),
                 file_bytes(BehaviourFile(each.name, each.workspace, each.robots, each.others)),
             )

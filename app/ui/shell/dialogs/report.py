@@ -13,14 +13,14 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWi
 from app.core.reports.privacy import without_home
 from app.core.reports.problem_report import (
     ENDING,
+    ReportedWork,
     ReportParts,
-    Work,
+    ReportWriter,
     file_name,
     make_report,
     what_goes_in,
     work_words,
 )
-from app.core.reports.writer import ReportWriter
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -43,7 +43,7 @@ NOT_IN_IT = (
     lazy("Keys, passwords and access codes; your home folder stands there as ~"),
 )
 
-Behaviours = Callable[[], Sequence[Work]]
+Behaviours = Callable[[], Sequence[ReportedWork]]
 
 
 def documents_folder() -> Path:
