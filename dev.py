@@ -194,7 +194,8 @@ def package(computer: Computer, arguments: Sequence[str]) -> int:
     ours = [*pip(python), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
     if computer.do(ours, computer.environ, None) != 0:
         raise Trouble("Studio could not be installed; pip's own words are above")
-    return computer.do([str(python), "-m", "installers.package", *arguments], computer.environ, None)
+    given = [each for each in arguments if each != "--"]
+    return computer.do([str(python), "-m", "installers.package", *given], computer.environ, None)
 
 
 def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:

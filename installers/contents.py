@@ -73,6 +73,8 @@ def is_wanted(name: str) -> bool:
         return False
     if parts[:2] == ("cv2", "data"):
         return path.suffix != ".xml"  # trained classifiers, which nothing here reads
+    if path.name.startswith("opencv_videoio_ffmpeg"):  # Windows; elsewhere: film_libraries.py
+        return False
     if "PySide6" in parts:
         return _is_wanted_of_qt(path)
     return path.suffix not in {".pyi", ".h", ".pxd", ".a", ".lib"}

@@ -3,7 +3,7 @@
 The loader wants a file for each library that `cv2` names, with the names that it imports. So empty libraries
 take FFmpeg's place; their functions do nothing. The programs switch that part of OpenCV off when they start
 (`installers/entries`), so that nobody calls them. What only FFmpeg needed goes, too. That takes away 35 MB,
-and what FFmpeg would have to be mended for. Needs gcc and readelf; without them FFmpeg stays.
+and what FFmpeg would have to be mended for. Needs gcc and readelf.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import subprocess
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from installers.context import Context
+from installers.context import Context, PackageError
 
 __all__ = ["FILMS", "leave_out_films"]
 
@@ -24,11 +24,12 @@ _NEEDED = re.compile(r"\(NEEDED\)\s+Shared library: \[([^\]]+)\]")
 
 
 def leave_out_films(context: Context) -> int:
-    """Put empty libraries in the place of FFmpeg's; how many bytes that took away."""
+    """Put empty libraries in the place of FFmpeg's; how many bytes that took away. Raises `PackageError`."""
     inside = context.frozen / "_internal"
     folder = inside / "opencv_python_headless.libs"
-    if shutil.which("gcc") is None or shutil.which("readelf") is None or not folder.is_dir():
-        return 0
+    missing = [tool for tool in ("gcc", "readelf") if shutil.which(tool) is None]
+    if missing:
+        raise PackageError(f"'{missing[0]}' is missing; try: apt-get install gcc binutils")
     before = _size(folder)
     users = [inside / "cv2" / "cv2.abi3.so"]
     films = [path for path in sorted(folder.iterdir()) if FILMS.match(path.name)]
