@@ -86,6 +86,7 @@ def test_it_opens_in_the_field_and_says_what_goes_in(sheet: ReportSheet) -> None
     for words in ("Nothing is sent", "In the file", "connection doctor", "Not in it", "Keys, passwords"):
         assert words in lines(sheet)
     assert not sheet.work.isVisible(), "nothing is open that could go in"
+    assert "unless" not in lines(sheet)
     assert not sheet.show_file.isVisible()
 
 
@@ -132,6 +133,7 @@ def test_behaviours_go_in_only_when_they_are_switched_on_each_time(
     assert window.commands.run("help.report")
     assert sheet.work.isVisible()
     assert not sheet.work.isChecked()
+    assert "Your behaviours, unless you switch them on below" in lines(sheet)
     assert sheet.names.text() == "As they are now: “New behaviour”"
     answers.path = tmp_path / "without.zip"
     written(qtbot, sheet)

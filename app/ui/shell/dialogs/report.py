@@ -37,8 +37,10 @@ INTRODUCTION = lazy(
     "Studio writes one file that tells how it is on this computer. Nothing is sent: you give the file to"
     " whoever helps you."
 )
+NO_BEHAVIOURS = lazy("Your behaviours")
+NO_BEHAVIOURS_UNLESS = lazy("Your behaviours, unless you switch them on below")
 NOT_IN_IT = (
-    lazy("Your behaviours, unless you switch them on below"),
+    NO_BEHAVIOURS,
     lazy("Pictures, sounds, and what robots tell"),
     lazy("Keys, passwords and access codes; your home folder stands there as ~"),
 )
@@ -133,8 +135,9 @@ class ReportSheet(Overlay):
         inside.addWidget(label(_("Not in it"), "title"))
         left_out = QVBoxLayout()
         left_out.setSpacing(4)
-        for words in NOT_IN_IT:
-            left_out.addWidget(_Line(self.theme, _(words), "x"))
+        self._left_out = [_Line(self.theme, _(words), "x") for words in NOT_IN_IT]
+        for line in self._left_out:
+            left_out.addWidget(line)
         inside.addLayout(left_out)
         inside.addSpacing(6)
         inside.addWidget(self.work)
@@ -152,6 +155,7 @@ class ReportSheet(Overlay):
                 line.deleteLater()
         for words in what_goes_in(parts):
             self.list.addWidget(_Line(self.theme, words, "check"))
+        self._left_out[0].words.setText(_(NO_BEHAVIOURS_UNLESS if names else NO_BEHAVIOURS))
         self.work.setChecked(False)
         self.names.setText(work_words(names) if names else "")
         for widget in (self.work, self.names):
