@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, Qt, QUrl
-from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage, QResizeEvent
+from PySide6.QtGui import QAction, QGuiApplication, QImage, QResizeEvent
 
 from app.core.messages import snapshots
 from app.core.networks.networks import topic_words
+from app.ui.other_programs import open_outside
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.image.actions import PictureActions
 from app.ui.panels.image.snapshot import SnapshotJob
@@ -196,7 +197,7 @@ class ImagePanel(PanelWidget):
     def _saved(self, path: str) -> None:
         folder = QUrl.fromLocalFile(str(Path(path).parent))
         said = _("Saved {file}").format(file=Path(path).name)
-        self.context.toast(said, _("Open folder"), lambda: QDesktopServices.openUrl(folder))
+        self.context.toast(said, _("Open folder"), lambda: open_outside(folder))
 
     def _copied(self, image: QImage) -> None:
         QGuiApplication.clipboard().setImage(image)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from PySide6.QtCore import QUrl
-from PySide6.QtGui import QDesktopServices
 
 from app.blocks.compiler.stack import Stack
 from app.core.documents.document import Document
@@ -16,6 +15,7 @@ from app.core.session import Session
 from app.core.storage import deep_json
 from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
+from app.ui.other_programs import open_outside
 from app.ui.shell.commands.printing import Printing
 from app.ui.shell.commands.program_pictures import ProgramPictures
 from app.ui.shell.commands.shell import Shell
@@ -232,7 +232,7 @@ class BehaviourCommands:
             if document.path is None:
                 return
             folder = document.path.parent
-            if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+            if not open_outside(QUrl.fromLocalFile(str(folder))):
                 self._shell.say(_("The file is in {folder}").format(folder=folder))
 
         return self._with(key, show)

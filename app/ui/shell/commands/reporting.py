@@ -7,12 +7,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QLocale, QUrl, qVersion
-from PySide6.QtGui import QDesktopServices, QGuiApplication
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
 from app.core.documents.file_format import BehaviourFile, file_bytes
 from app.core.reports.crash_reports import ALERT
 from app.core.session import Session
+from app.ui.other_programs import open_outside
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
 from app.ui.widgets.file_dialogs import FileDialogs
@@ -83,7 +84,7 @@ class ReportCommands:
 
     def look_for_new_version(self, page: str = RELEASES_PAGE) -> None:
         """Open the page of releases in the browser, and say which version this is. Nothing is asked here."""
-        opened = QDesktopServices.openUrl(QUrl(page))
+        opened = open_outside(QUrl(page))
         words = (
             _("This is NEP Studio {version}. Your browser shows the newest one.")
             if opened

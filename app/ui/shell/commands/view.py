@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from PySide6.QtCore import QUrl
-from PySide6.QtGui import QAction, QDesktopServices
+from PySide6.QtGui import QAction
 
 from app import resources
 from app.core.faults import log_folder
 from app.core.session import Session
+from app.ui.other_programs import open_outside
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.freeze import freeze_or_go_on
@@ -333,7 +334,7 @@ class ViewCommands:
             reason = (error.strerror or str(error)).lower()
             self._shell.say(_("{folder} can't be made: {reason}").format(folder=folder, reason=reason))
             return
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+        if not open_outside(QUrl.fromLocalFile(str(folder))):
             self._shell.say(_("The log files are in {folder}").format(folder=folder))
 
     def about(self) -> None:

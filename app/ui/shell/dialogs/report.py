@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import QRectF, QSize, QStandardPaths, Qt, QTimer, QUrl
-from PySide6.QtGui import QDesktopServices, QPainter, QPaintEvent
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from app.core.reports.privacy import without_home
@@ -21,6 +21,7 @@ from app.core.reports.problem_report import (
     what_goes_in,
     work_words,
 )
+from app.ui.other_programs import open_outside
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -232,7 +233,7 @@ class ReportSheet(Overlay):
     def _show_file(self) -> None:
         if self.written is not None:
             folder = self.written.parent
-            if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+            if not open_outside(QUrl.fromLocalFile(str(folder))):
                 self._say(_("The file is in {folder}").format(folder=folder))
 
 

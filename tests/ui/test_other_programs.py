@@ -1,0 +1,35 @@
+"""What other programs inherit from a frozen Studio: nothing of its loader's."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.ui.other_programs import outside
+
+OURS = {"LD_LIBRARY_PATH": "/opt/nep-studio/_internal", "_PYI_ARCHIVE_FILE": "/opt/nep-studio/nep-studio"}
+
+
+@pytest.mark.parametrize(
+    ("original", "inherited"),
+    [({}, {}), ({"LD_LIBRARY_PATH_ORIG": "/usr/games"}, {"LD_LIBRARY_PATH": "/usr/games"})],
+)
+def test_they_get_what_was_there_before(original: dict[str, str], inherited: dict[str, str]) -> None:
+    environ = {"HOME": "/home/ana", **OURS, **original}
+    before = dict(environ)
+    with outside(environ, is_frozen=True):
+        assert environ == {"HOME": "/home/ana", **inherited}
+    assert environ == before
+
+
+def test_it_is_ours_again_whatever_happened() -> None:
+    environ = dict(OURS)
+    with pytest.raises(OSError, match="gone"), outside(environ, is_frozen=True):
+        raise OSError("gone")
+    assert environ == OURS
+
+
+def test_a_checkout_changes_nothing() -> None:
+    environ = {"LD_LIBRARY_PATH": "/opt/ros/lib"}
+    with outside(environ, is_frozen=False):
+        assert environ == {"LD_LIBRARY_PATH": "/opt/ros/lib"}
+    assert environ == {"LD_LIBRARY_PATH": "/opt/ros/lib"}
