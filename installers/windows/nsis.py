@@ -1,0 +1,162 @@
+"""The setup program, made by NSIS from setup/nep-studio.nsi and what is written here for it."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path, PurePath, PureWindowsPath
+
+from installers.context import Context, PackageError
+from installers.windows.version import COPYRIGHT, PUBLISHER, version_numbers
+
+__all__ = ["association", "entries", "make_setup"]
+
+HERE = Path(__file__).resolve().parent
+SOURCES = HERE / "setup"
+REG_FILE = HERE / "nep-studio.reg"
+REG_FOLDER = r"C:\Program Files\NEP Studio"
+"""What stands in the .reg file for the folder that Studio is installed in."""
+CLASSES = "Software\\Classes\\"
+PROGRAMS = ("nep-studio.exe", "nep.exe")
+UNINSTALLER = "uninstall.exe"
+ROOM_MB = 100
+"""What must be free beside the new files: the settings, and a computer that goes on working."""
+
+
+def quoted(text: str | PurePath, folder: str = "") -> str:
+    """Text as NSIS reads it in double quotes; in ``folder``, a variable of NSIS, when one is given."""
+    escaped = str(text).replace("$", "$$").replace('"', '$\\"')
+    return f'"{folder}\\{escaped}"' if folder else f'"{escaped}"'
+
+
+def entries(frozen: Path) -> str:
+    """The macros about what is in the frozen program: its files, and what of it is in its folder itself.
+
+    Each file is named, in order: a folder's own order differs from computer to computer, and like beside like
+    packs better.
+    """
+    unpack: list[str] = []
+    folder = frozen
+    for path in sorted(_files(frozen), key=lambda path: (path.parent, path.suffix, path.name)):
+        if path.parent != folder:
+            folder = path.parent
+            unpack.append(f"SetOutPath {quoted(PureWindowsPath(folder.relative_to(frozen)), '$NewFolder')}")
+        unpack.append(f'File "{path}"')  # a name on this computer: NSIS looks for no variables in it
+    names = [*sorted(path.name for path in frozen.iterdir()), UNINSTALLER]
+    return (
+        _macro("UnpackEntries", unpack)
+        + _macro("ForEachEntry do", [f"!insertmacro ${{do}} {quoted(name)}" for name in names])
+        + _macro("ForEachProgram do", [f"!insertmacro ${{do}} {quoted(name)}" for name in PROGRAMS])
+    )
+
+
+def _macro(name: str, lines: Sequence[str]) -> str:
+    return "\n".join([f"!macro {name}", *(f"  {line}" for line in lines), "!macroend", "", ""])
+
+
+def _files(frozen: Path) -> Iterator[Path]:
+    return (path for path in frozen.rglob("*") if path.is_file())
+
+
+def association(reg_file: str) -> str:
+    """The macros that tell Windows who opens .nepb, and take it back, from the text of a .reg file.
+
+    Keys of a suffix may hold what others have written, too: of them goes what is ours; our own go whole.
+    """
+    values = list(_values(reg_file))
+    put = [f"WriteRegStr HKCU {quoted(key)} {quoted(name)} {text}" for key, name, text in values]
+    take: list[str] = []
+    for key, name, text in values:
+        if _root(key).startswith("."):
+            take += [
+                f"ReadRegStr $0 HKCU {quoted(key)} {quoted(name)}",
+                f"${{If}} $0 == {text}",
+                f"  DeleteRegValue HKCU {quoted(key)} {quoted(name)}",
+                "${EndIf}",
+            ]
+    for key in sorted({key for key, _name, _text in values}, reverse=True):  # what is inside goes first
+        if _root(key).startswith("."):
+            take += [
+                "ClearErrors",
+                f"EnumRegValue $0 HKCU {quoted(key)} 0",
+                "${If} ${Errors}",  # no value, not even one without a name
+                f"  DeleteRegKey /ifempty HKCU {quoted(key)}",
+                "${EndIf}",
+            ]
+        elif key == f"{CLASSES}{_root(key)}":
+            take.append(f"DeleteRegKey HKCU {quoted(key)}")
+    return _macro("Associate", put) + _macro("Dissociate", take)
+
+
+def _root(key: str) -> str:
+    """The suffix or the kind of file that a key is about."""
+    return key.removeprefix(CLASSES).partition("\\")[0]
+
+
+def _values(reg_file: str) -> Iterator[tuple[str, str, str]]:
+    """Key, name and text (as NSIS reads it) of each value; the key without its hive."""
+    key = ""
+    for line in reg_file.splitlines():
+        if line.startswith("["):
+            key = line.strip("[]").removeprefix("HKEY_CURRENT_USER\\")
+        elif match := re.fullmatch(r'(?:@|"((?:[^"\\]|\\.)*)")="((?:[^"\\]|\\.)*)"', line):
+            name, text = (re.sub(r"\\(.)", r"\1", part or "") for part in match.groups())
+            folder, *others = (quoted(part)[1:-1] for part in text.split(REG_FOLDER))
+            yield key, name, '"' + "$INSTDIR".join([folder, *others]) + '"'
+
+
+def make_setup(context: Context, icon: Path) -> Path:
+    """Make the setup program of the frozen Studio, and say where it is. Raises `PackageError`."""
+    folder = context.work / "setup"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "entries.nsh").write_text(entries(context.frozen), "utf-8")
+    (folder / "association.nsh").write_text(association(REG_FILE.read_text("utf-8")), "utf-8")
+    target = context.dist / f"NEP-Studio-{context.version}-setup.exe"
+    target.parent.mkdir(exist_ok=True)
+    size_kb = sum(path.stat().st_size for path in _files(context.frozen)) // 1024
+    given = {
+        "VERSION": context.version,
+        "VERSION_NUMBERS": ".".join(map(str, version_numbers(context.version))),
+        "PUBLISHER": PUBLISHER,
+        "COPYRIGHT": COPYRIGHT,
+        "OUTPUT": target,
+        "LICENSE": context.root / "LICENSE",
+        "ICON": icon,
+        "SIZE_KB": size_kb,
+        "NEEDED_MB": size_kb // 1024 + ROOM_MB,
+    }
+    makensis = _makensis()
+    option = "/" if sys.platform == "win32" else "-"
+    context.run(
+        makensis, f"{option}V2", f"{option}INPUTCHARSET", "UTF8", f"{option}X{_target(makensis)}",
+        f"{option}X!addincludedir {quoted(folder)}", f"{option}X!addincludedir {quoted(SOURCES)}",
+        *(f"{option}D{name}={value}" for name, value in given.items()),
+        SOURCES / "nep-studio.nsi",
+    )  # fmt: skip
+    return target
+
+
+def _makensis() -> Path:
+    """The program of NSIS. Raises `PackageError` when it is not there."""
+    usual = Path(os.environ.get("PROGRAMFILES(X86)", "C:/Program Files (x86)")) / "NSIS" / "makensis.exe"
+    found = shutil.which("makensis") or (str(usual) if usual.is_file() else None)
+    if found is None:
+        raise PackageError(
+            "the setup program is made by NSIS, which is not here: 'sudo apt-get install nsis' on Debian and "
+            "Ubuntu, https://nsis.sourceforge.io on Windows"
+        )
+    return Path(found).resolve()
+
+
+def _target(makensis: Path) -> str:
+    """What the setup program itself is: of 64 bit where NSIS can (Debian's), else of 32 bit, which will do.
+
+    Wine without its part for 32 bit starts only the former.
+    """
+    stubs = (makensis.parent / "Stubs", Path("/usr/share/nsis/Stubs"))
+    can = any((folder / "lzma_solid-amd64-unicode").is_file() for folder in stubs)
+    return "Target amd64-unicode" if can else "Unicode true"

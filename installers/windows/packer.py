@@ -1,0 +1,81 @@
+"""The packages for Windows: a setup program and a zip that runs where it is unpacked.
+
+On Windows with its own Python; on Linux with a Windows Python under Wine.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import zipfile
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import datetime, timezone
+from pathlib import Path
+
+from installers.context import APP, Context, PackageError
+from installers.freeze import freeze
+from installers.windows.nsis import make_setup
+from installers.windows.version import version_resource
+
+__all__ = ["build", "make_zip", "refuse_files_of_wine"]
+
+OF_WINE = (b"Wine builtin DLL", b"Wine placeholder DLL")
+EARLIEST = 315_532_800
+"""1980: no entry of a zip can be older."""
+
+
+def build(context: Context) -> list[Path]:
+    """Freeze Studio and make its packages for Windows; where they are. Raises `PackageError`."""
+    context.work.mkdir(parents=True, exist_ok=True)
+    icon = context.work / "nep-studio.ico"
+    context.run(sys.executable, "-m", "installers.windows.icon", icon)
+    version = context.work / "version.txt"
+    version.write_text(version_resource(context.version), "utf-8")
+    os.environ.update(NEP_PACKAGE_ICON=str(icon), NEP_PACKAGE_VERSION_FILE=str(version))
+    if sys.platform != "win32":
+        from installers.windows.wine import windows_python  # noqa: PLC0415  Windows needs none of it
+
+        context = replace(context, python=windows_python(context))
+    frozen = freeze(context)
+    refuse_files_of_wine(frozen)
+    give_one_time(frozen, context.epoch)
+    return [make_setup(context, icon), make_zip(context)]
+
+
+def refuse_files_of_wine(frozen: Path) -> None:
+    """Raises `PackageError` when a library of Wine's is in the package, where Windows would take it."""
+    found = [
+        path.name for path in _files(frozen) if path.suffix.lower() in {".dll", ".exe"} and _is_of_wine(path)
+    ]
+    if found:
+        raise PackageError(f"the package would hold files of Wine: {', '.join(sorted(found))}")
+
+
+def _is_of_wine(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(0x80)[0x40:].startswith(OF_WINE)
+
+
+def give_one_time(frozen: Path, epoch: int) -> None:
+    """Let all files be of the same time, whenever they were made."""
+    for path in _files(frozen):
+        os.utime(path, (epoch, epoch))
+
+
+def _files(frozen: Path) -> Iterator[Path]:
+    return (path for path in sorted(frozen.rglob("*")) if path.is_file())
+
+
+def make_zip(context: Context) -> Path:
+    """The frozen Studio as a zip, in which files are sorted and of one time."""
+    target = context.dist / f"NEP-Studio-{context.version}-windows-x64.zip"
+    target.parent.mkdir(exist_ok=True)
+    moment = datetime.fromtimestamp(max(context.epoch, EARLIEST), timezone.utc).timetuple()[:6]
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for path in _files(context.frozen):
+            entry = zipfile.ZipInfo(f"{APP}/{path.relative_to(context.frozen).as_posix()}", moment)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 0  # as Windows writes it, wherever it is made
+            archive.writestr(entry, path.read_bytes())
+    return target

@@ -1,0 +1,313 @@
+; The setup program of NEP Studio: per user, no administrator, 64 bit. `installers.windows.setup` gives what is
+; in ${...} and writes entries.nsh and association.nsh.
+;
+;   /S        ask nothing; exit code 0 done, 2 not possible (no room, ...), 3 NEP Studio is open
+;   /PATH     the command `nep` on this user's PATH
+;   /D=FOLDER another folder; last, without quotes
+;
+; Silent, what would have been said goes to the standard output and to %TEMP%\NEP-Studio-setup.txt.
+
+Name "NEP Studio"
+OutFile "${OUTPUT}"
+InstallDir "$LOCALAPPDATA\Programs\NEP Studio"
+InstallDirRegKey HKCU "Software\NEP Studio" "Folder"
+RequestExecutionLevel user
+ManifestDPIAware true
+ManifestSupportedOS Win10
+SetCompressor /SOLID lzma
+SetCompressorDictSize 64
+SetOverwrite on
+AllowSkipFiles off
+BrandingText "NEP Studio ${VERSION}"
+
+VIProductVersion "${VERSION_NUMBERS}"
+VIAddVersionKey /LANG=0 "ProductName" "NEP Studio"
+VIAddVersionKey /LANG=0 "ProductVersion" "${VERSION}"
+VIAddVersionKey /LANG=0 "FileVersion" "${VERSION}"
+VIAddVersionKey /LANG=0 "FileDescription" "NEP Studio Setup"
+VIAddVersionKey /LANG=0 "CompanyName" "${PUBLISHER}"
+VIAddVersionKey /LANG=0 "LegalCopyright" "${COPYRIGHT}"
+
+!include "MUI2.nsh"
+!include "LogicLib.nsh"
+!include "FileFunc.nsh"
+!include "WinMessages.nsh"
+
+!define UNINSTALL_KEY "Software\Microsoft\Windows\CurrentVersion\Uninstall\NEP Studio"
+!define EXIT_IMPOSSIBLE 2
+!define EXIT_OPEN 3
+!define ON_PATH 1
+
+Var NewFolder
+Var OldFolder
+Var KeepWork
+
+!include "entries.nsh"
+!include "association.nsh"
+!include "path.nsh"
+
+!define MUI_ICON "${ICON}"
+!define MUI_UNICON "${ICON}"
+!define MUI_ABORTWARNING
+!define MUI_COMPONENTSPAGE_SMALLDESC
+!define MUI_FINISHPAGE_NOAUTOCLOSE
+!define MUI_FINISHPAGE_RUN "$INSTDIR\nep-studio.exe"
+!insertmacro MUI_PAGE_LICENSE "${LICENSE}"
+!insertmacro MUI_PAGE_COMPONENTS
+!insertmacro MUI_PAGE_DIRECTORY
+!insertmacro MUI_PAGE_INSTFILES
+!insertmacro MUI_PAGE_FINISH
+!insertmacro MUI_UNPAGE_CONFIRM
+!insertmacro MUI_UNPAGE_INSTFILES
+!insertmacro MUI_LANGUAGE "English"
+!insertmacro MUI_LANGUAGE "Spanish"
+!include "words.nsh"
+!insertmacro MUI_RESERVEFILE_LANGDLL
+
+; ---- saying things, and leaving ----------------------------------------------------------------------
+
+!macro Say text
+  ${If} ${Silent}
+    System::Call 'kernel32::GetStdHandle(i -11) p .r8'
+    ${If} $8 P<> 0
+    ${AndIf} $8 P<> -1
+      FileWrite $8 "${text}$\r$\n"
+    ${EndIf}
+    FileOpen $8 "$TEMP\NEP-Studio-setup.txt" w
+    FileWriteUTF16LE /BOM $8 "${text}$\r$\n"
+    FileClose $8
+  ${Else}
+    MessageBox MB_OK|MB_ICONEXCLAMATION "${text}"
+  ${EndIf}
+!macroend
+
+!macro Functions UN
+
+; $0 is 1 while a program of Studio runs from $INSTDIR: Windows lets nobody write into a program that runs.
+Function ${UN}AskWhetherOpen
+  StrCpy $0 0
+  !insertmacro ForEachProgram AskOneProgram
+FunctionEnd
+
+; Comes back only when Studio is closed.
+Function ${UN}WaitUntilClosed
+  Call ${UN}AskWhetherOpen
+  ${While} $0 = 1
+    ${If} ${Silent}
+      !insertmacro Say "$(StudioIsOpen)"
+      SetErrorLevel ${EXIT_OPEN}
+      Quit
+    ${EndIf}
+    MessageBox MB_RETRYCANCEL|MB_ICONEXCLAMATION "$(StudioIsOpen)" IDRETRY +3
+    SetErrorLevel ${EXIT_OPEN}
+    Quit
+    Call ${UN}AskWhetherOpen
+  ${EndWhile}
+FunctionEnd
+
+!insertmacro PathFunctions "${UN}"
+
+!macroend
+
+!macro AskOneProgram name
+  ${If} ${FileExists} "$INSTDIR\${name}"
+    ClearErrors
+    FileOpen $1 "$INSTDIR\${name}" a
+    ${If} ${Errors}
+      StrCpy $0 1
+    ${Else}
+      FileClose $1
+    ${EndIf}
+  ${EndIf}
+!macroend
+
+!insertmacro Functions ""
+!insertmacro Functions "un."
+
+; ---- installing --------------------------------------------------------------------------------------
+
+!macro MoveOut name
+  ${IfNot} ${Errors}
+  ${AndIf} ${FileExists} "$INSTDIR\${name}"
+    Rename "$INSTDIR\${name}" "$OldFolder\${name}"
+  ${EndIf}
+!macroend
+
+!macro MoveIn name
+  ${IfNot} ${Errors}
+    Rename "$NewFolder\${name}" "$INSTDIR\${name}"
+  ${EndIf}
+!macroend
+
+; What is old goes back to its place; what is new and in its place goes first.
+!macro MoveBack name
+  ${If} ${FileExists} "$OldFolder\${name}"
+    ${If} ${FileExists} "$INSTDIR\${name}"
+      Rename "$INSTDIR\${name}" "$NewFolder\${name}"
+    ${EndIf}
+    Rename "$OldFolder\${name}" "$INSTDIR\${name}"
+  ${EndIf}
+!macroend
+
+; A new version is unpacked beside the old one and takes its place by renaming, which needs no room: with a full
+; disk, or when something can't be moved, the old version stays whole.
+Section "!NEP Studio" SectionStudio
+  SectionIn RO
+  StrCpy $NewFolder "$INSTDIR\new~"
+  StrCpy $OldFolder "$INSTDIR\old~"
+  Call WaitUntilClosed
+  Call FinishEarlierUpdate
+  Call AskForRoom
+  SetOutPath $NewFolder
+  !insertmacro UnpackEntries
+  WriteUninstaller "$NewFolder\uninstall.exe"
+  ; A current folder can't be renamed.
+  SetOutPath $TEMP
+
+  CreateDirectory $OldFolder
+  ClearErrors
+  !insertmacro ForEachEntry MoveOut
+  ${IfNot} ${Errors}
+    !insertmacro ForEachEntry MoveIn
+  ${EndIf}
+  ${If} ${Errors}
+    !insertmacro ForEachEntry MoveBack
+    RMDir $OldFolder
+    !insertmacro Say "$(CannotReplace)"
+    SetErrorLevel ${EXIT_IMPOSSIBLE}
+    Abort
+  ${EndIf}
+  RMDir /r $NewFolder
+  RMDir /r $OldFolder
+
+  WriteRegStr HKCU "Software\NEP Studio" "Folder" "$INSTDIR"
+  !insertmacro Associate
+  CreateShortcut "$SMPROGRAMS\NEP Studio.lnk" "$INSTDIR\nep-studio.exe"
+  Call WriteUninstallEntry
+  System::Call 'shell32::SHChangeNotify(i 0x08000000, i 0, p 0, p 0)'
+SectionEnd
+
+Section /o "$(PathTitle)" SectionPath
+  ; In the hidden section below, which also takes it away again.
+SectionEnd
+
+Section "-Path"
+  ReadRegDWORD $0 HKCU "Software\NEP Studio" "OnPath"
+  ${If} ${SectionIsSelected} ${SectionPath}
+    Call AddToPath
+  ${ElseIf} $0 = ${ON_PATH}
+    Call RemoveFromPath
+  ${EndIf}
+SectionEnd
+
+!insertmacro MUI_FUNCTION_DESCRIPTION_BEGIN
+  !insertmacro MUI_DESCRIPTION_TEXT ${SectionStudio} "$(StudioDescription)"
+  !insertmacro MUI_DESCRIPTION_TEXT ${SectionPath} "$(PathDescription)"
+!insertmacro MUI_FUNCTION_DESCRIPTION_END
+
+; An update that was cut off (power, a killed setup) leaves the old version in old~: it is put back first.
+Function FinishEarlierUpdate
+  RMDir /r $NewFolder
+  CreateDirectory $NewFolder
+  !insertmacro ForEachEntry MoveBack
+  RMDir /r $NewFolder
+  RMDir /r $OldFolder
+FunctionEnd
+
+Function AskForRoom
+  CreateDirectory $INSTDIR
+  System::Call 'kernel32::GetDiskFreeSpaceExW(w "$INSTDIR", *l .r1, p 0, p 0) i .r0'
+  ${If} $0 <> 0
+    System::Int64Op $1 / 1048576
+    Pop $1
+    ${If} $1 L< ${NEEDED_MB}
+      StrCpy $2 ${NEEDED_MB}
+      !insertmacro Say "$(NoRoom)"
+      SetErrorLevel ${EXIT_IMPOSSIBLE}
+      Abort
+    ${EndIf}
+  ${EndIf}
+FunctionEnd
+
+Function WriteUninstallEntry
+  WriteRegStr HKCU "${UNINSTALL_KEY}" "DisplayName" "NEP Studio"
+  WriteRegStr HKCU "${UNINSTALL_KEY}" "DisplayVersion" "${VERSION}"
+  WriteRegStr HKCU "${UNINSTALL_KEY}" "DisplayIcon" "$INSTDIR\nep-studio.exe,0"
+  WriteRegStr HKCU "${UNINSTALL_KEY}" "Publisher" "${PUBLISHER}"
+  WriteRegStr HKCU "${UNINSTALL_KEY}" "InstallLocation" "$INSTDIR"
+  WriteRegStr HKCU "${UNINSTALL_KEY}" "UninstallString" '"$INSTDIR\uninstall.exe"'
+  WriteRegStr HKCU "${UNINSTALL_KEY}" "QuietUninstallString" '"$INSTDIR\uninstall.exe" /S'
+  WriteRegDWORD HKCU "${UNINSTALL_KEY}" "EstimatedSize" ${SIZE_KB}
+  WriteRegDWORD HKCU "${UNINSTALL_KEY}" "NoModify" 1
+  WriteRegDWORD HKCU "${UNINSTALL_KEY}" "NoRepair" 1
+FunctionEnd
+
+Function .onInit
+  System::Call 'kernel32::CreateMutexW(p 0, i 1, w "NEP Studio Setup") p .r1 ?e'
+  Pop $0
+  ${If} $0 = 183 ; ERROR_ALREADY_EXISTS
+    !insertmacro Say "$(SetupRunsAlready)"
+    SetErrorLevel ${EXIT_IMPOSSIBLE}
+    Quit
+  ${EndIf}
+  ${GetParameters} $1
+  ClearErrors
+  ${GetOptions} $1 "/PATH" $2
+  ${IfNot} ${Errors}
+    !insertmacro SelectSection ${SectionPath}
+  ${EndIf}
+  ; An update keeps what was chosen before.
+  ReadRegDWORD $0 HKCU "Software\NEP Studio" "OnPath"
+  ${If} $0 = ${ON_PATH}
+    !insertmacro SelectSection ${SectionPath}
+  ${EndIf}
+  Call WaitUntilClosed
+FunctionEnd
+
+Function .onInstFailed
+  SetOutPath $TEMP
+  RMDir /r "$INSTDIR\new~"
+  RMDir "$INSTDIR"
+  !insertmacro Say "$(NotInstalled)"
+FunctionEnd
+
+; ---- removing ----------------------------------------------------------------------------------------
+
+Function un.onInit
+  Call un.WaitUntilClosed
+  StrCpy $KeepWork 1
+  MessageBox MB_YESNO|MB_ICONQUESTION "$(KeepYourWork)" /SD IDYES IDYES +2
+  StrCpy $KeepWork 0
+FunctionEnd
+
+!macro Remove name
+  ${If} ${FileExists} "$INSTDIR\${name}\*.*"
+    RMDir /r "$INSTDIR\${name}"
+  ${Else}
+    Delete "$INSTDIR\${name}"
+  ${EndIf}
+!macroend
+
+Section "Uninstall"
+  Call un.WaitUntilClosed
+  SetOutPath $TEMP
+  StrCpy $OldFolder "$INSTDIR\old~"
+  ReadRegDWORD $0 HKCU "Software\NEP Studio" "OnPath"
+  ${If} $0 = ${ON_PATH}
+    Call un.RemoveFromPath
+  ${EndIf}
+  Delete "$SMPROGRAMS\NEP Studio.lnk"
+  !insertmacro Dissociate
+  ; Only what the setup has put there: the folder may be one that holds other things.
+  !insertmacro ForEachEntry Remove
+  RMDir /r "$INSTDIR\new~"
+  RMDir /r "$OldFolder"
+  RMDir "$INSTDIR"
+  RMDir "$LOCALAPPDATA\Programs" ; when it is empty
+  DeleteRegKey HKCU "${UNINSTALL_KEY}"
+  DeleteRegKey HKCU "Software\NEP Studio"
+  ${If} $KeepWork = 0
+    RMDir /r "$LOCALAPPDATA\nep-studio"
+  ${EndIf}
+  System::Call 'shell32::SHChangeNotify(i 0x08000000, i 0, p 0, p 0)'
+SectionEnd
