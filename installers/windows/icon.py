@@ -1,42 +1,16 @@
-"""The icon of Studio's programs and files, as Windows wants it: the logo at every size that it shows.
-
-``python -m installers.windows.icon FILE.ico`` draws it, with Qt and no screen.
-"""
+"""The icons of Studio's programs and files, as Windows wants them: one file with all sizes."""
 
 from __future__ import annotations
 
-import os
 import struct
-import sys
-from collections.abc import Mapping
 from pathlib import Path
 
-from PySide6.QtCore import QBuffer, QIODevice, QRectF, Qt
-from PySide6.QtGui import QGuiApplication, QImage, QPainter
+__all__ = ["SIDES", "ico", "write_icon"]
 
-from app.ui.shell.bars.logo import paint_logo
-from app.ui.theme.theme import Theme
-
-__all__ = ["SIDES", "ico", "logo_png"]
-
-SIDES = (16, 20, 24, 32, 40, 48, 64, 128, 256)
+SIDES = (16, 24, 32, 48, 64, 128, 256)
 
 
-def logo_png(side: int, theme: Theme) -> bytes:
-    """The logo as a PNG picture of that many pixels on each side, clear around it."""
-    image = QImage(side, side, QImage.Format.Format_ARGB32_Premultiplied)
-    image.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(image)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    paint_logo(painter, QRectF(0, 0, side, side), theme)
-    painter.end()
-    buffer = QBuffer()
-    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-    image.save(buffer, "PNG")  # type: ignore[call-overload]  # the stubs want bytes, Qt a str
-    return bytes(buffer.data().data())
-
-
-def ico(pictures: Mapping[int, bytes]) -> bytes:
+def ico(pictures: dict[int, bytes]) -> bytes:
     """An .ico file of square PNG pictures, by their sides in pixels (at most 256)."""
     head = struct.pack("<HHH", 0, 1, len(pictures))
     at = len(head) + 16 * len(pictures)
@@ -47,15 +21,7 @@ def ico(pictures: Mapping[int, bytes]) -> bytes:
     return head + entries + b"".join(png for _side, png in sorted(pictures.items()))
 
 
-def main(target: Path) -> int:
-    """Write the icon; the exit code."""
-    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-    application = QGuiApplication([])
-    theme = Theme("light")
-    target.write_bytes(ico({side: logo_png(side, theme) for side in SIDES}))
-    application.quit()
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+def write_icon(painted: Path, name: str, target: Path) -> Path:
+    """Put the painted pictures of that name (`installers.icons_of`) into one file; the file."""
+    target.write_bytes(ico({side: (painted / f"{name}-{side}.png").read_bytes() for side in SIDES}))
+    return target

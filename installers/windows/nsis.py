@@ -22,6 +22,8 @@ REG_FOLDER = r"C:\Program Files\NEP Studio"
 CLASSES = "Software\\Classes\\"
 PROGRAMS = ("nep-studio.exe", "nep.exe")
 UNINSTALLER = "uninstall.exe"
+BEHAVIOUR_ICON = "nep-behaviour.ico"
+"""What Windows shows for a .nepb file; the .reg file names it, too."""
 ROOM_MB = 100
 """What must be free beside the new files: the settings, and a computer that goes on working."""
 
@@ -108,7 +110,7 @@ def _values(reg_file: str) -> Iterator[tuple[str, str, str]]:
             yield key, name, '"' + "$INSTDIR".join([folder, *others]) + '"'
 
 
-def make_setup(context: Context, icon: Path) -> Path:
+def make_setup(context: Context, icon: Path, picture: Path) -> Path:
     """Make the setup program of the frozen Studio, and say where it is. Raises `PackageError`."""
     folder = context.work / "setup"
     shutil.rmtree(folder, ignore_errors=True)
@@ -126,6 +128,7 @@ def make_setup(context: Context, icon: Path) -> Path:
         "OUTPUT": target,
         "LICENSE": context.root / "LICENSE",
         "ICON": icon,
+        "PICTURE": picture,
         "SIZE_KB": size_kb,
         "NEEDED_MB": size_kb // 1024 + ROOM_MB,
     }

@@ -1,4 +1,4 @@
-"""The packages for Windows: a setup program and a zip that runs where it is unpacked.
+"""The packages for Windows: `NEP-Studio-VERSION-setup.exe` and a zip that runs where it is unpacked.
 
 On Windows with its own Python; on Linux with a Windows Python under Wine.
 """
@@ -8,14 +8,16 @@ from __future__ import annotations
 import os
 import sys
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 
 from installers.context import APP, Context, PackageError
-from installers.freeze import freeze
-from installers.windows.nsis import make_setup
+from installers.freeze import add_licences, freeze
+from installers.icons_of import paint_icons
+from installers.windows.icon import write_icon
+from installers.windows.nsis import BEHAVIOUR_ICON, make_setup
 from installers.windows.version import version_resource
 
 __all__ = ["build", "make_zip", "refuse_files_of_wine"]
@@ -25,22 +27,27 @@ EARLIEST = 315_532_800
 """1980: no entry of a zip can be older."""
 
 
-def build(context: Context) -> list[Path]:
-    """Freeze Studio and make its packages for Windows; where they are. Raises `PackageError`."""
-    context.work.mkdir(parents=True, exist_ok=True)
-    icon = context.work / "nep-studio.ico"
-    context.run(sys.executable, "-m", "installers.windows.icon", icon)
-    version = context.work / "version.txt"
-    version.write_text(version_resource(context.version), "utf-8")
-    os.environ.update(NEP_PACKAGE_ICON=str(icon), NEP_PACKAGE_VERSION_FILE=str(version))
+def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
+    """The setup program, the zip, and the bill of materials. Raises `PackageError`."""
+    host = replace(context, python=(sys.executable,))
+    painted = paint_icons(host)
+    icon = write_icon(painted, "nep-studio", context.work / "nep-studio.ico")
+    picture = context.work / "page.bmp"
+    host.run(sys.executable, context.root / "installers" / "windows" / "page_picture.py", picture)
     if sys.platform != "win32":
         from installers.windows.wine import windows_python  # noqa: PLC0415  Windows needs none of it
 
         context = replace(context, python=windows_python(context))
-    frozen = freeze(context)
-    refuse_files_of_wine(frozen)
-    give_one_time(frozen, context.epoch)
-    return [make_setup(context, icon), make_zip(context)]
+    if not (keep_frozen and context.frozen.is_dir()):
+        version = context.work / "version.txt"
+        version.write_text(version_resource(context.version), "utf-8")
+        os.environ.update(NEP_PACKAGE_ICON=str(icon), NEP_PACKAGE_VERSION_FILE=str(version))
+        freeze(context)
+    write_icon(painted, "nep-behaviour", context.frozen / BEHAVIOUR_ICON)
+    bill = add_licences(context, context.frozen)
+    refuse_files_of_wine(context.frozen)
+    give_one_time(context.frozen, context.epoch)
+    return [make_setup(context, icon, picture), make_zip(context), bill]
 
 
 def refuse_files_of_wine(frozen: Path) -> None:

@@ -50,7 +50,8 @@ Var KeepWork
 !define MUI_UNICON "${ICON}"
 !define MUI_ABORTWARNING
 !define MUI_COMPONENTSPAGE_SMALLDESC
-!define MUI_FINISHPAGE_NOAUTOCLOSE
+!define MUI_WELCOMEFINISHPAGE_BITMAP "${PICTURE}"
+!define MUI_UNWELCOMEFINISHPAGE_BITMAP "${PICTURE}"
 !define MUI_FINISHPAGE_RUN "$INSTDIR\nep-studio.exe"
 !insertmacro MUI_PAGE_LICENSE "${LICENSE}"
 !insertmacro MUI_PAGE_COMPONENTS
@@ -73,7 +74,8 @@ Var KeepWork
     ${AndIf} $8 P<> -1
       FileWrite $8 "${text}$\r$\n"
     ${EndIf}
-    FileOpen $8 "$TEMP\NEP-Studio-setup.txt" w
+    FileOpen $8 "$TEMP\NEP-Studio-setup.txt" a
+    FileSeek $8 0 END
     FileWriteUTF16LE /BOM $8 "${text}$\r$\n"
     FileClose $8
   ${Else}
@@ -215,7 +217,13 @@ Function FinishEarlierUpdate
 FunctionEnd
 
 Function AskForRoom
-  CreateDirectory $INSTDIR
+  ClearErrors
+  CreateDirectory "$INSTDIR\new~"
+  ${If} ${Errors}
+    !insertmacro Say "$(NoFolder)"
+    SetErrorLevel ${EXIT_IMPOSSIBLE}
+    Abort
+  ${EndIf}
   System::Call 'kernel32::GetDiskFreeSpaceExW(w "$INSTDIR", *l .r1, p 0, p 0) i .r0'
   ${If} $0 <> 0
     System::Int64Op $1 / 1048576

@@ -18,6 +18,9 @@ LangString SetupRunsAlready ${LANG_SPANISH} "Este instalador ya está en marcha:
 LangString NoRoom ${LANG_ENGLISH} "There is not enough room on the disk: NEP Studio needs $2 MB, and $1 MB are free. Make room and try again."
 LangString NoRoom ${LANG_SPANISH} "No hay suficiente espacio en el disco: NEP Studio necesita $2 MB y hay $1 MB libres. Libera espacio e inténtalo otra vez."
 
+LangString NoFolder ${LANG_ENGLISH} "You may not write into this folder: $INSTDIR. Choose another one."
+LangString NoFolder ${LANG_SPANISH} "No puedes escribir en esta carpeta: $INSTDIR. Elige otra."
+
 LangString CannotReplace ${LANG_ENGLISH} "The files of the version that is there can't be replaced: another program uses them. That version stays as it was. Close it or restart the computer, then try again."
 LangString CannotReplace ${LANG_SPANISH} "No se pueden reemplazar los archivos de la versión instalada: otro programa los usa. Esa versión queda como estaba. Ciérralo o reinicia la computadora; después inténtalo otra vez."
 
