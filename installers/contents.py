@@ -13,6 +13,7 @@ from pathlib import PurePosixPath
 __all__ = ["EXCLUDED_MODULES", "is_wanted"]
 
 EXCLUDED_MODULES = (
+    "PySide6.QtQml", "PySide6.QtQuick",  # their libraries come with Chromium; their hooks bring all of QML
     "tkinter", "_tkinter", "turtle", "idlelib", "lib2to3", "pydoc_data", "ensurepip", "pip", "setuptools",
     "wheel", "pkg_resources", "IPython", "matplotlib", "PIL", "pytest", "_pytest", "hypothesis", "mypy",
     "babel", "numpy.f2py", "numpy.distutils",

@@ -119,6 +119,8 @@ def make_setup(context: Context, icon: Path, picture: Path) -> Path:
     (folder / "association.nsh").write_text(association(REG_FILE.read_text("utf-8")), "utf-8")
     target = context.dist / f"NEP-Studio-{context.version}-setup.exe"
     target.parent.mkdir(exist_ok=True)
+    for path in (icon, picture):  # the setup keeps their times, too
+        os.utime(path, (context.epoch, context.epoch))
     size_kb = sum(path.stat().st_size for path in _files(context.frozen)) // 1024
     given = {
         "VERSION": context.version,

@@ -1,0 +1,177 @@
+"""What is given to NSIS and PyInstaller for Windows, and the zip."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from installers.context import Context, PackageError
+from installers.windows.icon import SIDES, ico
+from installers.windows.nsis import REG_FILE, association, entries
+from installers.windows.packer import give_one_time, make_zip, refuse_files_of_wine
+from installers.windows.version import version_numbers, version_resource
+from installers.windows.wine import for_windows
+from tests.installers.small_setup import frozen_program, setup_of
+
+LATER = 1_800_000_000
+
+
+@pytest.fixture
+def context(tmp_path: Path) -> Context:
+    """With a frozen program of a few small files."""
+    return frozen_program(tmp_path)
+
+
+# ---- what Windows gets of the pinned packages -----------------------------------------------------
+
+
+def test_pinned_packages_are_chosen_as_windows_would() -> None:
+    lines = [
+        "# a comment",
+        "colorama==0.4.6 ; sys_platform == 'win32' \\",
+        "    --hash=sha256:aa \\",
+        "    --hash=sha256:bb",
+        "macholib==1.16.4 ; sys_platform == 'darwin' \\",
+        "    --hash=sha256:cc",
+        "numpy==2.2.6 ; python_full_version < '3.11' \\",
+        "    --hash=sha256:dd",
+        "iceoryx2==0.10.0 ; platform_machine == 'AMD64' and sys_platform == 'win32' \\",
+        "    --hash=sha256:ee",
+        "rich==15.0.0 \\",
+        "    --hash=sha256:ff",
+    ]
+    assert for_windows(lines) == [
+        "colorama==0.4.6 --hash=sha256:aa --hash=sha256:bb",
+        "iceoryx2==0.10.0 --hash=sha256:ee",
+        "rich==15.0.0 --hash=sha256:ff",
+    ]
+
+
+def test_every_package_for_windows_has_a_hash() -> None:
+    pinned = (Path(__file__).parents[2] / "requirements" / "package.txt").read_text("utf-8")
+    wanted = for_windows(pinned.splitlines())
+    assert {"pefile", "pywin32-ctypes", "pyinstaller", "pyside6"} <= {line.split("==")[0] for line in wanted}
+    assert all("==" in line and "--hash=sha256:" in line for line in wanted)
+
+
+# ---- the version and the icon ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("version", "numbers"), [("0.1.0", (0, 1, 0, 0)), ("1.2.3rc4", (1, 2, 3, 0)), ("2", (2, 0, 0, 0))]
+)
+def test_a_version_becomes_four_numbers(version: str, numbers: tuple[int, ...]) -> None:
+    assert version_numbers(version) == numbers
+
+
+@dataclass
+class Written:
+    """One thing of a version file, as PyInstaller would make it."""
+
+    args: tuple[object, ...]
+    named: dict[str, object]
+
+
+def test_the_version_file_is_an_expression_that_names_all() -> None:
+    def make(*args: object, **named: object) -> Written:
+        return Written(args, named)
+
+    names = ("VSVersionInfo", "FixedFileInfo", "StringFileInfo", "StringTable", "StringStruct", "VarFileInfo")
+    written = eval(version_resource("1.2.3"), dict.fromkeys((*names, "VarStruct"), make))
+    assert written.named["ffi"].named["filevers"] == (1, 2, 3, 0)
+    (table,) = written.named["kids"][0].args[0]
+    texts = dict(each.args for each in table.args[1])
+    assert (texts["ProductName"], texts["ProductVersion"]) == ("NEP Studio", "1.2.3")
+
+
+def test_an_icon_holds_each_picture_at_its_place() -> None:
+    pictures = {side: b"\x89PNG" + bytes([side % 256]) * side for side in SIDES}
+    made = ico(pictures)
+    assert struct.unpack_from("<HHH", made) == (0, 1, len(SIDES))
+    for number, side in enumerate(SIDES):
+        width, height, *_rest, size, at = struct.unpack_from("<BBBBHHII", made, 6 + 16 * number)
+        assert (width or 256, height or 256) == (side, side)
+        assert made[at : at + size] == pictures[side]
+
+
+# ---- what NSIS is told ----------------------------------------------------------------------------
+
+
+def test_every_file_is_unpacked_into_its_folder(context: Context) -> None:
+    told = entries(context.frozen)
+    unpacked = [line.strip() for line in told.partition("!macroend")[0].splitlines()[1:]]
+    frozen = context.frozen
+    assert unpacked == [
+        f'File "{frozen}/nep-studio.exe"',
+        f'File "{frozen}/nep.exe"',
+        'SetOutPath "$NewFolder\\_internal"',
+        f'File "{frozen}/_internal/a.dll"',
+        f'File "{frozen}/_internal/b.dll"',
+        'SetOutPath "$NewFolder\\_internal\\ñ x"',
+        f'File "{frozen}/_internal/ñ x/text.txt"',
+    ]
+    for name in ("_internal", "nep-studio.exe", "nep.exe", "uninstall.exe"):
+        assert f'!insertmacro ${{do}} "{name}"' in told
+
+
+def test_windows_is_told_who_opens_the_files_and_forgets_it_again() -> None:
+    put, take = association(REG_FILE.read_text("utf-8")).split("!macro Dissociate")
+    command = '"Software\\Classes\\NEPStudio.Behaviour\\shell\\open\\command" ""'
+    assert f'WriteRegStr HKCU {command} "$\\"$INSTDIR\\nep-studio.exe$\\" $\\"%1$\\""' in put
+    assert 'DeleteRegKey HKCU "Software\\Classes\\NEPStudio.Behaviour"\n' in take
+    # The suffix may be another program's, too: only our values go, and the key when nothing is left in it.
+    assert '${If} $0 == "NEPStudio.Behaviour"\n    DeleteRegValue HKCU "Software\\Classes\\.nepb" ""' in take
+    assert 'DeleteRegKey HKCU "Software\\Classes\\.nepb"' not in take
+    assert "Program Files" not in put + take
+
+
+def test_what_the_setup_says_is_there_in_both_languages() -> None:
+    words = (REG_FILE.parent / "setup" / "words.nsh").read_text("utf-8")
+    said = {
+        language: {line.split()[1] for line in words.splitlines() if f"${{LANG_{language}}}" in line}
+        for language in ("ENGLISH", "SPANISH")
+    }
+    used = (REG_FILE.parent / "setup" / "nep-studio.nsi").read_text("utf-8")
+    assert said["ENGLISH"] == said["SPANISH"]
+    assert all(f"$({name})" in used for name in said["ENGLISH"])
+
+
+@pytest.mark.skipif(shutil.which("makensis") is None, reason="needs nsis")
+def test_the_same_files_give_the_same_setup(context: Context) -> None:
+    give_one_time(context.frozen, context.epoch)
+    made = setup_of(context)
+    assert made.name == "NEP-Studio-1.2.3-setup.exe"
+    first = made.read_bytes()
+    assert first.startswith(b"MZ")
+    made.unlink()
+    assert setup_of(context).read_bytes() == first
+
+
+# ---- the zip, and what may not be in a package ----------------------------------------------------
+
+
+def test_the_zip_is_sorted_and_the_same_whenever_it_is_made(context: Context) -> None:
+    made = make_zip(context)
+    first = made.read_bytes()
+    with zipfile.ZipFile(made) as archive:
+        names = archive.namelist()
+        assert names == sorted(names)
+        assert "NEP Studio/_internal/ñ x/text.txt" in names
+        assert {each.date_time for each in archive.infolist()} == {(2025, 6, 15, 15, 6, 40)}
+    for path in context.frozen.rglob("*"):
+        os.utime(path, (LATER, LATER))
+    made.unlink()
+    assert make_zip(context).read_bytes() == first
+
+
+def test_a_library_of_wine_is_refused(context: Context) -> None:
+    refuse_files_of_wine(context.frozen)
+    (context.frozen / "_internal" / "version.dll").write_bytes(b"MZ" + bytes(62) + b"Wine builtin DLL\0")
+    with pytest.raises(PackageError, match=r"files of Wine: version\.dll"):
+        refuse_files_of_wine(context.frozen)

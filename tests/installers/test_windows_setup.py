@@ -1,0 +1,204 @@
+"""The setup program, run under Wine as one user would: installing, updating, bad days, removing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from tests.installers.small_setup import frozen_program, setup_of
+
+COMPILER = "x86_64-w64-mingw32-gcc"
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not sys.platform.startswith("linux")
+        or any(
+            shutil.which(each) is None for each in ("wine", "wineboot", "wineserver", "makensis", COMPILER)
+        ),
+        reason="needs wine, nsis and mingw",
+    ),
+]
+IMPOSSIBLE, OPEN = 2, 3
+UNINSTALL = r"HKCU\Software\Microsoft\Windows\CurrentVersion\Uninstall\NEP Studio"
+CLASSES = r"HKCU\Software\Classes"
+PROGRAM = """
+#include <stdio.h>
+int main(void) { puts("started"); fflush(stdout); getchar(); return 0; }
+"""
+LONG_PATH = ";".join(rf"C:\\Some folder\\{number}" for number in range(200))
+
+
+@dataclass(frozen=True)
+class Windows:
+    """A Windows of Wine's, with the setup of two versions."""
+
+    prefix: Path
+    setups: dict[str, Path] = field(default_factory=dict)
+
+    @property
+    def environ(self) -> dict[str, str]:
+        """For programs of Windows."""
+        return {
+            **{name: text for name, text in os.environ.items() if name != "DISPLAY"},
+            "WINEPREFIX": str(self.prefix),
+            "WINEDEBUG": "-all",
+            "WINEDLLOVERRIDES": "mscoree,mshtml,winemenubuilder.exe=",
+            "LC_ALL": "C.UTF-8",
+        }
+
+    @property
+    def local(self) -> Path:
+        """The user's folder of programs and of what they keep."""
+        (user,) = [each for each in (self.prefix / "drive_c/users").iterdir() if each.name != "Public"]
+        return user / "AppData" / "Local"
+
+    @property
+    def folder(self) -> Path:
+        """Where Studio is installed."""
+        return self.local / "Programs" / "NEP Studio"
+
+    def run(self, *command: str | Path) -> tuple[int, str]:
+        """The exit code of a program of Windows and what it says."""
+        done = subprocess.run(
+            ["wine", *map(str, command)],
+            env=self.environ, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, check=False,
+        )  # fmt: skip
+        return done.returncode, done.stdout.decode("utf-8", "replace")
+
+    def uninstall(self) -> None:
+        """Remove Studio silently; back when all of it has ended."""
+        self.run(self.folder / "uninstall.exe", "/S")
+        subprocess.run(["wineserver", "--wait"], env=self.environ, check=True)
+
+    def registry(self, key: str, name: str | None = None) -> str:
+        """A value of the registry, or nothing."""
+        which = ["/ve"] if name is None else ["/v", name]
+        _code, said = self.run("reg", "query", key, *which)
+        lines = [line.split("    ", 3) for line in said.splitlines() if "    REG_" in line]
+        return lines[0][3].strip() if lines and len(lines[0]) > 3 else ""
+
+    def path(self) -> str:
+        """The user's PATH."""
+        return self.registry(r"HKCU\Environment", "Path")
+
+
+@pytest.fixture(scope="module")
+def computer(tmp_path_factory: pytest.TempPathFactory) -> Windows:
+    """With two versions of the setup; made once, as it takes long."""
+    folder = tmp_path_factory.mktemp("windows")
+    (folder / "program.c").write_text(PROGRAM, "utf-8")
+    program = folder / "program.exe"
+    subprocess.run([COMPILER, "-s", "-o", program, folder / "program.c"], check=True)
+    made = Windows(folder / "prefix")
+    for version in ("1.2.3", "1.3.0"):
+        made.setups[version] = setup_of(frozen_program(folder / version, version, program.read_bytes()))
+    subprocess.run(["wineboot", "--init"], env=made.environ, check=True)
+    subprocess.run(["wineserver", "--wait"], env=made.environ, check=True)
+    return made
+
+
+@pytest.fixture
+def windows(computer: Windows) -> Iterator[Windows]:
+    """With version 1.2.3 installed, and removed afterwards."""
+    assert computer.run(computer.setups["1.2.3"], "/S") == (0, "")
+    yield computer
+    if (computer.folder / "uninstall.exe").exists():
+        computer.uninstall()
+    shutil.rmtree(computer.local / "Programs", ignore_errors=True)
+
+
+def test_installed_it_is_known_and_removed_it_is_forgotten_but_for_the_work(windows: Windows) -> None:
+    work = windows.local / "nep-studio" / "kept" / "mine.nepb"
+    work.parent.mkdir(parents=True)
+    work.write_text("{}", "utf-8")
+    assert sorted(path.name for path in windows.folder.iterdir()) == [
+        "_internal", "nep-studio.exe", "nep.exe", "uninstall.exe",
+    ]  # fmt: skip
+    assert (windows.folder / "_internal/ñ x/text.txt").is_file()
+    command = windows.registry(rf"{CLASSES}\NEPStudio.Behaviour\shell\open\command")
+    assert command.endswith(r'\AppData\Local\Programs\NEP Studio\nep-studio.exe" "%1"')
+    assert windows.registry(rf"{CLASSES}\.nepb") == "NEPStudio.Behaviour"
+    assert windows.registry(UNINSTALL, "DisplayVersion") == "1.2.3"
+    assert list(windows.prefix.rglob("NEP Studio.lnk"))
+    windows.uninstall()
+    assert work.read_text("utf-8") == "{}"
+    assert not windows.folder.exists()
+    assert not list(windows.prefix.rglob("NEP Studio.lnk"))
+    assert windows.registry(rf"{CLASSES}\.nepb") == ""
+    assert windows.registry(UNINSTALL, "DisplayVersion") == ""
+    assert "nep-studio" not in (windows.prefix / "user.reg").read_text("utf-8")
+
+
+def test_another_program_s_claim_on_the_suffix_stays(windows: Windows) -> None:
+    windows.run("reg", "add", rf"{CLASSES}\.nepb", "/ve", "/d", "Other.Program", "/f")
+    windows.uninstall()
+    assert windows.registry(rf"{CLASSES}\.nepb") == "Other.Program"
+    windows.run("reg", "delete", rf"{CLASSES}\.nepb", "/f")
+
+
+def test_an_update_takes_the_place_of_the_old_version_and_leaves_what_is_not_ours(windows: Windows) -> None:
+    (windows.folder / "mine.txt").write_text("mine", "utf-8")
+    assert windows.run(windows.setups["1.3.0"], "/S") == (0, "")
+    assert windows.registry(UNINSTALL, "DisplayVersion") == "1.3.0"
+    assert (windows.folder / "_internal/a.dll").read_text("utf-8") == "_internal/a.dll 1.3.0"
+    assert not (windows.folder / "old~").exists()
+    windows.uninstall()
+    assert [path.name for path in windows.folder.iterdir()] == ["mine.txt"]
+
+
+def test_while_studio_is_open_nothing_is_updated_or_removed(windows: Windows) -> None:
+    studio = subprocess.Popen(
+        ["wine", windows.folder / "nep-studio.exe"],
+        env=windows.environ, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
+    assert studio.stdout is not None
+    assert studio.stdout.readline().strip() == b"started"
+    code, said = windows.run(windows.setups["1.3.0"], "/S")
+    assert code == OPEN
+    assert "NEP Studio is open" in said
+    windows.run(windows.folder / "uninstall.exe", "/S")
+    studio.communicate(b"\n")
+    subprocess.run(["wineserver", "--wait"], env=windows.environ, check=True)
+    assert (windows.folder / "_internal/a.dll").read_text("utf-8") == "_internal/a.dll 1.2.3"
+    assert windows.registry(UNINSTALL, "DisplayVersion") == "1.2.3"
+
+
+def test_an_update_that_was_cut_off_is_put_right_first(windows: Windows) -> None:
+    (windows.folder / "old~").mkdir()
+    (windows.folder / "new~").mkdir()
+    for name in ("_internal", "nep.exe"):  # the computer was switched off while these were moved
+        (windows.folder / name).rename(windows.folder / "old~" / name)
+    assert windows.run(windows.setups["1.3.0"], "/S") == (0, "")
+    assert sorted(path.name for path in windows.folder.iterdir()) == [
+        "_internal", "nep-studio.exe", "nep.exe", "uninstall.exe",
+    ]  # fmt: skip
+    assert (windows.folder / "_internal/a.dll").read_text("utf-8") == "_internal/a.dll 1.3.0"
+
+
+def test_a_folder_that_may_not_be_written_is_said_and_the_old_version_stays(computer: Windows) -> None:
+    blocked = computer.prefix / "drive_c" / "blocked"
+    blocked.write_text("a file where the folder should be", "utf-8")
+    code, said = computer.run(computer.setups["1.2.3"], "/S", r"/D=C:\blocked")
+    assert code == IMPOSSIBLE
+    assert r"You may not write into this folder: C:\blocked" in said
+    assert computer.registry(UNINSTALL, "DisplayVersion") == ""
+
+
+def test_a_long_path_gets_the_command_whole_and_loses_it_again(computer: Windows) -> None:
+    computer.run(
+        "reg", "add", r"HKCU\Environment", "/v", "Path", "/t", "REG_EXPAND_SZ", "/d", LONG_PATH, "/f"
+    )
+    assert computer.run(computer.setups["1.2.3"], "/S", "/PATH") == (0, "")
+    assert computer.path().startswith(f"{LONG_PATH};C:\\users\\")
+    assert computer.path().endswith(r"\AppData\Local\Programs\NEP Studio")
+    assert computer.run(computer.setups["1.3.0"], "/S") == (0, "")
+    assert computer.path().count("NEP Studio") == 1  # an update keeps what was chosen, once
+    computer.uninstall()
+    assert computer.path() == LONG_PATH
