@@ -16,7 +16,8 @@ from typing import TypeVar
 LEVELS = 9_000
 SHALLOW = 8_000
 """So many brackets can't be nested too deep."""
-STACK_BYTES = 256 * 1024 * 1024
+STACK_BYTES = 255 * 1024 * 1024
+"""Python for Windows refuses 256 MiB: less, it says, are valid."""
 
 T = TypeVar("T")
 _one_at_a_time = threading.Lock()
