@@ -51,7 +51,8 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path: Path) -> Non
     path = tmp_path / "a"
     path.mkdir()
     (path / "inside").write_text("kept")
-    with pytest.raises(OSError, match="irectory"):
+    said = "irectory" if os.name == "posix" else "has the file open"  # Windows only says that it may not
+    with pytest.raises(OSError, match=said):
         write_atomically(path, b"data")
     assert (path / "inside").read_text() == "kept"
     assert [file.name for file in tmp_path.iterdir()] == ["a"]
@@ -100,9 +101,10 @@ def test_what_killed_writers_left_is_swept_away_but_no_write_that_goes_on(tmp_pa
 def test_a_regular_file_is_read_whole(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(b"x" * 1000)
-    (tmp_path / "link").symlink_to(path)
     assert read_whole(path, 1000) == b"x" * 1000
-    assert read_whole(tmp_path / "link", 1000) == b"x" * 1000
+    if os.name == "posix":  # Windows lets not everybody make links
+        (tmp_path / "link").symlink_to(path)
+        assert read_whole(tmp_path / "link", 1000) == b"x" * 1000
     with pytest.raises(OSError, match=r"at most 0 MB are read"):
         read_whole(path, 999)
     with pytest.raises(FileNotFoundError):
@@ -133,6 +135,7 @@ def test_what_is_no_file_is_a_sentence_for_every_reader(tmp_path: Path, kind: st
     assert Settings(tmp_path).get("a", 1) == 2
 
 
+@pytest.mark.skipif(os.name != "posix", reason="needs pipes that look like files")
 def test_a_pipe_in_place_of_a_file_holds_nobody_up(tmp_path: Path) -> None:
     for name in ("settings.json", "Round.nepb"):
         os.mkfifo(tmp_path / name)

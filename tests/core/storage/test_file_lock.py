@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -58,7 +57,7 @@ def test_who_can_not_have_it_goes_on_after_a_bounded_wait(
 
 
 def test_it_is_free_when_its_process_is_killed(tmp_path: Path, holder: subprocess.Popen[str]) -> None:
-    holder.send_signal(signal.SIGKILL)
+    holder.kill()
     with locked(tmp_path / "file", within_s=10.0) as held:
         assert held
 
