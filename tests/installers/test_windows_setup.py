@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -71,6 +72,17 @@ class Windows:
             env=self.environ, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, check=False,
         )  # fmt: skip
         return done.returncode, done.stdout.decode("utf-8", "replace")
+
+    @contextlib.contextmanager
+    def running(self, *command: Path) -> Iterator[None]:
+        """A program that says when it has started, and ends with the block."""
+        words = ["wine", *map(str, command)]
+        started = subprocess.Popen(words, env=self.environ, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert started.stdout is not None
+        assert started.stdout.readline().strip() == b"started"
+        yield
+        started.communicate(b"\n")
+        subprocess.run(["wineserver", "--wait"], env=self.environ, check=True)
 
     def uninstall(self) -> None:
         """Remove Studio silently; back when all of it has ended."""
@@ -154,19 +166,29 @@ def test_an_update_takes_the_place_of_the_old_version_and_leaves_what_is_not_our
 
 
 def test_while_studio_is_open_nothing_is_updated_or_removed(windows: Windows) -> None:
-    studio = subprocess.Popen(
-        ["wine", windows.folder / "nep-studio.exe"],
-        env=windows.environ, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    )  # fmt: skip
-    assert studio.stdout is not None
-    assert studio.stdout.readline().strip() == b"started"
-    code, said = windows.run(windows.setups["1.3.0"], "/S")
-    assert code == OPEN
-    assert "NEP Studio is open" in said
-    windows.run(windows.folder / "uninstall.exe", "/S")
-    studio.communicate(b"\n")
-    subprocess.run(["wineserver", "--wait"], env=windows.environ, check=True)
+    with windows.running(windows.folder / "nep-studio.exe"):
+        code, said = windows.run(windows.setups["1.3.0"], "/S")
+        assert code == OPEN
+        assert "NEP Studio is open" in said
+        windows.run(windows.folder / "uninstall.exe", "/S")
     assert (windows.folder / "_internal/a.dll").read_text("utf-8") == "_internal/a.dll 1.2.3"
+    assert windows.registry(UNINSTALL, "DisplayVersion") == "1.2.3"
+
+
+def test_a_file_that_can_not_be_moved_leaves_the_old_version_whole(windows: Windows) -> None:
+    before = {path.name: path.read_bytes() for path in windows.folder.glob("*.*")}
+    last = windows.folder / "uninstall.exe"  # the others have been moved out of the way when its turn comes
+    if subprocess.run(["chattr", "+i", last], check=False).returncode != 0:
+        pytest.skip("only root can hold a file at its place, and not on every disk")
+    try:
+        code, said = windows.run(windows.setups["1.3.0"], "/S")
+    finally:
+        subprocess.run(["chattr", "-i", last], check=True)
+    assert code == IMPOSSIBLE
+    assert "can't be replaced: another program uses them" in said
+    assert {path.name: path.read_bytes() for path in windows.folder.glob("*.*")} == before
+    assert (windows.folder / "_internal/a.dll").read_text("utf-8") == "_internal/a.dll 1.2.3"
+    assert not (windows.folder / "new~").exists()
     assert windows.registry(UNINSTALL, "DisplayVersion") == "1.2.3"
 
 

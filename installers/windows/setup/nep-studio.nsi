@@ -41,6 +41,7 @@ VIAddVersionKey /LANG=0 "LegalCopyright" "${COPYRIGHT}"
 Var NewFolder
 Var OldFolder
 Var KeepWork
+Var IsMoved
 
 !include "entries.nsh"
 !include "association.nsh"
@@ -129,15 +130,15 @@ FunctionEnd
 ; ---- installing --------------------------------------------------------------------------------------
 
 !macro MoveOut name
-  ${IfNot} ${Errors}
+  ${If} $IsMoved = 1
   ${AndIf} ${FileExists} "$INSTDIR\${name}"
-    Rename "$INSTDIR\${name}" "$OldFolder\${name}"
+    !insertmacro Move "$INSTDIR\${name}" "$OldFolder\${name}"
   ${EndIf}
 !macroend
 
 !macro MoveIn name
-  ${IfNot} ${Errors}
-    Rename "$NewFolder\${name}" "$INSTDIR\${name}"
+  ${If} $IsMoved = 1
+    !insertmacro Move "$NewFolder\${name}" "$INSTDIR\${name}"
   ${EndIf}
 !macroend
 
@@ -145,11 +146,33 @@ FunctionEnd
 !macro MoveBack name
   ${If} ${FileExists} "$OldFolder\${name}"
     ${If} ${FileExists} "$INSTDIR\${name}"
-      Rename "$INSTDIR\${name}" "$NewFolder\${name}"
+      !insertmacro Move "$INSTDIR\${name}" "$NewFolder\${name}"
     ${EndIf}
-    Rename "$OldFolder\${name}" "$INSTDIR\${name}"
+    !insertmacro Move "$OldFolder\${name}" "$INSTDIR\${name}"
   ${EndIf}
 !macroend
+
+!macro Move from to
+  StrCpy $R0 "${from}"
+  StrCpy $R1 "${to}"
+  Call Move
+!macroend
+
+; Renames $R0 to $R1; $IsMoved is 0 when it can't. A virus scanner holds new files for a moment: ten seconds are
+; given to it. (NSIS' own mark of errors would not do: who asks for it clears it.)
+Function Move
+  StrCpy $R2 0
+  ${Do}
+    ClearErrors
+    Rename $R0 $R1
+    ${IfNot} ${Errors}
+      Return
+    ${EndIf}
+    Sleep 500
+    IntOp $R2 $R2 + 1
+  ${LoopUntil} $R2 = 20
+  StrCpy $IsMoved 0
+FunctionEnd
 
 ; A new version is unpacked beside the old one and takes its place by renaming, which needs no room: with a full
 ; disk, or when something can't be moved, the old version stays whole.
@@ -167,12 +190,10 @@ Section "!NEP Studio" SectionStudio
   SetOutPath $TEMP
 
   CreateDirectory $OldFolder
-  ClearErrors
+  StrCpy $IsMoved 1
   !insertmacro ForEachEntry MoveOut
-  ${IfNot} ${Errors}
-    !insertmacro ForEachEntry MoveIn
-  ${EndIf}
-  ${If} ${Errors}
+  !insertmacro ForEachEntry MoveIn
+  ${If} $IsMoved = 0
     !insertmacro ForEachEntry MoveBack
     RMDir $OldFolder
     !insertmacro Say "$(CannotReplace)"
@@ -211,8 +232,14 @@ SectionEnd
 Function FinishEarlierUpdate
   RMDir /r $NewFolder
   CreateDirectory $NewFolder
+  StrCpy $IsMoved 1
   !insertmacro ForEachEntry MoveBack
   RMDir /r $NewFolder
+  ${If} $IsMoved = 0
+    !insertmacro Say "$(CannotReplace)"
+    SetErrorLevel ${EXIT_IMPOSSIBLE}
+    Abort
+  ${EndIf}
   RMDir /r $OldFolder
 FunctionEnd
 
