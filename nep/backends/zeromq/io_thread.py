@@ -296,7 +296,8 @@ class SharedContext:
     def __init__(self) -> None:
         check_room(_CONTEXT_FILES, "a node")
         self._context: zmq.Context[Socket] = zmq.Context()
-        self._context.set(zmq.MAX_SOCKETS, _MAX_SOCKETS)
+        # libzmq refuses more than it was made for, which on Windows is 16383.
+        self._context.set(zmq.MAX_SOCKETS, min(_MAX_SOCKETS, self._context.get(zmq.SOCKET_LIMIT)))
         self.io = IoThread("nep-io")
         self._lock = threading.Lock()
         self._idle_wakers: list[Waker] = []
