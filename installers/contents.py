@@ -50,12 +50,11 @@ _OF_THE_SYSTEM = re.compile(
     r"""
     ^lib(?:stdc\+\+|gcc_s|
     X11|X11-xcb|Xau|Xdmcp|Xext|Xfixes|Xrender|drm|gbm|epoxy|fontconfig|freetype|harfbuzz|fribidi|thai|datrie|
-    graphite2|pixman-1|expat|png16|jpeg|brotli\w+|
+    graphite2|pixman-1|expat|png16|jpeg|
     glib-2|gio-2|gobject-2|gmodule-2|gthread-2|gdk_pixbuf-2|gtk-3|gdk-3|atk-\S+|atspi|cairo|cairo-gobject|pango\S*|
-    pcre2-8|mount|blkid|selinux|uuid|dbus-1|systemd|udev|cap|bsd|md|lz4|
+    pcre2-8|mount|blkid|selinux|uuid|dbus-1|systemd|udev|cap|bsd|md|
     asound|pulse|pulsecommon-\S+|asyncns|sndfile|FLAC|ogg|opus|vorbis\w*|mp3lame|mpg123|
-    cups|avahi-\w+|gnutls|p11-kit|gcrypt|gpg-error|unistring|idn2|tasn1|nettle|hogweed|gmp|
-    gssapi_krb5|krb5|krb5support|k5crypto|com_err|keyutils|speechd|sqlite3)[.-][\d.-]*so\b
+    cups|avahi-\w+|gnutls|p11-kit|gcrypt|gpg-error|unistring|idn2|tasn1|nettle|hogweed|gmp|speechd)[.-][\d.-]*so\b
     """,
     re.VERBOSE,
 )

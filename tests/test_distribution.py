@@ -92,6 +92,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
     return build(tmp_path_factory.mktemp("built"))
 
 
+@pytest.mark.long
 def test_a_build_elsewhere_and_straight_from_the_sources_makes_the_same_bytes(
     built: Built, tmp_path: Path
 ) -> None:

@@ -9,32 +9,23 @@ from __future__ import annotations
 
 import gzip
 import os
-import re
 import shutil
 import subprocess
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from installers.context import APP, ROOT, Context, PackageError
 from installers.freeze import add_licences, freeze
 from installers.icons_of import ICON_SIZES, paint_icons
 from installers.linux.film_libraries import leave_out_films
-from tools.system_packages import QT_LIBRARIES
+from installers.linux.system_libraries import libc_needed, system_packages
 
 HERE = Path(__file__).resolve().parent
 NAME = "nep-studio"
 PREFIX = Path("opt") / NAME
 ARCHITECTURES = {"x86_64": "amd64", "arm64": "arm64"}
-NEEDED = (
-    *QT_LIBRARIES, "libfreetype6", "libstdc++6", "libgcc-s1", "libdrm2", "libgbm1", "libx11-6", "libxext6",
-    "libxfixes3",
-)  # fmt: skip
-"""What of Debian's the programs are linked with; one name or the other, as releases call them."""
-RECOMMENDED = (
-    "libcups2t64|libcups2", "libpulse0", "libspeechd2", "fonts-noto-color-emoji", "xdg-desktop-portal",
-)  # fmt: skip
-"""Without these it works, but for printing, sounds, voices, pictures in text, the desktop's file dialogs."""
-LIBC = re.compile(rb"GLIBC_(\d+)\.(\d+)\b")
+RECOMMENDED = ("fonts-noto-color-emoji", "xdg-desktop-portal")
+"""Without these it works, but for pictures in text and the desktop's file dialogs."""
 DESCRIPTION = """see what robots say, and tell them what to do
  Watch the messages of robots and programs live, compose behaviours out of blocks,
  rehearse them on a virtual robot and run them on a real one.
@@ -145,37 +136,21 @@ def control_file(context: Context, root: Path, control: Path) -> str:
     """The package's description for dpkg."""
     files = [path for path in root.rglob("*") if path.is_file() and control not in path.parents]
     size = sum(path.lstat().st_size for path in files)
-    needed = [f"libc6 (>= {libc_needed(root)})", *(_alternatives(each) for each in NEEDED)]
+    packages, optional = system_packages(root / PREFIX)
+    needed = [f"libc6 (>= {libc_needed(root)})", *map(_alternatives, packages)]
+    recommended = [*map(_alternatives, optional), *RECOMMENDED]
     return (
         f"Package: {NAME}\nVersion: {context.version}\nArchitecture: {_architecture(context)}\n"
         "Maintainer: The NEP Studio authors <nep-studio@localhost>\nSection: science\nPriority: optional\n"
         f"Installed-Size: {size // 1024}\n"
         f"Depends: {', '.join(needed)}\n"
-        f"Recommends: {', '.join(map(_alternatives, RECOMMENDED))}\n"
+        f"Recommends: {', '.join(recommended)}\n"
         f"Description: {DESCRIPTION}"
     )
 
 
 def _alternatives(entry: str) -> str:
     return " | ".join(entry.split("|"))
-
-
-def libc_needed(folder: Path) -> str:
-    """The newest version of the C library that a program or library in a folder asks for."""
-    versions = {
-        (int(major), int(minor))
-        for path in _libraries(folder)
-        for major, minor in LIBC.findall(path.read_bytes())
-    }
-    return "{}.{}".format(*max(versions)) if versions else "2.28"
-
-
-def _libraries(folder: Path) -> Iterator[Path]:
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and not path.is_symlink():
-            with path.open("rb") as file:
-                if file.read(4) == b"\x7fELF":
-                    yield path
 
 
 def _write_documents(context: Context, folder: Path) -> None:

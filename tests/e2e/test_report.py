@@ -78,6 +78,7 @@ def test_a_native_crash_is_offered_once_and_its_report_is_written(
     assert third.quit() == 0
 
 
+@pytest.mark.long
 def test_an_end_by_the_system_is_told_once_and_one_that_was_asked_for_is_not(
     start: Callable[..., Studio],
 ) -> None:
@@ -97,6 +98,7 @@ def test_an_end_by_the_system_is_told_once_and_one_that_was_asked_for_is_not(
     assert third.quit() == 0
 
 
+@pytest.mark.long
 def test_a_robot_and_an_editor_that_crash_are_reported_and_the_next_start_offers_that(
     start: Callable[..., Studio],
 ) -> None:

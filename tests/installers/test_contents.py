@@ -37,6 +37,9 @@ WANTED = [
     "libnss3.so",
     "libxcb-cursor.so.0",
     "libcrypto.so.3",
+    "libgssapi_krb5.so.2",
+    "libbrotlidec.so.1",
+    "libsqlite3.so.0",
 ]
 
 UNWANTED = [

@@ -81,7 +81,7 @@ def test_first_it_is_frozen_then_signed_and_only_then_put_into_the_image(
     packages = packer.pack(made, identity, image, keep_frozen=False)
     assert [path.name for path in packages] == [
         "NEP-Studio-0.1.0-macos-arm64.dmg",
-        "NEP-Studio-0.1.0-macos.cdx.json",
+        "NEP-Studio-0.1.0-macos-arm64.cdx.json",
     ]
     steps = [
         " ".join([call[0], *(word for word in call[1:3] if not word.startswith("/"))]) for call in calls(log)
