@@ -83,7 +83,7 @@ def libc_needed(folder: Path) -> str:
 
 
 def _read(path: Path) -> str:
-    ask = ["readelf", "--dynamic", "--wide", path]
+    ask = ["readelf", "--dynamic", "--wide", str(path)]
     return subprocess.run(ask, capture_output=True, text=True, check=True).stdout
 
 
