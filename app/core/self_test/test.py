@@ -146,7 +146,7 @@ def command(process: psutil.Process) -> list[str]:
     """Its command line; nothing for one that has ended."""
     try:
         return process.cmdline()
-    except psutil.Error:
+    except (psutil.Error, OSError):  # see `is_web`
         return []
 
 
@@ -160,7 +160,7 @@ def is_web(process: psutil.Process) -> bool:
     """Whether it belongs to the web view, whose processes end with the one that they belong to."""
     try:
         return process.name().lower().startswith(WEB_PROCESS[:15])
-    except psutil.Error:
+    except (psutil.Error, OSError):  # Windows' own word, where psutil has none for it
         return False
 
 
