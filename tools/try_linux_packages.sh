@@ -41,6 +41,8 @@ root "id $user >/dev/null 2>&1 || useradd --create-home --home-dir '$home' $user
 root "find / -xdev \( -path /proc -o -path /tmp -o -path /var -o -path /packages \) -prune -o -print | sort >/before"
 
 if [ $kind = deb ]; then
+    # An earlier try may have ended before its end.
+    root "apt-get purge -y -qq nep-studio >/dev/null 2>&1 || true; apt-get autoremove -y -qq --purge >/dev/null"
     root "DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends /packages/nep-studio_*.deb >/dev/null
           dpkg-query -W -f '\${Package} \${Version} \${Installed-Size} kB\n' nep-studio"
     program=nep-studio command=/opt/nep-studio/nep
@@ -63,4 +65,5 @@ else
     ana "./NEP-Studio-*/install.sh --remove && rm -rf ./NEP-Studio-* out"
 fi
 root "find / -xdev \( -path /proc -o -path /tmp -o -path /var -o -path /packages \) -prune -o -print | sort >/after
-      comm -13 /before /after | grep -iE 'nep|Ana' | grep -v '^/before\|^/after' || echo 'nothing is left of it'"
+      echo 'left of the system: '; comm -13 /before /after | grep -v '^/before\|^/after\|^/home/' | grep -i nep || echo '  nothing'
+      echo 'left in the home:'; comm -13 /before /after | grep '^/home/' | cut -d/ -f1-5 | sort -u"

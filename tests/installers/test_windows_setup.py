@@ -18,6 +18,7 @@ from tests.installers.small_setup import frozen_program, setup_of
 COMPILER = "x86_64-w64-mingw32-gcc"
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.long,
     pytest.mark.skipif(
         not sys.platform.startswith("linux")
         or any(
