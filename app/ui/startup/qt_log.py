@@ -27,7 +27,7 @@ KEPT = 200
 
 NOISE = re.compile(
     r"Failed to load vulkan:|initInstance: No Vulkan library available$"
-    r"|Failed to create platform Vulkan instance$|QVulkanInstance: Failed to initialize Vulkan$"
+    r"|Failed to create (platform )?Vulkan instance(: -\d+)?$|QVulkanInstance: Failed to initialize Vulkan$"
     r"|Unable to detect GPU vendor|GBM is not supported with the current configuration"
     r"|GPUInfo not initialized on GpuInfoUpdate|Sandboxing disabled by user"
     r"|Couldn't (load|resolve) (pipewire|va)\b.* (library|symbols)$"

@@ -22,6 +22,7 @@ from app.ui.startup.qt_log import FLAGS, Log, TerminalHandler, on_qt_message, qu
     ("words", "heard"),
     [
         ("Failed to load vulkan: Cannot load library vulkan: no such file", False),
+        ("Failed to create Vulkan instance: -9", False),
         ("initInstance: No Vulkan library available", False),
         ("Unable to detect GPU vendor for device: Mesa/X.org llvmpipe", False),
         ("Sandboxing disabled by user.", False),
