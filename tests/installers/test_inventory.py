@@ -6,8 +6,6 @@ import json
 from importlib import metadata
 from pathlib import Path
 
-import pytest
-
 from installers import inventory
 from installers.inventory import bill, editor_parts, main, others, parts_of, write_licences
 from nep.version import __version__
@@ -75,7 +73,7 @@ def test_the_same_parts_give_the_same_bill(tmp_path: Path) -> None:
         assert (tmp_path / "a" / "licences" / name).stat().st_size > 500, name
 
 
-def test_a_licence_in_words_is_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_licence_in_words_is_a_name() -> None:
     odd = inventory.Part("odd", "1", "My own words, and more")
     told = json.loads(bill([odd], "linux", 0, "1.0"))
     (component,) = told["components"]
