@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from installers.context import Context, PackageError
+from installers.shared_libraries import remove_dead_links, remove_unneeded, size_of
 
 __all__ = ["FILMS", "leave_out_films"]
 
@@ -30,25 +31,19 @@ def leave_out_films(context: Context) -> int:
     missing = [tool for tool in ("gcc", "readelf") if shutil.which(tool) is None]
     if missing:
         raise PackageError(f"'{missing[0]}' is missing; try: apt-get install gcc binutils")
-    before = _size(folder)
+    before = size_of(folder)
     users = [inside / "cv2" / "cv2.abi3.so"]
     films = [path for path in sorted(folder.iterdir()) if FILMS.match(path.name)]
     imported = _imported_by(users)
-    needed = set(_needed_by(users))
+    needed = {name for user in users for name in _needed_by(user)}
     for path in films:
         if path.name not in needed:
             path.unlink()
             continue
         _make_empty(context, path, imported)
-    _remove_unneeded(folder, users)
-    for link in inside.iterdir():  # PyInstaller puts a link beside the program for each library
-        if link.is_symlink() and not link.exists():
-            link.unlink()
-    return before - _size(folder)
-
-
-def _size(folder: Path) -> int:
-    return sum(path.stat().st_size for path in folder.iterdir())
+    remove_unneeded(folder, users, _needed_by)
+    remove_dead_links(inside.iterdir())
+    return before - size_of(folder)
 
 
 def _read(option: str, path: Path) -> str:
@@ -57,9 +52,8 @@ def _read(option: str, path: Path) -> str:
     ).stdout
 
 
-def _needed_by(paths: Iterable[Path]) -> Iterable[str]:
-    for path in paths:
-        yield from _NEEDED.findall(_read("--dynamic", path))
+def _needed_by(path: Path) -> list[str]:
+    return _NEEDED.findall(_read("--dynamic", path))
 
 
 def _imported_by(paths: Iterable[Path]) -> Mapping[str, set[str]]:
@@ -91,16 +85,3 @@ def _make_empty(context: Context, path: Path, imported: Mapping[str, set[str]]) 
         "gcc", "-shared", "-fPIC", "-O1", "-w", "-fno-builtin", "-nostdlib", "-s", "-Wl,--build-id=none",
         f"-Wl,-soname,{path.name}", f"-Wl,--version-script={script}", "-o", path, source,
     )  # fmt: skip
-
-
-def _remove_unneeded(folder: Path, users: list[Path]) -> None:
-    """Remove what nobody is linked with any more."""
-    waiting, kept = list(users), set[str]()
-    while waiting:
-        for name in _needed_by([waiting.pop()]):
-            if name not in kept and (folder / name).is_file():
-                kept.add(name)
-                waiting.append(folder / name)
-    for path in folder.iterdir():
-        if path.name not in kept:
-            path.unlink()

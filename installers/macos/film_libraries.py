@@ -16,6 +16,7 @@ from installers.context import Context, PackageError, this_system
 from installers.macos.information import OLDEST_MACOS
 from installers.macos.layout import compiled
 from installers.macos.mach_o import read
+from installers.shared_libraries import remove_dead_links, remove_unneeded, size_of
 
 __all__ = ["FILMS", "leave_out_films"]
 
@@ -36,7 +37,7 @@ def leave_out_films(context: Context, app: Path) -> int:
     user = folder.parent / "cv2.abi3.so"
     if {path.parent for path in films} != {folder} or not user.is_file():
         raise PackageError(f"FFmpeg is not where OpenCV brings it, but in '{folder}'")
-    before = _size(folder)
+    before = size_of(folder)
     imported = _imported_by(user)
     needed = _needed_by(user)
     for path in films:
@@ -44,15 +45,9 @@ def leave_out_films(context: Context, app: Path) -> int:
             _make_empty(context, path, imported.get(path.name.split(".")[0], set()))
         else:
             path.unlink()
-    _remove_unneeded(folder, user)
-    for link in sorted(app.rglob("*")):  # PyInstaller puts links to libraries into other folders
-        if link.is_symlink() and not link.exists():
-            link.unlink()
-    return before - _size(folder)
-
-
-def _size(folder: Path) -> int:
-    return sum(path.stat().st_size for path in folder.iterdir())
+    remove_unneeded(folder, [user], _needed_by)
+    remove_dead_links(sorted(app.rglob("*")))
+    return before - size_of(folder)
 
 
 def _needed_by(path: Path) -> set[str]:
@@ -85,16 +80,3 @@ def _make_empty(context: Context, path: Path, names: set[str]) -> None:
         "-fno-builtin", *elsewhere, "-install_name", f"@rpath/{path.name}", "-compatibility_version", "999",
         "-current_version", "999", "-o", path, source,
     )  # fmt: skip
-
-
-def _remove_unneeded(folder: Path, user: Path) -> None:
-    """Remove what nobody is linked with any more."""
-    waiting, kept = [user], set[str]()
-    while waiting:
-        for name in _needed_by(waiting.pop()):
-            if name not in kept and (folder / name).is_file():
-                kept.add(name)
-                waiting.append(folder / name)
-    for path in folder.iterdir():
-        if path.name not in kept:
-            path.unlink()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Generator, Iterator
 from functools import partialmethod
 
@@ -54,6 +55,13 @@ def _sessions_end() -> Iterator[None]:
     """Ends the sessions in memory that the test has made."""
     yield
     close_sessions()
+
+
+@pytest.fixture(autouse=True)
+def _silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test opens the sound system: Qt keeps its connections to it for as long as the process lives."""
+    for module in ("PySide6.QtTextToSpeech", "PySide6.QtMultimedia"):
+        monkeypatch.setitem(sys.modules, module, None)  # what an import fails at
 
 
 @pytest.fixture(autouse=True)

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).parents[3]
+from tests.small_disk import SmallDisk
+
 FULL = """
 import json, sys
 from pathlib import Path
@@ -91,37 +85,7 @@ print(json.dumps(told))
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
     """What happened on a disk of 256 kB."""
-    tmp_path = tmp_path_factory.mktemp("disk")
-    unshare = shutil.which("unshare")
-    if unshare is None:
-        pytest.skip("a disk of one's own needs Linux with unshare")
-    mount = f"mount -t tmpfs -o size=256k,mode=777 none '{tmp_path}'"
-    if subprocess.run([unshare, "-rm", "sh", "-c", mount], check=False, capture_output=True).returncode:
-        pytest.skip("this computer does not permit disks of one's own (unshare -rm)")
-    done = subprocess.run(
-        [
-            unshare,
-            "-rm",
-            "sh",
-            "-c",
-            f'{mount} && exec "$@"',
-            "sh",
-            sys.executable,
-            "-c",
-            FULL,
-            str(tmp_path),
-        ],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        encoding="utf-8",
-        timeout=50,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert isinstance(found, dict)
-    return found
+    return SmallDisk(tmp_path_factory.mktemp("disk")).run(FULL)
 
 
 def test_nothing_is_lost_on_a_full_disk_and_all_of_it_is_said(told: dict[str, object]) -> None:

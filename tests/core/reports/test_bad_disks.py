@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).parents[3]
+from tests.small_disk import SmallDisk
+
 FULL = """
 import json, sys
 from pathlib import Path
@@ -57,39 +51,12 @@ print(json.dumps(told))
 
 
 @pytest.fixture(scope="module")
-def disk(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
-    """``unshare``, and the command that puts a disk of 256 kB into a folder."""
-    unshare = shutil.which("unshare")
-    if unshare is None:
-        pytest.skip("a disk of one's own needs Linux with unshare")
-    folder = tmp_path_factory.mktemp("disk")
-    mount = f"mount -t tmpfs -o size=256k,mode=777 none '{folder}'"
-    if subprocess.run([unshare, "-rm", "sh", "-c", mount], check=False, capture_output=True).returncode:
-        pytest.skip("this computer does not permit disks of one's own (unshare -rm)")
-    return unshare, str(folder)
+def disk(tmp_path_factory: pytest.TempPathFactory) -> SmallDisk:
+    return SmallDisk(tmp_path_factory.mktemp("disk"))
 
 
-def on_disk(disk: tuple[str, str], code: str, more: str = "") -> dict[str, object]:
-    unshare, folder = disk
-    mount = f"mount -t tmpfs -o size=256k,mode=777 none '{folder}'"
-    words = [unshare, "-rm", "sh", "-c", f'{mount} {more} && exec "$@"', "sh", sys.executable, "-c", code]
-    done = subprocess.run(
-        [*words, folder],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        encoding="utf-8",
-        timeout=100,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert isinstance(found, dict)
-    return found
-
-
-def test_on_a_full_disk_a_report_is_whole_or_not_there(disk: tuple[str, str]) -> None:
-    told = on_disk(disk, FULL)
+def test_on_a_full_disk_a_report_is_whole_or_not_there(disk: SmallDisk) -> None:
+    told = disk.run(FULL)
     advice = "make room there or choose another place"
     assert told["report"] == f"other.zip can't be written ({told['full']}); {advice}"
     assert told["over"] == f"report.zip can't be written ({told['full']}); {advice}"
@@ -123,16 +90,14 @@ print(json.dumps({"noted": noted, "left": len(left), "lines": len(lines), "new":
                   "all": len(reports.all())}))
 """
 BEFORE = (
-    "&& mkdir -p '{0}/log/crashes' '{0}/runs'"
+    "mkdir -p '{0}/log/crashes' '{0}/runs'"
     " && echo x > '{0}/log/crashes/crash 2026-01-01 10.00.00 studio.new.txt'"
     " && echo '{{\"pid\": 4000000, \"began_s\": 4e9}}' > '{0}/runs/a.json'"
     " && mount -o remount,ro '{0}'"
 )
 
 
-def test_a_disk_that_can_not_be_written_is_told_in_one_line_and_no_crash_each_time(
-    disk: tuple[str, str],
-) -> None:
-    told = on_disk(disk, READ_ONLY, BEFORE.format(disk[1]))
+def test_a_disk_that_can_not_be_written_is_told_in_one_line_and_no_crash_each_time(disk: SmallDisk) -> None:
+    told = disk.run(READ_ONLY, BEFORE.format(disk.folder))
     # the mark and the report of before stay, as nothing can be taken away: neither is told at each start
     assert told == {"noted": False, "left": 0, "lines": 1, "new": 0, "all": 1}

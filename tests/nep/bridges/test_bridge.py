@@ -472,6 +472,8 @@ def test_a_network_that_is_not_there_is_waited_for_and_said_and_the_rest_works(c
                 pub.publish(number)
             eventually(lambda: route(bridge, "a", "/t").counts().waiting == 5)
             eventually(lambda: "no master answers at" in bridge.sides["b"].problem)
+            # It is known before it is written to the log.
+            eventually(lambda: "is waited for: no master answers at" in caplog.text)
             assert caplog.text.count("is waited for: no master answers at") == 1
             assert not bridge.is_ready
             with Master(address, learn_s=0.0), away:

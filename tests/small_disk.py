@@ -1,0 +1,51 @@
+"""A disk of 256 kB of a test's own: it fills up, and it can be made one that can't be written."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+TIMEOUT_S = 100
+
+
+class SmallDisk:
+    """A folder that is a small disk for the program that `run` starts, and for nobody else."""
+
+    def __init__(self, folder: Path) -> None:
+        """Skips the test where a computer does not permit it."""
+        unshare = shutil.which("unshare")
+        if unshare is None:
+            pytest.skip("a disk of one's own needs Linux with unshare")
+        self.folder = folder
+        self._unshare = [unshare, "-rm", "sh", "-c"]
+        self._mount = f"mount -t tmpfs -o size=256k,mode=777 none '{folder}'"
+        tried = subprocess.run([*self._unshare, self._mount], check=False, capture_output=True)
+        if tried.returncode:
+            pytest.skip("this computer does not permit disks of one's own (unshare -rm)")
+
+    def run(self, code: str, before: str = "true") -> dict[str, object]:
+        """What a Python program prints as JSON; it gets the folder as argument.
+
+        ``before`` is a command of the shell that comes first, with the disk there.
+        """
+        shell = f'{self._mount} && {before} && exec "$@"'
+        done = subprocess.run(
+            [*self._unshare, shell, "sh", sys.executable, "-c", code, str(self.folder)],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            encoding="utf-8",
+            timeout=TIMEOUT_S,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        found = json.loads(done.stdout)
+        assert isinstance(found, dict)
+        return found
