@@ -101,10 +101,10 @@ def _main(given: Sequence[str]) -> int:
         return hand_over("app.blocks.runtime.child", given[1:])
     if given[:1] == ["--module"] and len(given) > 1:
         return hand_over(given[1], given[2:])
-    from app.core.storage.settings import Settings  # noqa: PLC0415  the processes of a frozen build need none
+    from app.core.storage.settings import kept_language  # noqa: PLC0415  processes of a frozen build need none
 
     tests_itself = any(word.startswith("--selft") for word in given)  # it leaves a person's settings alone
-    begin("" if tests_itself else Settings().get("language", ""))
+    begin("" if tests_itself else kept_language())
     if given[:1] == ["run"]:
         return run_behaviour(given[1:])
     parser = window_parser()

@@ -127,14 +127,14 @@ def make_window(session: Session, options: Options) -> MainWindow:
         window.resize(fitting(window.size(), window.screen().availableSize()))
     if not options.alone:
         window.commands.behaviours.come_back(left_behind(), window.banner.offer)
-        tell_of_newer(session)
+        tell_of_what_was_found(session)
     return window
 
 
-def tell_of_newer(session: Session) -> None:
-    """Say what a newer Studio keeps here: settings, and unsaved work that only that one can put back."""
+def tell_of_what_was_found(session: Session) -> None:
+    """Say what of the kept files this Studio can't use: settings, and unsaved work of a newer one."""
     if session.settings.notice:
-        session.alerts.put("settings:newer", "warn", session.settings.notice)
+        session.alerts.put("settings:notice", "warn", session.settings.notice)
     names = of_newer()
     if names:
         session.alerts.put(

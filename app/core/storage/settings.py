@@ -21,6 +21,7 @@ from nep.system.replace_file import replace_file
 FORMAT = 1
 """Goes up when this version can't understand what the next one keeps; what is only new needs no other number.
 The states of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are in here, too."""
+_OWN_NAME = f"settings.format-{FORMAT}.json"
 RECENT_LIMIT = 12
 _LATEST_S = 1e12
 """No time is later: a damaged file may have a number that no clock can show."""
@@ -56,6 +57,25 @@ def state_home() -> Path:
 def kept_folder() -> Path:
     """Where Studio saves behaviours that were closed and had no file yet."""
     return home() / "kept"
+
+
+def kept_language(folder: Path | None = None) -> str:
+    """The language that a person chose, "" for none: for who has no words yet. Nothing is moved or made."""
+    place = folder if folder is not None else home()
+    values = _values_in(place / "settings.json")
+    if _format_of(values) > FORMAT:
+        values = _values_in(place / _OWN_NAME) or values
+    chosen = values.get("language")
+    return chosen if isinstance(chosen, str) else ""
+
+
+def _values_in(path: Path) -> dict[str, object]:
+    """What a file says; nothing when it can't be read."""
+    try:
+        values = json.loads(read_whole(path))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return values if isinstance(values, dict) else {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +211,7 @@ class Settings:
 
     def _own_path(self) -> Path:
         """Where the settings are while a newer Studio has its own in their place."""
-        return self.path.with_name(f"settings.format-{FORMAT}.json")
+        return self.path.with_name(_OWN_NAME)
 
     def _beside(self, newer: dict[str, object]) -> dict[str, object]:
         """Leave the file of a newer Studio alone; from now on there is one of our own beside it."""
@@ -224,6 +244,10 @@ class Settings:
             replace_file(self.path, self.damaged)
         except OSError:
             self.damaged = None
+            return {}
+        self.notice = _(
+            "The settings could not be read, so Studio starts with new ones. The file is kept as “{file}”."
+        ).format(file=self.damaged.name)
         return {}
 
     def _write(self) -> None:

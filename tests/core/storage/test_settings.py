@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.storage.settings import RECENT_LIMIT, Settings, home
+from app.core.storage.settings import RECENT_LIMIT, Settings, home, kept_language
 from app.errors import SettingsError
 
 
@@ -39,8 +39,40 @@ def test_a_damaged_file_is_kept_beside(tmp_path: Path, damage: bytes) -> None:
     assert settings.get("theme", "light") == "light"
     assert settings.damaged is not None
     assert settings.damaged.read_bytes() == damage
+    assert "settings.damaged.json" in settings.notice
     settings.set("theme", "dark")
     assert Settings(tmp_path).get("theme", "light") == "dark"
+
+
+@pytest.mark.parametrize(
+    ("kept", "language"),
+    [
+        (b'{"language": "ja"}', "ja"),
+        (b'{"language": 5}', ""),
+        (b"{}", ""),
+        (b"[1]", ""),
+        (b"{", ""),
+        (b"\xff", ""),
+        (b"[" * 100_000, ""),
+        (None, ""),
+    ],
+)
+def test_the_language_is_known_before_anything_is_moved(
+    tmp_path: Path, kept: bytes | None, language: str
+) -> None:
+    if kept is not None:
+        (tmp_path / "settings.json").write_bytes(kept)
+    assert kept_language(tmp_path) == language
+    assert [each.read_bytes() for each in tmp_path.iterdir()] == ([] if kept is None else [kept])
+
+
+def test_the_language_that_was_chosen_beside_the_settings_of_a_newer_studio_counts(tmp_path: Path) -> None:
+    (tmp_path / "settings.json").write_text('{"format": 99, "language": "ja"}', "utf-8")
+    assert kept_language(tmp_path) == "ja"
+    Settings(tmp_path).set("language", "fr")
+    assert kept_language(tmp_path) == "fr"
+    (tmp_path / "settings.json").write_text('{"language": "es"}', "utf-8")
+    assert kept_language(tmp_path) == "es"
 
 
 def test_recent_files_are_newest_first_without_doubles_or_missing_ones(tmp_path: Path) -> None:

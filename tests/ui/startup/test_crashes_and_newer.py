@@ -15,7 +15,7 @@ from app.core.reports.crash_reports import ALERT, CrashReports
 from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui.application import close_when_asked, tell_of_crashes, tell_of_newer
+from app.ui.application import close_when_asked, tell_of_crashes, tell_of_what_was_found
 from app.ui.shell.main_window import MainWindow
 from tests.pseudo import untranslated
 
@@ -58,16 +58,16 @@ def test_work_and_settings_of_a_newer_studio_are_told_in_the_persons_words(pseud
     (home / "journal" / "a.json").write_text(json.dumps(entry))
     (home / "settings.json").write_text(json.dumps({"format": 7}))
     session = Session(Settings(home), journal_folder=home / "journal", start_processes=False)
-    tell_of_newer(session)
+    tell_of_what_was_found(session)
     told = {each.id: f"{each.title} {each.detail}" for each in session.alerts.active}
-    assert set(told) == {"journal:newer", "settings:newer"}
+    assert set(told) == {"journal:newer", "settings:notice"}
     assert "“Mine”" in told["journal:newer"]
-    assert "7" in told["settings:newer"]
+    assert "7" in told["settings:notice"]
     assert [words for words in told.values() if untranslated(words, "Mine", "settings", "json")] == []
 
 
 def test_where_nothing_is_newer_nothing_is_told(session: Session) -> None:
-    tell_of_newer(session)
+    tell_of_what_was_found(session)
     assert not session.alerts.active
 
 
