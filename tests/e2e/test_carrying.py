@@ -17,7 +17,8 @@ pytestmark = pytest.mark.timeout(170)
 ACCENT = (0x2F, 0x4F, 0xD0)  # the token "accent" of the light theme
 SENTENCES = f"{SHOWN}.querySelectorAll('.blocklyBlockCanvas .robot_pepper_do_say').length"
 SELECTED = f"[...{SHOWN}.querySelectorAll('.blocklyBlockCanvas .blocklySelected')].map(e => e.textContent)"
-PATH = ".nepTab:not([hidden]) .blocklyBlockCanvas [data-id='{}'] > .blocklyPath"
+VISIBLE = ".nepTab:not([hidden])"
+PATH = f"{VISIBLE} .blocklyBlockCanvas [data-id='{{}}'] > .blocklyPath"
 
 
 def carry(studio: Studio, block: str, x: float, y: float) -> None:
@@ -103,10 +104,13 @@ def test_a_tab_opens_under_held_blocks_and_they_are_dragged_on_there(studio: Stu
     assert 0 < picture[1] - y < 40
     until(lambda: "say Four" in shown(studio), "the tab has opened")
     assert studio.find(kind="CarriedPicture"), "the blocks are still in the hand"
-    left, top, _, high = studio.spot(PATH.format("say Four"))
+    left, top, wide, high = studio.spot(PATH.format("say Four"))
     bottom = top + high
-    studio.screen.glide(left + 60, bottom + 60)
+    studio.screen.move(*middle(studio.spot(f"{VISIBLE} .blocklyToolbox")))
     until(lambda: not studio.all(kind="CarriedPicture"), "the page shows them itself")
+    studio.screen.glide(left + 60, bottom + 60)
+    there = studio.spot(PATH.format("say Four"))
+    assert there == pytest.approx((left, top, wide, high), abs=1), "nothing on the page moves for them"
     studio.screen.glide(left + 14, bottom + 14, 6)
     until(
         lambda: studio.page(f"!!{SHOWN}.querySelector('.blocklyInsertionMarker')"),

@@ -238,7 +238,10 @@ export class Carrying {
     const {workspace} = tab;
     const {scrollX, scrollY} = workspace;
     const {svgMath, Coordinate} = Blockly.utils;
-    const wanted = Coordinate.difference(svgMath.screenToWsCoordinates(workspace, mouse), hand.what.grip);
+    const held = Coordinate.difference(svgMath.screenToWsCoordinates(workspace, mouse), hand.what.grip);
+    // Never left of what is in sight, as under the toolbox: Blockly would scroll to it, and all else would move.
+    const {left, top} = inSight(workspace);
+    const wanted = new Coordinate(Math.max(held.x, left), Math.max(held.y, top));
     const variables = new Set(workspace.getVariableMap().getAllVariables().map((each) => each.getId()));
     this.over(null);
     Blockly.Events.setGroup(true);  // until it is let go: all of it is one step
