@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,20 +12,15 @@ import pytest
 import nep
 from nep.masters.master import Master
 from nep.patterns.parameters.owned import place_of
+from tests.nep.cli.conftest import TypeIn
 from tests.nep.cli.test_command import LONG_S, Running
 
-REPOSITORY = Path(__file__).resolve().parents[3]
 
-
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "nep", "param", *arguments],
-        capture_output=True,
-        encoding="utf-8",
-        timeout=60,
-        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "COLUMNS": "120"},
-        check=False,
-    )
+@pytest.fixture
+def run(type_in: TypeIn, monkeypatch: pytest.MonkeyPatch) -> TypeIn:
+    """Types the words behind `nep param`."""
+    monkeypatch.setenv("COLUMNS", "120")
+    return lambda *words: type_in("param", *words)
 
 
 @pytest.fixture
@@ -39,7 +32,7 @@ def node(master: Master) -> Iterator[nep.Node]:
         yield made
 
 
-def test_list_get_and_set(node: nep.Node) -> None:
+def test_list_get_and_set(node: nep.Node, run: TypeIn) -> None:
     told = run("list", "robot")
     assert told.returncode == 0
     for word in ("speed", "0.5", "float", "0 ≤ … ≤ 2", "how fast, in m/s", '["walk","run"]', "read only"):
@@ -56,7 +49,7 @@ def test_list_get_and_set(node: nep.Node) -> None:
     assert run("get", node.id, "mode", "--json").stdout.strip() == '"run"'
 
 
-def test_what_is_refused_is_a_sentence(node: nep.Node) -> None:
+def test_what_is_refused_is_a_sentence(node: nep.Node, run: TypeIn) -> None:
     refused = run("set", "robot", "speed", "9")
     assert (refused.returncode, refused.stdout) == (1, "")
     assert "the parameter 'speed' cannot be 9; the most is 2" in refused.stderr
@@ -67,7 +60,7 @@ def test_what_is_refused_is_a_sentence(node: nep.Node) -> None:
     assert node.parameters["word"] == "5", "a text stays one"
 
 
-def test_to_a_file_and_back(node: nep.Node, tmp_path: Path) -> None:
+def test_to_a_file_and_back(node: nep.Node, run: TypeIn, tmp_path: Path) -> None:
     file = tmp_path / "robot.json"
     assert run("dump", "robot", str(file)).returncode == 0
     assert json.loads(file.read_text()) == {"speed": 0.5, "mode": "walk", "serial": "7"}
@@ -104,7 +97,7 @@ def test_watching_shows_what_is_and_each_change_once(node: nep.Node) -> None:
         watching.close()
 
 
-def test_watching_one_ends_when_its_node_does_or_in_time(node: nep.Node) -> None:
+def test_watching_one_ends_when_its_node_does_or_in_time(node: nep.Node, run: TypeIn) -> None:
     assert (
         run("watch", "robot", "mode", "--json", "--count", "1").stdout == '{"name":"mode","value":"walk"}\n'
     )

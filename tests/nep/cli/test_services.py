@@ -8,23 +8,12 @@ import threading
 import pytest
 
 import nep
-from nep.cli.app import run
 from nep.cli.complete import complete_service
 from nep.cli.screen import UNKNOWN
 from tests.nep.meeting import place_for
 from tests.nep.programs import eventually
 
 SERVICE = "/arm/move"
-
-
-@pytest.fixture
-def type_in(monkeypatch, capfd):
-    def typed(*words):
-        monkeypatch.setattr("sys.argv", ["nep", *words])
-        code = run()
-        return code, *capfd.readouterr()
-
-    return typed
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import json
 import pytest
 
 import nep
-from nep.cli.app import run
 from tests.nep.programs import eventually
 
 
@@ -21,16 +20,6 @@ def robot(master):
             sub.listen(timeout_s=30.0)
             eventually(lambda: {"/odom", "/words"} <= master.view().topics.keys())
             yield pub
-
-
-@pytest.fixture
-def type_in(monkeypatch, capfd):
-    def typed(*words):
-        monkeypatch.setattr("sys.argv", ["nep", *words])
-        code = run()
-        return code, *capfd.readouterr()
-
-    return typed
 
 
 def test_info_names_each_node(robot, type_in):
