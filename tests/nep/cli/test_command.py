@@ -1,4 +1,4 @@
-"""The command `nep` as a person uses it: processes, exit codes, both streams."""
+"""The command `nep` as a person uses it: exit codes, both streams, and what only processes show."""
 
 from __future__ import annotations
 
@@ -113,37 +113,37 @@ def test_the_version_is_that_of_the_package():
     assert nep.__version__ == told[1]
 
 
-def test_the_master_can_be_named_before_and_behind_the_command(running_master, monkeypatch):
+def test_the_master_can_be_named_before_and_behind_the_command(running_master, monkeypatch, type_in):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
     for words in (
         ("--master", running_master.address, "topic", "list"),
         ("topic", "list", "--master", running_master.address),
     ):
-        assert run(*words).returncode == 0
-    assert run("master", "--master", running_master.address).stderr.startswith(
+        assert type_in(*words).returncode == 0
+    assert type_in("master", "--master", running_master.address).stderr.startswith(
         "nep: a master already runs at"
     )
 
 
-def test_a_name_that_no_computer_has_is_the_right_sentence():
-    done = run("--master", "nosuchhost.invalid:7781", "topic", "list")
+def test_a_name_that_no_computer_has_is_the_right_sentence(type_in):
+    done = type_in("--master", "nosuchhost.invalid:7781", "topic", "list")
     assert done.returncode == 1
     assert done.stderr.startswith("nep: no computer is called 'nosuchhost.invalid' here; ")
-    doctor = run("doctor", "--master", "nosuchhost.invalid:7781")
+    doctor = type_in("doctor", "--master", "nosuchhost.invalid:7781")
     assert "No computer is called" in doctor.stdout
     assert "Start one" not in doctor.stdout
-    assert run("--master", "not an address", "topic", "list").stderr.startswith(
+    assert type_in("--master", "not an address", "topic", "list").stderr.startswith(
         "nep: 'not an address:7780' is no"
     )
 
 
-def test_a_type_that_is_wrong_is_warned_of(running_master):
+def test_a_type_that_is_wrong_is_warned_of(running_master, type_in):
     with nep.node("talker") as node:
         node.new_pub("/odom")
-        done = run("topic", "pub", "/odom", "text", "--type", "string")
+        done = type_in("topic", "pub", "/odom", "text", "--type", "string")
         assert done.returncode == 0
         assert "'/odom' is published with the type 'json'; yours is 'string'" in done.stderr
-    assert "did you mean 'string'?" in run("topic", "pub", "new", "1", "--type", "strng").stderr
+    assert "did you mean 'string'?" in type_in("topic", "pub", "new", "1", "--type", "strng").stderr
 
 
 def test_lines_that_are_no_utf8_are_a_sentence(running_master):
@@ -166,9 +166,9 @@ def test_a_wrong_command_is_a_sentence_and_code_2():
     assert "Traceback" not in done.stderr
 
 
-def test_without_a_master_each_command_says_how_to_start_one(address):
+def test_without_a_master_each_command_says_how_to_start_one(address, type_in):
     for command in (("node", "list"), ("topic", "list"), ("topic", "echo", "t"), ("topic", "pub", "t", "1")):
-        done = run(*command)
+        done = type_in(*command)
         assert done.returncode == 1
         assert (
             done.stderr
@@ -177,14 +177,14 @@ def test_without_a_master_each_command_says_how_to_start_one(address):
         assert not done.stdout
 
 
-def test_lists_are_tables_for_people_and_json_for_programs(running_master):
+def test_lists_are_tables_for_people_and_json_for_programs(running_master, type_in):
     with nep.node("Pepper") as node, nep.node("page") as other:
         pub = node.new_pub("/Pepper/battery")
         with other.new_sub("/Pepper/battery"):
-            shown = run("topic", "list").stdout
-            topics = json.loads(run("topic", "list", "--json").stdout)
-            nodes = json.loads(run("node", "list", "--json").stdout)
-            assert "Pepper" in run("node", "list").stdout
+            shown = type_in("topic", "list").stdout
+            topics = json.loads(type_in("topic", "list", "--json").stdout)
+            nodes = json.loads(type_in("node", "list", "--json").stdout)
+            assert "Pepper" in type_in("node", "list").stdout
         assert pub.topic in shown
         assert [topic["name"] for topic in topics] == ["/Pepper/battery"]
         assert topics[0]["publishers"][0]["id"] == str(pub.id), "readers with floats alone would lose digits"
@@ -194,10 +194,10 @@ def test_lists_are_tables_for_people_and_json_for_programs(running_master):
         }
 
 
-def test_empty_lists_say_what_will_fill_them(running_master):
-    assert "no topics yet" in run("topic", "list").stderr
-    assert "no nodes yet" in run("node", "list").stderr
-    assert json.loads(run("topic", "list", "--json").stdout) == []
+def test_empty_lists_say_what_will_fill_them(running_master, type_in):
+    assert "no topics yet" in type_in("topic", "list").stderr
+    assert "no nodes yet" in type_in("node", "list").stderr
+    assert json.loads(type_in("topic", "list", "--json").stdout) == []
 
 
 def test_what_is_published_by_hand_arrives(running_master):
@@ -212,19 +212,19 @@ def test_what_is_published_by_hand_arrives(running_master):
         assert [sub.listen(timeout_s=LONG_S)[1] for _ in range(5)] == [7] * 5
 
 
-def test_the_type_is_the_one_that_the_topic_has(running_master):
+def test_the_type_is_the_one_that_the_topic_has(running_master, type_in):
     with nep.node("listener") as node, node.new_sub("words", "string") as sub:
-        assert run("topic", "pub", "words", "no JSON at all").returncode == 0
+        assert type_in("topic", "pub", "words", "no JSON at all").returncode == 0
         assert sub.listen(timeout_s=LONG_S) == (True, "no JSON at all")
 
 
-def test_bad_input_is_a_sentence_and_code_1(running_master):
-    done = run("topic", "pub", "t", "no JSON at all")
+def test_bad_input_is_a_sentence_and_code_1(running_master, type_in):
+    done = type_in("topic", "pub", "t", "no JSON at all")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("nep: 'no JSON at all' is no JSON; ")
-    assert run("topic", "pub", "bad topic", "1").returncode == 1
-    assert "'bad topic'" in run("topic", "pub", "bad topic", "1").stderr
-    assert run("topic", "pub", "t", "1", "--rate", "0").returncode == 2
+    assert type_in("topic", "pub", "bad topic", "1").returncode == 1
+    assert "'bad topic'" in type_in("topic", "pub", "bad topic", "1").stderr
+    assert type_in("topic", "pub", "t", "1", "--rate", "0").returncode == 2
 
 
 def test_echo_writes_one_json_object_a_line(running_master):
@@ -235,8 +235,8 @@ def test_echo_writes_one_json_object_a_line(running_master):
         assert '{"n":1}' in run("topic", "echo", "t", "-n", "1").stdout
 
 
-def test_echo_ends_when_nothing_comes_for_so_long(running_master):
-    done = run("topic", "echo", "t", "--timeout", "0.2")
+def test_echo_ends_when_nothing_comes_for_so_long(running_master, type_in):
+    done = type_in("topic", "echo", "t", "--timeout", "0.2")
     assert done.returncode == 1
     assert "did not come within 0.2 s" in done.stderr
 
@@ -302,9 +302,9 @@ def test_a_master_ends_when_its_owner_is_gone_and_nobody_needs_it(address, start
     assert master.process.wait(LONG_S) == 0
 
 
-def test_a_master_serves_this_computer_only_unless_it_is_told(monkeypatch):
+def test_a_master_serves_this_computer_only_unless_it_is_told(monkeypatch, type_in):
     monkeypatch.setenv("NEP_MASTER", "192.168.1.7:7780")
-    done = run("master", "--no-gateway")
+    done = type_in("master", "--no-gateway")
     assert done.returncode == 1
     assert "add --listen 192.168.1.7" in done.stderr
 
@@ -337,7 +337,7 @@ def test_the_command_starts_without_loading_rich():
         (("topic", "pub", "t", "1", "--type", "a" * 300), "(300 characters)'; use 200"),
     ],
 )
-def test_what_cannot_be_is_told_before_a_master_is_looked_for(words, sentence):
-    done = run(*words)
+def test_what_cannot_be_is_told_before_a_master_is_looked_for(words, sentence, type_in):
+    done = type_in(*words)
     assert done.returncode == 2
     assert sentence in done.stderr
