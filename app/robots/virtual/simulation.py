@@ -5,12 +5,15 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import cv2
 
 from app.robots.driver.call import Clock, Link
 from app.robots.virtual.body import HEIGHT, RADIUS, Body, BodyEvent
 from app.robots.virtual.camera import Camera, lens_of
+from app.robots.virtual.canvas import Picture
+from app.robots.virtual.lens import Lens
 from app.robots.virtual.room import Ball, Other, Person, Room, Thing
 from app.robots.virtual.room_map import kind_of
 from app.robots.virtual.shared_room import SharedRoom
@@ -31,6 +34,16 @@ PLACES = ("head", "left_hand", "right_hand")
 _log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True)
+class _View:
+    """What the camera sees of a room from one place: the same until one of both changes."""
+
+    room: Room
+    lens: Lens
+    picture: Picture
+    seen: Mapping[str, list[Detection]]
+
+
 class Simulation:
     """Owns the body, its lock and the two threads; `link` hears of everything."""
 
@@ -42,6 +55,7 @@ class Simulation:
         self._camera, self._eyes = Camera(body.room), ObjectDetector()
         like = Other(link.name, body.x, body.y, body.theta_deg, RADIUS, HEIGHT)
         self._shared = SharedRoom(link, clock, body, self.changed, like)
+        self._view: _View | None = None
         self._ended = threading.Event()
         self._stepped_s = clock.now()
         self._face: str | None = None
@@ -130,14 +144,11 @@ class Simulation:
         """Take one picture, publish it when somebody watches, and what is recognised in it."""
         with self.changed:
             room, lens = self.body.room, lens_of(self.body)
-        picture = self._camera.picture(room, lens)
+        if self._view is None or (self._view.room, self._view.lens) != (room, lens):
+            self._view = self._painted(room, lens)
+        picture, seen = self._view.picture, self._view.seen
         if publish:
             self._link.sense("camera", picture)
-        seen = {
-            "faces": self._eyes.faces(room, lens),
-            "balls": self._eyes.balls(picture),
-            "markers": self._eyes.markers(picture),
-        }
         with self.changed:
             self.seen = seen
         for sensor, found in seen.items():
@@ -145,6 +156,16 @@ class Simulation:
         self._link.sense("sees_face", bool(seen["faces"]))
         self._link.sense("sees_ball", bool(seen["balls"]))
         self._notice_face(seen["faces"])
+
+    def _painted(self, room: Room, lens: Lens) -> _View:
+        picture = self._camera.picture(room, lens)
+        picture.flags.writeable = False  # it is published until something moves
+        seen = {
+            "faces": self._eyes.faces(room, lens),
+            "balls": self._eyes.balls(picture),
+            "markers": self._eyes.markers(picture),
+        }
+        return _View(room, lens, picture, seen)
 
     def _notice_face(self, faces: list[Detection]) -> None:
         now = self._clock.now()
