@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from app.core.messages.picture import Picture, Size, decode
+from app.core.messages.picture import Picture, Size, decode, once_more
 from app.core.network.watches import Watching
 from nep.i18n import _
 from nep.messages.message import Message
@@ -244,7 +244,9 @@ class Images:
             work = self._take_waiting()
         for streams, message, arrived_s, size in work:
             try:
-                picture, error = decode(message, arrived_s, size)
+                picture, error = once_more(streams[0].picture, message, arrived_s, size), None
+                if picture is None:
+                    picture, error = decode(message, arrived_s, size)
             except Exception as problem:  # noqa: BLE001  one message must not end the pictures of all
                 picture, error = (
                     None,

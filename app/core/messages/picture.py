@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from nep.errors import EncodeError, NepError
@@ -84,6 +84,22 @@ def decode(message: Message, received_s: float, fit: Size | None = None) -> tupl
     if (bgra.shape[1], bgra.shape[0]) != size:
         numbers = None
     return Picture(bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers), None
+
+
+def once_more(shown: Picture | None, message: Message, received_s: float, fit: Size | None) -> Picture | None:
+    """The picture that is shown as that of a message with the same bytes: its very pixels, nothing decoded.
+
+    None when the message says something else, or is wanted in another size (``fit``, see `decode`).
+    """
+    if shown is None or shown.message is None or shown.message is message:
+        return None
+    of, factor = shown.message, _factor((shown.width, shown.height), fit)
+    if abs(shown.bgra.shape[0] * factor - shown.height) >= factor:  # it is rounded up or down
+        return None
+    same = of.data.nbytes == message.data.nbytes and of.extension == message.extension
+    if not (same and bytes(of.data) == bytes(message.data)):
+        return None
+    return replace(shown, seq=message.seq, stamp_ns=message.stamp_ns, received_s=received_s, message=message)
 
 
 def _short(error: BaseException) -> str:

@@ -150,13 +150,16 @@ class PictureView(QWidget):
             self._state = ""
         if picture is not self._picture and picture is not None:
             self._picture = picture
-            rows, columns = picture.bgra.shape[:2]
-            # QImage does not copy the bytes: self._picture keeps them.
-            self._grey = None
-            self._image = QImage(picture.bgra.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32)
+            if shown is None or picture.bgra is not shown.bgra:  # else a camera that sees the same still
+                rows, columns = picture.bgra.shape[:2]
+                # QImage does not copy the bytes: self._picture keeps them.
+                self._grey = None
+                self._image = QImage(
+                    picture.bgra.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32
+                )
+                self.update()
             if not stream.held:
                 stream.shown()
-            self.update()
         if not stream.held or picture is not shown:
             self._boxes = boxes  # those on a frozen picture are frozen, too
         stream.want(self._wish())

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from app.core.messages.image_streams import Images, Rate
-from app.core.messages.picture import decode
+from app.core.messages.picture import decode, once_more
 from app.core.network.watches import Watches
 from nep.messages.message import Message
 from tests.ui import fakes
@@ -51,6 +51,44 @@ def images(kind: type[Images], watched: list[str]):
     images = kind(lambda topic: Watches(watched.append, watched.remove).open([topic]))
     yield images
     images.close()
+
+
+def test_the_same_bytes_again_are_the_same_pixels_of_a_new_message(images: Images) -> None:
+    stream = images.stream("/camera")
+    images.offer([jpeg((10, 20, 30), seq=7)])
+    until(lambda: stream.picture is not None)
+    first = stream.picture
+    assert first is not None
+    images.offer([jpeg((10, 20, 30), seq=8)])
+    until(lambda: stream.picture is not None and stream.picture.seq == 8)
+    assert stream.picture is not None
+    assert stream.picture.bgra is first.bgra
+    assert stream.picture.received_s >= first.received_s
+    images.offer([jpeg((10, 20, 31), seq=9)])
+    until(lambda: stream.picture is not None and stream.picture.seq == 9)
+    assert stream.picture.bgra is not first.bgra
+
+
+@pytest.mark.parametrize("size", [(320, 240), (33, 25), (1, 1), (17, 400)])
+@pytest.mark.parametrize("fit", [None, (16, 12), (4, 3), (0, 0)])
+@pytest.mark.parametrize("kind", [".jpg", ".png"])
+def test_what_is_wanted_in_another_size_is_decoded_anew(
+    size: tuple[int, int], fit: tuple[int, int] | None, kind: str
+) -> None:
+    frame = np.random.default_rng(1).integers(0, 255, (size[1], size[0], 3), np.uint8)
+    data = cv2.imencode(kind, frame)[1].tobytes()
+    first, second = (Message("/camera", data, "image", "image", seq=n) for n in (1, 2))
+    shown, error = decode(first, 1.0, fit)
+    assert shown is not None, error
+    again = once_more(shown, second, 2.0, fit)
+    assert again is not None
+    assert (again.bgra is shown.bgra, again.seq, again.received_s) == (True, 2, 2.0)
+    assert once_more(shown, first, 2.0, fit) is None, "it is wanted in another size, and is to be decoded"
+    assert once_more(None, second, 2.0, fit) is None
+    whole = once_more(shown, second, 2.0, None)
+    assert (whole is not None) == shown.whole
+    other = Message("/camera", data + b"x", "image", "image", seq=3)
+    assert once_more(shown, other, 3.0, fit) is None
 
 
 def test_a_picture_is_decoded_for_its_stream(images: Images) -> None:

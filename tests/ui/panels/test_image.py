@@ -132,6 +132,22 @@ def camera_view(qtbot, qapp) -> PictureView:
     return view
 
 
+def test_a_camera_that_sees_the_same_is_not_painted_again(qtbot, camera_view, monkeypatch) -> None:
+    stream = stream_of(picture(320, 240))
+    camera_view.take(stream)
+    qtbot.waitExposed(camera_view)
+    asked: list[str] = []
+    monkeypatch.setattr(camera_view, "update", lambda: asked.append("update"))
+    first = stream.picture
+    assert first is not None
+    stream.picture = replace(first, seq=2)
+    camera_view.take(stream)
+    assert (asked, camera_view.picture) == ([], stream.picture)
+    stream.picture = replace(first, seq=3, bgra=first.bgra.copy())
+    camera_view.take(stream)
+    assert asked
+
+
 def test_beside_the_cameras_picture_there_is_no_black(camera_view) -> None:
     camera_view.take(stream_of(picture(320, 240)))  # type: ignore[arg-type]
     assert camera_view.area().left() > 60
