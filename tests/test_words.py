@@ -96,12 +96,20 @@ def spanish(words, tmp_path) -> None:
     install("es_MX.UTF-8", tmp_path)
 
 
-@pytest.fixture
-def pseudo(words, tmp_path) -> None:
+@pytest.fixture(scope="module")
+def pseudo_folder(tmp_path_factory) -> Path:
     """The pseudo-language, made from the sources of now."""
-    words.extract(tmp_path)
-    words.compile_all(tmp_path)
-    install("qps", tmp_path)
+    from tools import words as tool
+
+    folder = tmp_path_factory.mktemp("pseudo")
+    tool.extract(folder)
+    tool.compile_all(folder)
+    return folder
+
+
+@pytest.fixture
+def pseudo(pseudo_folder) -> None:
+    install("qps", pseudo_folder)
 
 
 def is_pseudo(text: str) -> bool:
@@ -234,11 +242,11 @@ def test_the_computers_language_counts_when_it_is_offered(share, expected, spani
     assert i18n.language() == "es"
 
 
-def test_the_pseudo_language_is_offered_only_while_it_is_used(pseudo, tmp_path) -> None:
+def test_the_pseudo_language_is_offered_only_while_it_is_used(pseudo, pseudo_folder) -> None:
     install("en")
     assert "qps" not in dict(i18n.offered())
     assert dict(i18n.offered())["en"] == "English"
-    install("qps", tmp_path)
+    install("qps", pseudo_folder)
     assert "qps" in dict(i18n.offered())
 
 
