@@ -6,9 +6,20 @@ import plistlib
 from collections.abc import Mapping
 from pathlib import Path
 
-__all__ = ["DOCUMENTED", "QT_WEB_PROCESS", "SOURCE", "STUDIO", "WEB_PROCESS", "problems", "write"]
+__all__ = [
+    "DOCUMENTED",
+    "QT_WEB_PROCESS",
+    "SOURCE",
+    "STUDIO",
+    "WEB_PROCESS",
+    "problems",
+    "source_of",
+    "write",
+]
 
-SOURCE = "https://developer.apple.com/documentation/xcode/configuring-the-hardened-runtime"
+SOURCE = "https://developer.apple.com/documentation/security/hardened-runtime"
+"""The list of all of them. It says, too, that a key which is not true is to be left out."""
+_PAGES = "https://developer.apple.com/documentation/bundleresources/entitlements/"
 DOCUMENTED: Mapping[str, str] = {
     "com.apple.security.cs.allow-jit": "Allow execution of JIT-compiled code",
     "com.apple.security.cs.allow-unsigned-executable-memory": "Allow unsigned executable memory",
@@ -24,7 +35,10 @@ DOCUMENTED: Mapping[str, str] = {
     "com.apple.security.personal-information.photos-library": "Photos library",
     "com.apple.security.automation.apple-events": "Apple events",
 }
-"""The keys of the hardened runtime that Apple documents (`SOURCE`, November 2026), with their names there."""
+"""The keys of the hardened runtime with their names: all that `SOURCE` lists, compared in November 2026.
+
+The first six are its runtime exceptions, the others its access to resources; `source_of` has each one's page.
+"""
 
 QT_WEB_PROCESS = frozenset(
     {
@@ -54,8 +68,15 @@ STUDIO: Mapping[str, str] = {
 
 Callbacks of ctypes and cffi are machine code that libffi writes, where it has none prepared. Not in it: DYLD
 variables, as no child process is started with any; libraries of strangers, as all are signed with one name;
-camera and microphone, as Studio uses neither.
+camera and microphone, as Studio uses neither: without their keys macOS refuses them unasked.
 """
+
+
+def source_of(key: str) -> str:
+    """Where Apple says what a key of `DOCUMENTED` does. KeyError when it is none."""
+    if key not in DOCUMENTED:
+        raise KeyError(key)
+    return f"{_PAGES}{key}"
 
 
 def problems(entitlements: Mapping[str, object]) -> list[str]:

@@ -13,6 +13,7 @@ from app.core.documents.file_format import SUFFIX
 __all__ = [
     "APP_ICON",
     "BUNDLE_ID",
+    "DOCUMENTED",
     "DOCUMENT_ICON",
     "LANGUAGES",
     "OLDEST_MACOS",
@@ -20,6 +21,7 @@ __all__ = [
     "apple_version",
     "information",
     "sentences",
+    "source_of",
     "write_information",
     "write_sentences",
 ]
@@ -64,8 +66,40 @@ _WORDS: Mapping[str, tuple[str, str]] = {
 """What a person reads, in the order of `LANGUAGES`. Types of documents are found by their English words.
 
 Studio itself uses no camera and no microphone. Its libraries could, and a program that asks without having
-such a sentence is ended by macOS.
+such a sentence is ended by macOS. With it, and without the entitlement, it is refused unasked. Nothing here
+sends Apple events, so there is no sentence for them.
 """
+
+_OF_TYPES = frozenset(
+    {
+        "UTTypeConformsTo", "UTTypeDescription", "UTTypeIconFile", "UTTypeIdentifier",
+        "UTTypeTagSpecification",
+    }
+)  # fmt: skip
+DOCUMENTED = frozenset(
+    {
+        "CFBundleDevelopmentRegion", "CFBundleDisplayName", "CFBundleDocumentTypes", "CFBundleExecutable",
+        "CFBundleIconFile", "CFBundleIdentifier", "CFBundleInfoDictionaryVersion", "CFBundleLocalizations",
+        "CFBundleName", "CFBundlePackageType", "CFBundleShortVersionString", "CFBundleVersion",
+        "LSApplicationCategoryType", "LSBackgroundOnly", "LSMinimumSystemVersion", "NSCameraUsageDescription",
+        "NSDesktopFolderUsageDescription", "NSDocumentsFolderUsageDescription",
+        "NSDownloadsFolderUsageDescription", "NSHighResolutionCapable", "NSLocalNetworkUsageDescription",
+        "NSMicrophoneUsageDescription", "NSPrincipalClass", "NSSupportsAutomaticGraphicsSwitching",
+        "UTExportedTypeDeclarations", "UTImportedTypeDeclarations",
+    }
+)  # fmt: skip
+"""The keys of Info.plist that we use, as Apple writes them (`source_of`, November 2026)."""
+_DOCUMENTED_WITHIN: Mapping[str, frozenset[str]] = {
+    "CFBundleDocumentTypes": frozenset(
+        {
+            "CFBundleTypeIconFile", "CFBundleTypeName", "CFBundleTypeRole", "LSHandlerRank",
+            "LSItemContentTypes",
+        }
+    ),
+    "UTExportedTypeDeclarations": _OF_TYPES,
+    "UTImportedTypeDeclarations": _OF_TYPES,
+}  # fmt: skip
+_PAGES = "https://developer.apple.com/documentation/bundleresources/information-property-list/"
 
 
 def apple_version(version: str) -> str:
@@ -74,6 +108,16 @@ def apple_version(version: str) -> str:
     if found is None:
         raise ValueError(f"no version '{version}'")
     return found.group()
+
+
+def source_of(key: str, within: str = "") -> str:
+    """Where Apple says what a key of Info.plist, or one of the dictionaries `within` it, means.
+
+    KeyError when it is none that we know to be documented.
+    """
+    if key not in (_DOCUMENTED_WITHIN[within] if within else DOCUMENTED):
+        raise KeyError(key)
+    return _PAGES + "/".join(each.lower() for each in (within, key) if each)
 
 
 def sentences(language: str) -> dict[str, str]:
@@ -85,8 +129,11 @@ def sentences(language: str) -> dict[str, str]:
 def information(version: str, machine: str) -> dict[str, Any]:
     """The content of Info.plist of the application for a processor; KeyError when there is none for it.
 
-    Recordings of messages (.mcap) are a type that is known, so that the Finder has a name for them. Studio
-    opens none yet, so they are not among the documents that it opens.
+    A type of ours is exported, one that others own imported; either conforms in the end to `public.data`:
+    https://developer.apple.com/documentation/uniformtypeidentifiers/defining-file-and-data-types-for-your-app
+    (`public.json` does: https://developer.apple.com/documentation/uniformtypeidentifiers/uttypejson).
+    Recordings of messages (.mcap) are a type that is known, so that the Finder has a name for them; nobody
+    has published an identifier for it. Studio opens none yet, so they are not among the documents it opens.
     """
     return {
         "CFBundleName": "NEP Studio",

@@ -9,7 +9,15 @@ from pathlib import Path
 import PySide6
 import pytest
 
-from installers.macos.entitlements import DOCUMENTED, QT_WEB_PROCESS, STUDIO, WEB_PROCESS, problems, write
+from installers.macos.entitlements import (
+    DOCUMENTED,
+    QT_WEB_PROCESS,
+    STUDIO,
+    WEB_PROCESS,
+    problems,
+    source_of,
+    write,
+)
 
 CS = "com.apple.security.cs."
 
@@ -20,6 +28,27 @@ def test_every_key_is_one_that_apple_documents(allowed: dict[str, str], tmp_path
     assert read == dict.fromkeys(allowed, True)
     assert read.keys() <= DOCUMENTED.keys()
     assert all(allowed.values()), "each has its reason"
+
+
+def test_the_table_has_what_apples_page_of_the_hardened_runtime_lists() -> None:
+    # The page's two groups, as they stood in November 2026: six exceptions and seven resources.
+    groups = {
+        CS: "allow-jit allow-unsigned-executable-memory allow-dyld-environment-variables debugger "
+        "disable-library-validation disable-executable-page-protection",
+        "com.apple.security.device.": "audio-input camera",
+        "com.apple.security.personal-information.": "location addressbook calendars photos-library",
+        "com.apple.security.automation.": "apple-events",
+    }
+    listed = {f"{group}{name}" for group, names in groups.items() for name in names.split()}
+    assert set(DOCUMENTED) == listed
+
+
+def test_every_key_has_its_page_and_what_is_none_has_not() -> None:
+    pages = {source_of(key) for key in DOCUMENTED}
+    assert len(pages) == len(DOCUMENTED)
+    assert all(each.startswith("https://developer.apple.com/documentation/") for each in pages)
+    with pytest.raises(KeyError, match="get-task-allow"):
+        source_of("com.apple.security.get-task-allow")
 
 
 def test_a_misspelt_key_is_found(tmp_path: Path) -> None:

@@ -11,10 +11,12 @@ import pytest
 import nep
 from app.core.documents.file_format import SUFFIX
 from installers.macos.information import (
+    DOCUMENTED,
     LANGUAGES,
     apple_version,
     information,
     sentences,
+    source_of,
     write_information,
     write_sentences,
 )
@@ -40,6 +42,27 @@ def test_recordings_are_known_but_studio_does_not_claim_to_open_them() -> None:
     assert recording["UTTypeTagSpecification"] == {"public.filename-extension": ["mcap"]}
     opened = [kind for each in told["CFBundleDocumentTypes"] for kind in each["LSItemContentTypes"]]
     assert recording["UTTypeIdentifier"] not in opened
+
+
+@pytest.mark.parametrize("machine", ["arm64", "x86_64"])
+def test_every_key_is_one_that_apple_documents(machine: str) -> None:
+    told = information(__version__, machine)
+    assert told.keys() == DOCUMENTED, "all that are listed are used, and no others"
+    pages = {source_of(key) for key in told}
+    for within in ("CFBundleDocumentTypes", "UTExportedTypeDeclarations", "UTImportedTypeDeclarations"):
+        pages |= {source_of(key, within) for each in told[within] for key in each}
+    assert all(re.fullmatch(r"https://developer\.apple\.com/documentation/[a-z/-]+", each) for each in pages)
+    with pytest.raises(KeyError, match="NSHighResolutionCapabel"):
+        source_of("NSHighResolutionCapabel")
+    with pytest.raises(KeyError, match="UTTypeConformsTo"):
+        source_of("UTTypeConformsTo", "CFBundleDocumentTypes")
+
+
+def test_what_a_type_conforms_to_ends_in_data() -> None:
+    told = information(__version__, "arm64")
+    kinds = (*told["UTExportedTypeDeclarations"], *told["UTImportedTypeDeclarations"])
+    data = {"public.json", "public.data"}  # uttypejson: it conforms to text, and that to data
+    assert [kind["UTTypeIdentifier"] for kind in kinds if not data & set(kind["UTTypeConformsTo"])] == []
 
 
 def test_the_version_is_that_of_nep(tmp_path: Path) -> None:
