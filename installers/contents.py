@@ -17,6 +17,7 @@ EXCLUDED_MODULES = (
     "tkinter", "_tkinter", "turtle", "idlelib", "lib2to3", "pydoc_data", "ensurepip", "pip", "setuptools",
     "wheel", "pkg_resources", "IPython", "matplotlib", "PIL", "pytest", "_pytest", "hypothesis", "mypy",
     "babel", "numpy.f2py", "numpy.distutils",
+    "readline",  # GNU's, under the General Public License; nothing of ours asks for lines by it
 )  # fmt: skip
 
 _LANGUAGES = ("en", "es")

@@ -29,13 +29,16 @@ def freeze(context: Context) -> Path:
     return context.frozen
 
 
-def add_licences(context: Context, folder: Path) -> Path:
-    """Put the licence texts and the notice into a folder; the bill of materials, in `dist`."""
+def add_licences(context: Context, inside: Path, folder: Path) -> Path:
+    """Put the licence texts and the notice of what is `inside` into a folder; the bill, in `dist`.
+
+    Raises `PackageError`, also when something is inside of which nobody knows the licence.
+    """
     # A release has one of each, and two for macOS.
     of = f"macos-{context.machine}" if context.system == "macos" else context.system
     bill = context.dist / f"NEP-Studio-{context.version}-{of}.cdx.json"
-    inventory = context.root / "installers" / "inventory.py"
+    inventory = context.root / "installers" / "inventory" / "__main__.py"
     context.run(
-        *context.python, inventory, context.system, str(context.epoch), folder, bill, cwd=context.work
+        *context.python, inventory, context.system, str(context.epoch), inside, folder, bill, cwd=context.work
     )
     return bill

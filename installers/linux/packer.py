@@ -38,7 +38,7 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
         freeze(context)
         strip(context)
         leave_out_films(context)
-    bill = add_licences(context, context.frozen)
+    bill = add_licences(context, context.frozen, context.frozen)
     add_share(context, context.frozen)
     made = [debian_package(context), archive(context), bill]
     tool = shutil.which("appimagetool")

@@ -65,7 +65,7 @@ def pack(
         freeze(context)
         leave_out_films(context, app)
     context.dist.mkdir(parents=True, exist_ok=True)
-    bill = add_licences(context, app / "Contents" / "Resources")
+    bill = add_licences(context, app, app / "Contents" / "Resources")
     finish(context, app, identity)
     pictures = _pictures(context)
     target = context.dist / f"NEP-Studio-{context.version}-macos-{context.machine}.dmg"

@@ -44,7 +44,7 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
         os.environ.update(NEP_PACKAGE_ICON=str(icon), NEP_PACKAGE_VERSION_FILE=str(version))
         freeze(context)
     write_icon(painted, "nep-behaviour", context.frozen / BEHAVIOUR_ICON)
-    bill = add_licences(context, context.frozen)
+    bill = add_licences(context, context.frozen, context.frozen)
     refuse_files_of_wine(context.frozen)
     give_one_time(context.frozen, context.epoch)
     return [make_setup(context, icon, picture), make_zip(context), bill]

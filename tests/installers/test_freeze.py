@@ -20,7 +20,7 @@ def test_each_package_of_a_release_has_a_bill_of_materials_of_its_own(tmp_path: 
         does_nothing = (sys.executable, "-c", "")
         context = Context(system, does_nothing, root=tmp_path, version="1.2.3", machine=machine, epoch=0)
         context.work.mkdir(parents=True, exist_ok=True)
-        names.append(add_licences(context, tmp_path).name)
+        names.append(add_licences(context, tmp_path, tmp_path).name)
     assert names == [
         f"NEP-Studio-1.2.3-{of}.cdx.json" for of in ("windows", "macos-arm64", "macos-x86_64", "linux")
     ]

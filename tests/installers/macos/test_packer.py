@@ -38,8 +38,8 @@ elif words[1] == "PyInstaller":
         shutil.rmtree(app / "Contents" / "Resources" / f"{{language}}.lproj")
     (app / "Contents" / "Resources" / "behaviour.icns").unlink()
 else:
-    put(Path(words[3]) / "NOTICE.txt")
-    put(Path(words[4]))
+    put(Path(words[4]) / "NOTICE.txt")
+    put(Path(words[5]))
 """
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="its tools are scripts of a Unix")

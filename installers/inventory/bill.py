@@ -1,0 +1,118 @@
+"""A package's bill of materials in CycloneDX, its folder of licence texts, and its notice."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import uuid
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+
+from cyclonedx.contrib.license.factories import LicenseFactory
+from cyclonedx.model.bom import Bom
+from cyclonedx.model.component import Component, ComponentType
+from cyclonedx.output import make_outputter
+from cyclonedx.schema import OutputFormat, SchemaVersion
+from packageurl import PackageURL
+
+from installers.inventory.parts import LICENCES, PROJECT, InventoryError, Part
+
+__all__ = ["bill", "standard_texts", "write_licences"]
+
+NOTICE = LICENCES.parent / "notice.txt"
+CRATES = "rust-crates.txt"
+_SAME = {"Unicode-DFS-2016": "Unicode-3.0"}
+"""Licences whose words are those of another, with other names for the data."""
+
+
+def write_licences(parts: Iterable[Part], folder: Path, version: str) -> None:
+    """The folder of licence texts and the notice. Raises `InventoryError` for a crate without a text."""
+    made = list(parts)
+    shutil.rmtree(folder / "licences", ignore_errors=True)
+    for part in made:
+        for name, text in part.texts:
+            within = [each for each in (part.within, part.name) if each]
+            target = folder.joinpath(
+                "licences", *(each.replace("/", "-").lstrip("@") for each in within), name
+            )
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(text.encode() if isinstance(text, str) else text.read_bytes())
+    _write_crates([part for part in made if part.kind == "cargo"], folder / "licences")
+    qt = next(part.version for part in made if part.name == "qt")
+    notice = NOTICE.read_text("utf-8")
+    (folder / "NOTICE.txt").write_text(notice.format(version=version, qt=qt), "utf-8", newline="\n")
+
+
+def _write_crates(crates: Sequence[Part], licences: Path) -> None:
+    """A list of all crates with their authors, and the texts of their licences, each once."""
+    if not crates:
+        return
+    lines = {
+        f"{each.name} {each.version}: {each.licence}"
+        + (f"\n    {each.authors}" if each.authors else "")
+        + f"\n    in {', '.join(sorted({other.within for other in crates if _key(other) == _key(each)}))}\n"
+        for each in crates
+    }
+    texts = sorted({name for each in crates for name in standard_texts(each)})
+    words = "Crates of Rust, compiled into what is named below each. The texts of their licences follow.\n\n"
+    words += "".join(sorted(lines))
+    for name in texts:
+        words += f"\n---- {name} ----\n\n{(LICENCES / f'{name}.txt').read_text('utf-8').strip()}\n"
+    licences.mkdir(parents=True, exist_ok=True)
+    (licences / CRATES).write_text(words, "utf-8", newline="\n")
+
+
+def standard_texts(part: Part) -> Sequence[str]:
+    """The names of those of `LICENCES` that a licence expression needs: of alternatives all that we have.
+
+    Raises `InventoryError` when what is asked for besides each other is not there.
+    """
+    needed = list[str]()
+    # AND binds closer than OR without brackets; no crate mixes them so.
+    for alternatives in re.split(r"\s+AND\s+", part.licence):
+        ids = [
+            _SAME.get(each, each)
+            for each in re.findall(r"[A-Za-z][\w.-]*\d[\w.-]*|MIT|ISC|Zlib", alternatives)
+        ]
+        here = [each for each in ids if (LICENCES / f"{each}.txt").is_file()]
+        if not here:
+            raise InventoryError(f"the licence text of {part.name} is missing: {part.licence}")
+        needed += here
+    return needed
+
+
+def bill(parts: Iterable[Part], system: str, epoch: int, version: str) -> str:
+    """The bill of materials as JSON of CycloneDX 1.6; the same parts give the same bill.
+
+    What is compiled into another part is among what that depends on, all else among what Studio does.
+    """
+    made = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_URL, f"{PROJECT}/{version}/{system}/{epoch}"))
+    made.metadata.timestamp = datetime.fromtimestamp(epoch, timezone.utc)
+    studio = made.metadata.component = _component(Part(PROJECT, version, "MIT"), ComponentType.APPLICATION)
+    inside = [part for part in parts if part.name != PROJECT]
+    components = {_key(part): _component(part, ComponentType.LIBRARY) for part in inside}
+    outer: Mapping[str, Component] = {part.name: components[_key(part)] for part in inside if not part.within}
+    for component in components.values():
+        made.components.add(component)
+    for part in inside:
+        made.register_dependency(outer[part.within] if part.within else studio, [components[_key(part)]])
+    return make_outputter(made, OutputFormat.JSON, SchemaVersion.V1_6).output_as_string(indent=1)
+
+
+def _key(part: Part) -> tuple[str, str, str]:
+    return part.kind, part.name, part.version
+
+
+def _component(part: Part, kind: ComponentType) -> Component:
+    licences = [LicenseFactory().make_from_string(part.licence)] if part.licence else []
+    within, _slash, name = part.name.rpartition("/")
+    type_, _slash, distributor = part.kind.partition("/")
+    return Component(
+        name=part.name,
+        version=part.version or None,
+        type=kind,
+        bom_ref=f"{part.kind}/{part.name}@{part.version}",
+        licenses=licences,
+        purl=PackageURL(type_, distributor or within or None, name, part.version or None),
+    )

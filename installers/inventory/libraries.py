@@ -1,0 +1,327 @@
+"""The shared libraries in a frozen program: each has a licence that is told, or the build stops.
+
+PyInstaller takes from the computer that it runs on whatever a program is linked with. A library that nobody
+named here would be given away without its licence.
+"""
+
+from __future__ import annotations
+
+import os
+import pyexpat
+import re
+import shutil
+import sqlite3
+import ssl
+import subprocess
+import sys
+import sysconfig
+import zlib
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from importlib import metadata
+from pathlib import Path, PurePath
+from typing import NamedTuple
+
+from installers.inventory.parts import QT_WHEELS, InventoryError, Part, own_text
+
+__all__ = ["LIBRARIES", "Library", "compiled_files", "library_of", "parts_in_folder"]
+
+
+class Library(NamedTuple):
+    """What files of these names are.
+
+    ``of`` is the part that has them; without one, the package of this computer's system that brought them is
+    a part of its own. ``rights`` and ``texts`` make the licence text when neither has one.
+    """
+
+    files: str
+    licence: str
+    of: str = ""
+    rights: str = ""
+    texts: tuple[str, ...] = ()
+    version: str = ""
+    """A pattern for the name of the file, where that has the version."""
+    is_of_system: bool = False
+    """Whether the system's package comes first, where there is one."""
+
+
+_X = "X11"
+_EXTENSION = r"(?:\.so(?:\.[\d.]+)?|(?:\.[\d.]+)?\.dylib|\.dll)"
+LIBRARIES = (
+    # of wheels
+    Library(r"libzmq(?:-[\w.-]+?)?", "MPL-2.0", "libzmq"),
+    Library(r"libsodium(?:-[\w.-]+?)?", "ISC", "libsodium"),
+    Library(r"libscipy_openblas\w*(?:-\w+)?", "BSD-3-Clause", "openblas"),
+    Library(r"libopenblas[\w-]*(?:\.[\d.]+)?", "BSD-3-Clause", "openblas"),
+    Library(
+        r"lib(?:gfortran|gcc_s)[\w.-]*?", "GPL-3.0-or-later WITH GCC-exception-3.1", "gcc-runtime-library"
+    ),
+    Library(r"libquadmath[\w.-]*?", "LGPL-2.1-or-later", "libquadmath"),
+    Library(r"libpng16(?:-\w+)?", "libpng-2.0", "libpng"),
+    Library(r"libavif(?:-\w+)?", "BSD-2-Clause", "libavif"),
+    Library(
+        r"libaom(?:-\w+)?",
+        "BSD-2-Clause",
+        "libaom",
+        "Copyright (c) 2016, Alliance for Open Media. All rights reserved.",
+        ("BSD-2-Clause", "AOM-patent"),
+        r"[.-](\d+\.\d+\.\d+)\b",
+    ),
+    Library(
+        r"libvmaf",
+        "BSD-2-Clause-Patent",
+        "libvmaf",
+        "Copyright (c) 2020 Netflix, Inc.",
+        ("BSD-2-Clause-Patent",),
+    ),
+    # of Qt's wheels
+    Library(r"libicu(?:data|i18n|uc)", "Unicode-3.0", "icu", "", ("Unicode-3.0",), r"\.so\.(\d+)"),
+    Library(r"(?:lib)?(?:pyside6(?:qml)?|shiboken6)\.abi3(?:\.[\d.]+)?", "LGPL-3.0-only", "qt"),
+    Library(
+        r"opengl32sw",
+        "MIT",
+        "mesa",
+        "Copyright (C) 1999-2007  Brian Paul   All Rights Reserved.\n"
+        "And of LLVM, under the Apache License with LLVM's exception: https://llvm.org/LICENSE.txt",
+        ("MIT", "Apache-2.0"),
+    ),
+    # of Python and of Windows; on Linux of the system
+    Library(r"(?:lib)?python3[\d.]*t?", "PSF-2.0", "cpython"),
+    Library(
+        r"(?:msvcp|vcruntime|concrt|vcamp|vccorlib|vcomp)140[\w-]*|ucrtbase|api-ms-win-[\w-]+",
+        "Microsoft Visual C++ Redistributable",
+        "microsoft-visual-cpp-runtime",
+        "Copyright (c) Microsoft Corporation. All rights reserved.\n\n"
+        "These files may be given away with programs that need them, unchanged:\n"
+        "https://learn.microsoft.com/cpp/windows/redistributing-visual-cpp-files",
+    ),
+    Library(
+        r"lib(?:ssl|crypto)(?:-3[\w-]*)?",
+        "Apache-2.0",
+        "openssl",
+        "Copyright (c) 1998-2025 The OpenSSL Project Authors",
+        ("Apache-2.0",),
+        is_of_system=True,
+    ),
+    Library(
+        r"libffi(?:-\d+)?",
+        "MIT",
+        "libffi",
+        "Copyright (c) 1996-2025  Anthony Green, Red Hat, Inc and others.",
+        ("MIT",),
+        is_of_system=True,
+    ),
+    Library(
+        r"(?:lib)?sqlite3",
+        "blessing",
+        "sqlite",
+        "SQLite is in the public domain: https://sqlite.org/copyright.html",
+        is_of_system=True,
+    ),
+    Library(
+        r"libz|zlib1",
+        "Zlib",
+        "zlib",
+        "Copyright (C) 1995-2024 Jean-loup Gailly and Mark Adler",
+        ("Zlib",),
+        is_of_system=True,
+    ),
+    Library(
+        r"libbz2",
+        "bzip2-1.0.6",
+        "bzip2",
+        "Copyright (C) 1996-2019 Julian R Seward. All rights reserved.",
+        ("bzip2-1.0.6",),
+        is_of_system=True,
+    ),
+    Library(
+        r"liblzma",
+        "0BSD",
+        "xz",
+        "liblzma of XZ Utils, under the BSD Zero Clause License: it may be used, copied, changed and "
+        "given away for any purpose; it is provided as it is, without any warranty.",
+        is_of_system=True,
+    ),
+    Library(
+        r"libmpdec(?:\+\+)?",
+        "BSD-2-Clause",
+        "mpdecimal",
+        "Copyright (c) 2008-2024 Stefan Krah. All rights reserved.",
+        ("BSD-2-Clause",),
+        is_of_system=True,
+    ),
+    Library(
+        r"libexpat",
+        "MIT",
+        "expat",
+        "Copyright (c) 1998-2000 Thai Open Source Software Center Ltd and Clark Cooper\n"
+        "Copyright (c) 2001-2025 Expat maintainers",
+        ("MIT",),
+        is_of_system=True,
+    ),
+    # of Linux: the text is that of the system's package
+    Library(r"libX(?:composite|damage|i|inerama|randr|tst|cursor|ss)|libxkbfile|libxshmfence", _X),
+    Library(r"libxcb(?:-[a-z0-9]+)*", _X),
+    Library(r"libxkbcommon(?:-x11)?|libwayland-\w+", "MIT"),
+    Library(r"libbrotli(?:common|dec|enc)|libcom_err", "MIT"),
+    Library(r"lib(?:gssapi_krb5|k5crypto|krb5|krb5support)", "MIT"),
+    Library(r"libkeyutils", "LGPL-2.1-or-later"),
+    Library(r"lib(?:nspr4|plc4|plds4|smime3|softokn3|ssl3)|libnss\w+|libfreebl\w+", "MPL-2.0"),
+    Library(r"liblz4", "BSD-2-Clause"),
+    Library(r"libzstd", "BSD-3-Clause"),
+    Library(r"libtinfo|libncursesw?|libpanelw?", "X11-distribute-modifications-variant"),
+    Library(r"libtirpc|libnsl|libedit|libbsd|libmd", "BSD-3-Clause"),
+    Library(r"libcrypt", "LGPL-2.1-or-later"),
+)  # fmt: skip
+"""By the beginning of their names, before the suffix and its numbers."""
+_PATTERNS = [(re.compile(f"(?:{each.files}){_EXTENSION}", re.IGNORECASE), each) for each in LIBRARIES]
+_PYTHON_KNOWS = {
+    "expat": pyexpat.EXPAT_VERSION.rpartition("_")[2],
+    "openssl": ssl.OPENSSL_VERSION.split()[1],
+    "sqlite": sqlite3.sqlite_version,
+    "zlib": zlib.ZLIB_RUNTIME_VERSION,
+}
+"""Versions that the interpreter tells which is frozen."""
+_FILMS = re.compile(r"lib(?:av(?:codec|device|filter|format|util)|sw(?:scale|resample)|postproc)[.-]")
+"""The names of FFmpeg's libraries, of which empty ones of our own are in the package (film_libraries.py)."""
+_EMPTY = 96 * 1024
+_QT = re.compile(r"(?:lib)?Qt\w*(?:\.framework)?\b|QtWebEngineProcess")
+_OURS = frozenset({"nep", "nep-studio", "nep.exe", "nep-studio.exe"})
+_MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"\xca\xfe\xba\xbf")
+
+
+def compiled_files(folder: Path) -> Iterator[Path]:
+    """Every file of compiled code in a folder, for whatever system, in order; links are not followed."""
+    for at, folders, names in os.walk(folder):
+        folders.sort()
+        for path in (Path(at, name) for name in sorted(names)):
+            if not path.is_symlink():
+                with path.open("rb") as file:
+                    head = file.read(4)
+                if head in _MAGIC or head[:2] == b"MZ":
+                    yield path
+
+
+def library_of(name: str) -> Library | None:
+    """What a shared library of this name is; None when nobody named it."""
+    return next((library for pattern, library in _PATTERNS if pattern.fullmatch(name)), None)
+
+
+def parts_in_folder(folder: Path, told: Sequence[Part]) -> Iterator[Part]:
+    """The parts that a frozen program's libraries are, and that were not told yet.
+
+    Raises `InventoryError` with a sentence for each library that belongs to nothing, or has no licence text.
+    """
+    known = _names_of_wheels({each.name for each in told if each.kind == "pypi"})
+    names, wrong, libraries = {each.name for each in told}, list[str](), dict[str, Library]()
+    for path in compiled_files(folder):
+        library = library_of(path.name)
+        if library is not None:
+            if library.of not in names:
+                libraries[path.name] = library
+        elif not _is_told(path, known):
+            wrong.append(f"'{path.relative_to(folder)}' is of nothing that is told: put it into LIBRARIES")
+    found = dict[str, Part]()
+    packages = _debian_packages(
+        name for name, library in libraries.items() if library.is_of_system or not library.of
+    )
+    for name, library in libraries.items():
+        part = packages[name].part(library) if name in packages else _carried(name, library)
+        if part is None:
+            wrong.append(f"'{name}' is of no package of this computer, so its licence text is missing")
+        else:
+            found.setdefault(part.name, part)
+    if wrong:
+        raise InventoryError("\n".join(wrong))
+    yield from found.values()
+
+
+class _Known(NamedTuple):
+    extensions: frozenset[str]
+    qt: frozenset[str]
+    python: frozenset[str]
+
+
+def _names_of_wheels(names: Collection[str]) -> _Known:
+    extensions, qt = set[str](), set[str]()
+    for name in names:
+        for file in metadata.distribution(name).files or ():
+            if name in QT_WHEELS and (_QT.match(file.name) or "plugins" in file.parts):
+                qt.add(file.name)
+            elif _is_extension(file):
+                extensions.add(file.name)
+    base = Path(sys.base_prefix)
+    folders = (Path(sysconfig.get_path("stdlib")) / "lib-dynload", base / "DLLs", base)
+    python = {
+        path.name for each in folders if each.is_dir() for path in each.iterdir() if _is_extension(path)
+    }
+    return _Known(frozenset(extensions), frozenset(qt), frozenset(python))
+
+
+def _is_extension(path: PurePath) -> bool:
+    """Whether a file is a module of Python's, and no library that came with it."""
+    return path.suffix in {".pyd", ".so"} and not path.name.startswith("lib")
+
+
+def _is_told(path: Path, known: _Known) -> bool:
+    """Whether a file is a program of ours, a module of what is told, of Qt's, or an empty library of ours."""
+    if path.name in _OURS or path.name in known.extensions or path.name in known.qt:
+        return True
+    if path.name in known.python or (path.name == "Python" and "Python.framework" in path.parts):
+        return True
+    return _FILMS.match(path.name) is not None and path.stat().st_size < _EMPTY
+
+
+def _carried(name: str, library: Library) -> Part | None:
+    """The part that a library is by what is written here; None when that has no licence text."""
+    if not (library.rights or library.texts):
+        return None
+    found = re.search(library.version, name) if library.version else None
+    version = found[1] if found else _PYTHON_KNOWS.get(library.of, "")
+    text = own_text(library.rights, *library.texts)
+    return Part(library.of, version, library.licence, text, "generic")
+
+
+class _DebianPackage(NamedTuple):
+    """A package of Debian's or Ubuntu's that brought a library."""
+
+    name: str
+    version: str
+    text: Path
+
+    def part(self, library: Library) -> Part:
+        """The part that a library of it is."""
+        return Part(self.name, self.version, library.licence, (("copyright", self.text),), _system_kind())
+
+
+def _debian_packages(names: Iterable[str]) -> Mapping[str, _DebianPackage]:
+    """The packages of this computer that have libraries of these names; none without dpkg."""
+    wanted = [f"*/{name}" for name in names]
+    if not wanted or shutil.which("dpkg-query") is None:
+        return {}
+    told = subprocess.run(
+        ["dpkg-query", "--search", *wanted], capture_output=True, text=True, check=False
+    ).stdout
+    # "libssl3:amd64, other: /usr/lib/x86_64-linux-gnu/libssl.so.3"; the shortest path is that of the system
+    lines = sorted((line.partition(": ") for line in told.splitlines()), key=lambda each: -len(each[2]))
+    by_name = {
+        path.rpartition("/")[2]: packages.partition(",")[0].partition(":")[0]
+        for packages, _colon, path in lines
+    }
+    ask = ["dpkg-query", "--show", "--showformat=${Package} ${Version}\n", *sorted(set(by_name.values()))]
+    told = subprocess.run(ask, capture_output=True, text=True, check=False).stdout
+    versions = dict(line.split(" ", 1) for line in told.splitlines())
+    found = {
+        name: _DebianPackage(package, versions.get(package, ""), Path("/usr/share/doc", package, "copyright"))
+        for name, package in by_name.items()
+    }
+    return {name: package for name, package in found.items() if package.text.is_file()}
+
+
+def _system_kind() -> str:
+    """The beginning of the package URL of a system's package: "deb/debian", "deb/ubuntu"."""
+    try:
+        release = Path("/etc/os-release").read_text("utf-8")
+    except OSError:
+        return "deb"
+    found = re.search(r'^ID="?([a-z]+)"?$', release, re.MULTILINE)
+    return f"deb/{found[1]}" if found else "deb"

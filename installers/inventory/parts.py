@@ -1,0 +1,158 @@
+"""The parts of a package: what Python, Qt and the block editor bring, each with its licence."""
+
+from __future__ import annotations
+
+import platform
+import re
+import sys
+import sysconfig
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+__all__ = [
+    "LICENCES",
+    "PROJECT",
+    "QT_WHEELS",
+    "InventoryError",
+    "Part",
+    "Texts",
+    "editor_parts",
+    "others",
+    "own_text",
+    "parts_of",
+]
+
+PROJECT, EXTRA = "nep-studio", "studio"
+LICENCES = Path(__file__).resolve().parent / "licences"
+LICENCE_FILE = re.compile(r"(?:^|[/._-])(?:licen[cs]es?|copying|notice|authors|legal)\b", re.IGNORECASE)
+TEXT_SUFFIX = re.compile(r"(?:\.(?:txt|md|rst|bsd|apache2?|html|\d))?$", re.IGNORECASE)
+"""".0" is that of LICENSE-MPL-2.0."""
+QT_WHEELS = ("pyside6", "pyside6-addons", "pyside6-essentials", "shiboken6")
+LGPL = "LGPL-3.0-only"
+EDITOR_PART = re.compile(r"^(@?[\w./-]+) (\d[\w.-]*) \(([^)\n]+)\)$", re.MULTILINE)
+
+Texts = Sequence[tuple[str, "Path | str"]]
+"""Licence texts: the name of each, and the file that it is in, or the text itself."""
+
+
+class InventoryError(Exception):
+    """Something is inside of which nobody knows the licence; a sentence for each, one a line."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One thing inside: its name and version, the licence as SPDX or in words, and its licence texts.
+
+    ``kind`` is the package URL's type, ``within`` the name of the part that has it compiled in.
+    """
+
+    name: str
+    version: str
+    licence: str
+    texts: Texts = ()
+    kind: str = "pypi"
+    within: str = ""
+    authors: str = ""
+
+
+def own_text(copyright_lines: str, *licences: str) -> Texts:
+    """The text of a part that comes without: who has the rights, and the standard texts of `LICENCES`.
+
+    OSError when there is no such text.
+    """
+    texts = [(LICENCES / f"{each}.txt").read_text("utf-8").strip("\n") for each in licences]
+    return (("LICENSE.txt", "\n\n".join([copyright_lines, *texts]) + "\n"),)
+
+
+def parts_of(project: str = PROJECT, extra: str = EXTRA) -> Iterator[Part]:
+    """The project with all that it needs on this system, each once."""
+    waiting, seen = [Requirement(f"{project}[{extra}]")], set[tuple[str, frozenset[str]]]()
+    told = set[str]()
+    while waiting:
+        wanted = waiting.pop(0)
+        name = canonicalize_name(wanted.name)
+        if (name, frozenset(wanted.extras)) in seen:
+            continue
+        seen.add((name, frozenset(wanted.extras)))
+        found = metadata.distribution(name)
+        for line in found.requires or ():
+            needed = Requirement(line)
+            if needed.marker is None or any(
+                needed.marker.evaluate({"extra": each}) for each in ("", *wanted.extras)
+            ):
+                waiting.append(needed)
+        if name not in told:
+            told.add(name)
+            licence = _licence(found)
+            yield Part(name, found.version, licence, tuple(_texts(found)) or _common_text(licence, name))
+
+
+def _licence(found: metadata.Distribution) -> str:
+    """What it says of its licence: an SPDX expression where it has one."""
+    said = found.metadata.get_all("License-Expression") or found.metadata.get_all("License") or []
+    classes = [
+        each.rpartition(" :: ")[2]
+        for each in found.metadata.get_all("Classifier") or ()
+        if each.startswith("License :: ")
+    ]
+    short = [each for each in said if each and len(each) < 100 and "\n" not in each]
+    return str(short[0]) if short else " OR ".join(classes)
+
+
+def _common_text(licence: str, name: str) -> Texts:
+    """For a distribution that comes without: the text, if it is one that we have."""
+    if name in QT_WHEELS or "apache" not in licence.lower():
+        return ()
+    text = LICENCES / "Apache-2.0.txt"
+    return ((text.name, text),)
+
+
+def _texts(found: metadata.Distribution) -> Iterator[tuple[str, Path]]:
+    """Its licence texts: the name of each below the folder of the distribution, and the file."""
+    if canonicalize_name(found.metadata["Name"]) in QT_WHEELS:
+        return
+    for file in found.files or ():
+        path = Path(str(found.locate_file(file)))
+        is_text = TEXT_SUFFIX.fullmatch(file.suffix) is not None
+        is_beside = ".dist-info" in file.parts[0] or len(file.parts) <= 2
+        if is_text and is_beside and LICENCE_FILE.search("/".join(file.parts[-2:])) and path.is_file():
+            yield "-".join(each for each in file.parts[1:] if each != "licenses"), path
+
+
+def others(resources: Path) -> Iterator[Part]:
+    """What is inside and is no distribution of Python's."""
+    yield Part("cpython", platform.python_version(), "PSF-2.0", _texts_of_python(), "generic")
+    qt = metadata.version("PySide6-Essentials")
+    own = [(each.name, each) for each in sorted(LICENCES.glob("*GPL-3*"))]
+    yield Part("qt", qt, LGPL, own, "generic")
+    loader = metadata.distribution("pyinstaller")
+    yield Part(
+        "pyinstaller", loader.version, "GPL-2.0-or-later WITH Bootloader-exception", tuple(_texts(loader))
+    )
+    yield from editor_parts(resources / "blockly" / "LEGAL.txt")
+    fonts = resources / "fonts"
+    for name in ("Inter", "JetBrainsMono"):
+        text = fonts / f"LICENSE-{name}.txt"
+        yield Part(name.lower(), "", "OFL-1.1", [(text.name, text)], "generic")
+    icons = resources / "icons" / "LICENSE.txt"
+    yield Part("lucide", "", "ISC", [(icons.name, icons)], "npm")
+
+
+def _texts_of_python(base: Path = Path(sys.base_prefix)) -> Texts:
+    """This Python's own text, which tells on Windows of what was added; Debian's has none: then ours."""
+    beside = (
+        base / "LICENSE.txt",
+        Path(sysconfig.get_path("stdlib", vars={"installed_base": str(base)})) / "LICENSE.txt",
+    )
+    return [("LICENSE.txt", next(filter(Path.is_file, beside), LICENCES / "PSF-2.0.txt"))]
+
+
+def editor_parts(legal: Path) -> Iterator[Part]:
+    """What is in the block editor's page, as the bundler wrote it down."""
+    for found in EDITOR_PART.finditer(legal.read_text("utf-8")):
+        yield Part(found[1], found[2], found[3], [(legal.name, legal)], "npm")

@@ -1,0 +1,304 @@
+"""What is compiled into wheels and is no distribution of Python's: libraries in C and C++, crates of Rust.
+
+A wheel that brings a bill of materials of its own (PEP 770) is asked. Of the others each has a function here,
+which reads the versions out of what is installed, so that they are those of the package.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import zmq
+from packaging.utils import canonicalize_name
+from pynng import lib as nng  # type: ignore[import-untyped]
+
+from installers.inventory.parts import LICENCES, InventoryError, Part, Texts, own_text
+
+__all__ = ["parts_in_wheels", "parts_of_build", "parts_of_crates", "version_in"]
+
+COMPILED = (".so", ".pyd", ".dll", ".dylib")
+NUMPY_PART = re.compile(
+    r"^Name: (.+)\nFiles: .+\nDescription: .+\nAvailability: .+\nLicense: (.+)$", re.MULTILINE
+)
+BUILD = re.compile(rb"General configuration for OpenCV[^\0]+")
+CRATE = re.compile(rb"registry[/\\]src[/\\][^/\\]+[/\\]([A-Za-z0-9_-]+?)-(\d+\.\d+\.\d+[A-Za-z0-9.+-]*)[/\\]")
+CRATES = {
+    "arc-swap": "MIT OR Apache-2.0",
+    "libc": "MIT OR Apache-2.0",
+    "once_cell": "MIT OR Apache-2.0",
+    "pyo3": "MIT OR Apache-2.0",
+    "pyo3-ffi": "MIT OR Apache-2.0",
+    "pyo3-log": "Apache-2.0 OR MIT",
+    "serde_core": "MIT OR Apache-2.0",
+    "sha1_smol": "BSD-3-Clause",
+    "toml": "MIT OR Apache-2.0",
+    "toml_datetime": "MIT OR Apache-2.0",
+    "toml_parser": "MIT OR Apache-2.0",
+    "toml_writer": "MIT OR Apache-2.0",
+    "winnow": "MIT",
+}
+"""Of the crates in iceoryx2, whose wheel has no bill of materials: its library has names and versions."""
+
+
+class Bundled(NamedTuple):
+    """What OpenCV's list calls a part: its usual name, its licence, where the version is, who has rights.
+
+    Without the latter its text is in OpenCV's list of third parties, or it has the standard one.
+    """
+
+    name: str
+    licence: str
+    version: str = ""
+    rights: str = ""
+    texts: tuple[str, ...] = ()
+
+
+IN_OPENCV: Mapping[str, Bundled | None] = {
+    "ade": Bundled("ade", "Apache-2.0", texts=("Apache-2.0",), rights="Copyright (c) Intel Corporation"),
+    "avif": Bundled(
+        "libavif",
+        "BSD-2-Clause",
+        r"AVIF:\s+avif \(ver ([\d.]+)\)",
+        "Copyright 2019 Joe Drago\nCopyright 2018-2019, VideoLAN and dav1d authors\n"
+        "Copyright 2018, Two Orioles, LLC\nCopyright 2022 Google LLC",
+        ("BSD-2-Clause",),
+    ),
+    "flatbuffers": Bundled(
+        "flatbuffers",
+        "Apache-2.0",
+        r"Flatbuffers:\s+builtin/3rdparty \(([\d.]+)\)",
+        "Copyright Google Inc.",
+        ("Apache-2.0",),
+    ),
+    "IlmImf": Bundled(
+        "openexr",
+        "BSD-3-Clause",
+        r"OpenEXR:\s+build \(ver ([\d.]+)\)",
+        "Copyright (c) 2002-2018, Industrial Light & Magic, a division of Lucas Digital Ltd. LLC\n"
+        "Copyright (c) 2009-2014, DreamWorks Animation LLC\nCopyright (c) 2007-2013, Weta Digital Ltd\n"
+        "Copyright (c) 2012, Autodesk, Inc.\nCopyright (c) 2004, Pixar Animation Studios",
+        ("BSD-3-Clause",),
+    ),
+    "ippicv": Bundled(
+        "ipp-icv",
+        "Intel Simplified Software License",
+        r"Intel IPP:\s+([\d.]+)",
+        "Intel(R) Integrated Performance Primitives (Intel(R) IPP): Copyright (C) Intel Corporation",
+        ("ISSL",),
+    ),
+    "ippiw": None,  # sources of Intel IPP, with which it comes
+    "ipphal": None,  # OpenCV's own
+    "ittnotify": Bundled(
+        "ittapi",
+        "BSD-3-Clause OR GPL-2.0-only",
+        r"Intel ITT\(([\d.]+)\)",
+        "Copyright (c) Intel Corporation. All rights reserved.",
+        ("BSD-3-Clause",),
+    ),
+    "kleidicv": Bundled(
+        "kleidicv",
+        "Apache-2.0",
+        r"KleidiCV \(ver ([\d.]+)\)",
+        "Copyright Arm Limited and/or its affiliates",
+        ("Apache-2.0",),
+    ),
+    "kleidicv_hal": None,
+    "kleidicv_thread": None,
+    "libjpeg-turbo": Bundled(
+        "libjpeg-turbo",
+        "IJG AND BSD-3-Clause AND Zlib",
+        r"libjpeg-turbo \(ver ([\d.]+)",
+        "This software is based in part on the work of the Independent JPEG Group.\n"
+        "Copyright (C) 1991-2020, Thomas G. Lane, Guido Vollbeding\n"
+        "Copyright (C) 2009-2025, D. R. Commander\nCopyright (C) 1999-2006, MIYASAKA Masaru\n"
+        "Copyright (C) 2015, Viktor Szathmáry",
+        ("IJG", "BSD-3-Clause", "Zlib"),
+    ),
+    "libopenjp2": Bundled("openjpeg", "BSD-2-Clause", r"JPEG 2000:\s+build \(ver ([\d.]+)\)"),
+    "libpng": Bundled("libpng", "libpng-2.0", r"PNG:\s+(?:build|\S+) \(ver ([\d.]+)\)"),
+    "libprotobuf": Bundled(
+        "protobuf",
+        "BSD-3-Clause",
+        r"Protobuf:\s+build \(([\d.]+)\)",
+        "Copyright 2008 Google Inc. All rights reserved.",
+        ("BSD-3-Clause",),
+    ),
+    "libtiff": Bundled(
+        "libtiff",
+        "libtiff",
+        r"TIFF:\s+build \(ver \d+ - ([\d.]+)\)",
+        "Copyright (c) 1988-1997 Sam Leffler\nCopyright (c) 1991-1997 Silicon Graphics, Inc.",
+        ("libtiff",),
+    ),
+    "libwebp": Bundled(
+        "libwebp",
+        "BSD-3-Clause",
+        rights="Copyright (c) 2010, Google Inc. All rights reserved.",
+        texts=("BSD-3-Clause",),
+    ),
+    "tegra_hal": Bundled(
+        "carotene",
+        "BSD-3-Clause",
+        r"carotene \(ver ([\d.]+)",
+        "Copyright (C) 2012-2016, NVIDIA Corporation, all rights reserved.",
+        ("BSD-3-Clause",),
+    ),
+    "zlib": Bundled("zlib", "Zlib", r"ZLib:\s+build \(ver ([\d.]+)\)"),
+}
+"""By the names of "3rdparty dependencies" in what OpenCV tells of its build; None is nothing of its own."""
+
+
+def version_in(path: Path, pattern: bytes) -> str:
+    """The first group that a pattern finds in a file, which may be large; "" when there is none."""
+    if path.stat().st_size == 0:
+        return ""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        found = re.search(pattern, content)
+        return found[1].decode() if found else ""
+
+
+def parts_in_wheels(parts: Iterable[Part]) -> Iterator[Part]:
+    """What is compiled into the distributions among these. Raises `InventoryError` for what is not known."""
+    for part in parts:
+        if part.kind != "pypi":
+            continue
+        found = metadata.distribution(part.name)
+        yield from _crates_of(found, part.name)
+        if part.name in _KNOWN:
+            yield from _KNOWN[part.name](found)
+
+
+def parts_of_crates(bill: Mapping[str, Any], within: str) -> Iterator[Part]:
+    """The crates of a bill of materials as Cargo's tool writes it; what only built the wheel is left out."""
+    for each in bill.get("components", ()):
+        if str(each.get("purl", "")).startswith("pkg:cargo/") and each.get("scope") != "excluded":
+            said: Mapping[str, Any] = next(iter(each.get("licenses", ())), {})
+            licence = said.get("expression") or said.get("license", {}).get("id", "")
+            if not licence:
+                raise InventoryError(f"the crate '{each['name']}' in {within} tells no licence")
+            authors = str(each.get("author", ""))
+            yield Part(each["name"], each["version"], licence, (), "cargo", within, authors)
+
+
+def parts_of_build(told: str, theirs: Texts) -> Iterator[Part]:
+    """What OpenCV says of its build is inside of it, with the text of its third parties for some."""
+    names = _words(told, "3rdparty dependencies")
+    names += [each for each in _words(told, "Extra dependencies") if each == "avif"]
+    names += [name for name, line in (("flatbuffers", "Flatbuffers:  "), ("libpng", "PNG: ")) if line in told]
+    for name in dict.fromkeys(names):
+        if name not in IN_OPENCV:
+            raise InventoryError(f"OpenCV has '{name}' inside: put it with its licence into IN_OPENCV")
+        known = IN_OPENCV[name]
+        if known is not None:
+            found = re.search(known.version, told) if known.version else None
+            texts = own_text(known.rights, *known.texts) if known.texts else theirs
+            version = found[1] if found else ""
+            yield Part(known.name, version, known.licence, texts, "generic", "opencv-python-headless")
+
+
+def _words(told: str, line: str) -> list[str]:
+    found = re.search(rf"{line}:(.*)", told)
+    return found[1].split() if found else []
+
+
+def _compiled(found: metadata.Distribution) -> Iterator[Path]:
+    for file in found.files or ():
+        path = Path(str(found.locate_file(file)))
+        if (file.suffix in COMPILED or ".so." in file.name) and path.is_file():
+            yield path
+
+
+def _file(found: metadata.Distribution, name: str) -> Texts:
+    """One licence text of a distribution by the end of its name. Raises `InventoryError`."""
+    for file in found.files or ():
+        if str(file).endswith(name) and ".dist-info" in file.parts[0]:
+            return ((file.name, Path(str(found.locate_file(file)))),)
+    raise InventoryError(f"{found.metadata['Name']} has no '{name}' any more: look for the text")
+
+
+def _first(found: metadata.Distribution, pattern: bytes) -> str:
+    return next(filter(None, (version_in(path, pattern) for path in _compiled(found))), "")
+
+
+def _crates_of(found: metadata.Distribution, within: str) -> Iterator[Part]:
+    for file in found.files or ():
+        if "sboms" in file.parts and file.suffix == ".json":
+            bill = json.loads(Path(str(found.locate_file(file))).read_text("utf-8"))
+            yield from parts_of_crates(bill, within)
+
+
+def _in_iceoryx2(found: metadata.Distribution) -> Iterator[Part]:
+    crates = {pair for path in _compiled(found) for pair in CRATE.findall(path.read_bytes())}
+    for name, version in sorted((name.decode(), version.decode()) for name, version in crates):
+        if name not in CRATES:
+            raise InventoryError(
+                f"iceoryx2 has the crate '{name}' inside: put it with its licence into CRATES"
+            )
+        yield Part(name, version, CRATES[name], (), "cargo", "iceoryx2")
+
+
+def _in_numpy(found: metadata.Distribution) -> Iterator[Part]:
+    """As its licence tells: OpenBLAS, LAPACK, the run-time library of GCC's Fortran."""
+    text = _file(found, "licenses/LICENSE.txt")
+    blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]["version"]
+    inside = NUMPY_PART.findall(Path(text[0][1]).read_text("utf-8"))
+    if "OpenBLAS" not in {name for name, _licence in inside}:
+        raise InventoryError("numpy tells in another way what is inside: see NUMPY_PART")
+    for name, licence in inside:
+        version = str(blas) if name == "OpenBLAS" else ""
+        texts = [*text]
+        if licence.startswith("LGPL-2.1"):
+            texts.append(("LGPL-2.1.txt", LICENCES / "LGPL-2.1.txt"))
+        yield Part(canonicalize_name(name.replace(" ", "-")), version, licence, texts, "generic", "numpy")
+
+
+def _in_opencv(found: metadata.Distribution) -> Iterator[Part]:
+    told = next(
+        (each[0] for each in (BUILD.search(path.read_bytes()) for path in _compiled(found)) if each), b""
+    )
+    if not told:
+        raise InventoryError("OpenCV's library does not tell any more what was built into it")
+    yield from parts_of_build(told.decode("utf-8", "replace"), _file(found, "LICENSE-3RD-PARTY.txt"))
+
+
+def _in_pynng(found: metadata.Distribution) -> Iterator[Part]:
+    version = f"{nng.NNG_MAJOR_VERSION}.{nng.NNG_MINOR_VERSION}.{nng.NNG_PATCH_VERSION}"
+    rights = (
+        "Copyright 2018-2025 Staysail Systems, Inc. <info@staysail.tech>\n"
+        "Copyright 2018 Capitar IT Group BV <info@capitar.com>\n"
+        "Copyright 2018 Devolutions <info@devolutions.net>\n"
+        "Copyright 2017 Garrett D'Amore <garrett@damore.org>"
+    )
+    yield Part("nng", version, "MIT", own_text(rights, "MIT"), "generic", "pynng")
+    mbed = _first(found, rb"Mbed TLS (\d+\.\d+\.\d+)")
+    text = own_text("Copyright The Mbed TLS Contributors", "Apache-2.0")
+    yield Part("mbedtls", mbed, "Apache-2.0 OR GPL-2.0-or-later", text, "generic", "pynng")
+
+
+def _in_pyside(found: metadata.Distribution) -> Iterator[Part]:
+    version = _first(found, rb"Chrome/(\d+\.\d+\.\d+\.\d+)")
+    text = own_text("Copyright 2015 The Chromium Authors", "BSD-3-Clause")
+    yield Part("chromium", version, "BSD-3-Clause", text, "generic", "qt")
+
+
+def _in_pyzmq(found: metadata.Distribution) -> Iterator[Part]:
+    zeromq, sodium = _file(found, "LICENSE.zeromq.txt"), _file(found, "LICENSE.libsodium.txt")
+    yield Part("libzmq", zmq.zmq_version(), "MPL-2.0", zeromq, "generic", "pyzmq")
+    yield Part("libsodium", _first(found, rb"\0(1\.0\.\d\d)\0"), "ISC", sodium, "generic", "pyzmq")
+
+
+_KNOWN: Mapping[str, Callable[[metadata.Distribution], Iterator[Part]]] = {
+    "iceoryx2": _in_iceoryx2,
+    "numpy": _in_numpy,
+    "opencv-python-headless": _in_opencv,
+    "pynng": _in_pynng,
+    "pyside6-addons": _in_pyside,
+    "pyzmq": _in_pyzmq,
+}

@@ -1,0 +1,56 @@
+"""What Python, Qt and the block editor bring into a package, each with its licence."""
+
+from __future__ import annotations
+
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+from installers.inventory.parts import LICENCES, _texts_of_python, editor_parts, others, own_text, parts_of
+
+RESOURCES = Path(__file__).parents[3] / "resources"
+WITHOUT_TEXT = {"pyside6", "pyside6-addons", "pyside6-essentials", "shiboken6"}
+"""Qt's text is under `qt`."""
+
+
+def test_every_distribution_inside_is_told_once_with_its_licence() -> None:
+    parts = list(parts_of())
+    names = [each.name for each in parts]
+    assert len(names) == len(set(names))
+    assert {"nep-studio", "pyzmq", "pyside6-essentials", "numpy", "pynng", "cffi", "jsonschema"} <= set(names)
+    assert not {"pytest", "mypy", "eclipse-zenoh", "cyclonedds"} & set(names), "they are not in a package"
+    assert [each.name for each in parts if not each.licence] == []
+    assert [each.version for each in parts] == [metadata.version(each.name) for each in parts]
+
+
+def test_all_have_their_licence_text() -> None:
+    parts = [*parts_of(), *others(RESOURCES)]
+    assert {each.name for each in parts if not each.texts} <= WITHOUT_TEXT
+
+
+def test_a_text_with_a_number_at_its_end_is_one() -> None:
+    (orjson,) = (each for each in parts_of() if each.name == "orjson")
+    assert "LICENSE-MPL-2.0" in {name for name, _text in orjson.texts}
+
+
+def test_pythons_licence_is_there_whether_it_has_one_or_not(tmp_path: Path) -> None:
+    assert _texts_of_python(tmp_path) == [("LICENSE.txt", LICENCES / "PSF-2.0.txt")]
+    (tmp_path / "LICENSE.txt").write_text("that of Python for Windows", "utf-8")
+    assert _texts_of_python(tmp_path) == [("LICENSE.txt", tmp_path / "LICENSE.txt")]
+
+
+def test_a_text_of_ours_says_who_has_the_rights_and_under_what() -> None:
+    ((name, text),) = own_text("Copyright Ana", "MIT", "Zlib")
+    assert name == "LICENSE.txt"
+    assert isinstance(text, str)
+    assert text.startswith("Copyright Ana\n\nPermission is hereby granted")
+    assert text.endswith("source distribution.\n")
+    with pytest.raises(OSError, match="WTFPL"):
+        own_text("Copyright Ana", "WTFPL")
+
+
+def test_the_editors_parts_are_read_from_what_its_bundler_wrote() -> None:
+    parts = {each.name: each for each in editor_parts(RESOURCES / "blockly" / "LEGAL.txt")}
+    assert parts["blockly"].version.startswith("13.")
+    assert parts["blockly"].licence == "Apache-2.0"
