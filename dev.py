@@ -190,7 +190,8 @@ def script(
 
 def package(computer: Computer, arguments: Sequence[str]) -> int:
     """Make the packages out of an environment that has only what goes into them; the exit code."""
-    python = environment(computer, sys.executable, ROOT / "build" / "package" / "env", "package")
+    folder = ROOT / "build" / "package" / "env"
+    python = environment(computer, sys.executable, folder, "package", is_for_oldest=True)
     ours = [*pip(python), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
     if computer.do(ours, computer.environ, None) != 0:
         raise Trouble("Studio could not be installed; pip's own words are above")

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 import dev
+from installers.macos import information
 from tools.computer import ROOT, Computer, Trouble, venv_python
-from tools.versions import PROMISED, found, versions
+from tools.versions import OLDEST_MACOS, PROMISED, environment, found, versions
 
 HERE = "{}.{}".format(*sys.version_info[:2])
 OTHERS = [each for each in PROMISED if each != HERE]
@@ -37,8 +38,8 @@ class Pythons:
             Path(command[-1]).mkdir(parents=True)
         return int(any(Path(each).name == self.fails for each in self.ran[-1]))
 
-    def computer(self) -> Computer:
-        return Computer(platform="linux", environ={}, which=self.path.get, ask=self.ask, do=self.do)
+    def computer(self, platform: str = "linux", machine: str = "x86_64") -> Computer:
+        return Computer(platform, machine, {}, which=self.path.get, ask=self.ask, do=self.do)
 
 
 def here(**others: str) -> dict[str, str]:
@@ -109,6 +110,30 @@ def test_arguments_reach_pytest_and_folders_of_a_person_are_instead_of_ours(tmp_
         system = Pythons(here())
         versions(system.computer(), ["--only", HERE, "--", *given], tmp_path, tmp_path)
         assert system.ran[-1][4:] == rest
+
+
+def test_what_is_packaged_on_a_mac_is_made_of_wheels_for_the_oldest_macos(tmp_path: Path) -> None:
+    system = Pythons({})
+    mac = system.computer("darwin", "arm64")
+    environment(mac, "python3", tmp_path / "env", "package", is_for_oldest=True)
+    _venv, download, install = system.ran
+    assert download[2:4] == ["pip", "download"]
+    assert f"macosx_{OLDEST_MACOS}_arm64" in download
+    assert {"--no-deps", "--only-binary=:all:", "--require-hashes"} <= set(download)
+    assert {"--no-index", "--no-deps", "--require-hashes"} <= set(install)
+    assert download[download.index("--dest") + 1] == install[install.index("--find-links") + 1]
+    assert {OLDEST_MACOS} == {each.replace(".", "_") for each in information.OLDEST_MACOS.values()}
+
+
+@pytest.mark.parametrize(("platform", "is_for_oldest"), [("darwin", False), ("linux", True), ("win32", True)])
+def test_elsewhere_pip_chooses_the_wheels(platform: str, is_for_oldest: bool, tmp_path: Path) -> None:
+    system = Pythons({})
+    environment(
+        system.computer(platform), "python3", tmp_path / "env", "package", is_for_oldest=is_for_oldest
+    )
+    _venv, install = system.ran
+    assert install[2:4] == ["pip", "install"]
+    assert "--no-index" not in install
 
 
 @pytest.mark.parametrize(

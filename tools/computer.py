@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from platform import machine
 
 ROOT = Path(__file__).resolve().parents[1]
 END_S = 10.0
@@ -60,6 +61,7 @@ class Computer:
     """What we run on, and the only way that we touch it."""
 
     platform: str = sys.platform
+    machine: str = machine()
     environ: Mapping[str, str] = field(default_factory=lambda: dict(os.environ))
     root: bool = hasattr(os, "geteuid") and os.geteuid() == 0
     version: tuple[int, int] = sys.version_info[:2]

@@ -28,6 +28,8 @@ FOLDER = ROOT / "build" / "versions"
 TESTS = ("tests/nep", "tests/interop")
 WHO = "import sys; print('{}.{}'.format(*sys.version_info[:2]), sys.implementation.name, sys.executable)"
 PYENV = ".pyenv/versions"
+OLDEST_MACOS = "13_0"
+"""As wheels write it: what a package for macOS must run on (installers/macos/information.py)."""
 
 
 @dataclass(frozen=True)
@@ -86,15 +88,29 @@ def _stamp(requirements: str) -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in made_of)).hexdigest()
 
 
-def environment(computer: Computer, python: str, folder: Path, requirements: str) -> Path:
-    """The interpreter of an environment with the pinned packages of one file."""
+def environment(
+    computer: Computer, python: str, folder: Path, requirements: str, *, is_for_oldest: bool = False
+) -> Path:
+    """The interpreter of an environment with the pinned packages of one file.
+
+    ``is_for_oldest``: on a Mac the wheels are those that `OLDEST_MACOS` runs, too. pip takes the newest that
+    this Mac runs: of numpy one that is made for macOS 14.
+    """
     made = venv_python(folder, computer.platform)
     stamp = folder / "nep-stamp"
     if stamp.is_file() and stamp.read_text(encoding="utf-8") == _stamp(requirements):
         return made
-    install = [*pip(made), "--require-hashes", "-r", f"requirements/{requirements}.txt"]
+    pinned = ["--require-hashes", "-r", f"requirements/{requirements}.txt"]
+    steps = [[python, "-m", "venv", "--clear", str(folder)], [*pip(made), *pinned]]
+    if is_for_oldest and computer.platform == "darwin":
+        wheels, platform = str(folder / "wheels"), f"macosx_{OLDEST_MACOS}_{computer.machine}"
+        chosen = ["--no-deps", "--only-binary=:all:", "--platform", platform, "--dest", wheels]
+        steps[1:] = [
+            [str(made), "-m", "pip", "download", "--disable-pip-version-check", "--quiet", *chosen, *pinned],
+            [*pip(made), "--no-deps", "--no-index", "--find-links", wheels, *pinned],
+        ]
     with timed(f"making the environment {folder.name}"):
-        for step in ([python, "-m", "venv", "--clear", str(folder)], install):
+        for step in steps:
             if computer.do(step, computer.environ, None) != 0:
                 raise Trouble(f"{folder} could not be made; the words of Python or pip are above")
     stamp.write_text(_stamp(requirements), encoding="utf-8")

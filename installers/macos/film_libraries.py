@@ -1,8 +1,8 @@
 """OpenCV without what plays films, as on Linux (`installers.linux.film_libraries`).
 
-On Apple silicon OpenCV's wheel brings an FFmpeg with x264, x265, Rubber Band and vid.stab, which is under the
-GNU General Public License. Studio never asks for a film, so empty libraries take its place, and what only
-FFmpeg needed goes. The programs switch that part of OpenCV off when they start (`installers/entries`).
+OpenCV's wheels bring an FFmpeg with x264 and x265, on Apple silicon also Rubber Band and vid.stab, which is
+under the GNU General Public License. Studio never asks for a film, so empty libraries take its place, and
+what only FFmpeg needed goes. The programs switch that part of OpenCV off when they start (`entries`).
 """
 
 from __future__ import annotations

@@ -28,8 +28,8 @@ __all__ = [
 
 BUNDLE_ID = "org.nep.studio"
 PROGRAM = "nep-studio"
-OLDEST_MACOS: Mapping[str, str] = {"arm64": "13.0", "x86_64": "14.0"}
-"""The oldest macOS by processor: Qt 6.11 is made for 13, OpenCV 4.14 for Intel only for 14."""
+OLDEST_MACOS: Mapping[str, str] = {"arm64": "13.0", "x86_64": "13.0"}
+"""The oldest macOS by processor: that for which Qt 6.11 is made, and OpenCV (for Intel 4.12, no newer)."""
 APP_ICON, DOCUMENT_ICON = "nep-studio.icns", "behaviour.icns"
 LANGUAGES = ("en", "es")
 

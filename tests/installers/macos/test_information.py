@@ -90,7 +90,7 @@ def test_the_application_is_seen_and_looks_sharp() -> None:
     assert told["NSHighResolutionCapable"] is True
 
 
-@pytest.mark.parametrize(("machine", "oldest"), [("arm64", "13.0"), ("x86_64", "14.0")])
+@pytest.mark.parametrize(("machine", "oldest"), [("arm64", "13.0"), ("x86_64", "13.0")])
 def test_the_oldest_macos_is_that_of_the_libraries_for_the_processor(machine: str, oldest: str) -> None:
     assert information(__version__, machine)["LSMinimumSystemVersion"] == oldest
 
