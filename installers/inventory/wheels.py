@@ -27,6 +27,7 @@ COMPILED = (".so", ".pyd", ".dll", ".dylib")
 NUMPY_PART = re.compile(
     r"^Name: (.+)\nFiles: .+\nDescription: .+\nAvailability: .+\nLicense: (.+)$", re.MULTILINE
 )
+WEB_ENGINE = re.compile(r"(?:lib)?Qt6?WebEngineCore(?:\.so\.\d+|\.dll)?")
 BUILD = re.compile(rb"General configuration for OpenCV[^\0]+")
 CRATE = re.compile(rb"registry[/\\]src[/\\][^/\\]+[/\\]([A-Za-z0-9_-]+?)-(\d+\.\d+\.\d+[A-Za-z0-9.+-]*)[/\\]")
 CRATES = {
@@ -216,11 +217,12 @@ def _compiled(found: metadata.Distribution) -> Iterator[Path]:
 
 
 def _file(found: metadata.Distribution, name: str) -> Texts:
-    """One licence text of a distribution by the end of its name. Raises `InventoryError`."""
-    for file in found.files or ():
-        if str(file).endswith(name) and ".dist-info" in file.parts[0]:
-            return ((file.name, Path(str(found.locate_file(file)))),)
-    raise InventoryError(f"{found.metadata['Name']} has no '{name}' any more: look for the text")
+    """A licence text of a distribution, the uppermost of that name. Raises `InventoryError`."""
+    there = [file for file in found.files or () if file.name == name and ".dist-info" in file.parts[0]]
+    if not there:
+        raise InventoryError(f"{found.metadata['Name']} has no '{name}' any more: look for the text")
+    file = min(there, key=lambda each: len(each.parts))
+    return ((name, Path(str(found.locate_file(file)))),)
 
 
 def _first(found: metadata.Distribution, pattern: bytes) -> str:
@@ -246,7 +248,7 @@ def _in_iceoryx2(found: metadata.Distribution) -> Iterator[Part]:
 
 def _in_numpy(found: metadata.Distribution) -> Iterator[Part]:
     """As its licence tells: OpenBLAS, LAPACK, the run-time library of GCC's Fortran."""
-    text = _file(found, "licenses/LICENSE.txt")
+    text = _file(found, "LICENSE.txt")
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]["version"]
     inside = NUMPY_PART.findall(Path(text[0][1]).read_text("utf-8"))
     if "OpenBLAS" not in {name for name, _licence in inside}:
@@ -283,7 +285,11 @@ def _in_pynng(found: metadata.Distribution) -> Iterator[Part]:
 
 
 def _in_pyside(found: metadata.Distribution) -> Iterator[Part]:
-    version = _first(found, rb"Chrome/(\d+\.\d+\.\d+\.\d+)")
+    engine = (
+        Path(str(found.locate_file(each))) for each in found.files or () if WEB_ENGINE.fullmatch(each.name)
+    )
+    versions = (version_in(path, rb"Chrome/(\d+\.\d+\.\d+\.\d+)") for path in engine if path.is_file())
+    version = next(filter(None, versions), "")
     text = own_text("Copyright 2015 The Chromium Authors", "BSD-3-Clause")
     yield Part("chromium", version, "BSD-3-Clause", text, "generic", "qt")
 

@@ -59,6 +59,29 @@ def test_versions_are_those_of_what_is_installed(wheel: str, name: str) -> None:
     assert re.fullmatch(r"\d+\.\d+(\.\d+)+", parts_of_wheel(wheel)[name].version)
 
 
+def test_the_browser_inside_qt_has_its_version() -> None:
+    assert re.fullmatch(r"\d+\.0\.\d+\.\d+", parts_of_wheel("pyside6-addons")["chromium"].version)
+
+
+@pytest.mark.parametrize("folder", ["", "licenses/", "licenses/licenses/"])
+def test_a_text_is_found_in_old_and_new_wheels_and_the_uppermost_counts(folder: str, tmp_path: Path) -> None:
+    info = tmp_path / "made_up-1.dist-info"
+    names = [
+        f"{info.name}/{folder}LICENSE.txt",
+        f"{info.name}/{folder}deeper/LICENSE.txt",
+        "other/LICENSE.txt",
+    ]
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("words", "utf-8")
+    (info / "METADATA").write_text("Name: made-up\nVersion: 1\n", "utf-8")
+    (info / "RECORD").write_text("".join(f"{name},,\n" for name in reversed(names)), "utf-8")
+    found = metadata.Distribution.at(info)
+    assert wheels._file(found, "LICENSE.txt") == (("LICENSE.txt", tmp_path / names[0]),)
+    with pytest.raises(InventoryError, match="made-up has no 'COPYING' any more"):
+        wheels._file(found, "COPYING")
+
+
 def test_a_package_of_the_system_or_of_the_editor_is_no_wheel() -> None:
     assert list(parts_in_wheels([Part("libssl3", "3", "Apache-2.0", (), "deb/debian")])) == []
 
