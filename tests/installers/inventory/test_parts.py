@@ -7,15 +7,27 @@ from pathlib import Path
 
 import pytest
 
-from installers.inventory.parts import LICENCES, _texts_of_python, editor_parts, others, own_text, parts_of
+from installers.inventory.parts import (
+    LICENCES,
+    Part,
+    _texts_of_python,
+    editor_parts,
+    others,
+    own_text,
+    parts_of,
+)
 
 RESOURCES = Path(__file__).parents[3] / "resources"
 WITHOUT_TEXT = {"pyside6", "pyside6-addons", "pyside6-essentials", "shiboken6"}
 """Qt's text is under `qt`."""
 
 
-def test_every_distribution_inside_is_told_once_with_its_licence() -> None:
-    parts = list(parts_of())
+@pytest.fixture(scope="module")
+def parts() -> list[Part]:
+    return list(parts_of())
+
+
+def test_every_distribution_inside_is_told_once_with_its_licence(parts: list[Part]) -> None:
     names = [each.name for each in parts]
     assert len(names) == len(set(names))
     assert {"nep-studio", "pyzmq", "pyside6-essentials", "numpy", "pynng", "cffi", "jsonschema"} <= set(names)
@@ -24,13 +36,12 @@ def test_every_distribution_inside_is_told_once_with_its_licence() -> None:
     assert [each.version for each in parts] == [metadata.version(each.name) for each in parts]
 
 
-def test_all_have_their_licence_text() -> None:
-    parts = [*parts_of(), *others(RESOURCES)]
-    assert {each.name for each in parts if not each.texts} <= WITHOUT_TEXT
+def test_all_have_their_licence_text(parts: list[Part]) -> None:
+    assert {each.name for each in (*parts, *others(RESOURCES)) if not each.texts} <= WITHOUT_TEXT
 
 
-def test_a_text_with_a_number_at_its_end_is_one() -> None:
-    (orjson,) = (each for each in parts_of() if each.name == "orjson")
+def test_a_text_with_a_number_at_its_end_is_one(parts: list[Part]) -> None:
+    (orjson,) = (each for each in parts if each.name == "orjson")
     assert "LICENSE-MPL-2.0" in {name for name, _text in orjson.texts}
 
 

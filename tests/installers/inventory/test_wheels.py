@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from importlib import metadata
 from pathlib import Path
@@ -27,6 +28,7 @@ BUILD = """General configuration for OpenCV 4.14.0
 """
 
 
+@functools.cache
 def parts_of_wheel(name: str) -> dict[str, Part]:
     part = Part(name, metadata.version(name), "MIT")
     return {each.name: each for each in parts_in_wheels([part])}
@@ -139,7 +141,7 @@ def test_a_crate_without_a_licence_is_said() -> None:
 def test_a_crate_of_iceoryx2_that_nobody_knows_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wheels, "CRATES", {})
     with pytest.raises(InventoryError, match="iceoryx2 has the crate 'arc-swap' inside"):
-        parts_of_wheel("iceoryx2")
+        parts_of_wheel.__wrapped__("iceoryx2")
 
 
 def test_a_version_is_found_in_a_file(tmp_path: Path) -> None:
