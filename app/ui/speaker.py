@@ -1,22 +1,29 @@
 """Makes robots heard through Qt: its text to speech and its sound, in a thread of their own.
 
 Both are imported at the first word or tone, and may take seconds to begin; the window never waits for them.
+A voice is code of the system or of others: run as a process, this module tries whether it can be made.
 """
 
 from __future__ import annotations
 
+import faulthandler
 import logging
 import math
+import os
+import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
-from PySide6.QtCore import QBuffer, QByteArray, QEventLoop, QLocale, QObject, Qt, Signal
+from PySide6.QtCore import QBuffer, QByteArray, QCoreApplication, QEventLoop, QLocale, QObject, Qt, Signal
 
+from app.core.own_process import module_command
 from app.core.robots.voices import Notes
 from nep.i18n import _, lazy
+from nep.masters.process import NO_CONSOLE
 
 if TYPE_CHECKING:
     from PySide6.QtMultimedia import QAudioSink
@@ -40,6 +47,10 @@ ADVICE = {
 MOST_TONES = 4
 RATE_HZ, EDGE_S, LOUDNESS = 44_100, 0.006, 0.5
 JOIN_S = 0.5
+TRIAL_S = 20.0
+"""How long a process may take to make a voice; one that takes longer hangs, and would hang here, too."""
+NO_CRASH_DIALOG = 0x0001 | 0x0002 | 0x8000
+"""Windows' SEM_FAILCRITICALERRORS, SEM_NOGPFAULTERRORBOX and SEM_NOOPENFILEERRORBOX."""
 Order: TypeAlias = tuple[str, tuple[Any, ...], int]
 _log = logging.getLogger(__name__)
 
@@ -58,6 +69,53 @@ def has_voice_engine() -> bool:
         _log.info("robots have no voice here: %s", error)
         return False
     return bool(set(QTextToSpeech.availableEngines()) - {"mock"})
+
+
+def try_voice() -> int:
+    """Make a voice and ask what it speaks, as `QtEngine` does: the work of the process that tries it.
+
+    The exit code is 0 when all went well; a voice that can't be made may end the process in any way.
+    """
+    with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
+        faulthandler.dump_traceback_later(TRIAL_S, exit=True, file=nowhere)  # also when nobody waits for it
+        return _make_voice()
+
+
+def _make_voice() -> int:
+    if sys.platform == "win32":
+        import ctypes  # noqa: PLC0415  Windows alone has it
+
+        ctypes.windll.kernel32.SetErrorMode(NO_CRASH_DIALOG)
+    from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy, and needs a sound system)
+
+    application = QCoreApplication.instance() or QCoreApplication(sys.argv[:1])
+    voice = QTextToSpeech()
+    voice.availableLocales()
+    application.processEvents()
+    return 0
+
+
+def outlives_trial(command: Sequence[str] = ()) -> bool:
+    """Whether another process made a voice and is well: a voice that crashes would end Studio with it.
+
+    ``command`` tries it, by default this module. Waits for it, for at most `TRIAL_S`.
+    """
+    try:
+        done = subprocess.run(
+            command or module_command("app.ui.speaker"),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            timeout=TRIAL_S,
+            creationflags=NO_CONSOLE,
+            check=False,
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        _log.warning("robots have no voice here: it could not be tried: %s", error)
+        return False
+    if done.returncode != 0:
+        _log.warning("robots have no voice here: the trial of it ended with %d", done.returncode)
+    return done.returncode == 0
 
 
 def voice_words(problem: str, *, has_engine: bool, platform: str = sys.platform) -> str:
@@ -117,7 +175,7 @@ class QtEngine:
     def _found_voice(self) -> QTextToSpeech | None:
         if not self._voice_tried:
             self._voice_tried = True
-            if has_voice_engine():
+            if has_voice_engine() and outlives_trial():
                 from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy)
 
                 try:
@@ -334,3 +392,7 @@ class QtSpeaker(QObject):
 
     def _has_told(self, what: str, problem: str) -> None:
         self._problems[what] = problem
+
+
+if __name__ == "__main__":
+    sys.exit(try_voice())

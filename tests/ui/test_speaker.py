@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from array import array
 from collections.abc import Callable, Iterator
@@ -10,7 +12,7 @@ from itertools import pairwise
 import pytest
 
 from app.core.robots.voices import Notes
-from app.ui.speaker import QtEngine, QtSpeaker, no_voice, samples, voice_words
+from app.ui.speaker import QtEngine, QtSpeaker, no_voice, outlives_trial, samples, voice_words
 
 
 class FakeEngine:
@@ -138,6 +140,25 @@ def test_without_the_libraries_of_sound_it_is_silent_and_says_why(qtbot) -> None
     qtbot.waitUntil(lambda: len(speaker._problems) == 2)
     assert speaker._problems["play"] == "This computer plays no sound."
     speaker.close()
+
+
+def test_a_voice_that_ends_the_process_that_tries_it_is_not_made_here(qtbot, monkeypatch, caplog) -> None:
+    crash = [sys.executable, "-c", "import os; os.kill(os.getpid(), 11)"]
+    assert not outlives_trial(crash)
+    assert "the trial of it ended with" in caplog.text
+    assert not outlives_trial([sys.executable + " is not there"])
+    assert outlives_trial([sys.executable, "-c", ""])
+    monkeypatch.setattr("app.ui.speaker.has_voice_engine", lambda: True)
+    monkeypatch.setattr("app.ui.speaker.module_command", lambda module: crash)
+    assert QtEngine().say("Hello", "en", 0.5, lambda: None) == no_voice("en")
+
+
+def test_a_voice_that_hangs_ends_with_the_process_that_tries_it(monkeypatch) -> None:
+    monkeypatch.setattr("app.ui.speaker.TRIAL_S", 0.2)
+    assert not outlives_trial([sys.executable, "-c", "import threading; threading.Event().wait()"])
+    hangs = "import threading; from app.ui import speaker; speaker.TRIAL_S = 0.2; "
+    hangs += "speaker._make_voice = lambda: threading.Event().wait(); speaker.try_voice()"
+    assert subprocess.run([sys.executable, "-c", hangs], check=False).returncode == 1
 
 
 def test_a_tone_is_as_high_as_long_and_as_loud_as_asked_and_does_not_click() -> None:

@@ -9,6 +9,7 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import PureWindowsPath
 from typing import TextIO
 
 import psutil
@@ -101,7 +102,7 @@ class SelfTest:
             end_family()
             return
         self.begin("processes", _("every process of the test has ended"))
-        family = [each for each in children() if not is_web(each)]
+        family = [each for each in children() if not is_web(each) and not is_of_windows(each)]
         masters = [each for each in family if is_master(each)]
         for each in masters:
             with suppress(psutil.Error):
@@ -161,6 +162,19 @@ def is_web(process: psutil.Process) -> bool:
     try:
         return process.name().lower().startswith(WEB_PROCESS[:15])
     except (psutil.Error, OSError):  # Windows' own word, where psutil has none for it
+        return False
+
+
+def is_of_windows(process: psutil.Process, root: str = os.environ.get("SYSTEMROOT", "")) -> bool:
+    """Whether its program is one of Windows itself, in the folder ``root``; elsewhere there is none.
+
+    Windows starts some in our name, such as the host of a console, and ends them when it likes.
+    """
+    if not root:
+        return False
+    try:
+        return PureWindowsPath(process.exe()).is_relative_to(PureWindowsPath(root))
+    except (psutil.Error, OSError):  # see `is_web`
         return False
 
 

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
@@ -14,6 +15,7 @@ import pytest
 from app.__main__ import main
 from app.core.self_test.report import Report
 from app.core.self_test.surroundings import UnwritableFolderError, prepare
+from app.core.self_test.test import is_of_windows
 
 ROOT = Path(__file__).parents[3]
 HANGS = """
@@ -132,3 +134,26 @@ def test_a_process_in_which_nothing_moves_is_ended_with_all_that_it_started(tmp_
     assert not whole["steps"][0]["ok"]
     assert "in show" in (tmp_path / "crash.txt").read_text("utf-8")  # where it stood
     assert not psutil.pid_exists(int(done.stdout))
+
+
+@dataclass
+class ItsProgram:
+    """A process as far as its program is known; `ended`: it is there no more."""
+
+    program: str
+    ended: bool = False
+
+    def exe(self) -> str:
+        if self.ended:
+            raise psutil.NoSuchProcess(1)
+        return self.program
+
+
+def test_what_windows_started_in_our_name_is_not_of_the_test() -> None:
+    for program in (r"C:\Windows\explorer.exe", r"c:\windows\System32\conhost.exe"):
+        assert is_of_windows(ItsProgram(program), r"C:\Windows")
+    studio = r"C:\Users\山田 太郎\AppData\Local\Programs\NEP Studio\nep-studio.exe"
+    for program in (studio, r"C:\Windows of mine\a.exe", ""):
+        assert not is_of_windows(ItsProgram(program), r"C:\Windows")
+    assert not is_of_windows(ItsProgram(r"C:\Windows\explorer.exe", ended=True), r"C:\Windows")
+    assert not is_of_windows(ItsProgram("/usr/bin/python3"), "")
