@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -54,6 +55,15 @@ def test_who_can_not_have_it_goes_on_after_a_bounded_wait(
     with locked(tmp_path / "file", within_s=0.2) as held:
         assert not held
     assert 0.2 <= time.monotonic() - began < 5.0
+
+
+def test_where_the_disk_has_no_locks_nobody_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_file: object) -> None:
+        raise OSError(errno.ENOLCK, "no locks available")
+
+    monkeypatch.setattr("app.core.storage.file_lock._lock", refuse)
+    with locked(tmp_path / "file", within_s=60.0) as held:
+        assert not held
 
 
 def test_it_is_free_when_its_process_is_killed(tmp_path: Path, holder: subprocess.Popen[str]) -> None:
