@@ -195,7 +195,7 @@ def test_a_session_closes_soon_while_messages_flood_in(session: Session, master:
     )
     try:
         assert flood.stdout is not None
-        assert flood.stdout.readline() == b"ready\n"
+        assert flood.stdout.readline().strip() == b"ready"
         session.watch("/flood")
         tick_until(
             session, lambda: "/flood" in session.topics and session.topics["/flood"].dropped > 1000, 20
