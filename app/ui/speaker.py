@@ -49,8 +49,6 @@ RATE_HZ, EDGE_S, LOUDNESS = 44_100, 0.006, 0.5
 JOIN_S = 0.5
 TRIAL_S = 20.0
 """How long a process may take to make a voice; one that takes longer hangs, and would hang here, too."""
-NO_CRASH_DIALOG = 0x0001 | 0x0002 | 0x8000
-"""Windows' SEM_FAILCRITICALERRORS, SEM_NOGPFAULTERRORBOX and SEM_NOOPENFILEERRORBOX."""
 Order: TypeAlias = tuple[str, tuple[Any, ...], int]
 _log = logging.getLogger(__name__)
 
@@ -85,7 +83,10 @@ def _make_voice() -> int:
     if sys.platform == "win32":
         import ctypes  # noqa: PLC0415  Windows alone has it
 
-        ctypes.windll.kernel32.SetErrorMode(NO_CRASH_DIALOG)
+        # A crash ends it at once, with no dialog and no debugger.
+        kernel = ctypes.windll.kernel32
+        kernel.SetUnhandledExceptionFilter.argtypes = [ctypes.c_void_p]
+        kernel.SetUnhandledExceptionFilter(ctypes.cast(kernel.ExitProcess, ctypes.c_void_p))
     from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy, and needs a sound system)
 
     application = QCoreApplication.instance() or QCoreApplication(sys.argv[:1])

@@ -27,6 +27,9 @@ LEARNING_S = 1.5
 """How long a master that has just started may not know everybody yet (it learns for one second)."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
 """After how long a master that could not be started is tried again: twice as long each time."""
+START_S = 50.0
+"""How long a master may take to answer while its process lives: the first start after an installation, from a
+slow disk and past a virus scanner, takes longer than the ten seconds that a program usually waits."""
 END_WAIT_S = 2.0
 
 _log = logging.getLogger("studio.master")
@@ -117,7 +120,9 @@ class MasterStart:
         self.first = True
         self._look_back()
         try:
-            self._process = start_process(self._address, owner_pid=os.getpid(), command=module_command("nep"))
+            self._process = start_process(
+                self._address, owner_pid=os.getpid(), command=module_command("nep"), timeout_s=START_S
+            )
         except (NepError, OSError) as error:
             return str(error)
         return ""
