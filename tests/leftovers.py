@@ -11,6 +11,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable
+from typing import Any
 
 import psutil
 
@@ -29,6 +30,7 @@ many tests of a process may end with more of it than they began with, and not on
 PAGE = "QtWebEngineProcess"
 _FD = "/proc/self/fd"
 _CLOSED_SOON_S = 0.3
+_TRIES = 20
 
 
 def threads() -> set[threading.Thread]:
@@ -46,8 +48,7 @@ def descriptors() -> dict[int, str]:
     Where the system does not tell (there is no /proc), only what listens is known.
     """
     if not sys.platform.startswith("linux"):
-        connections = psutil.Process().net_connections(kind="inet")
-        listening = [each for each in connections if each.status == psutil.CONN_LISTEN]
+        listening = [each for each in _connections() if each.status == psutil.CONN_LISTEN]
         return {hash(each.laddr): f"listening {each.laddr}" for each in listening}
     found = {}
     for name in os.listdir(_FD):  # noqa: PTH208 - after every test: paths take three times as long
@@ -56,6 +57,16 @@ def descriptors() -> dict[int, str]:
         except OSError:
             continue  # the descriptor of this very look, or one that was closed meanwhile
     return found
+
+
+def _connections() -> list[Any]:
+    """This process's; asked again where Windows' table grew between its length and its content."""
+    for _ in range(_TRIES):
+        try:
+            return psutil.Process().net_connections(kind="inet")
+        except RuntimeError:  # psutil has no other word for it
+            continue
+    return psutil.Process().net_connections(kind="inet")
 
 
 def told(number: int, target: str) -> str:

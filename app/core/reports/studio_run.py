@@ -149,6 +149,7 @@ class StudioRun:
         lock = FileLock(mark)
         if not lock.acquire():
             return None  # its process lives
+        damaged = False
         try:
             entry = json.loads(read_whole(mark))
             began_s, pid = float(entry["began_s"]), int(entry["pid"])
@@ -158,12 +159,13 @@ class StudioRun:
         except OSError:
             return None
         except (ValueError, TypeError, KeyError, RecursionError):
-            _remove(mark, self._log)
-            return None
+            damaged = True
         finally:
-            lock.release()
+            lock.release()  # before it is removed: Windows removes no file that is open
         trace = self._trace_of(mark)
         _remove(mark, self._log)
+        if damaged:
+            return None
         return self._judged(entry, began_s, trace)
 
     def _judged(self, entry: Mapping[str, object], began_s: float, trace: str) -> Crash | None:
