@@ -105,8 +105,10 @@ def test_it_has_a_home_and_a_master_of_its_own(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_written_is_a_sentence_and_no_window(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # Where there are no alarms pytest-timeout has a thread, for which the end of a process would not wait.
+    monkeypatch.setattr("app.__main__.still_running", lambda within_s: ())
     (tmp_path / "file").write_text("", "utf-8")
     before = dict(os.environ)
     assert main(["--selftest", str(tmp_path / "file" / "below")]) == 2
