@@ -170,12 +170,11 @@ def is_of_windows(process: psutil.Process, root: str = os.environ.get("SYSTEMROO
 
     Windows starts some in our name, such as the host of a console, and ends them when it likes.
     """
-    if not root:
-        return False
     try:
-        return PureWindowsPath(process.exe()).is_relative_to(PureWindowsPath(root))
-    except (psutil.Error, OSError):  # see `is_web`
-        return False
+        program = process.exe()
+    except (psutil.Error, OSError):  # not every Windows tells it of every process; see `is_web`
+        program = next(iter(command(process)), "")
+    return bool(root) and PureWindowsPath(program).is_relative_to(PureWindowsPath(root))
 
 
 def end_family() -> None:

@@ -140,22 +140,29 @@ def test_a_process_in_which_nothing_moves_is_ended_with_all_that_it_started(tmp_
 
 @dataclass
 class ItsProgram:
-    """A process as far as its program is known; `ended`: it is there no more."""
+    """A process as far as its program is known: by itself, or only by the words that started it."""
 
     program: str
-    ended: bool = False
+    words: tuple[str, ...] = ()
 
     def exe(self) -> str:
-        if self.ended:
-            raise psutil.NoSuchProcess(1)
+        if not self.program:
+            raise OSError("WinError 0")
         return self.program
+
+    def cmdline(self) -> list[str]:
+        if not self.words:
+            raise psutil.NoSuchProcess(1)
+        return list(self.words)
 
 
 def test_what_windows_started_in_our_name_is_not_of_the_test() -> None:
     for program in (r"C:\Windows\explorer.exe", r"c:\windows\System32\conhost.exe"):
         assert is_of_windows(ItsProgram(program), r"C:\Windows")
+        assert is_of_windows(ItsProgram("", (program, "/desktop")), r"C:\Windows")
     studio = r"C:\Users\山田 太郎\AppData\Local\Programs\NEP Studio\nep-studio.exe"
-    for program in (studio, r"C:\Windows of mine\a.exe", ""):
+    for program in (studio, r"C:\Windows of mine\a.exe"):
         assert not is_of_windows(ItsProgram(program), r"C:\Windows")
-    assert not is_of_windows(ItsProgram(r"C:\Windows\explorer.exe", ended=True), r"C:\Windows")
+        assert not is_of_windows(ItsProgram("", (program, r"C:\Windows\a.exe")), r"C:\Windows")
+    assert not is_of_windows(ItsProgram(""), r"C:\Windows")  # it has ended
     assert not is_of_windows(ItsProgram("/usr/bin/python3"), "")
