@@ -149,24 +149,23 @@ class StudioRun:
         lock = FileLock(mark)
         if not lock.acquire():
             return None  # its process lives
-        damaged = False
+        judged: tuple[Mapping[str, object], float] | None = None
         try:
             entry = json.loads(read_whole(mark))
             began_s, pid = float(entry["began_s"]), int(entry["pid"])
             if _runs(pid, began_s):  # on a disk without locks
                 return None
             mark.unlink()  # who can do so tells of it
+            judged = entry, began_s
         except OSError:
             return None
         except (ValueError, TypeError, KeyError, RecursionError):
-            damaged = True
+            pass  # it is damaged, and tells nothing
         finally:
             lock.release()  # before it is removed: Windows removes no file that is open
         trace = self._trace_of(mark)
         _remove(mark, self._log)
-        if damaged:
-            return None
-        return self._judged(entry, began_s, trace)
+        return self._judged(*judged, trace) if judged is not None else None
 
     def _judged(self, entry: Mapping[str, object], began_s: float, trace: str) -> Crash | None:
         how = fatal_line(trace)
