@@ -29,6 +29,8 @@ _FILES = 16
 _AGAIN_S = 0.5
 """A request without an answer is sent again after this."""
 
+_ASKED_AT_MOST_S = 4.0
+
 NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """A `creationflags`: Windows opens a window for every console program otherwise."""
 
@@ -164,10 +166,11 @@ def start_process(
         start_new_session=True,
         creationflags=detached,
     )
-    deadline = time.monotonic() + timeout_s
-    while time.monotonic() < deadline and process.poll() is None:
-        if is_running(chosen, 0.5):
+    deadline, asked_s = time.monotonic() + timeout_s, 0.5
+    while (left := deadline - time.monotonic()) > 0 and process.poll() is None:
+        if is_running(chosen, min(asked_s, left)):
             return process
+        asked_s = min(2 * asked_s, _ASKED_AT_MOST_S)  # a busy computer may need longer for every answer
     if process.poll() is None:
         process.kill()
     process.wait(5.0)
