@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import faulthandler
+import logging
 import os
 import threading
 import time
@@ -91,6 +92,7 @@ class SelfTest:
             if crash.stat().st_size == 0:
                 crash.unlink()
         if not self.report.why:
+            logging.shutdown()  # the log is there, too, and Windows removes no file that is open
             remove_home(self.place)
         self._wait_until(time.monotonic() + bounds.END_S, _("the end of the process"))
 

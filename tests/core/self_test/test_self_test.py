@@ -34,6 +34,24 @@ def show():
 
 test.run(show)
 """
+WELL = """
+import logging, os, sys
+from pathlib import Path
+from app.core.self_test import SelfTest, prepare
+
+test = SelfTest(prepare(Path(sys.argv[1]), os.environ, is_root=False), {})
+log = test.place.home / "studio.log"
+handler = logging.FileHandler(log, encoding="utf-8")
+logging.getLogger().addHandler(handler)
+
+def show():
+    logging.warning("seen")
+    assert log.stat().st_size
+    return 0
+
+assert test.run(show) == 0
+assert handler.stream is None
+"""
 
 
 def told(folder: Path) -> dict:
@@ -136,6 +154,16 @@ def test_a_process_in_which_nothing_moves_is_ended_with_all_that_it_started(tmp_
     assert not whole["steps"][0]["ok"]
     assert "in show" in (tmp_path / "crash.txt").read_text("utf-8")  # where it stood
     assert not psutil.pid_exists(int(done.stdout))
+
+
+def test_when_all_was_well_its_home_goes_with_the_log_that_was_open(tmp_path: Path) -> None:
+    subprocess.run(
+        [sys.executable, "-c", WELL, str(tmp_path)],
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=True,
+    )
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.json"]
 
 
 @dataclass
