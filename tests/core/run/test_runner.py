@@ -238,6 +238,7 @@ def test_a_child_that_hangs_is_killed(runner, heard, command):
     assert heard.events[-1].kind == "ended"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_a_child_that_crashes_is_told(runner, heard):
     made = runner(CRASHES)
     made.start(program(), [], None)
@@ -252,6 +253,7 @@ def test_a_child_that_fails_says_why(runner, heard):
     assert heard.until("ended").text == "The program's process ended with code 1: no room left."
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_a_child_that_was_killed_by_somebody_is_told(runner, heard, master):
     made = runner()
     made.start(endless(), [], master.address)
@@ -260,6 +262,7 @@ def test_a_child_that_was_killed_by_somebody_is_told(runner, heard, master):
     assert heard.until("ended").text == f"The program's process was killed (signal {signal.SIGKILL.value})."
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_in_the_terminal_is_for_the_runner(runner, heard, master):
     made = runner()
     made.start(endless(), [], master.address)
