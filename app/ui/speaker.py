@@ -6,6 +6,7 @@ A voice is code of the system or of others: run as a process, this module tries 
 
 from __future__ import annotations
 
+import ctypes
 import faulthandler
 import logging
 import math
@@ -81,8 +82,6 @@ def try_voice() -> int:
 
 def _make_voice() -> int:
     if sys.platform == "win32":
-        import ctypes  # noqa: PLC0415  Windows alone has it
-
         # A crash ends it at once, with no dialog and no debugger.
         kernel = ctypes.windll.kernel32
         kernel.SetUnhandledExceptionFilter.argtypes = [ctypes.c_void_p]
