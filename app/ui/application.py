@@ -32,7 +32,7 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.shell.window_state import WindowState, fitting
 from app.ui.speaker import QtSpeaker
-from app.ui.startup import interpreter, portal, qt_log, single_instance
+from app.ui.startup import interpreter, portal, qt_log, sandbox, single_instance
 from app.ui.startup.deferred import DeferredSteps
 from app.ui.startup.file_open import Application, IncomingFiles
 from app.ui.startup.single_instance import StartRequest
@@ -267,11 +267,12 @@ def run(options: Options) -> int:
         return 2
     log = qt_log.listen()
     qt_log.quiet_chromium(os.environ)
+    trial = sandbox.begin_trial(os.environ, sys.platform)
     portal.use_portal(os.environ, sys.platform)
     logging.getLogger().addHandler(CrashLog(CrashReports()))
     application = make_application()
     with StudioRun() as this_run:
-        return _show(application, options, log, this_run, (meeting_place, turn))
+        return _show(application, options, log, this_run, (meeting_place, turn), trial)
 
 
 def _show(
@@ -280,6 +281,7 @@ def _show(
     log: qt_log.Log,
     this_run: StudioRun,
     single: tuple[str, FileLock],
+    trial: sandbox.SandboxTrial | None,
 ) -> int:
     """Show the window until it is closed; the exit code."""
     session = Session()
@@ -311,6 +313,7 @@ def _show(
         application.open_files_with(window.commands.files.open_all)
     if driver is None and options.self_drive is not None:
         driver = SelfDrive(window, options.self_drive)
+    sandbox.fit_sandbox(os.environ, trial)  # the page is made by the event loop
     code = application.exec()
     speaker.close()
     if driver is not None and not driver.well:

@@ -1,0 +1,85 @@
+"""The block editor's browser where the system forbids name spaces: found out before it would end Studio."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.ui.startup.qt_log import FLAGS
+from app.ui.startup.sandbox import FILTER_ALONE, OFF, SandboxTrial, begin_trial, fit_sandbox
+
+ROOT = Path(__file__).resolve().parents[3]
+GUARDED = """
+import ctypes, os, struct
+from app.ui.startup.sandbox import SandboxTrial
+LOAD, EQUAL, SET, RETURN = 0x20, 0x15, 0x45, 0x06
+ALLOW, REFUSE = 0x7FFF0000, 0x00050000
+CLONE, CHROOT, UNSHARE = 56, 161, 272
+class Program(ctypes.Structure):
+    _fields_ = [("length", ctypes.c_ushort), ("lines", ctypes.c_char_p)]
+def guard(call, bits, error):
+    lines = [(LOAD, 0, 0, 0), (EQUAL, 0, 3, call), (LOAD, 0, 0, 16), (SET, 0 if bits else 1, 1, bits),
+             (RETURN, 0, 0, REFUSE | error), (RETURN, 0, 0, ALLOW)]
+    if not bits:
+        lines = [(LOAD, 0, 0, 0), (EQUAL, 0, 1, call), (RETURN, 0, 0, REFUSE | error), (RETURN, 0, 0, ALLOW)]
+    made = b"".join(struct.pack("HBBI", *line) for line in lines)
+    system = ctypes.CDLL(None)
+    assert system.prctl(38, 1, 0, 0, 0) == 0
+    assert system.prctl(22, 2, ctypes.byref(Program(len(lines), made))) == 0
+def told(*of):
+    if (child := os.fork()) == 0:
+        if of:
+            guard(*of)
+        os._exit(0 if SandboxTrial().allowed() else 1)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+print(told(), told(UNSHARE, 0x10000000, 13), told(UNSHARE, 0x20000000, 1), told(CHROOT, 0, 1))
+"""
+"""Whether it is allowed: unguarded; no user's name space; none beside it; nowhere to be shut in."""
+
+
+class Told(SandboxTrial):
+    """A trial whose outcome is known."""
+
+    def __init__(self, outcome: bool) -> None:
+        self._outcome = outcome
+
+    def allowed(self) -> bool:
+        return self._outcome
+
+
+@pytest.mark.skipif(
+    (sys.platform, platform.machine()) != ("linux", "x86_64"), reason="the guard has its numbers"
+)
+def test_each_guard_is_found_out() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", GUARDED], cwd=ROOT, capture_output=True, text=True, timeout=60, check=True
+    )
+    free, *guarded = done.stdout.split()
+    if free == "False":
+        pytest.skip("this computer itself allows no name spaces")
+    assert guarded == ["False"] * 3
+
+
+def test_without_name_spaces_the_filter_stays_and_so_do_the_users_flags() -> None:
+    environ = {FLAGS: "--log-level=3"}
+    fit_sandbox(environ, Told(False))
+    assert environ == {FLAGS: f"--log-level=3 {FILTER_ALONE}"}
+
+
+def test_with_name_spaces_or_without_a_trial_nothing_is_changed() -> None:
+    environ: dict[str, str] = {}
+    fit_sandbox(environ, Told(True))
+    fit_sandbox(environ, None)
+    assert environ == {}
+
+
+@pytest.mark.parametrize(
+    ("environ", "platform"),
+    [({}, "win32"), ({}, "darwin"), ({OFF: "1"}, "linux"), ({FLAGS: "--no-sandbox"}, "linux")],
+)
+def test_where_somebody_has_decided_nothing_is_tried(environ: dict[str, str], platform: str) -> None:
+    assert begin_trial(environ, platform) is None
