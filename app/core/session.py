@@ -42,6 +42,7 @@ from app.core.network.traffic import Traffic
 from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import NetworkEvent, Networks, by_network
 from app.core.networks.parameters import ParameterSetter
+from app.core.own_process import OwnProgram
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
@@ -128,7 +129,7 @@ class Session:
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, self._mailbox.post_event)
-        self.tick_ms = 0.0
+        self._program, self.tick_ms = OwnProgram(), 0.0
         self._robots_seen = -1
         self._reachable: tuple[StopTarget, ...] = ()
         self._tries_to_reach = False
@@ -241,6 +242,7 @@ class Session:
             self.documents.unkept()
             self._health.journal(self.documents.journal_error)
             self._health.settings(self.settings.not_kept)
+            self._health.program(self._program.fate())
 
     def close(self) -> None:
         """End the program, the threads and the processes that were started here, whatever one does."""

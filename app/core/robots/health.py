@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from app.core.alerts import Alerts
 from app.core.network.decode_checks import Checked
 from app.core.network.topics import Topics
+from app.core.own_process import Fate
 from app.core.robots.fleet import Fleet
 from app.core.robots.robot_link import RobotLink
 from nep.i18n import _, lazy, ngettext
@@ -149,6 +150,27 @@ class Health:
             f"{sentence[0].upper()}{sentence[1:]}.",
             count=0,
         )
+
+    def program(self, fate: Fate) -> None:
+        """What became of Studio's own program while it was open."""
+        if fate == "replaced":
+            self._alerts.put(
+                "program",
+                "warn",
+                _("NEP Studio was updated while it was open."),
+                _("Save your behaviours and start it again: until then, parts of it may not open."),
+                count=0,
+            )
+        elif fate == "gone":
+            self._alerts.put(
+                "program",
+                "error",
+                _("NEP Studio was removed from this computer while it was open."),
+                _("Save your behaviours now: what is not open yet can't be opened any more, nor run."),
+                count=0,
+            )
+        else:
+            self._alerts.resolve("program")
 
     def graph_alerts(self, view: GraphView) -> None:
         """Take over what the master noticed (a name used twice, types that differ, a port that is taken)."""

@@ -1,0 +1,69 @@
+"""Studio open while its package is updated or removed: noticed, and said in a sentence."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from app.core.own_process import OwnProgram
+from app.core.session import Session
+from app.core.storage.settings import Settings
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    made = tmp_path / "nep-studio"
+    made.write_bytes(b"old")
+    return made
+
+
+def test_nothing_became_of_it(program: Path) -> None:
+    own = OwnProgram(program)
+    program.read_bytes()
+    assert own.fate() == ""
+
+
+def test_an_update_takes_its_place_with_the_same_size_and_time(program: Path) -> None:
+    own = OwnProgram(program)
+    new = program.with_name("nep-studio.dpkg-new")
+    new.write_bytes(b"new")
+    shutil.copystat(program, new)
+    new.replace(program)
+    assert own.fate() == "replaced"
+
+
+def test_it_is_gone_and_comes_back_as_another(program: Path) -> None:
+    own = OwnProgram(program)
+    program.rename(program.with_name("kept, so that its number is not given again"))
+    assert own.fate() == "gone"
+    program.write_bytes(b"new")
+    assert own.fate() == "replaced"
+
+
+def test_from_source_there_is_no_program_to_watch() -> None:
+    assert OwnProgram().fate() == ""
+
+
+def test_a_person_is_told_and_the_alert_goes_with_its_cause(
+    program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.frozen", True, raising=False)
+    monkeypatch.setattr("sys.executable", str(program))
+    session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=False)
+    try:
+        kept = program.rename(program.with_name("kept"))
+        session._check(0.0)
+        (alert,) = (each for each in session.alerts.active if each.id == "program")
+        assert (alert.severity, alert.count) == ("error", 0)
+        assert "removed" in alert.title
+        program.write_bytes(b"new")
+        session._check(1.0)
+        (alert,) = (each for each in session.alerts.active if each.id == "program")
+        assert "updated" in alert.title
+        kept.replace(program)
+        session._check(2.0)
+        assert not [each for each in session.alerts.active if each.id == "program"]
+    finally:
+        session.close()
