@@ -63,6 +63,10 @@ _OF_THE_SYSTEM = re.compile(
 graphics driver, the fonts or the printers of the computer that it runs on, or be too old for the driver."""
 
 
+_OF_THE_BUILD = frozenset({"direct_url.json", "RECORD"})
+"""Of a distribution's papers: from which folder of the builder's it came, and sums of these."""
+
+
 def is_wanted(name: str) -> bool:
     """Whether a collected file goes into the package; `name` has slashes of either kind."""
     path = PurePosixPath(name.replace("\\", "/"))
@@ -78,6 +82,8 @@ def is_wanted(name: str) -> bool:
         return False
     if "PySide6" in parts:
         return _is_wanted_of_qt(path)
+    if path.parent.suffix == ".dist-info" and path.name in _OF_THE_BUILD:
+        return False
     return path.suffix not in {".pyi", ".h", ".pxd", ".a", ".lib"}
 
 

@@ -48,8 +48,8 @@ if [ $kind = deb ]; then
     program=nep-studio command=/opt/nep-studio/nep
 else
     # What every desktop has and a bare system has not; the .deb asks for it by name.
-    root "needed=\$(dpkg-deb -f /packages/nep-studio_*.deb Depends | tr ',' '\n' | sed 's/ *|.*//; s/(.*)//')
-          DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \$needed >/dev/null"
+    root "DEBIAN_FRONTEND=noninteractive apt-get satisfy -y -qq --no-install-recommends \
+          \"\$(dpkg-deb -f /packages/nep-studio_*.deb Depends)\" >/dev/null"
     ana "tar -xf /packages/NEP-Studio-*.tar.xz && ./NEP-Studio-*/install.sh --command"
     program="./NEP-Studio-*/nep-studio" command="./.local/bin/nep"
 fi

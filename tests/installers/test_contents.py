@@ -40,9 +40,12 @@ WANTED = [
     "libgssapi_krb5.so.2",
     "libbrotlidec.so.1",
     "libsqlite3.so.0",
+    "nep_studio-0.1.0.dist-info/METADATA",
 ]
 
 UNWANTED = [
+    "nep_studio-0.1.0.dist-info/direct_url.json",
+    "nep_studio-0.1.0.dist-info/RECORD",
     "PySide6/Qt/lib/libQt63DRender.so.6",
     "PySide6/Qt/lib/libQt6Quick3D.so.6",
     "PySide6/Qt/lib/libQt6Designer.so.6",

@@ -1,0 +1,156 @@
+"""How long the Studio of a package takes to start, beside the one of the source tree: both in turns.
+
+    python bench/package_start.py FOLDER [--times 9] [--warm]
+
+FOLDER has the program `nep-studio`: an unpacked archive, or /opt/nep-studio. Each start has a home of its
+own, and is timed from the outside, from the moment when the process is asked for until its window does what
+another start asks of it: by then it has been painted and answers. "own work" is the processor time of the
+process until then, which other programs stretch less. Before each start the system forgets what it has read
+from the disk, as after switching on; that needs root, and without it, or with --warm, the files are in memory
+already. "source again" tells how far to trust the rest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import signal
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from app.ui.startup.single_instance import OK, place
+
+ROOT = Path(__file__).resolve().parents[1]
+DROP = Path("/proc/sys/vm/drop_caches")
+GOAL, TRUSTED = 1.5, 0.1
+LONGEST_S, LOOK_S = 60.0, 0.002
+MASTER_END_S = 10.0
+PAUSE = threading.Event()
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start: the seconds until the window answered, and those that the process worked itself."""
+
+    seconds: float
+    work: float
+
+
+def forget() -> bool:
+    """Let the system forget what it has read from the disk; whether it did."""
+    try:
+        os.sync()
+        DROP.write_text("3")
+    except OSError:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def surroundings() -> Iterator[dict[str, str]]:
+    """The environment of one start: a home, a runtime folder and a master's port that nobody else has."""
+    with tempfile.TemporaryDirectory(prefix="nep-start-") as folder, socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        environ = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+        environ.update(
+            NEP_STUDIO_HOME=folder,
+            NEP_STATE_DIR=folder,
+            XDG_RUNTIME_DIR=folder,
+            NEP_MASTER=f"127.0.0.1:{probe.getsockname()[1]}",
+            NEP_GATEWAY="0",
+        )
+        probe.close()
+        yield environ
+
+
+def until_answered(name: str, process: subprocess.Popen[bytes], until: float) -> None:
+    """Ask the window for nothing again and again, until it says that it has done it."""
+    while process.poll() is None and time.monotonic() < until:
+        with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as line:
+            line.settimeout(LONGEST_S)
+            line.connect(name)
+            line.sendall(json.dumps({"files": [], "demo": False}).encode() + b"\n")
+            if line.recv(len(OK)) == OK:
+                return
+        PAUSE.wait(LOOK_S)
+    raise SystemExit(f"no window answered within {LONGEST_S:g} s: {process.args!r}")
+
+
+def once(command: Sequence[str], *, cold: bool) -> Start:
+    """Start Studio, wait until its window answers, and close it with all that it has started."""
+    with surroundings() as environ:
+        if cold:
+            forget()
+        os.environ["XDG_RUNTIME_DIR"] = environ["XDG_RUNTIME_DIR"]
+        name = place(Path(environ["NEP_STUDIO_HOME"]))
+        began = time.monotonic()
+        process = subprocess.Popen(command, cwd=ROOT, env=environ, stdout=subprocess.DEVNULL)
+        family: list[psutil.Process] = []
+        try:
+            until_answered(name, process, began + LONGEST_S)
+            seconds = time.monotonic() - began
+            used = psutil.Process(process.pid).cpu_times()
+            family = psutil.Process(process.pid).children(recursive=True)
+            process.send_signal(signal.SIGTERM)
+            process.wait(LONGEST_S)
+        finally:
+            process.kill()
+            process.wait()
+            _gone, left = psutil.wait_procs(family, MASTER_END_S)
+            for each in left:
+                with contextlib.suppress(psutil.Error):
+                    each.kill()
+    return Start(seconds, used.user + used.system)
+
+
+def main() -> int:
+    """Measure, print a table; 0 when the goal was reached and the run counts."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--times", type=int, default=9)
+    parser.add_argument("--warm", action="store_true")
+    given = parser.parse_args()
+    cold = not given.warm and forget()
+    source = (sys.executable, "-m", "app")
+    kinds = {
+        "source": source,
+        "package": (str(given.folder.resolve() / "nep-studio"),),
+        "source again": source,
+    }
+    for command in kinds.values():
+        once(command, cold=False)  # compiles what is not compiled yet
+    starts: dict[str, list[Start]] = {name: [] for name in kinds}
+    for _ in range(given.times):
+        for name, command in kinds.items():
+            starts[name].append(once(command, cold=cold))
+    print("cold: nothing was in memory" if cold else "warm: the files were in memory")
+    print(f"{'':>14} {'median s':>9} {'least':>6} {'most':>6}  own work s")
+    medians = {}
+    for name, each in starts.items():
+        seconds = [start.seconds for start in each]
+        medians[name] = statistics.median(seconds)
+        work = statistics.median(start.work for start in each)
+        print(f"{name:>14} {medians[name]:>9.2f} {min(seconds):>6.2f} {max(seconds):>6.2f}  {work:.2f}")
+    again = medians["source again"] / medians["source"]
+    ratio = medians["package"] / statistics.mean((medians["source"], medians["source again"]))
+    counts = abs(again - 1.0) <= TRUSTED
+    print(f"source against itself: {again:.2f}; this run {'counts' if counts else 'does NOT count'}")
+    print(f"{psutil.getloadavg()[0]:.1f} programs wanted {psutil.cpu_count()} processors in the last minute")
+    print(f"package ÷ source: {ratio:.2f}, goal {GOAL:g}")
+    return 0 if counts and ratio <= GOAL else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
