@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import importlib.util
 import os
 import signal
@@ -10,6 +11,7 @@ from collections.abc import Generator, Iterator
 
 import hypothesis
 import pytest
+from _pytest.faulthandler import fault_handler_stderr_fd_key
 from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
 
@@ -131,6 +133,15 @@ def _nothing_is_left() -> Iterator[None]:
     refused = _allowances.refused(open_before, deadline)
     if refused:
         pytest.fail(f"descriptors are left behind: {refused}")
+
+
+@pytest.fixture(autouse=True)
+def _crashes_are_told(pytestconfig: pytest.Config) -> Iterator[None]:
+    """What Studio does of its own crashes takes pytest's away: a worker would die without a word."""
+    yield
+    told_to = pytestconfig.stash.get(fault_handler_stderr_fd_key, None)  # pytest keeps it from its capturing
+    if told_to is not None:
+        faulthandler.enable(told_to)
 
 
 @pytest.fixture

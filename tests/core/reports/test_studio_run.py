@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import faulthandler
 import json
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,12 +23,6 @@ BEGIN = (
     "run.begin()\n"
     "print('begun', flush=True)\n"
 )
-
-
-@pytest.fixture(autouse=True)
-def _pytest_has_its_faults_back() -> Iterator[None]:
-    yield
-    faulthandler.enable(sys.__stderr__)
 
 
 class Place:
