@@ -72,6 +72,8 @@ def surroundings() -> Iterator[dict[str, str]]:
             NEP_GATEWAY="0",
         )
         probe.close()
+        if hasattr(os, "geteuid") and os.geteuid() == 0:
+            environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium refuses root otherwise
         yield environ
 
 
