@@ -91,6 +91,20 @@ def test_what_is_wanted_in_another_size_is_decoded_anew(
     assert once_more(shown, other, 3.0, fit) is None
 
 
+@pytest.mark.parametrize("place", [0, 1, 5_000, 199_999])
+def test_one_other_byte_is_another_picture(place: int) -> None:
+    shape = {"shape": [100, 2000], "encoding": "mono8"}
+    first = Message("/camera", bytes(200_000), "image", "image", seq=1, extension=shape)
+    shown, error = decode(first, 1.0)
+    assert shown is not None, error
+    data = bytearray(200_000)
+    same = Message("/camera", bytes(data), "image", "image", seq=2, extension=shape)
+    assert once_more(shown, same, 2.0, None) is not None
+    data[place] = 1
+    other = Message("/camera", bytes(data), "image", "image", seq=2, extension=shape)
+    assert once_more(shown, other, 2.0, None) is None
+
+
 def test_a_picture_is_decoded_for_its_stream(images: Images) -> None:
     stream = images.stream("/camera")
     images.offer([jpeg((10, 20, 30), seq=7)])
