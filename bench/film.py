@@ -53,7 +53,7 @@ def films() -> dict[str, Path]:
 
 def play(film: Path, folder: Path) -> dict[str, Reactions]:
     """Play a film; of each title what its steps took. What a failed one showed until then counts, too."""
-    command = [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", "--long", str(film)]
+    command = [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", str(film)]
     environment = {**os.environ, "NEP_FILM": str(folder)}
     done = subprocess.run(
         command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=TIME_S, check=False

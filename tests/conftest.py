@@ -42,6 +42,8 @@ LONG_S = {
     "tests/e2e/test_hour_keys.py": 120.0,
     "tests/core/run/test_run_file.py": 100.0,
     "tests/nep/backends/test_ros2.py": 85.0,
+    "tests/e2e/test_path_mouse.py": 70.0,
+    "tests/e2e/test_path_keys.py": 60.0,
     "tests/e2e/test_soak.py": 65.0,
     "tests/nep/bridges/test_bridge.py": 50.0,
     "tests/nep/bridges/test_command.py": 40.0,

@@ -12,8 +12,7 @@ from tests.e2e.fingers import Fingers
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-# Nearly all of it is in test_hour_*.py and test_main_job.py, too, which always run.
-pytestmark = [pytest.mark.timeout(230), pytest.mark.long]
+pytestmark = pytest.mark.timeout(230)
 
 
 def test_a_persons_path_with_the_keyboard_alone(start: Callable[..., Studio], tmp_path: Path) -> None:

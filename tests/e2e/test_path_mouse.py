@@ -15,8 +15,7 @@ from tests.e2e.person import middle
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-# Nearly all of it is in test_hour_*.py and test_main_job.py, too, which always run.
-pytestmark = [pytest.mark.timeout(230), pytest.mark.long]
+pytestmark = pytest.mark.timeout(230)
 
 
 def colours_of(studio: Studio, block: str) -> str:

@@ -182,7 +182,7 @@ def places(value: object, path: tuple[object, ...] = ()) -> list[tuple[object, .
 PLACES = places(model("pepper"))
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.tuples(st.sampled_from(PLACES), json_values), min_size=1, max_size=3))
 def test_a_damaged_description_never_crashes(changes):
     document = copy.deepcopy(model("pepper"))
