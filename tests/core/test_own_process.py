@@ -55,15 +55,29 @@ def test_a_person_is_told_and_the_alert_goes_with_its_cause(
     try:
         kept = program.rename(program.with_name("kept"))
         session._check(0.0)
-        (alert,) = (each for each in session.alerts.active if each.id == "program")
+        (alert,) = (each for each in session.alerts.active if each.id == "installation")
         assert (alert.severity, alert.count) == ("error", 0)
         assert "removed" in alert.title
         program.write_bytes(b"new")
         session._check(1.0)
-        (alert,) = (each for each in session.alerts.active if each.id == "program")
+        (alert,) = (each for each in session.alerts.active if each.id == "installation")
         assert "updated" in alert.title
         kept.replace(program)
         session._check(2.0)
-        assert not [each for each in session.alerts.active if each.id == "program"]
+        assert not [each for each in session.alerts.active if each.id == "installation"]
+    finally:
+        session.close()
+
+
+def test_what_became_of_a_behaviour_is_still_told_after_the_look_at_studios_own_program(
+    tmp_path: Path,
+) -> None:
+    session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=False)
+    try:
+        session.alerts.put("program", "error", "The behaviour ended by itself.")
+        session._check(0.0)
+        assert [each.title for each in session.alerts.active if each.id == "program"] == [
+            "The behaviour ended by itself."
+        ]
     finally:
         session.close()

@@ -20,6 +20,8 @@ AWAY_S = 5.0
 """A driver that is started again is back by then."""
 ASK_DOCTOR = lazy("Open the connection doctor")
 GIVES_UP = "leaving"
+INSTALLATION = "installation"
+"""The alert of Studio's own program; "program" is the behaviour's."""
 
 REAL = lazy("Check that it is on and in the same Wi-Fi.")
 VIRTUAL = lazy("Start the virtual robot again.")
@@ -155,7 +157,7 @@ class Health:
         """What became of Studio's own program while it was open."""
         if fate == "replaced":
             self._alerts.put(
-                "program",
+                INSTALLATION,
                 "warn",
                 _("NEP Studio was updated while it was open."),
                 _("Save your behaviours and start it again: until then, parts of it may not open."),
@@ -163,14 +165,14 @@ class Health:
             )
         elif fate == "gone":
             self._alerts.put(
-                "program",
+                INSTALLATION,
                 "error",
                 _("NEP Studio was removed from this computer while it was open."),
                 _("Save your behaviours now: what is not open yet can't be opened any more, nor run."),
                 count=0,
             )
         else:
-            self._alerts.resolve("program")
+            self._alerts.resolve(INSTALLATION)
 
     def graph_alerts(self, view: GraphView) -> None:
         """Take over what the master noticed (a name used twice, types that differ, a port that is taken)."""
