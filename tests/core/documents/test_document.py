@@ -366,6 +366,32 @@ def test_the_file_carries_the_robots_that_its_blocks_name(document: Document, tm
     assert [robot.name for robot in later.absent] == ["Pepper"]
 
 
+def test_a_robots_description_is_read_once_until_it_changes(
+    document: Document, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pepper = rize.robot("Pepper")
+    block = {"type": "robot_rize_do_say", "id": "b", "fields": {"ROBOT": "Pepper"}}
+    document.set_connected([pepper])
+    document.edited({"blocks": {"blocks": [block]}})
+    document.set_connected([])
+    assert [robot.name for robot in document.absent] == ["Pepper"]
+    with monkeypatch.context() as patched:
+        patched.setattr("app.core.documents.document.parse", None)  # reading it now would fail
+        document.edited({"blocks": {"blocks": [{**block, "x": 9}]}})
+        assert [robot.name for robot in document.absent] == ["Pepper"]
+    document.robots["Pepper"] = {**pepper.source, "title": "Salt"}
+    assert [robot.name for robot in document.absent] == ["Salt"]
+    deep: dict[str, object] = {}
+    for _level in range(100_000):
+        deep = {"deep": deep}
+    document.robots["Pepper"] = deep
+    assert document.absent == ()
+    document.robots["Pepper"] = {"deep": deep}
+    assert document.absent == ()
+    while deep:  # from the outside: Python takes such a thing apart in levels, too
+        deep = deep.popitem()[1]  # type: ignore[assignment]
+
+
 def test_the_program_is_compiled_once_for_each_edit_and_change_of_robots(document: Document) -> None:
     document.edited(STARTED)
     first = document.program()
