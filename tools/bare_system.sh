@@ -1,4 +1,4 @@
-# A bare Debian in a folder, and commands in it; for the scripts beside this file, which source it.
+# A bare Debian or Ubuntu in a folder, and commands in it; for the scripts beside this file, which source it.
 # Needs root, debootstrap and unshare. apt and pip use this computer's own configuration of mirrors, proxies and
 # certificates. Every mount lives in a name space of its own and is gone when the script ends.
 
@@ -13,20 +13,31 @@ check_programs() {
     done
 }
 
+UBUNTU_SUITES=" jammy noble " UBUNTU=http://archive.ubuntu.com/ubuntu
+UBUNTU_SCRIPT=/usr/share/debootstrap/scripts/gutsy # that of all since; Debian's debootstrap does not know the newest
+
 make_system() { # FOLDER SUITE PACKAGES: as it is when somebody has just installed it
-    local system=$1 suite=$2 packages=$3
+    local system=$1 suite=$2 packages=$3 from=()
+    if [[ $UBUNTU_SUITES = *" $suite "* ]]; then
+        from=(--components=main,universe)
+        # Without the key (the package ubuntu-keyring) nothing proves that what comes is Ubuntu's.
+        [ -e /usr/share/keyrings/ubuntu-archive-keyring.gpg ] || from+=(--no-check-gpg)
+    fi
     if [ ! -e "$system/made" ]; then
-        say "making a bare Debian $suite in $system"
+        say "making a bare $suite in $system"
         mkdir -p "$(dirname "$system")"
         rm -rf --one-file-system "$system"
-        debootstrap --variant=minbase --include="$packages" "$suite" "$system" >"$system.log" 2>&1 ||
-            { tail "$system.log" >&2; exit 1; }
+        debootstrap --variant=minbase --include="$packages" ${from[@]+"${from[@]}"} "$suite" "$system" \
+            ${from:+"$UBUNTU" "$UBUNTU_SCRIPT"} >"$system.log" 2>&1 || { tail "$system.log" >&2; exit 1; }
         # No package lists: a person's new computer has none, or old ones.
         rm -rf "$system"/var/lib/apt/lists/* "$system"/var/cache/apt/archives/*.deb
         cp -r /etc/apt/apt.conf.d/. "$system/etc/apt/apt.conf.d/"
         # Hooks of the packages of this computer mean nothing over there.
         grep -lE 'Post-Invoke' "$system"/etc/apt/apt.conf.d/* | xargs -r rm
-        if ls /etc/apt/sources.list.d/debian.sources >/dev/null 2>&1; then
+        if [[ $UBUNTU_SUITES = *" $suite "* ]]; then
+            printf 'deb %s %s main universe\n' "$UBUNTU" "$suite" "$UBUNTU" "$suite-updates" \
+                >"$system/etc/apt/sources.list"
+        elif ls /etc/apt/sources.list.d/debian.sources >/dev/null 2>&1; then
             sed "s/bookworm/$suite/g" /etc/apt/sources.list.d/debian.sources \
                 >"$system/etc/apt/sources.list.d/debian.sources"
             rm -f "$system/etc/apt/sources.list"

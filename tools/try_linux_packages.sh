@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Tries the Linux packages in dist/ as a person would who has no Python: in a bare Debian, as an ordinary user.
+# Tries the Linux packages in dist/ as a person would who has no Python: in a bare Debian or Ubuntu, as an ordinary user.
 #
 #   sudo tools/try_linux_packages.sh [--fresh] [--suite SUITE] [--tar] [DIR]
 #
 #   DIR        where the bare systems are made and kept (default /tmp/nep-packages)
-#   --suite    which Debian (default bookworm)
+#   --suite    which Debian, or Ubuntu's jammy or noble (default bookworm)
 #   --tar      unpack the .tar.xz in the user's home instead of installing the .deb
 #   --fresh    throw the system away and make it again
 #
