@@ -9,6 +9,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import sysconfig
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -25,6 +26,8 @@ SCRIPTS = Path(__file__).parent / "peers"
 FIXED_PORTS = (7000, 50000)
 PYTHON_PEERS = ("0.5.3.5", "0.5.4.5", "0.5.4.6", "0.5.4.7", "0.5.4.8")
 JAVASCRIPT_PEER = "nep-js"
+SHARED = "shared"
+"""The environment of the packages that all Python peers need."""
 MARK = "\x1e"
 LONG_S = 20.0
 FIRST_S = 600.0
@@ -163,9 +166,7 @@ class Peers:
     def _have(self, version: str, install: Callable[[str, Path], str]) -> Path:
         folder = CACHE / version
         if version not in self._missing:
-            done = folder / "complete"
-            made = done.read_text("utf-8") if done.is_file() else None
-            self._missing[version] = "" if made == _packages(version) else install(version, folder)
+            self._missing[version] = "" if _is_complete(version) else install(version, folder)
         if self._missing[version]:
             pytest.skip(self._missing[version])
         return folder
@@ -182,22 +183,30 @@ def _python_of(folder: Path) -> Path:
 
 
 def _install_python(version: str, folder: Path) -> str:
+    """The version alone, with what all share seen from its environment: that is large, and the same."""
+    missing = "" if _is_complete(SHARED) else _make_python(SHARED, CACHE / SHARED)
+    return missing or _make_python(version, folder, sees=CACHE / SHARED)
+
+
+def _make_python(version: str, folder: Path, sees: Path | None = None) -> str:
     shutil.rmtree(folder, ignore_errors=True)
-    commands = (
-        [sys.executable, "-m", "venv", str(folder)],
-        [
-            str(_python_of(folder)),
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--require-hashes",
-            "-r",
-            str(_pins(version)),
-        ],
-        [str(_python_of(folder)), "-c", "import nep; nep.node"],
-    )
-    return _run_all(commands, version, folder)
+    python = _python_of(folder)
+    into = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "--no-deps"]
+    trial = "import nep; nep.node" if sees else "import cv2, zmq"
+    problem = _run_all([[sys.executable, "-m", "venv", "--without-pip", str(folder)]], version, folder)
+    if not problem and sees is not None:
+        own = _packages_in(folder)
+        own.mkdir(parents=True, exist_ok=True)
+        (own / "shared.pth").write_text(os.path.relpath(_packages_in(sees), own) + "\n", "utf-8")
+    rest = ([*into, "--require-hashes", "-r", str(_pins(version))], [str(python), "-c", trial])
+    return problem or _run_all(rest, version, folder, is_complete=True)
+
+
+def _packages_in(folder: Path) -> Path:
+    """Where an environment has its packages."""
+    scheme = {"base": str(folder), "platbase": str(folder)}
+    layout = "venv" if "venv" in sysconfig.get_scheme_names() else sysconfig.get_default_scheme()
+    return Path(sysconfig.get_path("purelib", layout, scheme))
 
 
 def _install_javascript(version: str, folder: Path) -> str:
@@ -212,13 +221,21 @@ def _install_javascript(version: str, folder: Path) -> str:
         [npm, "ci", "--silent", "--no-audit", "--no-fund", "--prefix", str(folder)],
         ["node", "-e", f"require({json.dumps(str(folder / 'node_modules' / 'nep-js'))})"],
     )
-    return _run_all(commands, version, folder)
+    return _run_all(commands, version, folder, is_complete=True)
+
+
+def _is_complete(version: str) -> bool:
+    """Whether its environment is there, and made of what is asked for now."""
+    done = CACHE / version / "complete"
+    return done.is_file() and done.read_text("utf-8") == _packages(version)
 
 
 def _pins(version: str) -> Path:
     """What is installed for a peer, with hashes."""
     if version == JAVASCRIPT_PEER:
         return SCRIPTS / "javascript" / "package-lock.json"
+    if version == SHARED:
+        return SCRIPTS / "python.txt"
     return SCRIPTS / f"nep-{version}.txt"
 
 
@@ -228,9 +245,13 @@ def _packages(version: str) -> str:
     return _pins(version).read_text("utf-8") + common.read_text("utf-8")
 
 
-def _run_all(commands: Sequence[Sequence[str]], version: str, folder: Path) -> str:
-    """Run the commands that install a peer; the reason why it is not there, or nothing."""
-    what = f"the test peer {version if version == 'nep-js' else f'nep {version}'}"
+def _run_all(
+    commands: Sequence[Sequence[str]], version: str, folder: Path, *, is_complete: bool = False
+) -> str:
+    """Run commands that install a peer, the last ones too; the reason why it is not there, or nothing."""
+    what = {JAVASCRIPT_PEER: "the test peer nep-js", SHARED: "what the test peers need"}.get(
+        version, f"the test peer nep {version}"
+    )
     where = folder.parent  # not where we are: `import nep` would find our own
     where.mkdir(parents=True, exist_ok=True)
     for command in commands:
@@ -249,7 +270,8 @@ def _run_all(commands: Sequence[Sequence[str]], version: str, folder: Path) -> s
             return f"{what} could not be installed: {lines[-1]}"
         except (OSError, subprocess.TimeoutExpired) as error:
             return f"{what} could not be installed: {error}"
-    (folder / "complete").write_text(_packages(version), "utf-8")
+    if is_complete:
+        (folder / "complete").write_text(_packages(version), "utf-8")
     return ""
 
 
