@@ -23,7 +23,8 @@
     ├── EncodeError             a payload cannot become bytes
     ├── DecodeError             bytes cannot become a payload
     │   └── WireError               parts that are no message of the native wire
-    └── RecordingError          a recording cannot be written or read
+    ├── RecordingError          a recording cannot be written or read
+    └── RecordingsUnavailableError  what recordings need is not installed
 
 Beside them `WrongTypeError`, for an argument that is refused at the call.
 
@@ -55,6 +56,7 @@ __all__ = [
     "ParameterError",
     "PluginsMissingError",
     "RecordingError",
+    "RecordingsUnavailableError",
     "RequestRefusedError",
     "ServerGoneError",
     "ServiceError",
@@ -413,6 +415,14 @@ class RecordingError(NepError):
         self.path = path
         self.reason = reason
         super().__init__(_("cannot use the recording '{path}'; {reason}").format(path=path, reason=reason))
+
+
+class RecordingsUnavailableError(NepError):
+    """The packages that recordings need are not installed; `needs` says how to get them."""
+
+    def __init__(self, needs: str) -> None:
+        self.needs = needs
+        super().__init__(_("recordings need what is not installed; {needs}").format(needs=needs))
 
 
 class WrongTypeError(TypeError, ValueError):

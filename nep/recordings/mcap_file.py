@@ -1,0 +1,368 @@
+"""Writing an MCAP file: chunks with their indexes, and the summary at its end.
+
+Why not the package's own writer: a chunk must be able to be copied from another file as it is (the flight
+recorder), a write that fails must leave a file that ends with a whole record, and channels stand before the
+chunk that needs them first, outside of it, where a damaged chunk cannot take them away.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from array import array
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    DataEnd,
+    Footer,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+from nep.recordings.channels import ChannelDefinition
+from nep.recordings.records import (
+    MAGIC,
+    ChunkInfo,
+    compressed,
+    message_count,
+    message_head,
+    pack_chunk,
+    pack_chunk_info,
+    pack_message_index,
+    pack_offsets,
+    packed,
+)
+from nep.version import __version__
+
+__all__ = ["CHUNK_BYTES", "MOST_CHANNELS", "ChannelTable", "FileWriter"]
+
+CHUNK_BYTES = 1_000_000
+MOST_CHANNELS = 60_000
+"""Their numbers have 16 bits."""
+
+
+class ChannelTable:
+    """Numbers of channels and schemas. Files that share one can take each other's chunks."""
+
+    def __init__(self, definitions: Mapping[int, ChannelDefinition] | None = None) -> None:
+        """`definitions`: channels that have their numbers already."""
+        self.definitions: dict[int, ChannelDefinition] = dict(definitions or {})
+        self._numbers = {definition: number for number, definition in self.definitions.items()}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._next = max(self.definitions, default=0) + 1
+
+    def number(self, definition: ChannelDefinition) -> int | None:
+        """The channel's number, from 1; None when there are too many."""
+        known = self._numbers.get(definition)
+        if known is None:
+            if self._next > MOST_CHANNELS:
+                return None
+            known = self._numbers[definition] = self._next
+            self.definitions[known] = definition
+            self._next += 1
+        return known
+
+    def put(self, number: int, definition: ChannelDefinition) -> None:
+        """A channel that has its number already, in chunks that are copied."""
+        if number not in self.definitions:
+            self.definitions[number] = definition
+            self._numbers[definition] = number
+            self._next = max(self._next, number + 1)
+
+    def has(self, definition: ChannelDefinition) -> bool:
+        """Whether it has a number."""
+        return definition in self._numbers
+
+    def schema_number(self, definition: ChannelDefinition) -> int:
+        """The number of its schema; 0 when it has none."""
+        key = (definition.schema_name, definition.schema_encoding, definition.schema_data)
+        return self._schemas.setdefault(key, len(self._schemas) + 1) if key[1] else 0
+
+    def records(self, number: int) -> tuple[Schema | None, Channel]:
+        """What stands in a file of a channel."""
+        made = self.definitions[number]
+        schema_number = self.schema_number(made)
+        channel = Channel(
+            id=number,
+            topic=made.topic,
+            message_encoding=made.message_encoding,
+            schema_id=schema_number,
+            metadata=dict(made.metadata),
+        )
+        if not schema_number:
+            return None, channel
+        return Schema(
+            id=schema_number, data=made.schema_data, encoding=made.schema_encoding, name=made.schema_name
+        ), channel
+
+
+class _Chunk:
+    """A chunk that is being filled."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes | memoryview] = []
+        self.size = 0
+        self.start_ns = 0
+        self.end_ns = 0
+        self.indexes: dict[int, array[int]] = {}
+
+
+class FileWriter:
+    """One file. Every method raises `OSError` when the disk does not take it.
+
+    After that the file ends with the last record that was whole, and `finish` may still be tried. Used by
+    one thread.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        table: ChannelTable | None = None,
+        *,
+        compression: str = "zstd",
+        is_new: bool = True,
+        keeps_chunks: bool = False,
+    ) -> None:
+        """Raises `FileExistsError` when there is such a file, unless it is not to be new."""
+        self.path = path
+        self.table = ChannelTable() if table is None else table
+        self.chunks: list[ChunkInfo] | None = [] if keeps_chunks else None
+        """Those that are written, for who wants to copy them; hours of them would take much memory."""
+        self.start_ns: int | None = None
+        self.end_ns = 0
+        self._packed_chunks = bytearray()
+        self._chunk_count = 0
+        self.counts: dict[int, int] = {}
+        """Messages of each channel, in chunks that are written."""
+        self._compression = compression
+        self._file: BinaryIO = open(path, "xb" if is_new else "wb", buffering=0)  # noqa: SIM115, PTH123
+        self._at = 0
+        self._chunk = _Chunk()
+        self._written_channels: set[int] = set()
+        self._written_schemas: set[int] = set()
+        self._metadata: list[MetadataIndex] = []
+        try:
+            self._write(MAGIC + packed(Header(profile="", library=f"nep {__version__}")))
+        except OSError:
+            self._file.close()
+            raise
+
+    # ---- filling it
+
+    @property
+    def size_bytes(self) -> int:
+        """Of the file as it is on the disk."""
+        return self._at
+
+    @property
+    def pending_bytes(self) -> int:
+        """What waits in the chunk that is not written yet."""
+        return self._chunk.size
+
+    @property
+    def pending_counts(self) -> dict[int, int]:
+        """The messages of each channel in that chunk."""
+        return {number: len(entries) // 2 for number, entries in self._chunk.indexes.items()}
+
+    @property
+    def message_count(self) -> int:
+        """Messages that are in the file."""
+        return sum(self.counts.values())
+
+    def add(
+        self, channel: int, times: tuple[int, int], sequence: int, before: bytes, data: bytes | memoryview
+    ) -> None:
+        """Add a message of a channel of the table to the chunk; nothing is written. `times`: log, publish."""
+        chunk = self._chunk
+        log_ns = times[0]
+        size = len(before) + (len(data) if isinstance(data, bytes) else data.nbytes)
+        index = chunk.indexes.get(channel)
+        if index is None:
+            index = chunk.indexes[channel] = array("Q")
+        if not chunk.parts:
+            chunk.start_ns = chunk.end_ns = log_ns
+        elif log_ns > chunk.end_ns:
+            chunk.end_ns = log_ns
+        elif log_ns < chunk.start_ns:
+            chunk.start_ns = log_ns
+        index.append(log_ns)
+        index.append(chunk.size)
+        head = message_head(channel, sequence, log_ns, times[1], size)
+        chunk.parts.append(head + before if before else head)
+        chunk.parts.append(data)
+        chunk.size += len(head) + size
+
+    def flush(self) -> int:
+        """Write the chunk, if there is anything in it; how many messages it has."""
+        chunk = self._chunk
+        if not chunk.parts:
+            return 0
+        data = b"".join(chunk.parts)
+        crc, size = zlib.crc32(data), len(data)
+        made, compression = compressed(data, self._compression), self._compression
+        if len(made) >= size:
+            made, compression = data, ""
+        head = pack_chunk(made, compression, size, crc, (chunk.start_ns, chunk.end_ns))
+        indexes = {number: pack_message_index(number, entries) for number, entries in chunk.indexes.items()}
+        counts = self.pending_counts
+        self.define(counts)
+        info = ChunkInfo(
+            chunk.start_ns,
+            chunk.end_ns,
+            self._at,
+            len(head) + len(made),
+            b"",
+            0,
+            compression,
+            len(made),
+            size,
+        )
+        self._write_chunk(info, [head, made], indexes, counts)
+        self._chunk = _Chunk()
+        return sum(counts.values())
+
+    def copy_chunk(self, record: bytes | memoryview, info: ChunkInfo, indexes: Mapping[int, bytes]) -> None:
+        """A chunk of another file, with the same channels. `indexes`: its message indexes by channel."""
+        self.flush()
+        counts = {number: message_count(index) for number, index in indexes.items()}
+        self.define(counts)
+        copied = replace(info, offset=self._at, packed_offsets=b"", index_bytes=0)
+        self._write_chunk(copied, [record], indexes, counts)
+
+    def _write_chunk(
+        self,
+        info: ChunkInfo,
+        record: list[bytes | memoryview],
+        indexes: Mapping[int, bytes],
+        counts: Mapping[int, int],
+    ) -> None:
+        at = self._at + info.length
+        offsets = {}
+        for number, index in indexes.items():
+            offsets[number] = at
+            at += len(index)
+        info.packed_offsets, info.index_bytes = pack_offsets(offsets), at - info.offset - info.length
+        self._write(*record, b"".join(indexes.values()))
+        if self.chunks is not None:
+            self.chunks.append(info)
+        self._packed_chunks += pack_chunk_info(info)
+        self._chunk_count += 1
+        self.start_ns = info.start_ns if self.start_ns is None else min(self.start_ns, info.start_ns)
+        self.end_ns = max(self.end_ns, info.end_ns)
+        for number, count in counts.items():
+            self.counts[number] = self.counts.get(number, 0) + count
+
+    def define(self, channels: Mapping[int, object]) -> None:
+        """Write those of these channels, and their schemas, that are not in the file yet."""
+        new = [number for number in channels if number not in self._written_channels]
+        if not new:
+            return
+        made = b""
+        schemas: set[int] = set()
+        for number in new:
+            schema, channel = self.table.records(number)
+            if schema is not None and schema.id not in self._written_schemas | schemas:
+                schemas.add(schema.id)
+                made += packed(schema)
+            made += packed(channel)
+        self._write(made)
+        self._written_channels.update(new)
+        self._written_schemas |= schemas
+
+    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """Write words about the recording, after what waits in the chunk."""
+        self.flush()
+        record = packed(Metadata(name=name, metadata=dict(values)))
+        index = MetadataIndex(offset=self._at, length=len(record), name=name)
+        self._write(record)
+        self._metadata.append(index)
+
+    def _write(self, *parts: bytes | memoryview) -> None:
+        """Write all of it, or nothing: what is half there is taken back. Raises `OSError`."""
+        size = 0
+        try:
+            for part in parts:
+                whole = memoryview(part)
+                at = 0
+                while at < whole.nbytes:
+                    at += self._file.write(whole[at:]) or 0
+                size += whole.nbytes
+        except OSError:
+            self.cut_back()
+            raise
+        self._at += size
+
+    def cut_back(self) -> None:
+        """Let the file end with its last whole record, as far as the disk does that."""
+        try:
+            self._file.truncate(self._at)
+            self._file.seek(self._at)
+        except OSError:
+            return
+
+    # ---- the end
+
+    def finish(self) -> None:
+        """Write what waits and the summary; the file is closed and on the disk then. Raises `OSError`."""
+        try:
+            self.flush()
+            self._write(self._summary())
+            os.fsync(self._file.fileno())
+        finally:
+            self._file.close()
+
+    def close(self) -> None:
+        """Close it as it is: whoever opens it makes the summary."""
+        self._file.close()
+
+    def _summary(self) -> bytes:
+        data_end = packed(DataEnd(data_section_crc=0))
+        start = self._at + len(data_end)
+        groups = self._groups()
+        made, offsets = b"", b""
+        for opcode, group in groups:
+            if group:
+                offsets += packed(
+                    SummaryOffset(group_opcode=opcode, group_start=start + len(made), group_length=len(group))
+                )
+                made += group
+        footer = Footer(summary_start=start, summary_offset_start=start + len(made), summary_crc=0)
+        head = packed(footer)[:-4]
+        crc = zlib.crc32(made + offsets + head)
+        return data_end + made + offsets + head + crc.to_bytes(4, "little") + MAGIC
+
+    def _groups(self) -> list[tuple[Opcode, bytes]]:
+        schemas: dict[int, bytes] = {}
+        channels = []
+        for number in sorted(self._written_channels):
+            schema, channel = self.table.records(number)
+            channels.append(packed(channel))
+            if schema is not None:
+                schemas.setdefault(schema.id, packed(schema))
+        statistics = Statistics(
+            attachment_count=0,
+            channel_count=len(channels),
+            channel_message_counts=self.counts,
+            chunk_count=self._chunk_count,
+            message_count=self.message_count,
+            message_end_time=self.end_ns,
+            message_start_time=self.start_ns or 0,
+            metadata_count=len(self._metadata),
+            schema_count=len(schemas),
+        )
+        return [
+            (Opcode.SCHEMA, b"".join(schemas.values())),
+            (Opcode.CHANNEL, b"".join(channels)),
+            (Opcode.STATISTICS, packed(statistics)),
+            (Opcode.CHUNK_INDEX, bytes(self._packed_chunks)),
+            (Opcode.METADATA_INDEX, b"".join(map(packed, self._metadata))),
+        ]

@@ -1,0 +1,444 @@
+"""Repair: what is whole in a cut or damaged recording, in a new file beside it.
+
+Read record by record until the cut. A damaged chunk, which its CRC shows, is left out, and the next whole one
+is looked for; of the last chunk, when it is cut, all whole messages are kept. The new file is read back
+before success is said, and the old one is not touched.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+import orjson
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Metadata
+
+from nep.errors import RecordingError
+from nep.i18n import _
+from nep.recordings.channels import ChannelDecoder
+from nep.recordings.index import DAMAGED, Definitions, Place, read_chunk, read_index
+from nep.recordings.mcap_file import ChannelTable, FileWriter
+from nep.recordings.records import (
+    CHUNK_HEAD_BYTES,
+    HEAD_BYTES,
+    MAGIC,
+    RECORD_HEAD,
+    ChunkHead,
+    ChunkInfo,
+    RawMessage,
+    chunk_head,
+    decompressed,
+    decompressed_part,
+    messages_in,
+    pack_message_index,
+    read_message_index,
+)
+from nep.recordings.writer import disk_sentence
+from nep.system.replace_file import replace_file
+
+__all__ = ["RepairReport", "repair", "repaired_path"]
+
+_WINDOW = 4_000_000
+_LIKE_A_CHUNK = re.compile(rb"\x06.{4}[\x00-\x7f]\x00\x00\x00", re.DOTALL)
+"""A chunk's opcode, and a length below 2^39."""
+_FLUSH_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class RepairReport:
+    """What was done. Nothing was lost when `discarded_bytes` is 0.
+
+    `recovered`: messages in the new file. `discarded`: messages that are known to be gone; None when nobody
+    knows how many there were. `discarded_bytes`: of the old file, that could not be read. `lost_s`: how long
+    before the recording's end the last message is that was recovered, as far as is known. `duration_s`: of
+    what was recovered.
+    """
+
+    path: Path
+    recovered: int
+    discarded: int | None
+    discarded_bytes: int
+    lost_s: float
+    duration_s: float
+    damaged_places: int
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing was lost: it had only not been ended."""
+        return not self.discarded_bytes and not self.discarded
+
+
+@dataclass
+class _Counts:
+    recovered: int = 0
+    discarded: int = 0
+    discarded_bytes: int = 0
+    is_unknown: bool = False
+    """Whether nobody knows how many messages were in what is gone."""
+    damaged_places: int = 0
+    last_ns: int = 0
+    """Until when there were messages."""
+    figures: dict[str, object] = field(default_factory=dict)
+    words: dict[str, str] = field(default_factory=dict)
+    metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
+
+
+def repaired_path(path: Path) -> Path:
+    """A name beside a damaged recording that no file has yet."""
+    made = path.with_name(f"{path.stem}.repaired.mcap")
+    number = 2
+    while made.exists():
+        made = path.with_name(f"{path.stem}.repaired-{number}.mcap")
+        number += 1
+    return made
+
+
+def repair(
+    path: Path, target: Path | None = None, progress: Callable[[int, int], object] | None = None
+) -> RepairReport:
+    """Write what is whole of a recording into `target` (`repaired_path`), and read that back.
+
+    `progress` is told how many bytes of how many are done. Raises `RecordingError` when there is no message
+    that can be read, when there is such a file already, or the disk does not take it.
+    """
+    target = repaired_path(path) if target is None else target
+    if target.exists():
+        raise RecordingError(str(target), _("there is such a file already; choose another name"))
+    unfinished = target.with_name(f"{target.name}.part")
+    try:
+        with path.open("rb") as file:
+            mending = _Mending(file, path, unfinished, progress or _no_progress)
+            try:
+                counts = mending.run()
+                first_ns, last_ns = _read_back(unfinished, mending.writer)
+                if not counts.recovered:
+                    raise RecordingError(str(path), _("it holds no message that can be read"))
+                replace_file(unfinished, target)
+            finally:
+                mending.writer.close()
+    except OSError as error:
+        raise disk_sentence(target, error) from error
+    finally:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+    return RepairReport(
+        target,
+        counts.recovered,
+        None if counts.is_unknown else counts.discarded,
+        counts.discarded_bytes,
+        max(0, counts.last_ns - last_ns) / 1e9,
+        (last_ns - first_ns) / 1e9,
+        counts.damaged_places,
+    )
+
+
+def _no_progress(_done: int, _total: int) -> None:
+    pass
+
+
+def _read_back(path: Path, writer: FileWriter) -> tuple[int, int]:
+    """The times of the first and last message. Raises `RecordingError` when it is not what was written."""
+    counts: dict[int, int] = {}
+    with path.open("rb") as file:
+        index = read_index(file, path)
+        if not index.is_complete:
+            raise RecordingError(str(path), _("what was recovered cannot be read back"))
+        for info in index.chunks:
+            try:
+                chunk = read_chunk(file, info)
+            except ValueError as error:
+                raise RecordingError(str(path), _("what was recovered cannot be read back")) from error
+            for record in messages_in(chunk):
+                if isinstance(record, RawMessage):
+                    counts[record.channel] = counts.get(record.channel, 0) + 1
+    if counts != writer.counts:
+        raise RecordingError(str(path), _("what was recovered cannot be read back"))
+    return writer.start_ns or 0, writer.end_ns
+
+
+class _Mending:
+    """One repair."""
+
+    def __init__(
+        self, file: BinaryIO, path: Path, target: Path, progress: Callable[[int, int], object]
+    ) -> None:
+        self._file = file
+        self._progress = progress
+        self._size = file.seek(0, io.SEEK_END)
+        file.seek(0)
+        if file.read(len(MAGIC)) != MAGIC and not self._find_chunk(0):
+            raise RecordingError(str(path), _("it is no MCAP file"))
+        self._definitions = self._known_definitions(path)
+        self._table = ChannelTable(self._definitions.channels)
+        self._counts = _Counts()
+        self._damaged_chunk: ChunkHead | None = None
+        self.writer = FileWriter(target, self._table, is_new=False)
+
+    def _known_definitions(self, path: Path) -> Definitions:
+        """Those of the summary, if there is one: then no damage before can take a channel away."""
+        try:
+            index = read_index(self._file, path)
+        except RecordingError:
+            return Definitions()
+        return index.definitions
+
+    def run(self) -> _Counts:
+        """Do it. Raises `OSError`."""
+        offset = len(MAGIC)
+        while offset + HEAD_BYTES <= self._size:
+            self._progress(offset, self._size)
+            place = self._place(offset)
+            if place is not None and place.opcode == Opcode.DATA_END:
+                break
+            if place is not None and self._take(place):
+                offset += HEAD_BYTES + place.length
+                continue
+            offset = self._beyond_damage(offset)
+        else:
+            self._discard_bytes(max(0, self._size - offset))
+        self._end()
+        self._progress(self._size, self._size)
+        return self._counts
+
+    def _place(self, offset: int) -> Place | None:
+        """The record at an offset, if it can be one; it may be cut."""
+        self._file.seek(offset)
+        opcode, length = RECORD_HEAD.unpack(self._file.read(HEAD_BYTES))
+        known = 0 < opcode <= Opcode.DATA_END or opcode >= 0x80
+        return Place(offset, opcode, length) if known and length < 2**39 else None
+
+    def _take(self, place: Place) -> bool:
+        """Keep what a record has; False when it is no whole record."""
+        end = place.offset + HEAD_BYTES + place.length
+        if end > self._size:
+            return False
+        if place.opcode == Opcode.CHUNK:
+            return self._take_chunk(place)
+        if place.opcode == Opcode.MESSAGE_INDEX:
+            self._take_index(place)
+        elif place.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
+            self._define(place.opcode, self._content(place))
+        elif place.opcode == Opcode.METADATA:
+            self._take_metadata(self._content(place))
+        elif place.opcode == Opcode.MESSAGE:
+            self._file.seek(place.offset)
+            for record in messages_in(self._file.read(end - place.offset)):
+                self._take_record(record)
+        return self._is_record_at(end)
+
+    def _is_record_at(self, offset: int) -> bool:
+        """Whether a record, or nothing, may follow: else a length was damaged."""
+        if offset + HEAD_BYTES > self._size:
+            return True
+        return self._place(offset) is not None
+
+    def _content(self, place: Place) -> bytes:
+        self._file.seek(place.offset + HEAD_BYTES)
+        return self._file.read(place.length)
+
+    def _define(self, opcode: int, content: bytes | memoryview) -> None:
+        before = set(self._definitions.channels)
+        self._definitions.add(opcode, content)
+        for number in self._definitions.channels.keys() - before:
+            self._table.put(number, self._definitions.channels[number])
+
+    def _take_metadata(self, content: bytes) -> None:
+        try:
+            made = Metadata.read(ReadDataStream(io.BytesIO(content)))
+        except DAMAGED:
+            return
+        if made.name == "nep.recording":
+            self._counts.words.update(made.metadata)
+        elif made.name == "nep.figures":
+            for topic, text in made.metadata.items():
+                with suppress(orjson.JSONDecodeError):
+                    self._counts.figures[topic] = orjson.loads(text)
+        else:
+            self._counts.metadata.append((made.name, made.metadata))
+
+    # ---- chunks
+
+    def _take_chunk(self, place: Place) -> bool:
+        self._file.seek(place.offset)
+        record = memoryview(self._file.read(HEAD_BYTES + place.length))
+        head = chunk_head(record, place.length)
+        self._damaged_chunk = None
+        if head is None:
+            return False
+        try:
+            chunk = decompressed(record[head.data_at :], head)
+        except ValueError:
+            if not self._is_record_at(place.offset + HEAD_BYTES + place.length):
+                return False
+            self._damaged_chunk = head
+            self._counts.damaged_places += 1
+            self._counts.is_unknown = True  # until its indexes tell
+            self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
+            self._discard_bytes(HEAD_BYTES + place.length)
+            return True
+        self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
+        self._keep_chunk(record, head, chunk)
+        return True
+
+    def _keep_chunk(self, record: memoryview, head: ChunkHead, chunk: bytes | memoryview) -> None:
+        """Copy it as it is, if it has nothing but messages of known channels."""
+        indexes: dict[int, list[int]] = {}
+        is_plain = True
+        for each in messages_in(chunk):
+            if not isinstance(each, RawMessage) or each.channel not in self._definitions.channels:
+                is_plain = False
+                break
+            indexes.setdefault(each.channel, []).extend((each.log_ns, each.offset))
+            self._read_own(each)
+        if not is_plain or not indexes:
+            for each in messages_in(chunk):
+                self._take_record(each)
+            return
+        info = ChunkInfo(
+            head.start_ns,
+            head.end_ns,
+            0,
+            len(record),
+            b"",
+            0,
+            head.compression,
+            head.data_bytes,
+            head.uncompressed_bytes,
+        )
+        packed = {number: pack_message_index(number, entries) for number, entries in indexes.items()}
+        self.writer.copy_chunk(record, info, packed)
+        self._counts.recovered += sum(
+            len(entries) // 2 for number, entries in indexes.items() if not self._is_own(number)
+        )
+
+    def _take_record(self, record: RawMessage | tuple[int, memoryview]) -> None:
+        """A record of its own, or of a chunk that is not copied as it is."""
+        if not isinstance(record, RawMessage):
+            self._define(*record)
+            return
+        self._counts.last_ns = max(self._counts.last_ns, record.log_ns)
+        if record.channel not in self._definitions.channels:
+            self._counts.discarded += 1
+            return
+        self._read_own(record)
+        self.writer.add(
+            record.channel, (record.log_ns, record.publish_ns), record.sequence, b"", bytes(record.data)
+        )
+        if not self._is_own(record.channel):
+            self._counts.recovered += 1
+        if self.writer.pending_bytes >= _FLUSH_BYTES:
+            self.writer.flush()
+
+    def _role(self, channel: int) -> str:
+        return dict(self._definitions.channels[channel].metadata).get("nep.role", "")
+
+    def _is_own(self, channel: int) -> bool:
+        return bool(self._role(channel))
+
+    def _read_own(self, record: RawMessage) -> None:
+        """The recorder's own counts, as far as they are there, stand at the end of the new file, too."""
+        if self._role(record.channel) != "figures":
+            return
+        with suppress(orjson.JSONDecodeError, AttributeError):
+            self._counts.figures.update(orjson.loads(record.data).get("topics", {}))
+
+    def _take_index(self, place: Place) -> None:
+        """Of a chunk that was kept it is known; of a damaged one it tells how many messages are gone."""
+        if self._damaged_chunk is None:
+            return
+        with suppress(ValueError):
+            channel, entries = read_message_index(self._content(place))
+            known = self._definitions.channels.get(channel)
+            if known is None or ChannelDecoder(known).role is None:
+                self._counts.discarded += len(entries)
+            self._counts.is_unknown = False
+
+    # ---- damage
+
+    def _discard_bytes(self, count: int) -> None:
+        self._counts.discarded_bytes += count
+
+    def _beyond_damage(self, offset: int) -> int:
+        """Where to go on; what is whole of a chunk that the file's end has cut is kept."""
+        found = next(self._whole_chunks(offset + 1), None)
+        self._counts.damaged_places += 1
+        self._counts.is_unknown = True
+        if found is None:
+            kept = self._take_cut_chunk(offset)
+            self._discard_bytes(self._size - offset - kept)
+            return self._size
+        self._discard_bytes(found - offset)
+        return found
+
+    def _find_chunk(self, offset: int) -> bool:
+        return next(self._whole_chunks(offset), None) is not None
+
+    def _whole_chunks(self, offset: int) -> Iterator[int]:
+        """Where a chunk begins whose CRC is right, from an offset on."""
+        while offset + CHUNK_HEAD_BYTES <= self._size:
+            self._file.seek(offset)
+            window = self._file.read(_WINDOW)
+            for match in _LIKE_A_CHUNK.finditer(window):
+                at = match.start()
+                _opcode, length = RECORD_HEAD.unpack_from(window, at)
+                if offset + at + HEAD_BYTES + length <= self._size and self._is_whole(offset + at, length):
+                    yield offset + at
+            offset += max(1, len(window) - CHUNK_HEAD_BYTES)
+            self._progress(min(offset, self._size), self._size)
+
+    def _is_whole(self, offset: int, length: int) -> bool:
+        self._file.seek(offset)
+        head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), length)
+        if head is None or not head.crc:
+            return False
+        self._file.seek(offset + head.data_at)
+        try:
+            decompressed(memoryview(self._file.read(head.data_bytes)), head)
+        except ValueError:
+            return False
+        return True
+
+    def _take_cut_chunk(self, offset: int) -> int:
+        """Keep the whole messages of a chunk of which the end is missing; how many bytes of it were there."""
+        self._file.seek(offset)
+        record = memoryview(self._file.read())
+        if len(record) < HEAD_BYTES or record[0] != Opcode.CHUNK:
+            return 0
+        _opcode, length = RECORD_HEAD.unpack_from(record)
+        head = chunk_head(record, length)
+        if head is None or HEAD_BYTES + length <= len(record):
+            return 0
+        self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
+        before = self._counts.recovered
+        for each in messages_in(decompressed_part(record[head.data_at :], head)):
+            if isinstance(each, RawMessage):
+                is_plausible = head.start_ns <= each.log_ns <= head.end_ns
+                if not is_plausible or each.channel not in self._definitions.channels:
+                    break
+            self._take_record(each)
+        return len(record) if self._counts.recovered > before else 0
+
+    # ---- the end
+
+    def _end(self) -> None:
+        counts, writer = self._counts, self.writer
+        writer.flush()
+        words = dict(counts.words)
+        words["repaired"] = "1"
+        words["recovered"] = str(counts.recovered)
+        words["discarded"] = "" if counts.is_unknown else str(counts.discarded)
+        words["discarded_bytes"] = str(counts.discarded_bytes)
+        writer.add_metadata("nep.recording", words)
+        if counts.figures:
+            figures = {topic: orjson.dumps(each).decode() for topic, each in counts.figures.items()}
+            writer.add_metadata("nep.figures", figures)
+        for name, values in counts.metadata:
+            writer.add_metadata(name, values)
+        writer.finish()

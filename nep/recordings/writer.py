@@ -1,0 +1,540 @@
+"""RecordingWriter: messages in, from any thread; a file out, written by one thread.
+
+`post` never waits. The queue is bounded by bytes and by number; a message for which there is no room is
+counted, shown and told inside the recording. Chunks are written when they have 1 MB or are half a second old:
+so a process that is killed loses less than a second, and a reader finds whole records up to there.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import orjson
+
+from nep.errors import ClosedError, RecordingError
+from nep.i18n import _
+from nep.messages.message import Message, MessageKind
+from nep.recordings.channels import (
+    Encoding,
+    Role,
+    definition_of,
+    encoding_of,
+    own_channel,
+)
+from nep.recordings.figures import MOST_TOPICS, TopicCounter, TopicFigures, changed
+from nep.recordings.mcap_file import CHUNK_BYTES, FileWriter
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["Destination", "LogClock", "RecordingStatus", "RecordingWriter", "disk_sentence"]
+
+QUEUE_BYTES = 256_000_000
+QUEUE_MESSAGES = 200_000
+FLUSH_S = 0.5
+FIGURES_S = 1.0
+LEAST_FREE_BYTES = 200_000_000
+"""With less of it free on the disk a recording ends: other programs need some, too."""
+MOST_ONES_CHANNELS = 10_000
+"""With more, publishers that come later share a channel for each topic."""
+_CLOSE_S = 30.0
+_KNOWN = 10_000
+_OTHERS = ""
+"""Where topics are counted of which there are too many."""
+
+
+class LogClock:
+    """When messages came, in nanoseconds since 1970: the computer's clock when it was made, and steady since.
+
+    So a recording's time never jumps, also when somebody sets the clock.
+    """
+
+    def __init__(self) -> None:
+        self._add_ns = time.time_ns() - time.monotonic_ns()
+
+    def __call__(self) -> int:
+        """Now."""
+        return time.monotonic_ns() + self._add_ns
+
+
+class Destination(Protocol):
+    """Where a writer's thread writes to. All of it is called by that thread alone."""
+
+    @property
+    def file(self) -> FileWriter:
+        """The file for what comes next."""
+
+    def flushed(self) -> None:
+        """A chunk was written. Raises `OSError`, `RecordingError`."""
+
+    def look(self) -> None:
+        """Once a second: is there still room? Raises `RecordingError` with the sentence when not."""
+
+    def finish(self) -> None:
+        """Nothing more comes. Raises `OSError`."""
+
+    def fail(self) -> None:
+        """Close it as it is, after an error."""
+
+
+class _OneFile:
+    """A recording's file."""
+
+    def __init__(self, file: FileWriter, least_free_bytes: int) -> None:
+        self.file = file
+        self._least_free_bytes = least_free_bytes
+        self._identity = _identity(file.path)
+
+    def flushed(self) -> None:
+        """There is nothing to do."""
+
+    def look(self) -> None:
+        """See `Destination`."""
+        if _identity(self.file.path) != self._identity:
+            raise RecordingError(
+                str(self.file.path), _("somebody has moved or deleted it while it was written")
+            )
+        if shutil.disk_usage(self.file.path.parent).free < self._least_free_bytes:
+            raise RecordingError(str(self.file.path), _("the disk is full; what came before is kept"))
+
+    def finish(self) -> None:
+        """See `Destination`."""
+        self.file.finish()
+
+    def fail(self) -> None:
+        """See `Destination`."""
+        self.file.close()
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
+
+
+def disk_sentence(path: Path, error: OSError) -> RecordingError:
+    """What a disk's error means for a recording."""
+    if error.errno in {errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC, errno.EFBIG}:
+        reason = _("the disk is full; what came before is kept")
+    else:
+        reason = (error.strerror or str(error)).lower()
+    return RecordingError(str(path), reason)
+
+
+@dataclass(frozen=True)
+class RecordingStatus:
+    """What a writer has done so far.
+
+    `message_count`: messages in the file. `size_bytes`: of the file. `duration_s`: since the first message.
+    `queued_bytes`: waits to be written. `unkept`: came and are not in it. `problem`: why it ended, or "".
+    """
+
+    message_count: int
+    size_bytes: int
+    duration_s: float
+    queued_bytes: int
+    unkept: int
+    topics: Mapping[str, TopicFigures] = field(default_factory=dict)
+    problem: str = ""
+
+
+@dataclass
+class _Known:
+    """What is known of the messages of one publisher, by their `MessageKind`."""
+
+    kind: MessageKind
+    publisher: int | None
+    counter: TopicCounter
+    channels: dict[tuple[str, bool, bool], int] = field(default_factory=dict)
+
+
+class _Said:
+    """Something that the recorder says itself."""
+
+    __slots__ = ("role", "text")
+
+    def __init__(self, role: Role, text: bytes) -> None:
+        self.role = role
+        self.text = text
+
+
+class RecordingWriter:
+    """Writes a recording. Use it from any thread; a context manager."""
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str] | Destination,
+        *,
+        note: str = "",
+        clock: Callable[[], int] | None = None,
+        queue_bytes: int = QUEUE_BYTES,
+        queue_messages: int = QUEUE_MESSAGES,
+        least_free_bytes: int = LEAST_FREE_BYTES,
+        flush_s: float = FLUSH_S,
+        on_problem: Callable[[str], object] | None = None,
+    ) -> None:
+        """Make the file, which there must not be yet, and start the thread. Raises `RecordingError`.
+
+        `note`: words about it. `clock`: nanoseconds since 1970, never backwards. `least_free_bytes`: with
+        less room on the disk it ends. `on_problem` is told once, in the thread that writes, why it has ended.
+        """
+        self._note = note
+        self._clock = LogClock() if clock is None else clock
+        self._started_ns = self._clock()
+        if isinstance(path, str | os.PathLike):
+            whole = Path(path)
+            try:
+                self._destination: Destination = _OneFile(FileWriter(whole), least_free_bytes)
+            except FileExistsError:
+                raise RecordingError(
+                    str(whole), _("there is such a file already; choose another name")
+                ) from None
+            except OSError as error:
+                raise disk_sentence(whole, error) from error
+        else:
+            self._destination = path
+        self._queue_bytes, self._queue_messages, self._flush_s = queue_bytes, queue_messages, flush_s
+        self._on_problem = on_problem
+        self._lock = threading.Condition()
+        self._queue: deque[tuple[int, Sequence[Message]] | _Said] = deque()
+        self._queued_bytes = self._queued_messages = 0
+        self._left_out: dict[tuple[str, int | None], list[int]] = {}
+        self._flush_wanted = self._flush_done = 0
+        self._is_closing = False
+        self._problem = ""
+        self._last_ns = 0
+        self._counters: dict[str, TopicCounter] = {}
+        self._known: dict[int, _Known] = {}
+        self._figures: dict[str, TopicFigures] = {}
+        self._first_ns: int | None = None
+        self._own_sequence = 0
+        self._own_numbers: set[int] = set()
+        self._rest: list[Sequence[Message]] = []
+        """What was taken from the queue and not added to the file when the disk took no more."""
+        self._message_count = self._size_bytes = 0
+        self._thread = threading.Thread(target=self._run, name="recording-writer", daemon=True)
+        self._thread.start()
+
+    # ---- any thread
+
+    def post(self, messages: Sequence[Message]) -> None:
+        """Record messages that came now, in this order. Never waits, never raises; a `nep.Sink`."""
+        now = self._clock()
+        size = sum([each.size_bytes for each in messages])
+        with self._lock:
+            is_full = (
+                self._queued_bytes + size > self._queue_bytes
+                or self._queued_messages + len(messages) > self._queue_messages
+            )
+            if self._is_closing or self._problem or is_full:
+                self._post_what_fits(messages, now, may_fit=not (self._is_closing or self._problem))
+                return
+            self._queue.append((now, messages))
+            self._queued_bytes += size
+            self._queued_messages += len(messages)
+            self._lock.notify_all()
+
+    def _post_what_fits(self, messages: Sequence[Message], now: int, *, may_fit: bool) -> None:
+        """There is no room for all of them: under the lock."""
+        fits = []
+        for message in messages:
+            size = message.size_bytes
+            has_room = (
+                self._queued_bytes + size <= self._queue_bytes
+                and self._queued_messages < self._queue_messages
+            )
+            if may_fit and has_room:
+                fits.append(message)
+                self._queued_bytes += size
+                self._queued_messages += 1
+                continue
+            key = (message.topic, message.publisher)
+            if key not in self._left_out and len(self._left_out) >= MOST_TOPICS:
+                key = (_OTHERS, None)
+            count = self._left_out.setdefault(key, [0, 0])
+            count[0] += 1
+            count[1] += size
+        if fits:
+            self._queue.append((now, fits))
+            self._lock.notify_all()
+
+    def say(self, role: Role, value: object) -> None:
+        """Write something of the recorder's own, as JSON: "alerts", "notes". Never waits."""
+        text = orjson.dumps(value, option=orjson.OPT_NON_STR_KEYS)
+        with self._lock:
+            if not (self._is_closing or self._problem) and self._queued_messages < self._queue_messages:
+                self._queue.append(_Said(role, text))
+                self._queued_bytes += len(text)
+                self._queued_messages += 1
+                self._lock.notify_all()
+
+    def flush(self, timeout_s: float = 10.0) -> bool:
+        """Let all that was posted before be in the file; whether that was done in time."""
+        with self._lock:
+            self._flush_wanted += 1
+            wanted = self._flush_wanted
+            self._lock.notify_all()
+            return (
+                self._lock.wait_for(
+                    lambda: self._flush_done >= wanted or not self._thread.is_alive() or bool(self._problem),
+                    timeout_s,
+                )
+                and not self._problem
+            )
+
+    @property
+    def status(self) -> RecordingStatus:
+        """What was done so far; the topics' figures are a second old at most."""
+        with self._lock:
+            first = self._first_ns
+            waiting = sum(count for count, _size in self._left_out.values())
+            return RecordingStatus(
+                self._message_count,
+                self._size_bytes,
+                0.0 if first is None else max(0, self._last_ns - first) / 1e9,
+                self._queued_bytes,
+                waiting + sum(each.unkept for each in self._figures.values()),
+                dict(self._figures),
+                self._problem,
+            )
+
+    @property
+    def problem(self) -> str:
+        """Why it has ended by itself; "" while all is well."""
+        return self._problem
+
+    def close(self, timeout_s: float = _CLOSE_S) -> RecordingStatus:
+        """Write what waits, and the end. May be called twice. Raises `ClosedError` when that takes too long.
+
+        What went wrong is in the status.
+        """
+        with self._lock:
+            self._is_closing = True
+            self._lock.notify_all()
+        self._thread.join(timeout_s)
+        if self._thread.is_alive():
+            raise ClosedError(_("a recording whose disk does not answer"))
+        return self.status
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    # ---- the thread that writes
+
+    def _run(self) -> None:
+        try:
+            self._write_until_closed()
+            self._finish()
+        except OSError as error:
+            self._fail(disk_sentence(self._destination.file.path, error))
+        except RecordingError as error:
+            self._end_early(error)
+
+    def _write_until_closed(self) -> None:
+        flush_at = look_at = time.monotonic() + self._flush_s
+        while True:
+            with self._lock:
+                if not self._queue and not self._is_closing and self._flush_done >= self._flush_wanted:
+                    self._lock.wait(max(0.0, min(flush_at, look_at) - time.monotonic()))
+                batch = list(self._queue)
+                self._queue.clear()
+                is_closing, wanted = self._is_closing, self._flush_wanted
+            self._write_batch(batch)
+            now = time.monotonic()
+            if wanted > self._flush_done or now >= flush_at:
+                self._flush()
+                flush_at = now + self._flush_s
+                with self._lock:
+                    self._flush_done = wanted
+                    self._lock.notify_all()
+            if now >= look_at:
+                look_at = now + FIGURES_S
+                self._write_figures()
+                self._destination.look()
+            if is_closing and not self._queue:
+                return
+
+    def _write_batch(self, batch: Sequence[tuple[int, Sequence[Message]] | _Said]) -> None:
+        for number, part in enumerate(batch):
+            if isinstance(part, _Said):
+                self._write_own(part.role, part.text)
+                size, count = len(part.text), 1
+            else:
+                now, messages = part
+                size, count = 0, len(messages)
+                for at, message in enumerate(messages):
+                    size += message.size_bytes
+                    try:
+                        self._write_message(message, self._log_ns(message, now))
+                    except OSError:
+                        self._rest = [
+                            messages[at + 1 :],
+                            *(each[1] for each in batch[number + 1 :] if not isinstance(each, _Said)),
+                        ]
+                        raise
+            with self._lock:
+                self._queued_bytes -= size
+                self._queued_messages -= count
+
+    def _log_ns(self, message: Message, now: int) -> int:
+        """When it came. Messages come in batches: their stamps say when, as far as their clock is known."""
+        difference = message.kind.clock.difference
+        log_ns = now
+        if difference is not None and message.stamp_ns is not None:
+            log_ns = min(now, message.stamp_ns + difference.add_ns)
+        log_ns = self._last_ns = max(self._last_ns, log_ns)
+        if self._first_ns is None:
+            # A latched message is as old as its publisher: the first one comes when it came.
+            self._first_ns = self._last_ns = log_ns = max(log_ns, self._started_ns)
+        return log_ns
+
+    def _write_message(self, message: Message, log_ns: int) -> None:
+        known = self._known.get(id(message.kind))
+        if known is None or known.publisher != message.publisher:
+            known = self._get_to_know(message)
+        encoding = encoding_of(message, log_ns)
+        key = (encoding.form, message.seq is None, message.stamp_ns is None)
+        channel = known.channels.get(key)
+        if channel is None:
+            channel, encoding = self._channel(message, encoding, log_ns)
+            if channel is None:
+                known.counter.leave_out(message.publisher, 1, message.size_bytes)
+                return
+            if not encoding.is_apart:
+                known.channels[key] = channel
+        file = self._destination.file
+        file.add(channel, (log_ns, encoding.publish_ns), encoding.sequence, encoding.before, message.raw)
+        known.counter.add(
+            message.publisher, message.seq, message.size_bytes, is_decodable=encoding.is_decodable
+        )
+        if file.pending_bytes >= CHUNK_BYTES:
+            self._flush()
+
+    def _get_to_know(self, message: Message) -> _Known:
+        if len(self._known) >= _KNOWN:
+            self._known.clear()
+        known = _Known(message.kind, message.publisher, self._counter(message.topic))
+        self._known[id(message.kind)] = known  # which lives as long as this, so nobody else has its id
+        return known
+
+    def _counter(self, topic: str) -> TopicCounter:
+        if topic not in self._counters and len(self._counters) >= MOST_TOPICS:
+            topic = _OTHERS
+        return self._counters.setdefault(topic, TopicCounter())
+
+    def _channel(self, message: Message, encoding: Encoding, log_ns: int) -> tuple[int | None, Encoding]:
+        """The number of its channel; with too many publishers it shares one, and tells all of itself."""
+        table = self._destination.file.table
+        definition = definition_of(message, encoding)
+        if len(table.definitions) < MOST_ONES_CHANNELS or table.has(definition):
+            return table.number(definition), encoding
+        apart = encoding_of(message, log_ns, is_apart=True)
+        return table.number(definition_of(message, apart)), apart
+
+    def _write_own(self, role: Role, text: bytes) -> None:
+        self._own_sequence += 1
+        now = self._last_ns = max(self._last_ns, self._clock())
+        file = self._destination.file
+        number = file.table.number(own_channel(role))
+        if number is not None:
+            self._own_numbers.add(number)
+            file.add(number, (now, now), self._own_sequence & 0xFFFFFFFF, b"", text)
+
+    def _flush(self) -> None:
+        file = self._destination.file
+        file.flush()
+        self._count_file(file)
+        self._destination.flushed()
+
+    def _write_figures(self, *, all_of_them: bool = False) -> None:
+        with self._lock:
+            left_out, self._left_out = self._left_out, {}
+        for (topic, publisher), (count, size) in left_out.items():
+            self._counter(topic).leave_out(publisher, count, size)
+        told = dict(self._counters) if all_of_them else dict(changed(self._counters))
+        if not told:
+            return
+        figures = {topic: counter.figures() for topic, counter in told.items()}
+        for counter in told.values():
+            counter.is_changed = False
+        with self._lock:
+            self._figures = {**self._figures, **figures}
+        plain = {topic: each.to_plain() for topic, each in figures.items()}
+        self._write_own("figures", orjson.dumps({"topics": plain, "is_final": all_of_them}))
+
+    # ---- the end
+
+    def _finish(self, reason: str = "") -> None:
+        self._write_figures(all_of_them=True)
+        self._flush()
+        file = self._destination.file
+        words = {
+            "started_ns": str(self._started_ns),
+            "ended_ns": str(self._last_ns or self._started_ns),
+            "note": self._note,
+            "end": reason,
+        }
+        file.add_metadata("nep.recording", words)
+        plain = {
+            topic: orjson.dumps(each.to_plain()).decode() for topic, each in sorted(self._figures.items())
+        }
+        if plain:
+            file.add_metadata("nep.figures", plain)
+        self._destination.finish()
+        self._count_file(file)
+
+    def _count_file(self, file: FileWriter) -> None:
+        own = sum(file.counts.get(each, 0) for each in self._own_numbers)
+        with self._lock:
+            self._message_count, self._size_bytes = file.message_count - own, file.size_bytes
+
+    def _end_early(self, error: RecordingError) -> None:
+        """It may not go on, but what is there can be finished."""
+        self._stop(error.reason)
+        try:
+            self._finish(error.reason)
+        except (OSError, RecordingError):
+            self._destination.fail()
+
+    def _fail(self, error: RecordingError) -> None:
+        """The disk takes no more: the file ends with its last whole record."""
+        file = self._destination.file
+        with self._lock:
+            for messages in self._rest:
+                self._leave_out(messages)
+            for number, count in file.pending_counts.items():  # came, but only into memory
+                definition = file.table.definitions[number]
+                left = self._left_out.setdefault((definition.topic, None), [0, 0])
+                left[0] += 0 if number in self._own_numbers else count
+        self._count_file(file)
+        self._destination.fail()
+        self._stop(error.reason)
+
+    def _stop(self, reason: str) -> None:
+        with self._lock:
+            self._problem = reason
+            for part in self._queue:
+                if not isinstance(part, _Said):
+                    self._leave_out(part[1])
+            self._queue.clear()
+            self._queued_bytes = self._queued_messages = 0
+            self._lock.notify_all()
+        if self._on_problem is not None:
+            self._on_problem(reason)
+
+    def _leave_out(self, messages: Sequence[Message]) -> None:
+        self._post_what_fits(messages, 0, may_fit=False)

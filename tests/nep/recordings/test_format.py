@@ -1,0 +1,239 @@
+"""What a recording keeps: all of it, of every message; and others read it, too."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import jsonschema
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+
+from nep.geometry import PoseStamped
+from nep.messages.message import Message
+from nep.recordings.channels import ChannelDecoder, definition_of, encoding_of
+from nep.recordings.protobuf import SCHEMAS, descriptor_set, fields
+from nep.recordings.reader import Recording
+from nep.recordings.records import RawMessage
+from nep.recordings.schemas import ANY_OBJECT, json_schema, schema_of
+from tests.nep.recordings.mcap_doctor import McapDoctor
+from tests.nep.recordings.messages import START_NS, json_message, kept, odd_messages, picture, record
+
+U64 = 2**64 - 1
+NUMBERS = st.one_of(st.none(), st.integers(0, U64), st.sampled_from([0, 1, 2**32 - 1, 2**32, U64]))
+VALUES = st.recursive(
+    st.one_of(
+        st.none(), st.booleans(), st.integers(-(2**63), U64), st.text(max_size=5), st.binary(max_size=5)
+    ),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=5), inner, max_size=3)
+    ),
+    max_leaves=5,
+)
+
+
+def there_and_back(message: Message, *, is_apart: bool = False) -> Message:
+    encoding = encoding_of(message, START_NS, is_apart=is_apart)
+    data = memoryview(encoding.before + bytes(message.data))
+    raw = RawMessage(0, 1, encoding.sequence, START_NS, encoding.publish_ns, data)
+    return ChannelDecoder(definition_of(message, encoding)).message(raw)
+
+
+@given(
+    codec=st.sampled_from(["json", "string", "bytes", "msgpack", "image", "another"]),
+    data=st.binary(max_size=40),
+    seq=NUMBERS,
+    stamp_ns=NUMBERS,
+    publisher=NUMBERS,
+    extension=st.dictionaries(st.text(max_size=10), VALUES, max_size=3),
+    is_apart=st.booleans(),
+)
+def test_every_message_comes_back_whole(codec, data, seq, stamp_ns, publisher, extension, is_apart):
+    message = Message(
+        "/a/b", data, codec, "some/Type", seq=seq, stamp_ns=stamp_ns, publisher=publisher, extension=extension
+    )
+    assert kept(there_and_back(message, is_apart=is_apart)) == kept(message)
+
+
+@pytest.mark.parametrize("message", odd_messages(), ids=lambda each: each.topic)
+def test_odd_messages_come_back_whole(message):
+    assert kept(there_and_back(message)) == kept(message)
+    assert kept(there_and_back(message, is_apart=True)) == kept(message)
+
+
+@given(st.binary(max_size=60))
+def test_any_bytes_in_the_place_of_a_wrapped_message_give_a_message(data):
+    for message in (picture(1), picture(1, "raw"), Message("/t", b"x", "string", "string")):
+        decoder = ChannelDecoder(definition_of(message, encoding_of(message, 0)))
+        assert decoder.message(RawMessage(0, 1, 1, 1, 1, memoryview(data))).topic == message.topic
+
+
+def test_a_recording_gives_back_what_was_posted_in_its_order(tmp_path):
+    messages = odd_messages()
+    record(tmp_path / "a.mcap", [messages])
+    with Recording(tmp_path / "a.mcap") as recording:
+        assert [kept(each.message) for each in recording.read()] == [kept(each) for each in messages]
+
+
+def test_the_rules_of_the_doctor_hold(tmp_path):
+    path = tmp_path / "a.mcap"
+    messages = odd_messages()
+    record(path, [messages, [json_message(seq) for seq in range(2, 200)], messages])
+    assert McapDoctor(path).problems == []
+
+
+def test_the_doctor_of_these_tests_finds_what_is_wrong(tmp_path):
+    path = tmp_path / "a.mcap"
+    record(path, [[json_message(seq) for seq in range(1, 20)]])
+    data = bytearray(path.read_bytes())
+    data[len(data) // 3] ^= 1
+    path.write_bytes(data)
+    assert McapDoctor(path).problems
+
+
+def test_mcaps_own_reader_reads_it_and_its_crcs_are_right(tmp_path):
+    path = tmp_path / "a.mcap"
+    messages = odd_messages()
+    record(path, [messages, messages])
+    with path.open("rb") as file:
+        assert sum(1 for _each in StreamReader(file, validate_crcs=True).records) > 2 * len(messages)
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        found = [
+            (channel, each)
+            for _schema, channel, each in reader.iter_messages()
+            if channel.metadata.get("nep.role") is None
+        ]
+        assert [channel.topic for channel, _each in found] == [each.topic for each in (*messages, *messages)]
+        plain = [
+            (channel.topic, each.data)
+            for channel, each in found
+            if channel.message_encoding in {"json", "msgpack"}
+        ]
+        sent = {(each.topic, bytes(each.data)) for each in messages}
+        assert plain and set(plain) <= sent
+
+
+def test_json_channels_have_only_json_that_every_reader_takes_and_schemas_that_they_fulfil(tmp_path):
+    path = tmp_path / "a.mcap"
+    record(path, [odd_messages()])
+    with path.open("rb") as file:
+        seen = set()
+        for schema, channel, each in make_reader(file).iter_messages():
+            if channel.message_encoding == "json":
+                value = json.loads(each.data, parse_constant=pytest.fail)
+                assert schema.encoding == "jsonschema"
+                rules = json.loads(schema.data)
+                assert rules["type"] == "object"
+                if isinstance(value, dict):
+                    jsonschema.validate(value, rules)
+                seen.add((channel.topic, schema.name))
+    assert {("/odom", "json"), ("/typed", "geometry_msgs/Point")} <= seen
+
+
+def test_pictures_are_messages_of_foxgloves_with_the_very_bytes():
+    for message, name, data_field in (
+        (picture(1), "foxglove.CompressedImage", 2),
+        (picture(3, "raw"), "foxglove.RawImage", 6),
+    ):
+        encoding = encoding_of(message, START_NS)
+        definition = definition_of(message, encoding)
+        found = dict(fields(memoryview(encoding.before + bytes(message.data))))
+        assert (definition.schema_name, definition.message_encoding) == (name, "protobuf")
+        assert bytes(found[data_field]) == bytes(message.data)
+        if name.endswith("CompressedImage"):
+            assert bytes(found[3]) == b"jpeg"
+        else:
+            assert (found[2], found[3], bytes(found[4]), found[5]) == (16, 12, b"bgr8", 48)
+
+
+def test_descriptions_of_wrapped_messages_are_those_that_googles_parser_read():
+    # Parsed and compared with foxglove's definitions by protobuf 7.36; the sums hold them to that.
+    sums = {name: hashlib.sha256(descriptor_set(name)).hexdigest()[:16] for name in SCHEMAS}
+    assert sums == GOLDEN
+
+
+def test_googles_own_parser_reads_a_picture():
+    descriptor_pb2 = pytest.importorskip("google.protobuf.descriptor_pb2")
+    from google.protobuf import descriptor_pool, message_factory
+
+    message = picture(1)
+    pool = descriptor_pool.DescriptorPool()
+    for file in descriptor_pb2.FileDescriptorSet.FromString(descriptor_set("foxglove.CompressedImage")).file:
+        pool.Add(file)
+    kind = message_factory.GetMessageClass(pool.FindMessageTypeByName("foxglove.CompressedImage"))
+    made = kind.FromString(encoding_of(message, START_NS).before + bytes(message.data))
+    assert (made.data, made.format) == (bytes(message.data), "jpeg")
+    assert made.timestamp.seconds * 10**9 + made.timestamp.nanos == message.stamp_ns
+
+
+@dataclass
+class Wheel:
+    MSG_TYPE = "test/Wheel"
+    speed: float
+    name: str = ""
+    laps: int | None = None
+    gears: list[int] = field(default_factory=list)
+    grid: list[list[int]] = field(default_factory=list)
+    _hidden: int = 0
+
+
+def test_schemas_tell_the_fields_of_types_and_nothing_of_others():
+    assert schema_of("anything/Else") == ANY_OBJECT
+    made = json.loads(schema_of("geometry_msgs/PoseStamped"))
+    assert made["properties"]["pose"]["properties"]["position"]["properties"]["x"] == {"type": "number"}
+    assert made["title"] == PoseStamped.MSG_TYPE
+    wheel = json.loads(json_schema(Wheel))
+    assert wheel["properties"] == {
+        "speed": {"type": "number"},
+        "name": {"type": "string"},
+        "laps": {"type": "integer"},
+        "gears": {"type": "array", "items": {"type": "integer"}},
+    }  # lists of lists are none of what viewers read
+
+
+def test_recordings_of_other_programs_are_read_as_far_as_they_go(tmp_path: Path):
+    from mcap.writer import CompressionType, Writer
+
+    path = tmp_path / "theirs.mcap"
+    wrapped = picture(1)
+    for compression in CompressionType:
+        with path.open("wb") as file:
+            writer = Writer(file, compression=compression, chunk_size=200)
+            writer.start()
+            schema = writer.register_schema("foxglove.CompressedImage", "protobuf", b"?")
+            camera = writer.register_channel("/cam", "protobuf", schema)
+            odom = writer.register_channel("/odom", "json", 0)
+            ros = writer.register_channel("/ros", "cdr", 0)
+            encoding = encoding_of(wrapped, 0)
+            for seq in range(20):  # theirs come in no order
+                writer.add_message(odom, 1000 - seq, b"{}", 5, seq)
+            writer.add_message(camera, 1000, encoding.before + bytes(wrapped.data), 6, 3)
+            writer.add_message(ros, 7, b"\0\1", 7, 1)
+            writer.finish()
+        with Recording(path) as recording:
+            found = list(recording.read())
+            assert [each.log_ns for each in found] == sorted(each.log_ns for each in found)
+            assert [recording.topics[each].codec for each in ("/cam", "/odom", "/ros")] == [
+                "image",
+                "json",
+                "bytes",
+            ]
+            newest = recording.newest(2000)
+            assert bytes(newest["/cam"].message.data) == bytes(wrapped.data)
+            assert newest["/cam"].message.payload.shape == (12, 16, 3)
+            assert (newest["/odom"].log_ns, newest["/odom"].message.seq) == (1000, 0)
+            assert recording.newest(985)["/odom"].log_ns == 985
+
+
+GOLDEN = {
+    "foxglove.CompressedImage": "5c7a8859d4aad3d3",
+    "foxglove.RawImage": "3f7f3e34541ec2d1",
+    "nep.Text": "c7cc332ae82bcea8",
+    "nep.Bytes": "16eeafd98335f7dc",
+}
