@@ -36,20 +36,30 @@ from nep.recordings.mcap_file import CHUNK_BYTES, FileWriter
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Destination", "LogClock", "RecordingStatus", "RecordingWriter", "disk_sentence"]
+__all__ = ["Destination", "LogClock", "RecordingStatus", "RecordingWriter", "WriterLimits", "disk_sentence"]
 
-QUEUE_BYTES = 256_000_000
-QUEUE_MESSAGES = 200_000
-FLUSH_S = 0.5
-FIGURES_S = 1.0
-LEAST_FREE_BYTES = 200_000_000
-"""With less of it free on the disk a recording ends: other programs need some, too."""
 MOST_ONES_CHANNELS = 10_000
 """With more, publishers that come later share a channel for each topic."""
 _CLOSE_S = 30.0
 _KNOWN = 10_000
 _OTHERS = ""
 """Where topics are counted of which there are too many."""
+
+
+@dataclass(frozen=True)
+class WriterLimits:
+    """How much a writer holds, and how long.
+
+    `queue_bytes`, `queue_messages`: what may wait to be written. `least_free_bytes`: with less of it free on
+    the disk a recording ends, because other programs need some, too. `flush_s`: what came is in the file so
+    long after at most. `figures_s`: how often it writes what became of the topics' messages.
+    """
+
+    queue_bytes: int = 256_000_000
+    queue_messages: int = 200_000
+    least_free_bytes: int = 200_000_000
+    flush_s: float = 0.5
+    figures_s: float = 1.0
 
 
 class LogClock:
@@ -178,16 +188,13 @@ class RecordingWriter:
         *,
         note: str = "",
         clock: Callable[[], int] | None = None,
-        queue_bytes: int = QUEUE_BYTES,
-        queue_messages: int = QUEUE_MESSAGES,
-        least_free_bytes: int = LEAST_FREE_BYTES,
-        flush_s: float = FLUSH_S,
+        limits: WriterLimits = WriterLimits(),
         on_problem: Callable[[str], object] | None = None,
     ) -> None:
         """Make the file, which there must not be yet, and start the thread. Raises `RecordingError`.
 
-        `note`: words about it. `clock`: nanoseconds since 1970, never backwards. `least_free_bytes`: with
-        less room on the disk it ends. `on_problem` is told once, in the thread that writes, why it has ended.
+        `note`: words about it. `clock`: nanoseconds since 1970, never backwards. `on_problem` is told once,
+        in the thread that writes, why it has ended.
         """
         self._note = note
         self._clock = LogClock() if clock is None else clock
@@ -195,7 +202,7 @@ class RecordingWriter:
         if isinstance(path, str | os.PathLike):
             whole = Path(path)
             try:
-                self._destination: Destination = _OneFile(FileWriter(whole), least_free_bytes)
+                self._destination: Destination = _OneFile(FileWriter(whole), limits.least_free_bytes)
             except FileExistsError:
                 raise RecordingError(
                     str(whole), _("there is such a file already; choose another name")
@@ -204,7 +211,7 @@ class RecordingWriter:
                 raise disk_sentence(whole, error) from error
         else:
             self._destination = path
-        self._queue_bytes, self._queue_messages, self._flush_s = queue_bytes, queue_messages, flush_s
+        self._limits = limits
         self._on_problem = on_problem
         self._lock = threading.Condition()
         self._queue: deque[tuple[int, Sequence[Message]] | _Said] = deque()
@@ -234,8 +241,8 @@ class RecordingWriter:
         size = sum([each.size_bytes for each in messages])
         with self._lock:
             is_full = (
-                self._queued_bytes + size > self._queue_bytes
-                or self._queued_messages + len(messages) > self._queue_messages
+                self._queued_bytes + size > self._limits.queue_bytes
+                or self._queued_messages + len(messages) > self._limits.queue_messages
             )
             if self._is_closing or self._problem or is_full:
                 self._post_what_fits(messages, now, may_fit=not (self._is_closing or self._problem))
@@ -251,8 +258,8 @@ class RecordingWriter:
         for message in messages:
             size = message.size_bytes
             has_room = (
-                self._queued_bytes + size <= self._queue_bytes
-                and self._queued_messages < self._queue_messages
+                self._queued_bytes + size <= self._limits.queue_bytes
+                and self._queued_messages < self._limits.queue_messages
             )
             if may_fit and has_room:
                 fits.append(message)
@@ -273,7 +280,10 @@ class RecordingWriter:
         """Write something of the recorder's own, as JSON: "alerts", "notes". Never waits."""
         text = orjson.dumps(value, option=orjson.OPT_NON_STR_KEYS)
         with self._lock:
-            if not (self._is_closing or self._problem) and self._queued_messages < self._queue_messages:
+            if (
+                not (self._is_closing or self._problem)
+                and self._queued_messages < self._limits.queue_messages
+            ):
                 self._queue.append(_Said(role, text))
                 self._queued_bytes += len(text)
                 self._queued_messages += 1
@@ -345,7 +355,8 @@ class RecordingWriter:
             self._end_early(error)
 
     def _write_until_closed(self) -> None:
-        flush_at = look_at = time.monotonic() + self._flush_s
+        flush_at = time.monotonic() + self._limits.flush_s
+        look_at = time.monotonic() + self._limits.figures_s
         while True:
             with self._lock:
                 if not self._queue and not self._is_closing and self._flush_done >= self._flush_wanted:
@@ -357,12 +368,12 @@ class RecordingWriter:
             now = time.monotonic()
             if wanted > self._flush_done or now >= flush_at:
                 self._flush()
-                flush_at = now + self._flush_s
+                flush_at = now + self._limits.flush_s
                 with self._lock:
                     self._flush_done = wanted
                     self._lock.notify_all()
             if now >= look_at:
-                look_at = now + FIGURES_S
+                look_at = now + self._limits.figures_s
                 self._write_figures()
                 self._destination.look()
             if is_closing and not self._queue:

@@ -85,12 +85,16 @@ class McapDoctor:
             self.message_indexes[at] = MessageIndex.read(stream)
         elif opcode == 0x08:
             self.indexes.append(ChunkIndex.read(stream))
-        elif opcode == 0x0B:
+        elif opcode == 0x0C:
+            self.metadata[at] = len(body) + 9
+        else:
+            self._summary_record(opcode, stream)
+
+    def _summary_record(self, opcode: int, stream: ReadDataStream) -> None:
+        if opcode == 0x0B:
             self.statistics.append(Statistics.read(stream))
             told = self.statistics[-1].channel_message_counts.keys()
             self._say(told - self.summary_channels.keys(), "counts of channels that come later")
-        elif opcode == 0x0C:
-            self.metadata[at] = len(body) + 9
         elif opcode == 0x0D:
             index = MetadataIndex.read(stream)
             self._say(self.metadata.get(index.offset) != index.length, "a metadata index that is wrong")

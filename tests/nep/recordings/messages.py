@@ -5,16 +5,22 @@ from __future__ import annotations
 import itertools
 import random
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from nep.messages import image_codec
 from nep.messages.message import Message
-from nep.recordings.writer import RecordingWriter
+from nep.recordings.writer import RecordingWriter, WriterLimits
 
 START_NS = 1_790_000_000_000_000_000
 STEP_NS = 10_000_000
+
+
+def limits(**changed: float) -> WriterLimits:
+    """The usual ones, on a disk that may be nearly full."""
+    return replace(WriterLimits(least_free_bytes=0), **changed)
 
 
 class TestClock:
@@ -39,7 +45,7 @@ def kept(message: Message) -> tuple[object, ...]:
         message.seq,
         message.stamp_ns,
         message.publisher,
-        dict(message.extension),
+        repr(dict(message.extension)),
     )
 
 
@@ -114,7 +120,7 @@ def odd_messages() -> list[Message]:
 
 def record(path: Path, parts: Sequence[Sequence[Message]]) -> None:
     """A recording with a chunk for each part, 10 ms between messages."""
-    with RecordingWriter(path, clock=TestClock(), least_free_bytes=0) as writer:
+    with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
         for part in parts:
             for message in part:
                 writer.post([message])

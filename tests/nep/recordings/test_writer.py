@@ -1,0 +1,293 @@
+"""The writer loses nothing without saying so, whatever the disk does."""
+
+from __future__ import annotations
+
+import errno
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from nep.errors import RecordingError
+from nep.messages.clocks import OWN_CLOCK, ClockDifference, PublisherClock
+from nep.messages.message import Message, arrived, kind_of
+from nep.recordings.mcap_file import FileWriter
+from nep.recordings.reader import Recording
+from nep.recordings.repair import repair
+from nep.recordings.writer import RecordingWriter
+from tests.blocks.fakes import until
+from tests.nep.recordings.mcap_doctor import McapDoctor
+from tests.nep.recordings.messages import START_NS, TestClock, json_message, kept, limits, odd_messages
+from tests.small_disk import SmallDisk
+
+
+class HeldDestination:
+    """A disk that takes nothing until it is let go."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = FileWriter(path)
+        self.is_held, self.go_on = threading.Event(), threading.Event()
+
+    def flushed(self) -> None:
+        self.is_held.set()
+        assert self.go_on.wait(30)
+
+    def look(self) -> None:
+        pass
+
+    def finish(self) -> None:
+        self.file.finish()
+
+    def fail(self) -> None:
+        self.file.close()
+
+
+class FullDisk:
+    """A file that takes so many bytes, the last ones of a write by half, and then raises."""
+
+    def __init__(self, file, budget: int) -> None:
+        self._file, self._budget = file, budget
+
+    def write(self, data) -> int:
+        if self._budget <= 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        part = memoryview(data)[: self._budget]
+        self._budget -= len(part)
+        return self._file.write(part)
+
+    def __getattr__(self, name: str):
+        return getattr(self._file, name)
+
+
+def read(path: Path) -> list[Message]:
+    with Recording(path) as recording:
+        return [each.message for each in recording.read()]
+
+
+def test_what_does_not_fit_into_the_queue_is_counted_shown_and_told_in_the_recording(tmp_path):
+    path = tmp_path / "a.mcap"
+    with RecordingWriter(path, clock=TestClock(), limits=limits(queue_messages=10)) as writer:
+        writer.post([json_message(seq) for seq in range(1, 26)])
+    status = writer.status
+    assert (status.message_count, status.unkept, status.problem) == (10, 15, "")
+    with Recording(path) as recording:
+        figures = recording.figures()["/odom"]
+    assert (figures.received, figures.unkept, figures.lost) == (25, 15, 0)
+    assert [each.seq for each in read(path)] == list(range(1, 11))
+
+
+def test_a_slow_disk_never_keeps_who_posts_waiting(tmp_path):
+    destination = HeldDestination(tmp_path / "a.mcap")
+    writer = RecordingWriter(destination, clock=TestClock(), limits=limits(queue_bytes=1000, flush_s=0.001))
+    writer.post([json_message(1)])
+    assert destination.is_held.wait(30)
+    for seq in range(2, 102):
+        writer.post([json_message(seq)])
+    assert writer.status.queued_bytes <= 1000
+    destination.go_on.set()
+    status = writer.close()
+    assert status.message_count + status.unkept == 101
+    assert status.unkept > 80
+    with Recording(tmp_path / "a.mcap") as recording:
+        assert recording.message_count == status.message_count
+        assert recording.figures()["/odom"].unkept == status.unkept
+        assert recording.figures()["/odom"].lost == 0
+
+
+def test_gaps_late_and_unreadable_messages_are_counted_per_topic(tmp_path):
+    path = tmp_path / "a.mcap"
+    seqs = [3, 4, 7, 6, 9]  # 5 and 8 are missing, 6 is late
+    messages = [json_message(seq) for seq in seqs] + [
+        json_message(1, publisher=8),
+        json_message(2, publisher=8),
+    ]
+    broken = Message("/camera", b"\xff\xd8\xff", "image", "image", seq=1, stamp_ns=1, publisher=9)
+    with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
+        writer.post([*messages, broken, Message("/original", b"{}", "json", "json")])
+    with Recording(path) as recording:
+        figures = recording.figures()
+    assert (figures["/odom"].received, figures["/odom"].lost, figures["/odom"].late) == (7, 2, 1)
+    assert (figures["/camera"].undecodable, figures["/camera"].lost) == (1, 0)
+    assert figures["/original"].lost is None
+    assert figures == writer.status.topics
+
+
+def test_figures_say_when_something_was_lost(tmp_path):
+    path = tmp_path / "a.mcap"
+    with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.001)) as writer:
+        for seqs in ((1, 2), (5,), (6,)):
+            writer.post([json_message(seq) for seq in seqs])
+            until(lambda last=seqs[-1]: writer.status.topics.get("/odom") and last_seen(writer, last))
+    with Recording(path) as recording:
+        times = [(at, each["/odom"].lost) for at, each in recording.figures_over_time() if "/odom" in each]
+        seen = {each.message.seq: each.log_ns for each in recording.read()}
+    lost_at = next(at for at, lost in times if lost == 2)
+    assert seen[5] <= lost_at <= seen[6]
+
+
+def last_seen(writer: RecordingWriter, seq: int) -> bool:
+    received = writer.status.topics["/odom"].received
+    return received == {2: 2, 5: 3, 6: 4}[seq]
+
+
+def test_times_of_arrival_are_those_of_the_stamps_where_clocks_are_known_and_never_go_back(tmp_path):
+    path, now = tmp_path / "a.mcap", [START_NS]
+    kinds = {
+        "own": kind_of("/own", "json", "json", clock=OWN_CLOCK),
+        "other": kind_of("/other", "json", "json", clock=PublisherClock(ClockDifference(1000, 10))),
+        "unknown": kind_of("/unknown", "json", "json"),
+    }
+    with RecordingWriter(path, clock=lambda: now[0], limits=limits()) as writer:
+        now[0] += 100_000
+        batch = [
+            ("own", 50_000),
+            ("other", 59_000),
+            ("own", 10),
+            ("unknown", 5),
+            ("own", 70_000),
+            ("own", 10**9),
+        ]
+        writer.post([arrived(kinds[name], b"{}", START_NS + at, 1, 1) for name, at in batch])
+    with Recording(path) as recording:
+        times = [each.log_ns - START_NS for each in recording.read()]
+    assert times == [50_000, 60_000, 60_000, 100_000, 100_000, 100_000]
+
+
+@pytest.mark.parametrize("budget", [0, 1, 40, 500, 1000, 2100, 3003, 5000, 8191])
+def test_a_full_disk_leaves_whole_records_and_counts_the_rest(tmp_path, budget):
+    path = tmp_path / "a.mcap"
+    messages = [json_message(seq) for seq in range(1, 101)]
+    told = []
+    writer = RecordingWriter(path, clock=TestClock(), limits=limits(), on_problem=told.append)
+    file = writer._destination.file
+    file._file = FullDisk(file._file, budget)
+    for message in messages:
+        writer.post([message])
+        writer.flush()
+    status = writer.close()
+    assert told == [status.problem]
+    assert "disk is full" in status.problem
+    assert status.message_count + status.unkept == len(messages)
+    with Recording(path) as recording:
+        assert not recording.is_complete
+        assert recording.size_bytes == path.stat().st_size  # nothing half is there
+        found = [each.message for each in recording.read()]
+    assert [kept(each) for each in found] == [kept(each) for each in messages[: status.message_count]]
+
+
+def test_a_disk_that_is_really_full(tmp_path):
+    disk = SmallDisk(tmp_path)
+    found = disk.run(
+        "import json, sys\n"
+        "from pathlib import Path\n"
+        "from nep.messages.message import Message\n"
+        "from nep.recordings.reader import Recording\n"
+        "from nep.recordings.writer import RecordingWriter, WriterLimits\n"
+        "import os\n"
+        "path = Path(sys.argv[1]) / 'a.mcap'\n"
+        "writer = RecordingWriter(path, limits=WriterLimits(least_free_bytes=0))\n"
+        "count = 0\n"
+        "while not writer.problem:\n"
+        "    count += 1\n"
+        "    writer.post([Message('/t', os.urandom(5000), 'bytes', 'bytes', seq=count)])\n"
+        "    writer.flush()\n"
+        "status = writer.close()\n"
+        "with Recording(path) as recording:\n"
+        "    seqs = [each.message.seq for each in recording.read()]\n"
+        "print(json.dumps({'a': [count, status.message_count, status.unkept, status.problem, len(seqs),\n"
+        "    seqs == list(range(1, len(seqs) + 1))]}))\n"
+    )["a"]
+    count, written, unkept, problem, there, is_in_order = found
+    assert "disk is full" in problem
+    assert written == there >= 40
+    assert written + unkept == count
+    assert is_in_order
+
+
+def test_it_ends_by_itself_and_whole_before_the_disk_is_full(tmp_path):
+    path = tmp_path / "a.mcap"
+    writer = RecordingWriter(path, clock=TestClock(), limits=limits(least_free_bytes=2**62, figures_s=0.001))
+    writer.post([json_message(1)])
+    until(lambda: writer.problem)
+    assert "disk is full" in writer.close().problem
+    assert McapDoctor(path).problems == []
+    with Recording(path) as recording:
+        assert (recording.is_complete, recording.message_count) == (True, 1)
+        assert "disk is full" in recording.words["end"]
+
+
+def test_a_file_that_is_gone_is_told(tmp_path):
+    path = tmp_path / "a.mcap"
+    writer = RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.001))
+    writer.post([json_message(1)])
+    assert writer.flush()
+    path.unlink()
+    until(lambda: writer.problem)
+    assert "moved or deleted" in writer.close().problem
+    writer.post([json_message(2)])  # is counted, and nothing else
+    assert writer.status.unkept == 1
+
+
+def test_no_file_is_written_over_and_no_folder_is_no_reason_for_a_traceback(tmp_path):
+    path = tmp_path / "a.mcap"
+    path.write_bytes(b"mine")
+    with pytest.raises(RecordingError, match="such a file already"):
+        RecordingWriter(path)
+    assert path.read_bytes() == b"mine"
+    with pytest.raises(RecordingError, match="cannot use the recording"):
+        RecordingWriter(tmp_path / "nowhere" / "a.mcap")
+
+
+def test_with_too_many_publishers_they_share_a_channel_and_nothing_is_lost(tmp_path, monkeypatch):
+    monkeypatch.setattr("nep.recordings.writer.MOST_ONES_CHANNELS", 3)
+    path = tmp_path / "a.mcap"
+    messages = [json_message(seq, publisher=seq) for seq in range(1, 50)] + odd_messages()
+    with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
+        writer.post(messages)
+    assert [kept(each) for each in read(path)] == [kept(each) for each in messages]
+    assert McapDoctor(path).problems == []
+
+
+def test_with_too_many_channels_what_is_left_out_is_counted(tmp_path, monkeypatch):
+    monkeypatch.setattr("nep.recordings.mcap_file.MOST_CHANNELS", 5)
+    monkeypatch.setattr("nep.recordings.writer.MOST_ONES_CHANNELS", 2)
+    path = tmp_path / "a.mcap"
+    with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
+        writer.post([json_message(1, topic=f"/t{number}") for number in range(20)])
+    assert writer.status.message_count + writer.status.unkept == 20
+    assert writer.status.unkept >= 15
+
+
+_CHILD = """
+import sys
+from nep.recordings.writer import RecordingWriter
+from tests.nep.recordings.messages import json_message, limits
+writer = RecordingWriter(sys.argv[1], limits=limits())
+seq = 0
+for line in sys.stdin:
+    for _each in range(100):
+        seq += 1
+        writer.post([json_message(seq)])
+    while writer.status.message_count < seq - 100 * (line == "more\\n"):
+        writer._thread.join(0.01)
+    print(seq, flush=True)
+"""
+
+
+def test_a_process_that_is_killed_leaves_all_but_the_last_moment(tmp_path):
+    path = tmp_path / "a.mcap"
+    child = subprocess.Popen(
+        [sys.executable, "-c", _CHILD, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    with child:
+        for line in ("wait", "wait", "more"):
+            child.stdin.write(f"{line}\n")
+            child.stdin.flush()
+            assert child.stdout.readline()
+        child.kill()
+    assert [each.seq for each in read(path)][:200] == list(range(1, 201))
+    report = repair(path)
+    assert report.recovered >= 200
+    assert McapDoctor(report.path).problems == []
