@@ -1,4 +1,4 @@
-"""Patterns of topics, such as `/*/odom`: what they match, and the topics that match them and are new."""
+"""Patterns of topics, such as `/*/odom`: the topics that match them and are new."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
+from nep.protocol.topic_glob import glob_matches as matches
+from nep.protocol.topic_glob import is_glob
 from nep.protocol.wire import check_topic
 
 __all__ = ["TopicPatterns", "is_pattern", "matches"]
@@ -22,45 +24,7 @@ _PATIENCE_S = 0.3
 
 def is_pattern(word: str) -> bool:
     """Whether a word of the command line is a pattern; one with brackets or quotes is a field."""
-    return any(letter in word for letter in "*?") and not any(letter in word for letter in "[\"'")
-
-
-def matches(pattern: str, topic: str) -> bool:
-    """Whether a topic matches: `*` is any letters between slashes, `?` is one, `**` is any parts or none."""
-    parts = pattern.split("/")
-    at = _with_empty(parts, {0})
-    for part in topic.split("/"):
-        after = {each for each in at if each < len(parts) and parts[each] == "**"}
-        after |= {each + 1 for each in at - after if each < len(parts) and _is_part(parts[each], part)}
-        at = _with_empty(parts, after)
-    return len(parts) in at
-
-
-def _with_empty(parts: Sequence[str], at: set[int]) -> set[int]:
-    """The places in a pattern, and those behind each `**` there, which may stand for nothing."""
-    found = set(at)
-    for each in range(len(parts)):
-        if each in found and parts[each] == "**":
-            found.add(each + 1)
-    return found
-
-
-def _is_part(pattern: str, part: str) -> bool:
-    """From left to right, back to the last `*` alone: an expression takes minutes for `*a*a*a*a*a*b`."""
-    at = begin = after = 0
-    star = -1
-    while begin < len(part):
-        letter = pattern[at : at + 1]
-        if letter == "*":
-            star, at, after = at, at + 1, begin
-        elif letter and letter in {"?", part[begin]}:
-            at, begin = at + 1, begin + 1
-        elif star >= 0:
-            after += 1  # the star stands for one letter more
-            at, begin = star + 1, after
-        else:
-            return False
-    return not pattern[at:].strip("*")
+    return is_glob(word) and not any(letter in word for letter in "[\"'")
 
 
 class TopicPatterns:

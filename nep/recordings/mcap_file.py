@@ -55,10 +55,12 @@ class ChannelTable:
 
     def __init__(self, definitions: Mapping[int, ChannelDefinition] | None = None) -> None:
         """`definitions`: channels that have their numbers already."""
-        self.definitions: dict[int, ChannelDefinition] = dict(definitions or {})
-        self._numbers = {definition: number for number, definition in self.definitions.items()}
+        self.definitions: dict[int, ChannelDefinition] = {}
+        self._numbers: dict[ChannelDefinition, int] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}
-        self._next = max(self.definitions, default=0) + 1
+        self._next = 1
+        for number, definition in (definitions or {}).items():
+            self._add(number, definition)
 
     def number(self, definition: ChannelDefinition) -> int | None:
         """The channel's number, from 1; None when there are too many."""
@@ -66,31 +68,33 @@ class ChannelTable:
         if known is None:
             if self._next > MOST_CHANNELS:
                 return None
-            known = self._numbers[definition] = self._next
-            self.definitions[known] = definition
-            self._next += 1
+            known = self._next
+            self._add(known, definition)
         return known
 
     def put(self, number: int, definition: ChannelDefinition) -> None:
         """A channel that has its number already, in chunks that are copied."""
         if number not in self.definitions:
-            self.definitions[number] = definition
-            self._numbers[definition] = number
-            self._next = max(self._next, number + 1)
+            self._add(number, definition)
 
     def has(self, definition: ChannelDefinition) -> bool:
         """Whether it has a number."""
         return definition in self._numbers
 
-    def schema_number(self, definition: ChannelDefinition) -> int:
-        """The number of its schema; 0 when it has none."""
+    def _add(self, number: int, definition: ChannelDefinition) -> None:
+        """Its schema has a number from now on, too: other threads may ask for `records` meanwhile."""
         key = (definition.schema_name, definition.schema_encoding, definition.schema_data)
-        return self._schemas.setdefault(key, len(self._schemas) + 1) if key[1] else 0
+        if key[1]:
+            self._schemas.setdefault(key, len(self._schemas) + 1)
+        self.definitions[number] = definition
+        self._numbers[definition] = number
+        self._next = max(self._next, number + 1)
 
     def records(self, number: int) -> tuple[Schema | None, Channel]:
         """What stands in a file of a channel."""
         made = self.definitions[number]
-        schema_number = self.schema_number(made)
+        key = (made.schema_name, made.schema_encoding, made.schema_data)
+        schema_number = self._schemas.get(key, 0)
         channel = Channel(
             id=number,
             topic=made.topic,

@@ -36,7 +36,15 @@ from nep.recordings.mcap_file import CHUNK_BYTES, FileWriter
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Destination", "LogClock", "RecordingStatus", "RecordingWriter", "WriterLimits", "disk_sentence"]
+__all__ = [
+    "USUAL_LIMITS",
+    "Destination",
+    "LogClock",
+    "RecordingStatus",
+    "RecordingWriter",
+    "WriterLimits",
+    "disk_sentence",
+]
 
 MOST_ONES_CHANNELS = 10_000
 """With more, publishers that come later share a channel for each topic."""
@@ -60,6 +68,9 @@ class WriterLimits:
     least_free_bytes: int = 200_000_000
     flush_s: float = 0.5
     figures_s: float = 1.0
+
+
+USUAL_LIMITS = WriterLimits()
 
 
 class LogClock:
@@ -188,7 +199,7 @@ class RecordingWriter:
         *,
         note: str = "",
         clock: Callable[[], int] | None = None,
-        limits: WriterLimits = WriterLimits(),
+        limits: WriterLimits = USUAL_LIMITS,
         on_problem: Callable[[str], object] | None = None,
     ) -> None:
         """Make the file, which there must not be yet, and start the thread. Raises `RecordingError`.

@@ -1,0 +1,191 @@
+"""Recorder: subscribes what is chosen, also topics that appear later, and gives it to a writer."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Protocol
+
+from nep.errors import BadTopicError, NepError
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.nodes.subscriber import Subscriber
+from nep.protocol.graph_view import GraphView
+from nep.protocol.topic_glob import glob_matches, is_glob, widened
+from nep.protocol.wire import check_topic
+from nep.recordings.channels import Role
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["DESCRIPTION_TYPE", "Recorder", "TopicSelection"]
+
+DESCRIPTION_TYPE = "robot/description"
+"""Topics of this type are recorded whatever is chosen, unless they are left out by name."""
+_LOOK_S = 1.0
+_PATIENCE_S = 0.5
+"""A master that is away must not keep anybody waiting who does not need it."""
+_MOST_KNOWN = 20_000
+_ALL = "**"
+
+
+class _Takes(Protocol):
+    """A `RecordingWriter` or a `FlightRecorder`."""
+
+    def post(self, messages: Sequence[Message]) -> None:
+        """Messages that came now."""
+
+    def say(self, role: Role, value: object) -> None:
+        """Something of the recorder's own."""
+
+
+@dataclass(frozen=True)
+class TopicSelection:
+    """Which topics: names and patterns (`*`, `?`, `**`) of those wanted, none for all; and of those not.
+
+    What is left out wins. Raises `BadTopicError` for what can be no topic.
+    """
+
+    topics: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for each in (*self.topics, *self.left_out):
+            check_topic(each)
+
+    @property
+    def subscriptions(self) -> tuple[str, ...]:
+        """What to subscribe, so that all of it is heard; none of them is another's part."""
+        made: list[str] = []
+        for each in map(widened, self.topics or (_ALL,)):
+            if not any(glob_matches(other, each) for other in made):
+                made = [*(other for other in made if not glob_matches(each, other)), each]
+        return tuple(made)
+
+    def has(self, topic: str) -> bool:
+        """Whether a topic is chosen."""
+        if any(glob_matches(each, topic) for each in self.left_out):
+            return False
+        return not self.topics or any(glob_matches(each, topic) for each in self.topics)
+
+    def leaves_out(self, topic: str) -> bool:
+        """Whether it is not wanted by name."""
+        return any(glob_matches(each, topic) for each in self.left_out)
+
+
+class Recorder:
+    """Gives the messages of chosen topics to a writer until it is closed; a context manager.
+
+    What is published after it was made is recorded, from topics that appear later too, the first message
+    included, where the back end knows wildcards (else within a second). Once a second it looks for alerts,
+    which are written when they change, and for descriptions of robots.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        writer: _Takes,
+        selection: TopicSelection = TopicSelection(),
+        *,
+        look_s: float = _LOOK_S,
+    ) -> None:
+        """Subscribe. The node stays the caller's. Raises as `Node.new_sub` does."""
+        self._node, self._writer, self._selection = node, writer, selection
+        self._subscriptions = selection.subscriptions
+        self._known: dict[str, int] = {}
+        self._subscribers: list[Subscriber] = []
+        self._exact: set[str] = set()
+        self._told_alerts: object = None
+        self._end = threading.Event()
+        self._has_patterns = True
+        try:
+            for number, topic in enumerate(self._subscriptions):
+                self._subscribe(number, topic)
+        except BaseException:
+            self._unsubscribe()
+            raise
+        self._thread = threading.Thread(target=self._look, args=(look_s,), name="recorder-look", daemon=True)
+        self._thread.start()
+
+    def _subscribe(self, number: int, topic: str) -> None:
+        if is_glob(topic):
+            try:
+                self._subscribers.append(self._node.new_sub(topic, sink=partial(self._take, number)))
+            except BadTopicError:  # a back end without wildcards: the graph tells the names
+                self._has_patterns = False
+        else:
+            self._subscribers.append(
+                self._node.new_sub(
+                    topic, self._type_of(topic), sink=partial(self._take, number), wildcards=False
+                )
+            )
+
+    def _type_of(self, topic: str) -> str:
+        """The topic's type now: who subscribes with another one causes an alert."""
+        with suppress(NepError):
+            known = self._node.graph(_PATIENCE_S).topics.get(topic)
+            if known is not None and known.msg_type:
+                return known.msg_type
+        return "json"
+
+    def _take(self, number: int, messages: Sequence[Message]) -> None:
+        """Of two subscriptions that hear the same topic the first one counts."""
+        mine = [each for each in messages if self._owner(each.topic) == number]
+        if mine:
+            self._writer.post(mine)
+
+    def _owner(self, topic: str) -> int:
+        """The number of the subscription whose messages of a topic are recorded; -1: it is not chosen."""
+        known = self._known.get(topic)
+        if known is None:
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            known = -1
+            if self._selection.has(topic):
+                heard = enumerate(self._subscriptions)
+                known = next((at for at, each in heard if glob_matches(each, topic)), -1)
+            self._known[topic] = known
+        return known
+
+    # ---- once a second
+
+    def _look(self, look_s: float) -> None:
+        while not self._end.is_set():
+            with suppress(NepError):
+                self._look_at(self._node.graph(_PATIENCE_S))
+            self._end.wait(look_s)
+
+    def _look_at(self, graph: GraphView) -> None:
+        alerts = [asdict(each) for each in graph.alerts]
+        if alerts != self._told_alerts and (alerts or self._told_alerts is not None):
+            self._writer.say("alerts", {"alerts": alerts})
+        self._told_alerts = alerts
+        for name, topic in graph.topics.items():
+            is_description = topic.msg_type == DESCRIPTION_TYPE and not self._selection.leaves_out(name)
+            is_chosen = self._selection.has(name)
+            is_heard = is_chosen and (self._has_patterns or name in self._subscriptions)
+            if is_heard or not (is_chosen or is_description) or name in self._exact or not topic.publishers:
+                continue
+            self._exact.add(name)
+            self._subscribers.append(
+                self._node.new_sub(name, topic.msg_type, sink=self._writer.post, wildcards=False)
+            )
+
+    def close(self) -> None:
+        """Hear no more. May be called twice; the writer and the node stay."""
+        self._end.set()
+        self._thread.join(10.0)
+        self._unsubscribe()
+
+    def _unsubscribe(self) -> None:
+        for each in self._subscribers:
+            each.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()

@@ -1,0 +1,228 @@
+"""The recorder hears what is chosen, each message once, and topics that appear later from their first one."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+
+import pytest
+
+import nep
+from nep.errors import BadTopicError
+from nep.protocol.topic_glob import glob_matches, widened
+from nep.protocol.topic_pattern import matches
+from nep.recordings.child import RecorderService
+from nep.recordings.reader import Recording
+from nep.recordings.recorder import Recorder, TopicSelection
+from nep.recordings.writer import RecordingWriter
+from tests.blocks.fakes import until
+from tests.nep.recordings.messages import limits
+
+
+class Heard:
+    """Takes what a recorder gives."""
+
+    def __init__(self) -> None:
+        self.messages: list[nep.Message] = []
+        self.said: list[tuple[str, object]] = []
+
+    def post(self, messages: Sequence[nep.Message]) -> None:
+        self.messages.extend(messages)
+
+    def say(self, role: str, value: object) -> None:
+        self.said.append((role, value))
+
+    def of(self, topic: str) -> list[object]:
+        return [each.payload["n"] for each in self.messages if each.topic == topic]
+
+
+@pytest.mark.parametrize(
+    ("topics", "left_out", "subscriptions", "chosen", "others"),
+    [
+        ((), (), ("**",), ["/a", "b", "/a/b/c"], []),
+        (("/a", "/a", "/b"), (), ("/a", "/b"), ["/a", "/b"], ["/c"]),
+        (("/arm*",), ("/arm2",), ("/*",), ["/arm1", "/arm"], ["/arm2", "/leg", "/arm/x"]),
+        (("/a/b", "/a/*", "/**"), (), ("/**",), ["/a/b", "/x"], ["x"]),
+        (("**", "*/**"), (), ("**",), ["x", "/x"], []),
+        (("*/**", "**"), (), ("**/**",), ["x", "/x"], []),
+        ((), ("**/camera",), ("**",), ["/x"], ["/x/camera", "camera"]),
+    ],
+)
+def test_what_is_chosen(topics, left_out, subscriptions, chosen, others):
+    selection = TopicSelection(topics, left_out)
+    assert selection.subscriptions == subscriptions
+    for topic in (*chosen, *others):
+        assert selection.has(topic) == (topic in chosen)
+        if topic in chosen:
+            assert any(matches(each, topic) for each in selection.subscriptions)
+    with pytest.raises(BadTopicError):
+        TopicSelection(("two words",))
+
+
+@pytest.mark.parametrize("pattern", ["/a*/b", "?", "*", "*/*", "/x/*y*/**", "**/cam?", "/plain"])
+def test_a_wider_pattern_hears_no_less(pattern):
+    topics = ["/a/b", "/ab/b", "q", "/x/y", "/x/ayb/c/d", "/cam1", "cams", "/r/cam2", "/plain", "/a/b/c"]
+    for topic in topics:
+        if glob_matches(pattern, topic):
+            assert matches(widened(pattern), topic)
+
+
+def test_each_message_once_from_the_first_one_of_topics_that_come_later(make):
+    node, heard = make("recorder"), Heard()
+    before = make("before").new_pub("/arm/joints")
+    selection = TopicSelection(("/arm/*", "/arm/joints", "/cam*"), ("/arm/secret",))
+    with Recorder(node, heard, selection, look_s=0.05):
+        later = make("later")
+        publishers = {
+            topic: later.new_pub(topic) for topic in ("/camera", "/other", "/arm/secret", "/arm/leg")
+        }
+        for n in range(20):
+            for publisher in (before, *publishers.values()):
+                publisher.publish({"n": n})
+        wanted = ("/arm/joints", "/camera", "/arm/leg")
+        until(lambda: all(19 in heard.of(topic) for topic in wanted))
+        for topic in wanted:
+            got = heard.of(topic)
+            assert got == sorted(set(got))
+            if topic == "/arm/joints" or node._backend.has_patterns:
+                assert got == list(range(20))
+        assert {each.topic for each in heard.messages} == set(wanted)
+    before.publish({"n": 99})
+    assert 99 not in heard.of("/arm/joints")
+
+
+def test_descriptions_of_robots_and_alerts_are_recorded_whatever_is_chosen(master):
+    heard = Heard()
+    with (
+        nep.node("recorder", master=master.address) as node,
+        nep.node("robot", master=master.address) as robot,
+    ):
+        robot.new_pub("/pepper/description", "robot/description", latched=True).publish({"n": 1})
+        robot.new_pub("/twice", "json")
+        robot.new_pub("/twice", "string")  # two types on one topic are an alert
+        with Recorder(node, heard, TopicSelection(("/other",)), look_s=0.05):
+            until(lambda: heard.of("/pepper/description") == [1])
+            until(lambda: any(role == "alerts" and "/twice" in json.dumps(each) for role, each in heard.said))
+        descriptions = [each for each in heard.messages if each.topic == "/pepper/description"]
+        assert [(each.msg_type, each.is_latched) for each in descriptions] == [("robot/description", True)]
+        assert {each.topic for each in heard.messages} == {"/pepper/description"}
+
+
+def test_what_is_recorded_is_what_a_subscriber_gets_byte_for_byte(master, tmp_path):
+    path = tmp_path / "a.mcap"
+    with (
+        nep.node("recorder", master=master.address) as node,
+        nep.node("robot", master=master.address) as robot,
+    ):
+        live: list[nep.Message] = []
+        subscriber = node.new_sub("**", sink=live.extend)
+        with RecordingWriter(path, limits=limits()) as writer, Recorder(node, writer):
+            publishers = [
+                robot.new_pub(f"/{kind}", kind) for kind in ("json", "string", "bytes", "msgpack", "image")
+            ]
+            import numpy as np
+
+            frame = np.arange(27, dtype=np.uint8).reshape(3, 3, 3)
+            for n in range(10):
+                for publisher, payload in zip(
+                    publishers, ({"n": n}, f"ñ{n}", b"\0" * n, {"b": b"\1", "n": n}, frame), strict=True
+                ):
+                    publisher.publish(payload)
+            until(lambda: len(live) >= 50 and writer.flush() and writer.status.message_count >= 50)
+        subscriber.close()
+
+    def all_of(each: nep.Message) -> tuple[object, ...]:
+        return (
+            each.topic, bytes(each.data), each.codec, each.msg_type, each.seq, each.stamp_ns, each.publisher,
+            each.is_latched, repr(dict(each.extension)),
+        )  # fmt: skip
+
+    with Recording(path) as recording:
+        found = sorted(all_of(each.message) for each in recording.read())
+        figures = recording.figures()
+    assert found == sorted(all_of(each) for each in live)
+    assert {(each.received, each.lost, each.late) for each in figures.values()} == {(10, 0, 0)}
+
+
+def test_orders_of_the_service(master, tmp_path):
+    events: list[dict[str, object]] = []
+
+    def seen(kind: str) -> list[dict[str, object]]:
+        return [each for each in events if each["event"] == kind]
+
+    def order(**content: object) -> None:
+        service.order(json.dumps(content).encode())
+
+    with (
+        nep.node("recorder", master=master.address) as node,
+        nep.node("robot", master=master.address) as robot,
+    ):
+        service = RecorderService(node, lambda event: events.append(dict(event)), figures_s=0.01)
+        publisher = robot.new_pub("/a")
+        order(op="ring", folder=str(tmp_path / "ring"), seconds=60)
+        order(op="record", path=str(tmp_path / "a.mcap"), note="first", topics=["/a"])
+        order(op="record", path=str(tmp_path / "b.mcap"))
+        for n in range(5):
+            publisher.publish({"n": n})
+        until(lambda: any((each["recording"] or {}).get("topics") for each in seen("figures")))
+        order(op="note", text="it fell")
+        order(op="keep", path=str(tmp_path / "kept.mcap"), seconds=60, note="the fall")
+        until(lambda: seen("kept"))
+        order(op="stop")
+        for wrong in (
+            b"",
+            b"[]",
+            b'{"op":7}',
+            b'{"op":"none"}',
+            b'{"op":"record"}',
+            b'{"op":"keep"}',
+            b"\xff",
+        ):
+            service.order(wrong)
+        order(op="record", path=str(tmp_path / "nowhere" / "a.mcap"))
+        order(op="record", path=str(tmp_path / "c.mcap"), topics=["two words"])
+        service.close()
+    assert [each["op"] for each in seen("problem")][:1] == ["record"]
+    assert len(seen("problem")) == 10
+    (ended,) = seen("ended")
+    assert ended["status"]["message_count"] == 5
+    with Recording(tmp_path / "a.mcap") as recording:
+        assert [each.message.payload for each in recording.read()] == [{"n": n} for n in range(5)]
+        assert recording.words["note"] == "first"
+        assert [value for _at, value in recording.said("notes")] == [{"text": "it fell"}]
+    with Recording(tmp_path / "kept.mcap") as recording:
+        assert (recording.topics["/a"].message_count, recording.words["note"]) == (5, "the fall")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.mcap", "kept.mcap", "ring"]
+    assert not list((tmp_path / "ring").iterdir())
+
+
+def test_a_process_of_its_own_finishes_when_its_input_ends(master, tmp_path):
+    path = tmp_path / "a.mcap"
+    child = subprocess.Popen(
+        [sys.executable, "-m", "nep.recordings.child", "--master", master.address],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    with child, nep.node("robot", master=master.address) as robot:
+        publisher = robot.new_pub("/a")
+        assert json.loads(child.stdout.readline()) == {"event": "ready"}
+        child.stdin.write(json.dumps({"op": "record", "path": str(path)}).encode() + b"\n")
+        child.stdin.flush()
+        assert json.loads(child.stdout.readline())["event"] == "recording"
+        for n in range(100):
+            publisher.publish({"n": n})
+        while True:
+            event = json.loads(child.stdout.readline())
+            if (
+                event["event"] == "figures"
+                and event["recording"]["topics"].get("/a", {}).get("received") == 100
+            ):
+                break
+        out, _err = child.communicate()
+    events = [json.loads(line) for line in out.splitlines()]
+    assert events[-1]["event"] == "ended"
+    with Recording(path) as recording:
+        assert recording.is_complete
+        assert [each.message.payload["n"] for each in recording.read(topics=("/a",))] == list(range(100))

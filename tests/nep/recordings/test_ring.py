@@ -1,0 +1,172 @@
+"""The flight recorder: always the last seconds, never more on the disk than allowed."""
+
+from __future__ import annotations
+
+import os
+import threading
+from contextlib import suppress
+
+import pytest
+
+from nep.errors import RecordingError
+from nep.recordings import ring as ring_module
+from nep.recordings.reader import Recording
+from nep.recordings.ring import FlightRecorder
+from tests.nep.recordings.mcap_doctor import McapDoctor
+from tests.nep.recordings.messages import STEP_NS, TestClock, json_message, kept, limits
+
+NO_PROCESS = 2**31 - 2
+
+
+def fill(ring: FlightRecorder, first: int, last: int, every: int = 10) -> None:
+    """A chunk for each few messages, 10 ms apart."""
+    for seq in range(first, last):
+        ring.post([json_message(seq)])
+        if seq % every == 0:
+            assert ring._writer.flush()
+
+
+def test_it_keeps_the_last_seconds_and_no_more_than_a_segment_beyond(tmp_path):
+    with FlightRecorder(tmp_path / "ring", seconds=2.0, clock=TestClock(), limits=limits()) as ring:
+        fill(ring, 1, 1001)
+        status = ring.status
+        assert 2.0 <= status.seconds <= 2.0 * 9 / 8 + 0.3
+        made = ring.keep(tmp_path / "a.mcap", 2.0, "it fell")
+        assert 2.0 <= made.duration_s <= 2.2
+        with Recording(tmp_path / "a.mcap") as recording:
+            seqs = [each.message.seq for each in recording.read()]
+            assert seqs == list(range(seqs[0], 1001))
+            assert len(seqs) == made.message_count == recording.figures()["/odom"].received
+            assert recording.words["note"] == "it fell"
+            assert (recording.words["kept"], recording.is_complete) == ("1", True)
+            assert [kept(each.message) for each in recording.read()] == [
+                kept(json_message(seq)) for seq in seqs
+            ]
+        assert McapDoctor(tmp_path / "a.mcap").problems == []
+        short = ring.keep(tmp_path / "b.mcap", 0.5)
+        assert 0.5 <= short.duration_s <= 0.7
+        fill(ring, 1001, 1101)  # and it goes on
+        ring.keep(tmp_path / "c.mcap", 60.0)
+        with Recording(tmp_path / "c.mcap") as recording:
+            assert recording.newest(recording.end_ns)["/odom"].message.seq == 1100
+    assert not list((tmp_path / "ring").iterdir())
+
+
+def test_bytes_end_it_before_seconds(tmp_path):
+    size = 60_000
+    with FlightRecorder(tmp_path, seconds=1e6, size_bytes=size, clock=TestClock(), limits=limits()) as ring:
+        for part in range(40):
+            fill(ring, part * 50 + 1, part * 50 + 51)
+            there = sum(each.stat().st_size for each in tmp_path.iterdir())
+            assert there <= size * 9 / 8 + 2000
+        assert ring.status.seconds < 20
+        assert ring.keep(tmp_path / "kept", 1e6).message_count > 100
+        (tmp_path / "kept").unlink()
+
+
+def test_a_segment_that_is_copied_is_removed_only_afterwards(tmp_path, monkeypatch):
+    copying, go_on, made = threading.Event(), threading.Event(), []
+
+    class SlowWriter(ring_module.FileWriter):
+        def copy_chunk(self, *args):
+            copying.set()
+            assert go_on.wait(30)
+            super().copy_chunk(*args)
+
+    with FlightRecorder(tmp_path / "ring", seconds=1.0, clock=TestClock(), limits=limits()) as ring:
+        fill(ring, 1, 101)
+        with monkeypatch.context() as patched:
+            patched.setattr(ring_module, "FileWriter", SlowWriter)
+            thread = threading.Thread(target=lambda: made.append(ring.keep(tmp_path / "a.mcap", 1.0)))
+            thread.start()
+            assert copying.wait(30)
+        fill(ring, 101, 601)
+        assert ring.status.seconds < 2
+        go_on.set()
+        thread.join(30)
+        with Recording(tmp_path / "a.mcap") as recording:
+            seqs = [each.message.seq for each in recording.read()]
+            assert seqs == list(range(seqs[0], 101))
+    assert made[0].message_count == len(seqs) >= 95
+    assert not list((tmp_path / "ring").iterdir())
+
+
+def test_losses_are_those_of_the_kept_seconds(tmp_path):
+    clock = TestClock()
+    with FlightRecorder(tmp_path / "ring", clock=clock, limits=limits(figures_s=1e-9)) as ring:
+        ring.post([json_message(1), json_message(5)])  # three are missing, long ago
+        assert ring._writer.flush()
+        ring.post([json_message(6)])
+        assert ring._writer.flush()
+        for _each in range(1000):
+            clock()
+        ring.post([json_message(7), json_message(9)])
+        assert ring._writer.flush()
+        ring.post([json_message(10)])
+        assert ring._writer.flush()
+        assert ring._writer.flush()
+        ring.keep(tmp_path / "all.mcap", 3600.0)
+        ring.keep(tmp_path / "last.mcap", 1.0)
+    with Recording(tmp_path / "last.mcap") as recording:
+        assert [each.message.seq for each in recording.read()] == [7, 9, 10]
+        assert recording.figures()["/odom"].lost in {0, 1}  # of this second, never the three
+
+
+def test_what_a_process_left_behind_is_removed_and_what_another_one_has_is_not(tmp_path):
+    gone = tmp_path / f"ring-{NO_PROCESS}-a-1.mcap"
+    others = [tmp_path / f"ring-{os.getppid()}-a-1.mcap", tmp_path / "mine.mcap", tmp_path / "ring-x-1.mcap"]
+    for each in (gone, *others):
+        each.write_bytes(b"x")
+    with FlightRecorder(tmp_path, limits=limits()):
+        assert not gone.exists()
+    assert all(each.exists() for each in others)
+
+
+def test_sentences(tmp_path):
+    with pytest.raises(ValueError, match="more than 0 seconds"):
+        FlightRecorder(tmp_path, seconds=0.0)
+    with pytest.raises(ValueError, match="more than 0 seconds"):
+        FlightRecorder(tmp_path, seconds=float("nan"))
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(RecordingError):
+        FlightRecorder(tmp_path / "file")
+    with FlightRecorder(tmp_path / "ring", clock=TestClock(), limits=limits()) as ring:
+        ring.post([json_message(1)])
+        with pytest.raises(RecordingError, match="such a file already"):
+            ring.keep(tmp_path / "file", 1.0)
+        with pytest.raises(RecordingError):
+            ring.keep(tmp_path / "nowhere" / "a.mcap", 1.0)
+        assert ring.keep(tmp_path / "a.mcap", 1.0).message_count == 1
+        for segment in (tmp_path / "ring").iterdir():
+            with suppress(OSError):
+                segment.write_bytes(b"damaged" * (segment.stat().st_size // 7 + 1))
+        with pytest.raises(RecordingError, match="damaged"):
+            ring.keep(tmp_path / "b.mcap", 1e6)
+        assert not (tmp_path / "b.mcap").exists()
+        ring.post([json_message(2)])  # what comes later is good again
+        assert ring.keep(tmp_path / "c.mcap", 1e6).message_count == 1
+    with Recording(tmp_path / "c.mcap") as recording:
+        assert [each.message.seq for each in recording.read()] == [2]
+        assert recording.words["damaged"] == "1"
+
+
+def test_a_full_disk_makes_it_shorter_before_it_ends(tmp_path):
+    told = []
+    ring = FlightRecorder(
+        tmp_path / "ring",
+        seconds=1.0,
+        clock=TestClock(),
+        limits=limits(least_free_bytes=2**62, figures_s=0.001),
+        on_problem=told.append,
+    )
+    with ring:
+        ring.post([json_message(1)])
+        while not ring.status.problem:
+            ring._writer.flush()
+    assert told == ["the disk is full"]
+    assert not list((tmp_path / "ring").iterdir())
+
+
+def test_time_of_the_tests_clock(tmp_path):
+    clock = TestClock()
+    assert clock() + STEP_NS == clock()
