@@ -17,7 +17,7 @@ from nep.recordings.child import RecorderService
 from nep.recordings.reader import Recording
 from nep.recordings.recorder import Recorder, TopicSelection
 from nep.recordings.writer import RecordingWriter
-from tests.blocks.fakes import until
+from tests.nep.programs import eventually as until
 from tests.nep.recordings.messages import limits
 
 

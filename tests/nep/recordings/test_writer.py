@@ -17,7 +17,7 @@ from nep.recordings.mcap_file import FileWriter
 from nep.recordings.reader import Recording
 from nep.recordings.repair import repair
 from nep.recordings.writer import RecordingWriter
-from tests.blocks.fakes import until
+from tests.nep.programs import eventually as until
 from tests.nep.recordings.mcap_doctor import McapDoctor
 from tests.nep.recordings.messages import START_NS, TestClock, json_message, kept, limits, odd_messages
 from tests.small_disk import SmallDisk

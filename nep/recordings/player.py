@@ -1,0 +1,344 @@
+"""Playing a recording: its messages again, in the time in which they came.
+
+`Playback` is the timing, with a clock that is passed in and nothing that waits. `Player` is a thread around
+it that gives what is due to a sink. Nothing is published by either: who wants that gives a sink that does.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from nep.i18n import _
+from nep.messages.message import UNDECODED, Message, MessageKind, new_message
+from nep.recordings.reader import RecordedMessage, Recording
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["SPEED_MAX", "SPEED_MIN", "Due", "Playback", "Player", "PlayerStatus"]
+
+SPEED_MIN, SPEED_MAX = 0.1, 10.0
+_MOST_LAG_S = 0.25
+"""Who is slower than that is not sent a burst: then the playback is slower, and `true_speed` tells."""
+_MOST_AT_ONCE = 2_000
+_MOST_WAIT_S = 0.05
+_MEASURED_S = 1.0
+_MOST_KINDS = 10_000
+
+
+@dataclass(frozen=True)
+class PlayerStatus:
+    """Where it is. `true_speed`: of the last second, None while it is paused or not known yet.
+
+    `loop`: the part that is played again and again, None for all; `is_looping`: whether it is.
+    """
+
+    position_ns: int
+    is_playing: bool
+    is_at_end: bool
+    speed: float
+    true_speed: float | None
+    loop: tuple[int, int] | None
+    is_looping: bool
+
+
+@dataclass(frozen=True)
+class Due:
+    """What is to be given out now.
+
+    `messages`: in their order. `is_jump`: they are the newest of each topic at another place, not what came
+    next. `wait_s`: until there is more to do, None when it is paused.
+    """
+
+    messages: Sequence[Message]
+    is_jump: bool
+    wait_s: float | None
+
+
+class Playback:
+    """A recording's position in time. Not for several threads at once."""
+
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        topics: Collection[str] | None = None,
+        remap: Mapping[str, str] | None = None,
+    ) -> None:
+        """Paused, before the first message. `topics`: those played, None for all. `remap`: new names."""
+        self._recording, self._clock = recording, clock
+        self._topics = topics
+        self._remap = dict(remap or {})
+        self._kinds: dict[int, tuple[MessageKind, MessageKind]] = {}
+        self._speed = 1.0
+        self._is_playing = self._is_looping = False
+        self._loop: tuple[int, int] | None = None
+        self._position_ns = recording.start_ns
+        self._anchor = (clock(), self._position_ns)
+        self._measured: deque[tuple[float, int]] = deque()
+        self._jump: list[Message] | None = None
+        self._coming: Iterator[RecordedMessage] = iter(())
+        self._next: RecordedMessage | None = None
+        self._read_from(recording.start_ns)
+
+    # ---- what a person does
+
+    def play(self) -> None:
+        """Go on, from the beginning when it is at its end."""
+        if not self._is_playing:
+            if self._is_at_end():
+                self._position_ns = self._first_ns()
+                self._read_from(self._position_ns)
+            self._is_playing = True
+            self._anchor_here()
+
+    def pause(self) -> None:
+        """Stay where it is."""
+        if self._is_playing:
+            self._is_playing = False
+            self._anchor_here()
+
+    def seek(self, at_ns: int) -> None:
+        """Go to a time; the newest message of each topic up to there is due at once."""
+        self._position_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
+        newest = self._recording.newest(self._position_ns, self._topics)
+        self._jump = [self._renamed(each.message) for each in sorted(newest.values(), key=_log_ns)]
+        self._read_from(self._position_ns + 1)
+        self._anchor_here()
+
+    def step(self, topic: str, *, forward: bool = True) -> bool:
+        """Go to the next or previous message of a topic, and pause; False when there is none."""
+        find = self._recording.after if forward else self._recording.before
+        found = find(self._position_ns, topic)
+        self.pause()
+        if found is None:
+            return False
+        self.seek(found.log_ns)
+        return True
+
+    @property
+    def speed(self) -> float:
+        """How fast it is to be, 0.1 to 10."""
+        return self._speed
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        if not SPEED_MIN <= speed <= SPEED_MAX:
+            raise ValueError(
+                _("{speed:g} is no speed; give {least:g} to {most:g}").format(
+                    speed=speed, least=SPEED_MIN, most=SPEED_MAX
+                )
+            )
+        self._speed = speed
+        self._anchor_here()
+
+    def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
+        """Play a part again and again, or all of it. Raises `ValueError` when the part has no length."""
+        if start_ns is None or end_ns is None:
+            self._loop = None
+        else:
+            start_ns = max(start_ns, self._recording.start_ns)
+            end_ns = min(end_ns, self._recording.end_ns)
+            if start_ns >= end_ns:
+                raise ValueError(_("the part to be played again has no length"))
+            self._loop = (start_ns, end_ns)
+            if not start_ns <= self._position_ns <= end_ns:
+                self.seek(start_ns)
+        self._is_looping = True
+
+    def end_loop(self) -> None:
+        """Play on beyond the part's end."""
+        self._is_looping, self._loop = False, None
+
+    # ---- the timing
+
+    def status(self) -> PlayerStatus:
+        """Where it is now."""
+        return PlayerStatus(
+            self._position_ns,
+            self._is_playing,
+            self._is_at_end(),
+            self._speed,
+            self._true_speed(),
+            self._loop,
+            self._is_looping,
+        )
+
+    def advance(self) -> Due:
+        """What is due by the clock. Call it again after `wait_s` seconds at most."""
+        if self._jump is not None:
+            messages, self._jump = self._jump, None
+            return Due(messages, is_jump=True, wait_s=0.0 if self._is_playing else None)
+        if not self._is_playing:
+            return Due((), is_jump=False, wait_s=None)
+        target = min(self._target(), self._last_ns())
+        due = self._due(target)
+        if len(due) >= _MOST_AT_ONCE and self._next is not None and self._next.log_ns <= target:
+            self._position_ns = due[-1].log_ns
+            self._anchor_here(is_measured=False)
+        else:
+            self._position_ns = target
+        self._measure()
+        if self._position_ns >= self._last_ns():
+            self._come_to_end()
+        messages = [self._renamed(each.message) for each in due]
+        return Due(messages, is_jump=False, wait_s=self._wait_s())
+
+    def _target(self) -> int:
+        now = self._clock()
+        started, from_ns = self._anchor
+        target = from_ns + int((now - started) * self._speed * 1e9)
+        most = self._position_ns + int(_MOST_LAG_S * self._speed * 1e9)
+        if target > most:
+            self._anchor = (now, most)
+            return most
+        return max(target, self._position_ns)
+
+    def _due(self, until_ns: int) -> list[RecordedMessage]:
+        due: list[RecordedMessage] = []
+        while self._next is not None and self._next.log_ns <= until_ns and len(due) < _MOST_AT_ONCE:
+            due.append(self._next)
+            self._next = next(self._coming, None)
+        return due
+
+    def _come_to_end(self) -> None:
+        if self._is_looping and self._last_ns() > self._first_ns():
+            self.seek(self._first_ns())
+        elif self._next is None or self._next.log_ns > self._last_ns():
+            self._is_playing = False
+            self._measured.clear()
+
+    def _wait_s(self) -> float | None:
+        if not self._is_playing:
+            return None
+        if self._jump is not None:
+            return 0.0
+        ahead = self._last_ns() if self._next is None else min(self._next.log_ns, self._last_ns())
+        return max(0.0, min(_MOST_WAIT_S, (ahead - self._position_ns) / 1e9 / self._speed))
+
+    def _first_ns(self) -> int:
+        return self._recording.start_ns if self._loop is None else self._loop[0]
+
+    def _last_ns(self) -> int:
+        return self._recording.end_ns if self._loop is None or not self._is_looping else self._loop[1]
+
+    def _is_at_end(self) -> bool:
+        return self._position_ns >= self._last_ns() and (
+            self._next is None or self._next.log_ns > self._last_ns()
+        )
+
+    def _read_from(self, at_ns: int) -> None:
+        self._coming = self._recording.read(at_ns, None, self._topics)
+        self._next = next(self._coming, None)
+
+    def _anchor_here(self, *, is_measured: bool = True) -> None:
+        self._anchor = (self._clock(), self._position_ns)
+        if is_measured:
+            self._measured.clear()
+
+    def _measure(self) -> None:
+        now = self._clock()
+        self._measured.append((now, self._position_ns))
+        while len(self._measured) > 2 and self._measured[0][0] < now - _MEASURED_S:
+            self._measured.popleft()
+
+    def _true_speed(self) -> float | None:
+        if len(self._measured) < 2:
+            return None
+        (started, from_ns), (now, to_ns) = self._measured[0], self._measured[-1]
+        return (to_ns - from_ns) / 1e9 / (now - started) if now > started else None
+
+    def _renamed(self, message: Message) -> Message:
+        """A message under the topic's new name."""
+        new = self._remap.get(message.topic)
+        if new is None:
+            return message
+        known = self._kinds.get(id(message.kind))
+        if known is None:
+            if len(self._kinds) >= _MOST_KINDS:
+                self._kinds.clear()
+            known = self._kinds[id(message.kind)] = (message.kind, message.kind._replace(topic=new))
+        made = new_message(Message)
+        made.kind = known[1]
+        made.raw, made.stamp_ns, made.seq = message.raw, message.stamp_ns, message.seq
+        made.publisher, made.extension, made.decoded = message.publisher, message.extension, UNDECODED
+        return made
+
+
+def _log_ns(each: RecordedMessage) -> int:
+    return each.log_ns
+
+
+class Player:
+    """Plays a recording into a sink, in a thread of its own. Use it from any thread; a context manager.
+
+    `sink` is given messages in their order, a few at a time; `on_jump` the newest of each topic after a seek
+    (without it they go to the sink, too). Both are called in the player's thread and may take their time:
+    then it is slower, and loses nothing. `on_end` is told when the end was reached.
+    """
+
+    def __init__(
+        self,
+        playback: Playback,
+        sink: Callable[[Sequence[Message]], object],
+        *,
+        on_jump: Callable[[Sequence[Message]], object] | None = None,
+        on_end: Callable[[], object] | None = None,
+    ) -> None:
+        self._playback, self._sink = playback, sink
+        self._on_jump = sink if on_jump is None else on_jump
+        self._on_end = on_end
+        self._lock = threading.Condition()
+        self._is_closed = False
+        self._thread = threading.Thread(target=self._run, name="recording-player", daemon=True)
+        self._thread.start()
+
+    def order(self, change: Callable[[Playback], object]) -> PlayerStatus:
+        """Let something be done to the playback: `player.order(Playback.play)`; what it raises comes out."""
+        with self._lock:
+            change(self._playback)
+            self._lock.notify_all()
+            return self._playback.status()
+
+    @property
+    def status(self) -> PlayerStatus:
+        """Where it is now."""
+        with self._lock:
+            return self._playback.status()
+
+    def _run(self) -> None:
+        was_playing = False
+        while True:
+            with self._lock:
+                if self._is_closed:
+                    return
+                due = self._playback.advance()
+                is_playing = self._playback.status().is_playing
+                has_ended = was_playing and not is_playing and self._playback.status().is_at_end
+                was_playing = is_playing
+                if not due.messages and not has_ended:
+                    self._lock.wait(due.wait_s)
+            if due.messages:
+                (self._on_jump if due.is_jump else self._sink)(due.messages)
+            if has_ended and self._on_end is not None:
+                self._on_end()
+
+    def close(self, timeout_s: float = 10.0) -> None:
+        """End. May be called twice; the recording stays open."""
+        with self._lock:
+            self._is_closed = True
+            self._lock.notify_all()
+        if self._thread is not threading.current_thread():
+            self._thread.join(timeout_s)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
