@@ -10,7 +10,20 @@ from typing import Annotated
 import typer
 from typer.models import CommandInfo
 
-from nep.cli import blackboard, bridge, doctor, log, masters, nodes, parameters, services, topics
+from nep.cli import (
+    blackboard,
+    bridge,
+    doctor,
+    log,
+    masters,
+    nodes,
+    parameters,
+    play,
+    record,
+    recordings,
+    services,
+    topics,
+)
 from nep.cli.screen import say_error, write
 from nep.cli.typer_words import TranslatedCommand, TranslatedGroup
 from nep.errors import NepError
@@ -38,12 +51,15 @@ app = typer.Typer(
 app.command("master")(masters.master)
 app.command("bridge")(bridge.bridge)
 app.command("log")(log.log)
+app.command("record")(record.record)
+app.command("play")(play.play)
 app.command("doctor")(doctor.doctor)
 app.add_typer(nodes.app, name="node")
 app.add_typer(topics.app, name="topic")
 app.add_typer(services.app, name="service")
 app.add_typer(parameters.app, name="param")
 app.add_typer(blackboard.app, name="blackboard")
+app.add_typer(recordings.app, name="recording")
 
 
 @app.callback()

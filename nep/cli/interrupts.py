@@ -9,12 +9,13 @@ import _thread
 import os
 import signal
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from types import FrameType
 
 from nep.cli import INTERRUPTED
 
-__all__ = ["ask_first", "end_at_once"]
+__all__ = ["ask_first", "call_first", "end_at_once"]
 
 GRACE_S = 3.0
 """So long may a command take to end that was asked to: nodes say goodbye within 2 s."""
@@ -31,6 +32,23 @@ def ask_first() -> None:
     Once more, or when that takes too long, ends it at once: a terminal may take nothing any more.
     """
     _handle_with(_ask)
+
+
+def call_first(action: Callable[[], object]) -> None:
+    """From now on Ctrl+C calls `action`, which lets the command come to its end; once more ends it at once.
+
+    For what takes its time to end well: a recording writes what it has. `action` only sets something.
+    """
+
+    def handle(_signal: int, _frame: FrameType | None) -> None:
+        end_at_once()
+        action()
+
+    _callers.add(handle)
+    _handle_with(handle)
+
+
+_callers: set[signal._HANDLER] = set()
 
 
 def _end(_signal: int, _frame: FrameType | None) -> None:
@@ -53,6 +71,6 @@ def _end_later() -> None:
 
 def _handle_with(handler: signal._HANDLER) -> None:
     """Unless whoever started this wants it to go on (`nohup`, `&` in a script) or handles it otherwise."""
-    if signal.getsignal(signal.SIGINT) in {signal.default_int_handler, _end, _ask}:
+    if signal.getsignal(signal.SIGINT) in {signal.default_int_handler, _end, _ask, *_callers}:
         with suppress(ValueError):  # only the main thread may, and only there does an interrupt come
             signal.signal(signal.SIGINT, handler)

@@ -93,8 +93,7 @@ class Playback:
         """Go on, from the beginning when it is at its end."""
         if not self._is_playing:
             if self._is_at_end():
-                self._position_ns = self._first_ns()
-                self._read_from(self._position_ns)
+                self.begin()
             self._is_playing = True
             self._anchor_here()
 
@@ -155,6 +154,16 @@ class Playback:
     def end_loop(self) -> None:
         """Play on beyond the part's end."""
         self._is_looping, self._loop = False, None
+
+    def once(self) -> None:
+        """Play to the part's end, and no further."""
+        self._is_looping = False
+
+    def begin(self) -> None:
+        """Go before the first message of the part, without showing what was before."""
+        self._position_ns, self._jump = self._first_ns(), None
+        self._read_from(self._position_ns)
+        self._anchor_here()
 
     # ---- the timing
 
@@ -226,7 +235,7 @@ class Playback:
         return self._recording.start_ns if self._loop is None else self._loop[0]
 
     def _last_ns(self) -> int:
-        return self._recording.end_ns if self._loop is None or not self._is_looping else self._loop[1]
+        return self._recording.end_ns if self._loop is None else self._loop[1]
 
     def _is_at_end(self) -> bool:
         return self._position_ns >= self._last_ns() and (

@@ -1,0 +1,413 @@
+"""Export: a recording's numbers as CSV or Parquet, its pictures as files or as a film.
+
+One file, or one folder of pictures, for each topic. Nothing is written over, and a file that is not whole is
+not left behind. Messages that cannot be read are left out and counted.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
+from nep.i18n import _
+from nep.messages.message import Message
+from nep.recordings.reader import RecordedMessage, Recording
+from nep.recordings.writer import disk_sentence
+
+__all__ = ["ALL_OF_IT", "FORMATS", "Exported", "Part", "export", "flattened"]
+
+FORMATS = ("csv", "parquet", "pictures", "mp4")
+MOST_COLUMNS = 5_000
+_MOST_ITEMS = 100
+"""Of a list that get a column each; a longer one is one column of JSON."""
+_DEEPEST = 20
+_ROWS_AT_ONCE = 5_000
+_FIRST_COLUMNS = ("time_s", "stamp_s", "seq", "publisher")
+_FPS = 30.0
+_SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "mp4": ".mp4", "pictures": ""}
+Progress = Callable[[int, int], object]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What of a recording: times in ns since 1970 (None: to its end), topics (None: all that fit)."""
+
+    start_ns: int | None = None
+    end_ns: int | None = None
+    topics: Collection[str] | None = None
+
+
+ALL_OF_IT = Part()
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A file or folder that was made. `count`: messages in it; `unreadable`: those left out."""
+
+    topic: str
+    path: Path
+    count: int
+    unreadable: int
+
+
+def export(
+    recording: Recording,
+    kind: str,
+    folder: Path,
+    part: Part = ALL_OF_IT,
+    *,
+    fps: float = _FPS,
+    progress: Progress | None = None,
+) -> list[Exported]:
+    """Export as one of `FORMATS` into a folder, which is made.
+
+    `progress` is told how many messages of how many are done. Raises `RecordingError`, also when no topic
+    fits, `RecordingsUnavailableError` when a package is missing.
+    """
+    if kind not in FORMATS:
+        raise ValueError(_("no format '{kind}'").format(kind=kind))
+    wants_pictures = kind in {"pictures", "mp4"}
+    topics = [
+        each
+        for each in recording.topics.values()
+        if (part.topics is None or each.name in part.topics)
+        and (each.codec == "image" if wants_pictures else each.codec in {"json", "msgpack", "string"})
+    ]
+    if not topics:
+        reason = _("no topic has pictures") if wants_pictures else _("no topic has values for a table")
+        raise RecordingError(str(recording.path), reason)
+    counted = _Counted(sum(each.message_count for each in topics), progress)
+    make = {"csv": _csv, "parquet": _parquet, "pictures": _pictures, "mp4": _mp4}[kind]
+    made, taken = [], set[str]()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for topic in topics:
+            path = folder / _file_name(topic.name, taken, _SUFFIXES[kind])
+            if path.exists():
+                raise RecordingError(str(path), _("there is such a file already; choose another name"))
+            unfinished = path.with_name(f"{path.name}.part")
+            source = _Source(recording, topic.name, part, counted)
+            try:
+                count = make(source, unfinished, fps)
+                unfinished.rename(path)
+            except BaseException:
+                _remove(unfinished)
+                raise
+            made.append(Exported(topic.name, path, count, source.unreadable))
+    except OSError as error:
+        raise disk_sentence(folder, error) from error
+    return made
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):
+        if path.is_dir():
+            for each in path.iterdir():
+                each.unlink()
+            path.rmdir()
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _file_name(topic: str, taken: set[str], suffix: str) -> str:
+    """A name for every system, another one for each topic."""
+    plain = re.sub(r"[^\w.-]+", "_", topic).strip("._") or "topic"
+    name, number = plain[:100], 2
+    while name.lower() in taken:
+        name, number = f"{plain[:100]}-{number}", number + 1
+    taken.add(name.lower())
+    return name + suffix
+
+
+class _Counted:
+    """How far all of it is."""
+
+    def __init__(self, total: int, progress: Progress | None) -> None:
+        self._total, self._progress = total, progress
+        self._done = 0
+
+    def add(self) -> None:
+        self._done += 1
+        if self._progress is not None and (self._done % 100 == 0 or self._done >= self._total):
+            self._progress(min(self._done, self._total), self._total)
+
+
+class _Source:
+    """The messages of one topic."""
+
+    def __init__(self, recording: Recording, topic: str, part: Part, counted: _Counted) -> None:
+        self._recording, self.topic, self._part, self._counted = recording, topic, part, counted
+        self.unreadable = 0
+
+    def messages(self, *, is_counted: bool = True) -> Iterator[RecordedMessage]:
+        for each in self._recording.read(self._part.start_ns, self._part.end_ns, (self.topic,)):
+            if is_counted:
+                self._counted.add()
+            yield each
+
+    def rows(self, *, is_counted: bool = True) -> Iterator[dict[str, object]]:
+        """Flat values of each message that can be read, with its times first."""
+        self.unreadable = 0
+        for each in self.messages(is_counted=is_counted):
+            try:
+                values = flattened(each.message.payload)
+            except DecodeError:
+                self.unreadable += 1
+                continue
+            yield {**_times(each), **values}
+
+
+def _times(each: RecordedMessage) -> dict[str, object]:
+    message = each.message
+    return {
+        "time_s": each.log_ns / 1e9,
+        "stamp_s": None if message.stamp_ns is None else message.stamp_ns / 1e9,
+        "seq": message.seq,
+        "publisher": None if message.publisher is None else str(message.publisher),
+    }
+
+
+def flattened(payload: object) -> dict[str, object]:
+    """Single values by their paths, such as "pose.x" and "joints[3]"; of a value alone by "value"."""
+    made: dict[str, object] = {}
+    _flatten(payload, "", made, _DEEPEST)
+    return made
+
+
+def _flatten(value: object, path: str, made: dict[str, object], depth: int) -> None:
+    if isinstance(value, Mapping) and value and depth > 0:
+        for key, each in value.items():
+            _flatten(each, f"{path}.{key}" if path else str(key), made, depth - 1)
+    elif isinstance(value, list | tuple) and 0 < len(value) <= _MOST_ITEMS and depth > 0:
+        for number, each in enumerate(value):
+            _flatten(each, f"{path}[{number}]", made, depth - 1)
+    elif value is None or isinstance(value, bool | int | float | str):
+        made[path or "value"] = value
+    else:
+        made[path or "value"] = json.dumps(value, default=str, ensure_ascii=False)
+
+
+def _columns(source: _Source) -> dict[str, set[type]]:
+    """The columns with the types of their values. Raises `RecordingError` for more than a table can have."""
+    columns: dict[str, set[type]] = {name: set() for name in _FIRST_COLUMNS}
+    for row in source.rows(is_counted=False):
+        for name, value in row.items():
+            columns.setdefault(name, set())
+            if value is not None:
+                columns[name].add(type(value))
+        if len(columns) > MOST_COLUMNS:
+            raise RecordingError(
+                source.topic,
+                _("its messages have more than {most} different fields").format(most=MOST_COLUMNS),
+            )
+    return columns
+
+
+# ---- tables
+
+
+def _csv(source: _Source, path: Path, _fps: float) -> int:
+    columns = list(_columns(source))
+    count = 0
+    with path.open("x", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, columns)
+        writer.writeheader()
+        for row in source.rows():
+            writer.writerow({name: _cell(value) for name, value in row.items()})
+            count += 1
+    return count
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value)
+    return value
+
+
+def _parquet(source: _Source, path: Path, _fps: float) -> int:
+    try:
+        import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415 - optional and heavy
+        import pyarrow.parquet as pq  # type: ignore[import-untyped]  # noqa: PLC0415
+    except ImportError as error:
+        raise RecordingsUnavailableError("pip install 'nep-studio[parquet]'") from error
+    columns = _columns(source)
+    kinds = {name: _kind_of(name, types) for name, types in columns.items()}
+    arrow = {
+        "bool": pa.bool_(),
+        "int": pa.int64(),
+        "uint": pa.uint64(),
+        "float": pa.float64(),
+        "text": pa.string(),
+    }
+    schema = pa.schema([(name, arrow[kind]) for name, kind in kinds.items()])
+    count = 0
+    with pq.ParquetWriter(path, schema) as writer:
+        rows: list[dict[str, object]] = []
+
+        def write() -> None:
+            table = {name: [_as(kinds[name], row.get(name)) for row in rows] for name in kinds}
+            writer.write_table(pa.table(table, schema=schema))
+            rows.clear()
+
+        for row in source.rows():
+            rows.append(row)
+            count += 1
+            if len(rows) >= _ROWS_AT_ONCE:
+                write()
+        if rows:
+            write()
+    return count
+
+
+def _kind_of(name: str, types: set[type]) -> str:
+    if name == "seq":
+        return "uint"
+    if types == {bool}:
+        return "bool"
+    if types == {int}:
+        return "int"
+    if types and types <= {int, float}:
+        return "float"
+    return "text"
+
+
+def _as(kind: str, value: object) -> object:
+    """A value as a column's kind; one that does not fit, such as a number beyond 64 bits, is left out."""
+    if value is None:
+        return None
+    if kind == "text":
+        return value if isinstance(value, str) else orjson.dumps(value).decode()
+    if kind == "float":
+        return float(value)  # type: ignore[arg-type]
+    if kind == "int":
+        return value if isinstance(value, int) and -(2**63) <= value < 2**63 else None
+    return value
+
+
+# ---- pictures
+
+
+def _pictures(source: _Source, path: Path, _fps: float) -> int:
+    """The files as they were received; raw ones as PNG, or as they are where PNG has no such numbers."""
+    path.mkdir()
+    count = 0
+    for each in source.messages():
+        made = _picture_file(each.message)
+        if made is None:
+            source.unreadable += 1
+            continue
+        suffix, data = made
+        count += 1
+        (path / f"{count:06d}.{suffix}").write_bytes(data)
+    return count
+
+
+def _picture_file(message: Message) -> tuple[str, bytes] | None:
+    data = bytes(message.data)
+    if data.startswith(b"\xff\xd8\xff"):
+        return "jpg", data
+    if data.startswith(b"\x89PNG\r\n\x1a\n"):
+        return "png", data
+    try:
+        frame: Any = message.payload
+    except DecodeError:
+        return None
+    opencv = _opencv()
+    try:
+        is_made, buffer = opencv.imencode(".png", frame)
+    except opencv.error:
+        is_made, buffer = False, None
+    return ("png", buffer.tobytes()) if is_made else ("raw", data)
+
+
+def _opencv() -> Any:  # noqa: ANN401 - a module
+    try:
+        import cv2  # noqa: PLC0415 - optional and heavy
+    except ImportError as error:
+        raise RecordingsUnavailableError("pip install 'nep-studio[image]'") from error
+    return cv2
+
+
+def _mp4(source: _Source, path: Path, fps: float) -> int:
+    """A film in the recording's own time: each of its pictures is the newest up to then."""
+    opencv = _opencv()
+    film = _Film(opencv, path, fps)
+    count = 0
+    try:
+        for each in source.messages():
+            frame = _frame(opencv, each.message)
+            if frame is None:
+                source.unreadable += 1
+                continue
+            film.add(each.log_ns, frame)
+            count += 1
+    finally:
+        film.close()
+    if not count:
+        raise RecordingError(str(path), _("no picture of it can be read"))
+    return count
+
+
+def _frame(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
+    """The picture with three channels of 8 bits; None when it cannot be read."""
+    try:
+        frame: Any = message.payload
+    except DecodeError:
+        return None
+    if frame.dtype.name != "uint8":
+        frame = opencv.normalize(frame, None, 0, 255, opencv.NORM_MINMAX).astype("uint8")
+    channels = 1 if frame.ndim == 2 else frame.shape[2]
+    if channels in {1, 2}:
+        plane = frame if frame.ndim == 2 else frame[:, :, 0]
+        return opencv.cvtColor(plane.copy(), opencv.COLOR_GRAY2BGR)
+    return frame[:, :, :3].copy()
+
+
+class _Film:
+    """Pictures at a steady rate, all of the size of the first one."""
+
+    def __init__(self, opencv: Any, path: Path, fps: float) -> None:  # noqa: ANN401 - a module
+        self._opencv, self._path, self._fps = opencv, path, fps
+        self._film: Any = None
+        self._size = (0, 0)
+        self._start_ns = self._frames = 0
+        self._last: Any = None
+        # OpenCV knows the container by the name's end.
+        self._written = path.with_name(f"{path.name}.mp4")
+
+    def add(self, log_ns: int, frame: Any) -> None:  # noqa: ANN401 - an array
+        """The next picture."""
+        if self._film is None:
+            height, width = frame.shape[:2]
+            self._size = (width // 2 * 2 or 2, height // 2 * 2 or 2)
+            code = self._opencv.VideoWriter_fourcc(*"mp4v")
+            self._film = self._opencv.VideoWriter(str(self._written), code, self._fps, self._size)
+            if not self._film.isOpened():
+                raise RecordingError(str(self._path), _("OpenCV cannot write films here"))
+            self._start_ns = log_ns
+        until = int((log_ns - self._start_ns) * self._fps / 1e9)
+        while self._last is not None and self._frames < until:
+            self._film.write(self._last)
+            self._frames += 1
+        if (frame.shape[1], frame.shape[0]) != self._size:
+            frame = self._opencv.resize(frame, self._size)
+        self._last = frame
+
+    def close(self) -> None:
+        """Write the last picture, and end."""
+        if self._film is not None:
+            if self._last is not None:
+                self._film.write(self._last)
+            self._film.release()
+            self._written.rename(self._path)
