@@ -22,7 +22,7 @@ from nep.cli.recording_files import (
 from nep.cli.screen import console, say
 from nep.cli.topic_wait import node_for
 from nep.errors import NepError
-from nep.i18n import _, listed, ngettext
+from nep.i18n import _, listed, ngettext, number
 from nep.messages.codecs import codec_for
 from nep.messages.message import Message
 from nep.nodes.node import Node
@@ -216,5 +216,7 @@ def _line(recording: reader.Recording, status: player.PlayerStatus) -> str:
     line = _("{time} of {whole}").format(time=at, whole=clock_text(recording.duration_s))
     true_speed = status.true_speed
     if true_speed is not None and true_speed < 0.9 * status.speed:
-        line += "  " + _("asked {asked:g}, is {is_now:.1f} x").format(asked=status.speed, is_now=true_speed)
+        line += "  " + _("asked {asked}, is {is_now} x").format(
+            asked=number(status.speed, "g"), is_now=number(true_speed, ".1f")
+        )
     return line

@@ -21,7 +21,7 @@ from nep.cli.recording_files import (
 )
 from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_json, show_table, size, write
 from nep.cli.typer_words import TranslatedGroup
-from nep.i18n import _, lazy, ngettext
+from nep.i18n import _, lazy, ngettext, number
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped
 
@@ -160,8 +160,12 @@ def repair(
     say(said.format(count=report.recovered, time=clock_text(report.duration_s), path=report.path))
     if not report.is_whole:
         gone = UNKNOWN if report.discarded is None else str(report.discarded)
-        words = _("lost: {messages} messages, {size}, the last {seconds:.1f} s")
-        say(words.format(messages=gone, size=size(report.discarded_bytes), seconds=report.lost_s))
+        words = _("lost: {messages} messages, {size}, the last {seconds} s")
+        say(
+            words.format(
+                messages=gone, size=size(report.discarded_bytes), seconds=number(report.lost_s, ".1f")
+            )
+        )
 
 
 def _complete_format(incomplete: str) -> list[str]:

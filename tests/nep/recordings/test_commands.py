@@ -1,0 +1,189 @@
+"""`nep record`, `nep play` and `nep recording`, as a person uses them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+import typer
+
+import nep
+from nep.cli.app import app
+from nep.errors import NepError, RecordingError, RecordingsUnavailableError
+from nep.recordings.reader import Recording
+from tests.nep.programs import eventually
+from tests.nep.recordings.mcap_doctor import McapDoctor
+from tests.nep.recordings.messages import json_message, picture, record
+
+
+def run(*words: object) -> None:
+    app([str(each) for each in words], standalone_mode=False)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recordings") / "Tour.mcap"
+    messages = [json_message(seq, topic="/arm/joints", size=20) for seq in range(1, 21)]
+    command = nep.Message("/pepper/command", b'{"op":"invoke"}', "json", "robot/command", seq=1, publisher=4)
+    rize = nep.Message("robot_action", b'{"action":"wave"}', "json", "json", seq=1, publisher=5)
+    record(path, [[*messages, picture(1), command, rize]])
+    return path
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl+C of another program needs POSIX")
+def test_recording_ends_cleanly_with_ctrl_c(master, tmp_path):
+    path = tmp_path / "a.mcap"
+    command = [
+        "-m",
+        "nep",
+        "record",
+        "/arm/*",
+        "-o",
+        str(path),
+        "--note",
+        "first",
+        "--master",
+        master.address,
+    ]
+    child = subprocess.Popen(
+        [sys.executable, *command], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    with child, nep.node("robot", master=master.address) as robot:
+        publisher = robot.new_pub("/arm/joints")
+        eventually(lambda: publisher.subscribers == 1, 60.0)
+        assert "Ctrl+C ends it" in child.stderr.readline()
+        for n in range(50):
+            publisher.publish({"n": n})
+        eventually(lambda: path.exists() and path.stat().st_size > 500)
+        child.send_signal(signal.SIGINT)
+        _out, err = child.communicate(timeout=60)
+    assert (child.returncode, "50 messages of 1 topics" in err) == (0, True), err
+    assert McapDoctor(path).problems == []
+    with Recording(path) as recording:
+        assert [each.message.payload["n"] for each in recording.read()] == list(range(50))
+        assert recording.words["note"] == "first"
+
+
+def test_a_recording_ends_after_its_time_and_tells_as_json(master, tmp_path, capfdbinary):
+    path = tmp_path / "a.mcap"
+    run("record", "-o", path, "--duration", 0.2, "--not", "/log", "--json", "--master", master.address)
+    told = json.loads(capfdbinary.readouterr().out)
+    assert (told["path"], told["problem"]) == (str(path), "")
+    with pytest.raises(RecordingError, match="such a file already"):
+        run("record", "-o", path, "--duration", 0.2, "--master", master.address)
+    with pytest.raises(typer.BadParameter):
+        run("record", "-o", tmp_path / "b.mcap", "--duration", 0, "--master", master.address)
+    assert not (tmp_path / "b.mcap").exists()
+
+
+def test_info_tells_what_is_there_and_what_is_missing(path, tmp_path, capfd):
+    run("recording", "info", path)
+    out = capfd.readouterr().out
+    assert "23 messages in 0:00" in out
+    line = next(line for line in out.splitlines() if line.startswith("/arm/joints"))
+    assert line.split()[:3] == ["/arm/joints", "json", "20"]
+    run("recording", "info", path, "--json")
+    told = json.loads(capfd.readouterr().out)
+    assert told["topics"]["/arm/joints"]["figures"]["received"] == 20
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(path.read_bytes()[:-200])
+    run("recording", "info", cut)
+    assert "nep recording repair" in capfd.readouterr().err
+
+
+def test_repair_says_what_came_back(path, tmp_path, capfd):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(path.read_bytes()[:-200])
+    run("recording", "repair", cut)
+    assert "23 messages recovered, 0:00, and read back" in capfd.readouterr().err
+    run("recording", "repair", cut, "-o", tmp_path / "b.mcap", "--json")
+    assert json.loads(capfd.readouterr().out)["recovered"] == 23
+
+
+def test_export_makes_files_beside(path, tmp_path, capfd):
+    run("recording", "export", path, "/arm/*", "-o", tmp_path / "out")
+    assert "20 messages" in capfd.readouterr().err
+    assert [each.name for each in (tmp_path / "out").iterdir()] == ["arm_joints.csv"]
+    run("recording", "export", path, "-f", "pictures", "-o", tmp_path / "out", "--json")
+    assert json.loads(capfd.readouterr().out)[0]["count"] == 1
+    for wrong in (("-f", "xls"), ("/none",), ("/no*ne",), ("--from", "-1"), ("--from", "2", "--to", "1")):
+        with pytest.raises(typer.BadParameter):
+            run("recording", "export", path, "-o", tmp_path / "out", *wrong)
+
+
+def test_play_publishes_what_is_named_and_nothing_else(path, master, capfd):
+    with nep.node("hears", master=master.address) as node:
+        heard: list[nep.Message] = []
+        node.new_sub("**", sink=heard.extend)
+        words = ("play", path, "--master", master.address, "--speed", 10)
+        run(*words, "/arm/joints", "--remap", "/arm/joints=/test/joints")
+        eventually(lambda: len(heard) >= 20)
+        assert {(each.topic, each.msg_type) for each in heard} == {("/test/joints", "json")}
+        assert [bytes(each.data) for each in heard] == [
+            bytes(json_message(seq, size=20).data) for seq in range(1, 21)
+        ]
+        assert "published 20 messages" in capfd.readouterr().err
+        heard.clear()
+        run(*words, "--all")
+        assert "'/pepper/command' moves a robot and is not sent" in capfd.readouterr().err
+        eventually(lambda: len(heard) >= 21)
+        assert {each.topic for each in heard} == {"/arm/joints", "/camera"}
+        assert next(each for each in heard if each.topic == "/camera").payload.shape == (12, 16, 3)
+        heard.clear()
+        run(*words, "/pepper/command", "robot_action", "--arm")
+        eventually(lambda: len(heard) >= 2)
+        assert {each.topic for each in heard} == {"/pepper/command", "robot_action"}
+        heard.clear()
+        run(*words, "/arm/joints", "--from", "0.05", "--to", "0.1")
+        eventually(lambda: len(heard) >= 4)
+        assert 4 <= len(heard) <= 7
+
+
+@pytest.mark.parametrize(
+    ("words", "error", "said"),
+    [
+        ((), typer.BadParameter, "name the topics"),
+        (("/arm/joint",), typer.BadParameter, "did you mean '/arm/joints'"),
+        (("/pepper/command",), NepError, "moves a robot; add --arm"),
+        (("/*/command",), NepError, "moves a robot; add --arm"),
+        (("robot_action",), NepError, "moves a robot; add --arm"),
+        (("--all", "--speed", "0"), typer.BadParameter, "is no speed"),
+        (("/arm/joints", "--remap", "/x=/y"), typer.BadParameter, "--remap OLD=NEW"),
+        (("/arm/joints", "--from", "5"), typer.BadParameter, "has no length"),
+    ],
+)
+def test_play_asks_before_it_sends(path, words, error, said):
+    with pytest.raises(error, match=said):
+        run("play", path, *words)
+
+
+def test_the_shell_is_offered_topics_of_the_file(path):
+    from nep.cli.recording_files import _complete_recorded
+
+    def offered(file):
+        return _complete_recorded(SimpleNamespace(params={"file": file}), "/a")
+
+    assert offered(path) == ["/arm/joints"]
+    assert offered(path.parent / "none") == offered(None) == []
+
+
+def test_nothing_of_recordings_is_imported_before_it_is_asked_for_and_a_missing_package_is_a_sentence():
+    code = (
+        "import sys, nep.cli.app\n"
+        "heavy = ('nep.recordings', 'mcap', 'zstandard', 'lz4', 'pyarrow', 'rich.progress')\n"
+        "assert not [each for each in sys.modules if each.startswith(heavy)]\n"
+        "sys.modules['zstandard'] = None\n"
+        "sys.argv = ['nep', 'recording', 'info', 'a.mcap']\n"
+        "sys.exit(nep.cli.app.run())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr == "nep: recordings need what is not installed; pip install 'nep-studio[recordings]'\n"
+    assert issubclass(RecordingsUnavailableError, NepError)

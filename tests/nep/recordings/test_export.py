@@ -1,0 +1,160 @@
+"""Tables and pictures of a recording have what was in it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+
+import cv2
+import numpy as np
+import pytest
+
+from nep.errors import RecordingError, RecordingsUnavailableError
+from nep.messages import image_codec
+from nep.messages.message import Message
+from nep.recordings.export import Part, export, flattened
+from nep.recordings.reader import Recording
+from tests.nep.recordings.messages import STEP_NS, json_message, picture, record
+
+VALUES = [
+    {"pose": {"x": 0.1, "y": None}, "j": [1, 2], "name": 'a,\n"b"', "ok": True, "big": 2**63},
+    {"pose": {"x": 2}, "j": [3, 4, 5], "name": "ñ", "ok": False, "big": 1, "new": {"deep": [[1], {"a": 2}]}},
+    {"pose": {"x": 1e300}, "j": [], "name": 7, "ok": None, "long": list(range(101))},
+]
+
+
+def message(seq, value, codec="json", topic="/arm/state"):
+    data = value if isinstance(value, bytes) else json.dumps(value).encode()
+    return Message(topic, data, codec, codec, stamp_ns=seq * 10**9, seq=seq, publisher=2**64 - 1)
+
+
+@pytest.fixture
+def recording(tmp_path):
+    messages = [message(seq, value) for seq, value in enumerate(VALUES, 1)]
+    messages += [
+        message(4, b"{broken"),
+        message(1, b"\xff", "bytes", "/raw"),
+        message(1, b"t", "string", "/t"),
+    ]
+    messages += [picture(seq) for seq in range(1, 6)]
+    record(tmp_path / "a.mcap", [messages])
+    with Recording(tmp_path / "a.mcap") as opened:
+        yield opened
+
+
+def test_csv_has_every_field_of_every_message_that_can_be_read(recording, tmp_path):
+    progress = []
+    made = export(recording, "csv", tmp_path / "out", progress=lambda *told: progress.append(told))
+    assert [(each.topic, each.path.name, each.count, each.unreadable) for each in made] == [
+        ("/arm/state", "arm_state.csv", 3, 1),
+        ("/t", "t.csv", 1, 0),
+    ]
+    assert progress[-1] == (5, 5)
+    with made[0].path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["pose.x"] for row in rows] == ["0.1", "2", "1e+300"]
+    assert [row["name"] for row in rows] == ['a,\n"b"', "ñ", "7"]
+    assert [row["ok"] for row in rows] == ["true", "false", ""]
+    assert [row["j[2]"] for row in rows] == ["", "5", ""]
+    assert rows[1]["new.deep[1].a"] == "2"
+    assert json.loads(rows[2]["long"]) == list(range(101))
+    assert (rows[0]["seq"], rows[0]["stamp_s"], rows[0]["publisher"]) == ("1", "1.0", str(2**64 - 1))
+    assert not list((tmp_path / "out").glob("*.part"))
+
+
+def test_parquet_keeps_kinds_of_values(recording, tmp_path):
+    pq = pytest.importorskip("pyarrow.parquet")
+    made = export(recording, "parquet", tmp_path, Part(topics=("/arm/state",)))
+    table = pq.read_table(made[0].path)
+    kinds = {field.name: str(field.type) for field in table.schema}
+    assert (kinds["pose.x"], kinds["ok"], kinds["j[0]"], kinds["name"], kinds["seq"]) == (
+        "double", "bool", "int64", "string", "uint64",
+    )  # fmt: skip
+    rows = table.to_pylist()
+    assert [row["pose.x"] for row in rows] == [0.1, 2.0, 1e300]
+    assert [row["name"] for row in rows] == ['a,\n"b"', "ñ", "7"]
+    assert [row["big"] for row in rows] == [None, 1, None]  # 2^63 has no place there
+
+
+def test_pictures_are_the_very_files(recording, tmp_path):
+    made = export(recording, "pictures", tmp_path / "out")
+    files = sorted(made[0].path.iterdir())
+    assert [each.name for each in files] == [f"{number:06d}.jpg" for number in range(1, 6)]
+    assert [each.read_bytes() for each in files] == [bytes(picture(seq).data) for seq in range(1, 6)]
+
+
+def test_raw_pictures_become_png_without_loss(tmp_path):
+    frame = np.arange(60, dtype=np.uint16).reshape(6, 10) * 1000
+    raw = image_codec.raw_image(frame)
+    sent = Message("/depth", bytes(raw.data), "image", "image", seq=1, extension=dict(raw.extension))
+    record(tmp_path / "a.mcap", [[sent]])
+    with Recording(tmp_path / "a.mcap") as recording:
+        made = export(recording, "pictures", tmp_path / "out")
+    assert (cv2.imread(str(made[0].path / "000001.png"), cv2.IMREAD_UNCHANGED) == frame).all()
+
+
+def test_a_film_has_the_recordings_time(tmp_path):
+    record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 101)]])
+    with Recording(tmp_path / "a.mcap") as recording:
+        times = [each.log_ns for each in recording.read()]
+        made = export(recording, "mp4", tmp_path / "out", fps=20.0)
+    film = cv2.VideoCapture(str(made[0].path))
+    count = 0
+    while film.read()[0]:
+        count += 1
+    film.release()
+    assert count == int((times[-1] - times[0]) / 1e9 * 20) + 1
+    assert (made[0].count, sorted(each.name for each in (tmp_path / "out").iterdir())) == (
+        100,
+        ["camera.mp4"],
+    )
+
+
+def test_a_part_of_it(recording, tmp_path):
+    start = recording.start_ns
+    made = export(recording, "csv", tmp_path, Part(start + STEP_NS, start + 2 * STEP_NS, ("/arm/state",)))
+    assert made[0].count == 1
+
+
+def test_nothing_is_written_over_and_nothing_half_is_left(recording, tmp_path, monkeypatch):
+    export(recording, "csv", tmp_path / "out")
+    before = (tmp_path / "out" / "t.csv").read_bytes()
+    with pytest.raises(RecordingError, match="such a file already"):
+        export(recording, "csv", tmp_path / "out")
+    assert (tmp_path / "out" / "t.csv").read_bytes() == before
+    monkeypatch.setattr("nep.recordings.export.MOST_COLUMNS", 3)
+    with pytest.raises(RecordingError, match="more than 3 different fields"):
+        export(recording, "csv", tmp_path / "more")
+    assert not list((tmp_path / "more").iterdir())
+
+
+def test_names_of_files_are_different_ones_on_every_system(tmp_path):
+    topics = ["/a/b", "/a_b", "/A/B", "a:b", "/日本", "/..", "/" + "x" * 190]
+    record(tmp_path / "a.mcap", [[json_message(1, topic=each) for each in topics]])
+    with Recording(tmp_path / "a.mcap") as recording:
+        names = [each.path.name.lower() for each in export(recording, "csv", tmp_path / "out")]
+    assert len(set(names)) == len(topics)
+    assert all(len(each) < 120 and not set('/\\:*?"<>|') & set(each) for each in names)
+
+
+def test_sentences(recording, tmp_path, monkeypatch):
+    record(tmp_path / "b.mcap", [[json_message(1)]])
+    with (
+        Recording(tmp_path / "b.mcap") as plain,
+        pytest.raises(RecordingError, match="no topic has pictures"),
+    ):
+        export(plain, "mp4", tmp_path)
+    with pytest.raises(ValueError, match="no format"):
+        export(recording, "xls", tmp_path)
+    with pytest.raises(RecordingError, match="no topic has values"):
+        export(recording, "csv", tmp_path, Part(topics=("/camera",)))
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(RecordingsUnavailableError, match="pip install"):
+        export(recording, "parquet", tmp_path / "out")
+
+
+def test_values_alone_and_empty_things_have_a_column():
+    assert flattened(5) == {"value": 5}
+    assert flattened({}) == {"value": "{}"}
+    assert flattened({"a": {}, "b": [], "c": b"\0"}) == {"a": "{}", "b": "[]", "c": "\"b'\\\\x00'\""}
