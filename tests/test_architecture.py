@@ -42,7 +42,6 @@ EARNED = {
     "nep.programs.blackboard.ages": "pure, and tested alone",
     "nep.programs.blackboard.perception": "pure, and tested alone",
     "nep.cli.doctor": "one of a list: the commands of nep",
-    "nep.cli.interrupts": "imported before all else of a command, under the guard of its caller",
     "app.core.run.edits_since_run": "pure, and tested alone",
     "app.core.run.run_warnings": "pure, and tested alone",
     "app.core.run.trial": "pure, and tested alone",

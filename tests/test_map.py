@@ -10,7 +10,7 @@ import grimp
 from tools import map as rooms
 
 ROOT = Path(__file__).parents[1]
-WIDEST = 17
+WIDEST = 18
 """Entries on the widest level but for lists of plug-ins and of commands: one of many alike each."""
 LISTS = {"app/ui/panels", "nep/cli"}
 LONGEST = 600

@@ -1,17 +1,12 @@
 """Recordings: what robots and programs said, in MCAP files, as it was received. See docs/recordings.md.
 
-    with RecordingWriter(path) as writer:       writer.post(messages)      (any thread; never waits)
-    with Recording(path) as recording:          for item in recording.read(start_ns): item.message
-    repair(damaged, mended)                     what is whole in a cut or damaged file, in a new one
+Record:   with RecordingWriter(path) as writer, Recorder(node, writer, TopicSelection(("/arm/*",))): ...
+          the same in a process of its own: `nep.recordings.child`; the last minute, always: `FlightRecorder`
+Read:     with Recording(path) as recording: for log_ns, message in recording.read(start_ns, topics=...): ...
+          `newest` for a seek, `densities` for a timeline, `figures` of what was lost, `said` by the recorder
+Play:     Player(Playback(recording), sink)
+Mend:     repair(path); tables and pictures: export(recording, "csv", folder)
 
-Needs the packages of `nep-studio[recordings]`; nothing of them is imported before this package is.
+Each is in the module of its name. They need the packages of `nep-studio[recordings]`, which are imported when
+a recording is opened or made: without them that raises `RecordingsUnavailableError`.
 """
-
-from nep.errors import RecordingsUnavailableError
-
-try:
-    import lz4.frame  # type: ignore[import-untyped]  # noqa: F401 - whether it is there
-    import mcap.records  # noqa: F401
-    import zstandard  # noqa: F401
-except ImportError as error:
-    raise RecordingsUnavailableError("pip install 'nep-studio[recordings]'") from error

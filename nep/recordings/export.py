@@ -22,6 +22,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.reader import RecordedMessage, Recording
 from nep.recordings.writer import disk_sentence
+from nep.system.replace_file import replace_file
 
 __all__ = ["ALL_OF_IT", "FORMATS", "Exported", "Part", "export", "flattened"]
 
@@ -98,7 +99,7 @@ def export(
             source = _Source(recording, topic.name, part, counted)
             try:
                 count = make(source, unfinished, fps)
-                unfinished.rename(path)
+                replace_file(unfinished, path)
             except BaseException:
                 _remove(unfinished)
                 raise
@@ -410,4 +411,4 @@ class _Film:
             if self._last is not None:
                 self._film.write(self._last)
             self._film.release()
-            self._written.rename(self._path)
+            replace_file(self._written, self._path)

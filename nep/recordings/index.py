@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import io
-import struct
 import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
-
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, MetadataIndex, Schema
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from nep.errors import RecordingError
 from nep.i18n import _
@@ -25,6 +20,7 @@ from nep.recordings.records import (
     RECORD_HEAD,
     ChunkHead,
     ChunkInfo,
+    Opcode,
     RawMessage,
     chunk_head,
     decompressed,
@@ -32,10 +28,13 @@ from nep.recordings.records import (
     pack_offsets,
     read_chunk_info,
     read_message_index,
+    read_record,
 )
 
+if TYPE_CHECKING:
+    from mcap.records import Channel, Schema
+
 __all__ = [
-    "DAMAGED",
     "Definitions",
     "FileIndex",
     "Place",
@@ -45,8 +44,6 @@ __all__ = [
     "records_of",
 ]
 
-DAMAGED = (ValueError, McapError, struct.error, OverflowError, EOFError, MemoryError)
-"""What reading damaged records with mcap's classes raises."""
 _FOOTER_BYTES = HEAD_BYTES + 20 + len(MAGIC)
 _MOST_SMALL_BYTES = 64_000_000
 """A record that is no chunk and is larger is damaged, or an attachment that nobody needs here."""
@@ -62,15 +59,12 @@ class Definitions:
 
     def add(self, opcode: int, content: bytes | memoryview) -> None:
         """A record of a schema or channel; others, and damaged ones, are passed over."""
-        stream = ReadDataStream(io.BytesIO(content))
-        try:
+        with suppress(ValueError):
             if opcode == Opcode.SCHEMA:
-                schema = Schema.read(stream)
+                schema = read_record("Schema", content)
                 self._schemas[schema.id] = schema
             elif opcode == Opcode.CHANNEL:
-                self._add_channel(Channel.read(stream))
-        except DAMAGED:
-            return
+                self._add_channel(read_record("Channel", content))
 
     def _add_channel(self, channel: Channel) -> None:
         schema = self._schemas.get(channel.schema_id)
@@ -148,7 +142,7 @@ def _of_summary(file: BinaryIO, size: int) -> FileIndex | None:
     index = FileIndex(end=size)
     try:
         _read_summary(file, summary, index)
-    except DAMAGED:
+    except ValueError:
         return None
     if not index.chunks and _has_messages(file, size, start):
         return None
@@ -170,7 +164,7 @@ def _read_summary(file: BinaryIO, summary: bytes, index: FileIndex) -> None:
         elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
             index.definitions.add(opcode, content)
         elif opcode == Opcode.METADATA_INDEX:
-            place = MetadataIndex.read(ReadDataStream(io.BytesIO(content)))
+            place = read_record("MetadataIndex", content)
             _read_metadata(file, Place(place.offset, Opcode.METADATA, place.length - HEAD_BYTES), index)
 
 
@@ -185,8 +179,8 @@ def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
         return
     file.seek(place.offset + HEAD_BYTES)
     try:
-        made = Metadata.read(ReadDataStream(io.BytesIO(file.read(place.length))))
-    except DAMAGED:
+        made = read_record("Metadata", file.read(place.length))
+    except ValueError:
         return
     index.metadata.append((made.name, made.metadata))
 

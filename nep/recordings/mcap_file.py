@@ -13,25 +13,14 @@ from array import array
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
-
-from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    DataEnd,
-    Footer,
-    Header,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
+from typing import TYPE_CHECKING, BinaryIO
 
 from nep.recordings.channels import ChannelDefinition
 from nep.recordings.records import (
     MAGIC,
     ChunkInfo,
+    Opcode,
+    check_packages,
     compressed,
     message_count,
     message_head,
@@ -41,7 +30,13 @@ from nep.recordings.records import (
     pack_offsets,
     packed,
 )
+from nep.system.lazy_import import lazy_module
 from nep.version import __version__
+
+if TYPE_CHECKING:
+    import mcap.records as mcap_records
+else:  # who records nothing need not have it
+    mcap_records = lazy_module("mcap.records")
 
 __all__ = ["CHUNK_BYTES", "MOST_CHANNELS", "ChannelTable", "FileWriter"]
 
@@ -90,12 +85,12 @@ class ChannelTable:
         self._numbers[definition] = number
         self._next = max(self._next, number + 1)
 
-    def records(self, number: int) -> tuple[Schema | None, Channel]:
+    def records(self, number: int) -> tuple[mcap_records.Schema | None, mcap_records.Channel]:
         """What stands in a file of a channel."""
         made = self.definitions[number]
         key = (made.schema_name, made.schema_encoding, made.schema_data)
         schema_number = self._schemas.get(key, 0)
-        channel = Channel(
+        channel = mcap_records.Channel(
             id=number,
             topic=made.topic,
             message_encoding=made.message_encoding,
@@ -104,7 +99,7 @@ class ChannelTable:
         )
         if not schema_number:
             return None, channel
-        return Schema(
+        return mcap_records.Schema(
             id=schema_number, data=made.schema_data, encoding=made.schema_encoding, name=made.schema_name
         ), channel
 
@@ -137,6 +132,7 @@ class FileWriter:
         keeps_chunks: bool = False,
     ) -> None:
         """Raises `FileExistsError` when there is such a file, unless it is not to be new."""
+        check_packages()
         self.path = path
         self.table = ChannelTable() if table is None else table
         self.chunks: list[ChunkInfo] | None = [] if keeps_chunks else None
@@ -153,9 +149,9 @@ class FileWriter:
         self._chunk = _Chunk()
         self._written_channels: set[int] = set()
         self._written_schemas: set[int] = set()
-        self._metadata: list[MetadataIndex] = []
+        self._metadata: list[mcap_records.MetadataIndex] = []
         try:
-            self._write(MAGIC + packed(Header(profile="", library=f"nep {__version__}")))
+            self._write(MAGIC + packed(mcap_records.Header(profile="", library=f"nep {__version__}")))
         except OSError:
             self._file.close()
             raise
@@ -285,8 +281,8 @@ class FileWriter:
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write words about the recording, after what waits in the chunk."""
         self.flush()
-        record = packed(Metadata(name=name, metadata=dict(values)))
-        index = MetadataIndex(offset=self._at, length=len(record), name=name)
+        record = packed(mcap_records.Metadata(name=name, metadata=dict(values)))
+        index = mcap_records.MetadataIndex(offset=self._at, length=len(record), name=name)
         self._write(record)
         self._metadata.append(index)
 
@@ -329,17 +325,21 @@ class FileWriter:
         self._file.close()
 
     def _summary(self) -> bytes:
-        data_end = packed(DataEnd(data_section_crc=0))
+        data_end = packed(mcap_records.DataEnd(data_section_crc=0))
         start = self._at + len(data_end)
         groups = self._groups()
         made, offsets = b"", b""
         for opcode, group in groups:
             if group:
                 offsets += packed(
-                    SummaryOffset(group_opcode=opcode, group_start=start + len(made), group_length=len(group))
+                    mcap_records.SummaryOffset(
+                        group_opcode=opcode, group_start=start + len(made), group_length=len(group)
+                    )
                 )
                 made += group
-        footer = Footer(summary_start=start, summary_offset_start=start + len(made), summary_crc=0)
+        footer = mcap_records.Footer(
+            summary_start=start, summary_offset_start=start + len(made), summary_crc=0
+        )
         head = packed(footer)[:-4]
         crc = zlib.crc32(made + offsets + head)
         return data_end + made + offsets + head + crc.to_bytes(4, "little") + MAGIC
@@ -352,7 +352,7 @@ class FileWriter:
             channels.append(packed(channel))
             if schema is not None:
                 schemas.setdefault(schema.id, packed(schema))
-        statistics = Statistics(
+        statistics = mcap_records.Statistics(
             attachment_count=0,
             channel_count=len(channels),
             channel_message_counts=self.counts,

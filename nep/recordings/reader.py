@@ -19,7 +19,7 @@ from nep.messages.message import Message
 from nep.recordings.channels import ChannelDecoder, Role
 from nep.recordings.figures import TopicFigures, read_figures
 from nep.recordings.index import FileIndex, read_chunk, read_entries, read_index
-from nep.recordings.records import ChunkInfo, RawMessage, messages_in
+from nep.recordings.records import ChunkInfo, RawMessage, check_packages, messages_in
 from nep.recordings.writer import disk_sentence
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ class Recording:
 
         Raises `RecordingError` for what is no recording.
         """
+        check_packages()
         self.path = Path(path)
         self._lock = threading.RLock()
         self.damaged_chunks = 0

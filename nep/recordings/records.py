@@ -7,17 +7,30 @@ packed and read here. Pure functions.
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import lz4.frame  # type: ignore[import-untyped]
-import zstandard
-from mcap.data_stream import RecordBuilder
-from mcap.opcode import Opcode
+from nep.errors import RecordingsUnavailableError
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    import lz4.frame as lz4_frame  # type: ignore[import-untyped]
+    import mcap.data_stream as mcap_stream
+    import mcap.exceptions as mcap_exceptions
+    import mcap.records as mcap_records
+    import zstandard
+else:  # who records nothing need not have them
+    lz4_frame = lazy_module("lz4.frame")
+    mcap_exceptions = lazy_module("mcap.exceptions")
+    mcap_records = lazy_module("mcap.records")
+    mcap_stream = lazy_module("mcap.data_stream")
+    zstandard = lazy_module("zstandard")
 
 __all__ = [
     "CHUNK_HEAD_BYTES",
@@ -29,7 +42,9 @@ __all__ = [
     "ChunkHead",
     "ChunkInfo",
     "IndexEntry",
+    "Opcode",
     "RawMessage",
+    "check_packages",
     "chunk_head",
     "compressed",
     "decompressed",
@@ -44,6 +59,7 @@ __all__ = [
     "packed",
     "read_chunk_info",
     "read_message_index",
+    "read_record",
 ]
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -68,9 +84,48 @@ CHUNK_HEAD_BYTES = HEAD_BYTES + _CHUNK.size + 16 + _SIZE.size
 """So many bytes hold the head of any chunk, whose compression has a name of a few letters."""
 
 
+class Opcode(IntEnum):
+    """The kinds of records, as the specification numbers them."""
+
+    HEADER = 1
+    FOOTER = 2
+    SCHEMA = 3
+    CHANNEL = 4
+    MESSAGE = 5
+    CHUNK = 6
+    MESSAGE_INDEX = 7
+    CHUNK_INDEX = 8
+    ATTACHMENT = 9
+    ATTACHMENT_INDEX = 10
+    STATISTICS = 11
+    METADATA = 12
+    METADATA_INDEX = 13
+    SUMMARY_OFFSET = 14
+    DATA_END = 15
+
+
+def check_packages() -> None:
+    """Raises `RecordingsUnavailableError` when a package that recordings need is not installed."""
+    try:
+        import lz4.frame  # noqa: F401, PLC0415 - optional
+        import mcap.records  # noqa: F401, PLC0415
+        import zstandard  # noqa: F401, PLC0415
+    except ImportError as error:
+        raise RecordingsUnavailableError("pip install 'nep-studio[recordings]'") from error
+
+
+def read_record(kind: str, content: bytes | memoryview) -> Any:  # noqa: ANN401 - any record of mcap
+    """One of mcap's records, by the name of its class, from its content. Raises `ValueError`."""
+    stream = mcap_stream.ReadDataStream(io.BytesIO(content))
+    try:
+        return getattr(mcap_records, kind).read(stream)
+    except (struct.error, OverflowError, EOFError, MemoryError, mcap_exceptions.McapError) as error:
+        raise ValueError(str(error)) from error
+
+
 def packed(record: Any) -> bytes:  # noqa: ANN401 - any record of mcap
     """One of mcap's records as bytes."""
-    builder = RecordBuilder()
+    builder = mcap_stream.RecordBuilder()
     record.write(builder)
     made: bytes = builder.end()  # type: ignore[no-untyped-call]
     return made
@@ -171,7 +226,7 @@ def compressed(data: bytes, compression: str) -> bytes:
     if compression == "zstd":
         return zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress(data)
     if compression == "lz4":
-        made: bytes = lz4.frame.compress(data)
+        made: bytes = lz4_frame.compress(data)
         return made
     return data
 
@@ -184,7 +239,7 @@ def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
                 data, max_output_size=head.uncompressed_bytes
             )
         elif head.compression == "lz4":
-            with lz4.frame.LZ4FrameDecompressor() as lz4_decompressor:
+            with lz4_frame.LZ4FrameDecompressor() as lz4_decompressor:
                 made = lz4_decompressor.decompress(data, max_length=head.uncompressed_bytes + 1)
         else:
             made = data
@@ -208,7 +263,7 @@ def decompressed_part(data: memoryview, head: ChunkHead) -> bytes | memoryview:
             for at in range(0, len(data), _STEP):
                 made += zstd.decompress(data[at : at + _STEP])
         else:
-            with lz4.frame.LZ4FrameDecompressor() as lz4_decompressor:
+            with lz4_frame.LZ4FrameDecompressor() as lz4_decompressor:
                 for at in range(0, len(data), _STEP):
                     made += lz4_decompressor.decompress(data[at : at + _STEP])
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):

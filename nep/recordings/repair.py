@@ -16,14 +16,11 @@ from pathlib import Path
 from typing import BinaryIO
 
 import orjson
-from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
-from mcap.records import Metadata
 
 from nep.errors import RecordingError
 from nep.i18n import _
 from nep.recordings.channels import ChannelDecoder
-from nep.recordings.index import DAMAGED, Definitions, Place, read_chunk, read_index
+from nep.recordings.index import Definitions, Place, read_chunk, read_index
 from nep.recordings.mcap_file import ChannelTable, FileWriter
 from nep.recordings.records import (
     CHUNK_HEAD_BYTES,
@@ -32,13 +29,16 @@ from nep.recordings.records import (
     RECORD_HEAD,
     ChunkHead,
     ChunkInfo,
+    Opcode,
     RawMessage,
+    check_packages,
     chunk_head,
     decompressed,
     decompressed_part,
     messages_in,
     pack_message_index,
     read_message_index,
+    read_record,
 )
 from nep.recordings.writer import disk_sentence
 from nep.system.replace_file import replace_file
@@ -108,6 +108,7 @@ def repair(
     `progress` is told how many bytes of how many are done. Raises `RecordingError` when there is no message
     that can be read, when there is such a file already, or the disk does not take it.
     """
+    check_packages()
     target = repaired_path(path) if target is None else target
     if target.exists():
         raise RecordingError(str(target), _("there is such a file already; choose another name"))
@@ -251,8 +252,8 @@ class _Mending:
 
     def _take_metadata(self, content: bytes) -> None:
         try:
-            made = Metadata.read(ReadDataStream(io.BytesIO(content)))
-        except DAMAGED:
+            made = read_record("Metadata", content)
+        except ValueError:
             return
         if made.name == "nep.recording":
             self._counts.words.update(made.metadata)

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import orjson
 import psutil
-from mcap.opcode import Opcode
 
 from nep.errors import RecordingError
 from nep.i18n import _
@@ -29,6 +28,7 @@ from nep.recordings.mcap_file import ChannelTable, FileWriter
 from nep.recordings.records import (
     HEAD_BYTES,
     ChunkInfo,
+    Opcode,
     RawMessage,
     chunk_head,
     decompressed,
@@ -223,7 +223,7 @@ class FlightRecorder:
         )
 
     def post(self, messages: Sequence[Message]) -> None:
-        """Messages that came now. Never waits, never raises; a `nep.Sink`."""
+        """Messages that came now. Never waits, never raises; a sink of `Node.new_sub`."""
         self._writer.post(messages)
 
     def say(self, role: Role, value: object) -> None:

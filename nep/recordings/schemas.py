@@ -16,6 +16,8 @@ from typing import Any
 
 import orjson
 
+from nep import geometry, sensor
+
 __all__ = ["ANY_OBJECT", "json_schema", "schema_of"]
 
 ANY_OBJECT = b'{"type":"object"}'
@@ -25,8 +27,6 @@ _DEEPEST = 10
 
 @cache
 def _known() -> Mapping[str, type]:
-    from nep import geometry, sensor  # noqa: PLC0415 - when the first message with a type is recorded
-
     kinds = [vars(module)[name] for module in (geometry, sensor) for name in module.__all__]
     return {str(kind.MSG_TYPE): kind for kind in kinds if hasattr(kind, "MSG_TYPE")}
 

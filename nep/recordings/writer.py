@@ -247,7 +247,7 @@ class RecordingWriter:
     # ---- any thread
 
     def post(self, messages: Sequence[Message]) -> None:
-        """Record messages that came now, in this order. Never waits, never raises; a `nep.Sink`."""
+        """Record messages that came now, in this order. Never waits, never raises: a sink of `new_sub`."""
         now = self._clock()
         size = sum([each.size_bytes for each in messages])
         with self._lock:
