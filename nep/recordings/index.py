@@ -81,6 +81,8 @@ class FileIndex:
     definitions: Definitions = field(default_factory=Definitions)
     chunks: list[ChunkInfo] = field(default_factory=list)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
+    counts: dict[int, int] | None = None
+    """Messages of each channel; None where the file does not tell."""
     is_complete: bool = True
     end: int = 0
     """How far the file is whole, in bytes."""
@@ -163,6 +165,8 @@ def _read_summary(file: BinaryIO, summary: bytes, index: FileIndex) -> None:
             index.chunks.append(info)
         elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
             index.definitions.add(opcode, content)
+        elif opcode == Opcode.STATISTICS:
+            index.counts = read_record("Statistics", content).channel_message_counts
         elif opcode == Opcode.METADATA_INDEX:
             place = read_record("MetadataIndex", content)
             _read_metadata(file, Place(place.offset, Opcode.METADATA, place.length - HEAD_BYTES), index)

@@ -106,10 +106,12 @@ class Recording:
                 self._in_chunks[channel].append(number)
 
     def _topics(self) -> dict[str, RecordedTopic]:
-        counts: dict[int, int] = {}
-        for chunk in self._chunks:
-            for channel, count in chunk.counts.items():
-                counts[channel] = counts.get(channel, 0) + count
+        counts = self._index.counts
+        if counts is None:
+            counts = {}
+            for chunk in self._chunks:
+                for channel, count in chunk.counts.items():
+                    counts[channel] = counts.get(channel, 0) + count
         made: dict[str, RecordedTopic] = {}
         for number, decoder in self._decoders.items():
             if decoder.role is None and number in self._in_chunks:
@@ -326,12 +328,11 @@ class Recording:
                 if channel not in wanted:
                     continue
                 counts = made.setdefault(self._decoders[channel].topic, [0] * buckets)
-                if is_exact:
-                    times: Sequence[int] = [each[0] for each in self._entries(number, channel)]
-                else:
-                    step = chunk.end_ns - chunk.start_ns
-                    times = [chunk.start_ns + step * at // max(1, count - 1) for at in range(count)]
-                for log_ns in times:
+                if not is_exact:
+                    at = (chunk.start_ns - start_ns) * buckets // span
+                    _spread(counts, at, (chunk.end_ns - start_ns) * buckets // span, count)
+                    continue
+                for log_ns, _offset in self._entries(number, channel):
                     if start_ns <= log_ns < end_ns:
                         counts[(log_ns - start_ns) * buckets // span] += 1
         return made
@@ -389,6 +390,13 @@ class Recording:
 
     def __exit__(self, *_exc: object) -> None:
         self.close()
+
+
+def _spread(counts: list[int], first: int, last: int, count: int) -> None:
+    """Add so many evenly to the parts from `first` to `last`, of which some may lie outside."""
+    parts = last - first + 1
+    for at in range(max(0, first), min(len(counts) - 1, last) + 1):
+        counts[at] += count * (at - first + 1) // parts - count * (at - first) // parts
 
 
 def _log_ns(raw: RawMessage) -> int:

@@ -1,0 +1,28 @@
+"""docs/recordings.md: its program runs and prints what it says, and the modules that it names are there."""
+
+from __future__ import annotations
+
+import importlib
+import re
+
+from nep.masters.master import Master
+from tests.nep.programs import ROOT, running
+
+_GUIDE = (ROOT / "docs" / "recordings.md").read_text(encoding="utf-8")
+
+
+def test_the_program_prints_what_is_said(master: Master) -> None:
+    program, _fence, text = _GUIDE.partition("```python\n")[2].partition("\n```\n\n")
+    with running(program, NEP_MASTER=master.address) as example:
+        printed, errors = example.end()
+    assert errors == ""
+    assert printed.splitlines() == [line.strip() for line in text.split("\n\n")[1].splitlines()]
+
+
+def test_the_modules_and_names_of_the_table_are_there() -> None:
+    rows = re.findall(r"^\| `(nep\.recordings\.\w+)` \| (.*) \|$", _GUIDE, re.MULTILINE)
+    assert len(rows) == 8
+    for module, said in rows:
+        found = importlib.import_module(module)
+        for name in re.findall(r"`([A-Z]\w+)`", said):
+            assert hasattr(found, name) or name == "TopicSelection", name
