@@ -329,8 +329,7 @@ class Recording:
                     continue
                 counts = made.setdefault(self._decoders[channel].topic, [0] * buckets)
                 if not is_exact:
-                    at = (chunk.start_ns - start_ns) * buckets // span
-                    _spread(counts, at, (chunk.end_ns - start_ns) * buckets // span, count)
+                    _spread(counts, (start_ns, end_ns), (chunk.start_ns, chunk.end_ns), count)
                     continue
                 for log_ns, _offset in self._entries(number, channel):
                     if start_ns <= log_ns < end_ns:
@@ -392,11 +391,18 @@ class Recording:
         self.close()
 
 
-def _spread(counts: list[int], first: int, last: int, count: int) -> None:
-    """Add so many evenly to the parts from `first` to `last`, of which some may lie outside."""
-    parts = last - first + 1
-    for at in range(max(0, first), min(len(counts) - 1, last) + 1):
-        counts[at] += count * (at - first + 1) // parts - count * (at - first) // parts
+def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], count: int) -> None:
+    """Add the messages of a chunk to the equal parts of `whole`, as if they came evenly."""
+    (start, end), (chunk_start, chunk_end), buckets = whole, chunk, len(counts)
+    first = (chunk_start - start) * buckets // (end - start)
+    last = (chunk_end - start) * buckets // (end - start)
+    before = 0
+    for at in range(first, last + 1):
+        until = start + (at + 1) * (end - start) // buckets
+        so_far = count if at == last else count * (until - chunk_start) // (chunk_end - chunk_start)
+        if 0 <= at < buckets:
+            counts[at] += so_far - before
+        before = so_far
 
 
 def _log_ns(raw: RawMessage) -> int:
