@@ -26,7 +26,14 @@ from nep.system.descriptors import allow_many
 from nep.system.streams import close_streams, prepare_streams, tell, words_given
 from nep.version import __version__
 
-PROCESSES = ("app.blocks.runtime.child", "app.robots.simulated", "app.robots.turtle", "app.ui.speaker", "nep")
+PROCESSES = (
+    "app.blocks.runtime.child",
+    "app.robots.simulated",
+    "app.robots.turtle",
+    "app.ui.speaker",
+    "nep",
+    "nep.recordings.child",
+)
 
 GRACE_S = 5.0
 """How long threads that are no daemons may take to end, when the window is closed and all of ours has."""

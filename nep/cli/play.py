@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -27,20 +27,24 @@ from nep.messages.codecs import codec_for
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
+from nep.protocol.wire import check_topic
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from nep.recordings import player, reader
+    from nep.recordings import player, reader, recorder
 else:  # the other commands need not wait for it, nor have what it needs
     player = lazy_module("nep.recordings.player")
     reader = lazy_module("nep.recordings.reader")
+    recorder = lazy_module("nep.recordings.recorder")
 
 _LOOK_S = 0.2
-_COMMAND_TYPES = frozenset({"robot/command"})
-_COMMAND_TOPICS = frozenset({"robot_action"})
-"""By which robots are told what to do: docs/robots.md."""
+_COMMAND_TYPES = frozenset({"robot/command", "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
+_COMMAND_TOPICS = frozenset({"command", "robot_action", "cmd_vel"})
+"""By which robots are told what to do (docs/robots.md), or a base of ROS its speed: last parts of names."""
+_MOVING = ("command", "world")
+"""What a robot's description calls its topics by which it is moved, where it gives them names of its own."""
 
 
 def play(
@@ -72,8 +76,15 @@ def play(
     with --arm, and when they are named.
     """
     with reader.Recording(file) as recording:
-        chosen = _chosen(recording, topics or (), publish_all=publish_all, is_armed=arm)
+        moving = _moves_robots(recording)
+        chosen = _chosen(recording, topics or (), moving, publish_all=publish_all)
         names = _names(chosen, remap or ())
+        # A robot's commands move it also under another name, where somebody may hear them.
+        moved = [each for each in (*chosen, *names.values()) if each in moving or _is_command_topic(each)]
+        if moved and not arm:
+            raise NepError(
+                _("'{topic}' moves a robot; add --arm when nobody is in its way").format(topic=moved[0])
+            )
         try:
             playback = player.Playback(recording, topics=chosen, remap=names)
             playback.speed = speed
@@ -87,33 +98,45 @@ def play(
 
 
 def _chosen(
-    recording: reader.Recording, words: Sequence[str], *, publish_all: bool, is_armed: bool
+    recording: reader.Recording, words: Sequence[str], moving: Collection[str], *, publish_all: bool
 ) -> list[str]:
-    """The topics to publish. Raises `NepError` for a robot's commands that are not armed."""
+    """The topics to publish; of those that move robots only the named ones. Raises `typer.BadParameter`."""
     if not words and not publish_all:
         known = listed([f"'{each}'" for each in list(recording.topics)[:20]], "and")
         raise typer.BadParameter(
             _("name the topics to publish, or --all; the recording has {topics}").format(topics=known)
         )
     named = chosen_topics(recording, words)
-    commands = {name for name in recording.topics if _moves_robots(recording, name)}
-    if not is_armed and (refused := [each for each in named if each in commands]):
-        raise NepError(
-            _("'{topic}' moves a robot; add --arm when nobody is in its way").format(topic=refused[0])
-        )
     if not publish_all:
         return named
-    for name in sorted(commands - set(named)):
-        say(_("'{topic}' moves a robot and is not sent; name it and add --arm to send it").format(topic=name))
-    return [name for name in recording.topics if name not in commands or name in named]
+    for name in recording.topics:
+        if name in moving and name not in named:
+            said = _("'{topic}' moves a robot and is not sent; name it and add --arm to send it")
+            say(said.format(topic=name))
+    return [name for name in recording.topics if name not in moving or name in named]
 
 
-def _moves_robots(recording: reader.Recording, topic: str) -> bool:
-    return recording.topics[topic].msg_type in _COMMAND_TYPES or topic.rsplit("/", 1)[-1] in _COMMAND_TOPICS
+def _moves_robots(recording: reader.Recording) -> set[str]:
+    """The topics by which robots are moved, whether they are in the recording or not."""
+    by_type = {each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES}
+    kind = recorder.DESCRIPTION_TYPE
+    described = {each.name for each in recording.topics.values() if each.msg_type == kind}
+    named = set[str]()
+    for _at, message in recording.read(topics=described) if described else ():
+        with suppress(NepError):
+            description = message.payload
+            topics = description.get("rb:topics") if isinstance(description, Mapping) else None
+            if isinstance(topics, Mapping):
+                named.update(each for key in _MOVING if isinstance(each := topics.get(key), str))
+    return by_type | named | {name for name in recording.topics if _is_command_topic(name)}
+
+
+def _is_command_topic(topic: str) -> bool:
+    return topic.rsplit("/", 1)[-1] in _COMMAND_TOPICS
 
 
 def _names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
-    """New names by the old ones. Raises `typer.BadParameter`."""
+    """New names by the old ones. Raises `typer.BadParameter`, `BadTopicError` for what can be no topic."""
     names: dict[str, str] = {}
     for each in remap:
         old, separator, new = each.partition("=")
@@ -121,7 +144,7 @@ def _names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
             raise typer.BadParameter(
                 _("'{word}' is none; write --remap OLD=NEW of a topic that is played").format(word=each)
             )
-        names[old] = new
+        names[old] = check_topic(new)
     return names
 
 
@@ -184,17 +207,8 @@ class _Sender:
 
 def _play(recording: reader.Recording, playback: player.Playback, sender: _Sender) -> None:
     ended = threading.Event()
-    problems: list[NepError] = []
-
-    def send(messages: Sequence[Message]) -> None:
-        try:
-            sender.send(messages)
-        except NepError as error:
-            problems.append(error)
-            ended.set()
-
     out = console(stderr=True)
-    with player.Player(playback, send, on_jump=_nothing, on_end=ended.set) as playing:
+    with player.Player(playback, sender.send, on_jump=_nothing, on_end=ended.set) as playing:
         playing.order(lambda each: each.play())
         if out.is_terminal:
             with out.status("") as shown:
@@ -203,12 +217,12 @@ def _play(recording: reader.Recording, playback: player.Playback, sender: _Sende
         else:
             while not ended.wait(_LOOK_S):
                 pass
-    if problems:
-        raise problems[0]
+    if playing.problem is not None:
+        raise playing.problem
 
 
 def _nothing(_messages: Sequence[Message]) -> None:
-    """What a seek would show is not published: it was, or will be."""
+    """What was before the part is not published."""
 
 
 def _line(recording: reader.Recording, status: player.PlayerStatus) -> str:

@@ -60,12 +60,11 @@ def info(file: FileArgument, as_json: JsonOption = False) -> None:
         if as_json:
             show_json(_plain(recording, told))
             return
-        started = datetime.fromtimestamp(recording.start_ns / 1e9, tz=timezone.utc).astimezone()
         head = _("{messages} messages in {time}, {size}, from {started}").format(
             messages=recording.message_count,
             time=clock_text(recording.duration_s),
             size=size(recording.size_bytes),
-            started=started.strftime("%Y-%m-%d %H:%M:%S"),
+            started=_day_text(recording.start_ns),
         )
         write(f"{head}\n")
         words = recording.words
@@ -79,6 +78,15 @@ def info(file: FileArgument, as_json: JsonOption = False) -> None:
                 "it was not ended, and is read as far as it is whole; mend it: nep recording repair {file}"
             )
             say(said.format(file=file))
+
+
+def _day_text(at_ns: int) -> str:
+    """A time as the computer's clock shows it; of recordings without messages there is none."""
+    try:
+        day = datetime.fromtimestamp(at_ns / 1e9, tz=timezone.utc).astimezone() if at_ns else None
+    except (OSError, OverflowError, ValueError):  # what another program wrote, and no calendar has
+        day = None
+    return UNKNOWN if day is None else day.strftime("%Y-%m-%d %H:%M:%S")
 
 
 def _row(

@@ -124,8 +124,11 @@ def encoding_of(message: Message, log_ns: int, *, is_apart: bool = False) -> Enc
 def _packed(extra: Mapping[str, Any]) -> bytes:
     try:
         return pack(extra)
-    except ValueError:  # an extension that cannot have come over a wire
-        return pack({**extra, "extension": {}})
+    except ValueError:  # an extension or a number that cannot have come over a wire
+        plain = {key: value for key, value in extra.items() if key != "extension"}
+        return pack({
+            key: max(-(2**63), min(value, _U64)) if type(value) is int else value for key, value in plain.items()
+        })  # fmt: skip
 
 
 def _form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
@@ -270,10 +273,12 @@ class ChannelDecoder:
         publisher, extension = self._publisher, NOTHING
         if self._is_wrapped:
             data, extra = self._unwrapped(data)
-            extension = extra.get("extension", NOTHING)
-            seq, stamp = extra.get("seq", seq), extra.get("stamp_ns", stamp)
-            if "publisher" in extra:
-                publisher, kind = extra["publisher"], self._kind_of(extra)
+            if extra:  # of a damaged or made up file they may be anything
+                told = extra.get("extension", NOTHING)
+                extension = told if isinstance(told, Mapping) else NOTHING
+                seq, stamp = _whole(extra.get("seq", seq)), _whole(extra.get("stamp_ns", stamp))
+                if "publisher" in extra:
+                    publisher, kind = _whole(extra["publisher"]), self._kind_of(extra)
         # A publisher's number may be missing, which `arrived` takes as it is.
         return arrived(kind, data, stamp, seq, publisher, extension)  # type: ignore[arg-type]
 
@@ -310,7 +315,11 @@ class ChannelDecoder:
             return {"encoding": encoding}
         layout = raw_layout(encoding)
         channels = 1 if layout is None else layout.channels
-        return {"shape": [told.get(3, 0), told.get(2, 0), channels], "encoding": encoding}
+        return {"shape": [_whole(told.get(3)) or 0, _whole(told.get(2)) or 0, channels], "encoding": encoding}
+
+
+def _whole(value: object) -> int | None:
+    return value if type(value) is int else None
 
 
 def _number(text: str) -> int | None:

@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import orjson
-
 from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
 from nep.messages.message import Message
@@ -31,9 +29,11 @@ MOST_COLUMNS = 5_000
 _MOST_ITEMS = 100
 """Of a list that get a column each; a longer one is one column of JSON."""
 _DEEPEST = 20
-_ROWS_AT_ONCE = 5_000
+_CELLS_AT_ONCE = 200_000
 _FIRST_COLUMNS = ("time_s", "stamp_s", "seq", "publisher")
 _FPS = 30.0
+_LONGEST_FILM_S = 86_400.0
+"""A recording with one picture of another day would become a film of millions of them."""
 _SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "mp4": ".mp4", "pictures": ""}
 Progress = Callable[[int, int], object]
 
@@ -156,15 +156,22 @@ class _Source:
             yield each
 
     def rows(self, *, is_counted: bool = True) -> Iterator[dict[str, object]]:
-        """Flat values of each message that can be read, with its times first."""
+        """Flat values of each message that can be read, with its times first.
+
+        What a payload calls as one of these gets another name: "payload.seq".
+        """
         self.unreadable = 0
         for each in self.messages(is_counted=is_counted):
             try:
                 values = flattened(each.message.payload)
-            except DecodeError:
+            except (DecodeError, RecursionError):
                 self.unreadable += 1
                 continue
-            yield {**_times(each), **values}
+            row = _times(each)
+            for name, value in values.items():
+                column = _letters(name) if name not in row else f"payload.{name}"
+                row[column] = _letters(value) if isinstance(value, str) else value
+            yield row
 
 
 def _times(each: RecordedMessage) -> dict[str, object]:
@@ -175,6 +182,11 @@ def _times(each: RecordedMessage) -> dict[str, object]:
         "seq": message.seq,
         "publisher": None if message.publisher is None else str(message.publisher),
     }
+
+
+def _letters(text: str) -> str:
+    """A text that a file can hold: JSON may have half letters."""
+    return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def flattened(payload: object) -> dict[str, object]:
@@ -194,7 +206,10 @@ def _flatten(value: object, path: str, made: dict[str, object], depth: int) -> N
     elif value is None or isinstance(value, bool | int | float | str):
         made[path or "value"] = value
     else:
-        made[path or "value"] = json.dumps(value, default=str, ensure_ascii=False)
+        try:
+            made[path or "value"] = json.dumps(value, default=str, ensure_ascii=False)
+        except TypeError:  # keys of msgpack may be bytes
+            made[path or "value"] = str(value)
 
 
 def _columns(source: _Source) -> dict[str, set[type]]:
@@ -252,7 +267,7 @@ def _parquet(source: _Source, path: Path, _fps: float) -> int:
         "text": pa.string(),
     }
     schema = pa.schema([(name, arrow[kind]) for name, kind in kinds.items()])
-    count = 0
+    count, at_once = 0, max(1, _CELLS_AT_ONCE // len(columns))
     with pq.ParquetWriter(path, schema) as writer:
         rows: list[dict[str, object]] = []
 
@@ -264,7 +279,7 @@ def _parquet(source: _Source, path: Path, _fps: float) -> int:
         for row in source.rows():
             rows.append(row)
             count += 1
-            if len(rows) >= _ROWS_AT_ONCE:
+            if len(rows) >= at_once:
                 write()
         if rows:
             write()
@@ -288,9 +303,11 @@ def _as(kind: str, value: object) -> object:
     if value is None:
         return None
     if kind == "text":
-        return value if isinstance(value, str) else orjson.dumps(value).decode()
+        return value if isinstance(value, str) else json.dumps(value)
     if kind == "float":
-        return float(value)  # type: ignore[arg-type]
+        with suppress(OverflowError):
+            return float(value)  # type: ignore[arg-type]
+        return None
     if kind == "int":
         return value if isinstance(value, int) and -(2**63) <= value < 2**63 else None
     return value
@@ -353,8 +370,9 @@ def _mp4(source: _Source, path: Path, fps: float) -> int:
                 continue
             film.add(each.log_ns, frame)
             count += 1
+        film.finish()
     finally:
-        film.close()
+        film.remove()
     if not count:
         raise RecordingError(str(path), _("no picture of it can be read"))
     return count
@@ -397,6 +415,10 @@ class _Film:
             if not self._film.isOpened():
                 raise RecordingError(str(self._path), _("OpenCV cannot write films here"))
             self._start_ns = log_ns
+        if log_ns - self._start_ns > _LONGEST_FILM_S * 1e9:
+            raise RecordingError(
+                str(self._path), _("its pictures are of more than a day; choose a part of it for a film")
+            )
         until = int((log_ns - self._start_ns) * self._fps / 1e9)
         while self._last is not None and self._frames < until:
             self._film.write(self._last)
@@ -405,10 +427,29 @@ class _Film:
             frame = self._opencv.resize(frame, self._size)
         self._last = frame
 
+    def finish(self) -> None:
+        """Write the last picture, and end. Raises `RecordingError` when they are not all in the file.
+
+        OpenCV does not say so when a disk is full.
+        """
+        if self._film is None:
+            return
+        self._film.write(self._last)
+        self._frames += 1
+        self.close()
+        film = self._opencv.VideoCapture(str(self._written))
+        count = int(film.get(self._opencv.CAP_PROP_FRAME_COUNT))
+        film.release()
+        if count != self._frames:
+            raise RecordingError(str(self._path), _("the film could not be written; the disk may be full"))
+        replace_file(self._written, self._path)
+
     def close(self) -> None:
-        """Write the last picture, and end."""
+        """End it as it is; may be called twice."""
         if self._film is not None:
-            if self._last is not None:
-                self._film.write(self._last)
             self._film.release()
-            replace_file(self._written, self._path)
+
+    def remove(self) -> None:
+        """Leave no half film behind."""
+        self.close()
+        _remove(self._written)

@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 
 import orjson
 
-__all__ = ["MOST_PUBLISHERS", "MOST_TOPICS", "TopicCounter", "TopicFigures", "read_figures"]
+__all__ = ["MOST_LOST", "MOST_PUBLISHERS", "MOST_TOPICS", "TopicCounter", "TopicFigures", "read_figures"]
 
 MOST_TOPICS = 10_000
 """Counted each; all others are counted together."""
 MOST_PUBLISHERS = 1_000
 """Of one topic, whose numbers are followed; of later ones nobody knows what was lost."""
+MOST_LOST = 2**63 - 1
+"""More is not told: who sends numbers at random would make figures that no JSON holds."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,9 @@ class TopicCounter:
 
     def figures(self) -> TopicFigures:
         """The counts as of now."""
-        lost = sum(each.lost for each in self._publishers.values()) if self._publishers else None
+        lost = None
+        if self._publishers:
+            lost = min(sum(each.lost for each in self._publishers.values()), MOST_LOST)
         return TopicFigures(self.received, lost, self.late, self.undecodable, self.unkept, self.size_bytes)
 
 

@@ -17,6 +17,7 @@ from nep.recordings.records import (
     CHUNK_HEAD_BYTES,
     HEAD_BYTES,
     MAGIC,
+    MOST_CHUNK_BYTES,
     RECORD_HEAD,
     ChunkHead,
     ChunkInfo,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from mcap.records import Channel, Schema
 
 __all__ = [
+    "MOST_SMALL_BYTES",
     "Definitions",
     "FileIndex",
     "Place",
@@ -45,9 +47,10 @@ __all__ = [
 ]
 
 _FOOTER_BYTES = HEAD_BYTES + 20 + len(MAGIC)
-_MOST_SMALL_BYTES = 64_000_000
+MOST_SMALL_BYTES = 64_000_000
 """A record that is no chunk and is larger is damaged, or an attachment that nobody needs here."""
-_BUFFER_BYTES = 1_000_000
+_MOST_SUMMARY_BYTES = 1_000_000_000
+"""A summary with more is damaged: a week of recording has less."""
 
 
 class Definitions:
@@ -135,7 +138,7 @@ def _of_summary(file: BinaryIO, size: int) -> FileIndex | None:
         return None
     start = int.from_bytes(footer[9:17], "little")
     crc = int.from_bytes(footer[25:29], "little")
-    if not len(MAGIC) <= start < size - _FOOTER_BYTES:
+    if not len(MAGIC) <= start < size - _FOOTER_BYTES or size - start > _MOST_SUMMARY_BYTES:
         return None
     file.seek(start)
     summary = file.read(size - _FOOTER_BYTES - start)
@@ -160,6 +163,8 @@ def _read_summary(file: BinaryIO, summary: bytes, index: FileIndex) -> None:
         at += HEAD_BYTES + length
         if opcode == Opcode.CHUNK_INDEX:
             info = read_chunk_info(content)
+            if not _is_inside(info, index.end):
+                raise ValueError("a chunk beyond the file")
             if not info.packed_offsets:
                 info = _indexed_by_reading(file, info, Definitions())
             index.chunks.append(info)
@@ -169,7 +174,14 @@ def _read_summary(file: BinaryIO, summary: bytes, index: FileIndex) -> None:
             index.counts = read_record("Statistics", content).channel_message_counts
         elif opcode == Opcode.METADATA_INDEX:
             place = read_record("MetadataIndex", content)
-            _read_metadata(file, Place(place.offset, Opcode.METADATA, place.length - HEAD_BYTES), index)
+            if place.offset + place.length <= index.end:
+                _read_metadata(file, Place(place.offset, Opcode.METADATA, place.length - HEAD_BYTES), index)
+
+
+def _is_inside(info: ChunkInfo, size: int) -> bool:
+    """Whether a chunk and its indexes can be where a summary says that they are."""
+    end = info.offset + info.length + info.index_bytes
+    return info.offset >= len(MAGIC) and info.length >= HEAD_BYTES and end <= size
 
 
 def _has_messages(file: BinaryIO, size: int, data_end: int) -> bool:
@@ -179,7 +191,7 @@ def _has_messages(file: BinaryIO, size: int, data_end: int) -> bool:
 
 
 def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
-    if not 0 < place.length <= _MOST_SMALL_BYTES:
+    if not 0 < place.length <= MOST_SMALL_BYTES:
         return
     file.seek(place.offset + HEAD_BYTES)
     try:
@@ -228,7 +240,7 @@ class _Scan:
             head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), place.length)
             if head is not None:
                 self._chunk = _info(place, head)
-        elif place.opcode in {Opcode.SCHEMA, Opcode.CHANNEL} and place.length <= _MOST_SMALL_BYTES:
+        elif place.opcode in {Opcode.SCHEMA, Opcode.CHANNEL} and place.length <= MOST_SMALL_BYTES:
             self._file.seek(place.offset + HEAD_BYTES)
             self._index.definitions.add(place.opcode, self._file.read(place.length))
         elif place.opcode == Opcode.METADATA:
@@ -261,7 +273,7 @@ def _info(place: Place, head: ChunkHead) -> ChunkInfo:
 
 
 def _indexed_by_reading(file: BinaryIO, info: ChunkInfo, definitions: Definitions) -> ChunkInfo:
-    """Which channels a chunk has, where the file does not tell; offsets of 0 are no index."""
+    """Which channels a chunk has, where the file does not tell; an offset of 0 is no index."""
     try:
         chunk = read_chunk(file, info)
     except ValueError:
@@ -278,6 +290,8 @@ def _indexed_by_reading(file: BinaryIO, info: ChunkInfo, definitions: Definition
 
 def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
     """A chunk's records. Raises `ValueError` when it is damaged, `OSError`."""
+    if info.length > MOST_CHUNK_BYTES:
+        raise ValueError("size")
     file.seek(info.offset)
     record = memoryview(file.read(info.length))
     if len(record) != info.length or len(record) < HEAD_BYTES or record[0] != Opcode.CHUNK:
@@ -291,7 +305,7 @@ def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
 def read_entries(file: BinaryIO, info: ChunkInfo, channel: int) -> Sequence[tuple[int, int]] | None:
     """(time, offset in the chunk) of a channel's messages; None where the file does not tell."""
     offset = info.index_offsets.get(channel, 0)
-    if not offset:
+    if not info.has_index_at(offset):
         return None
     file.seek(offset)
     head = file.read(HEAD_BYTES)

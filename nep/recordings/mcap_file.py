@@ -11,6 +11,7 @@ import os
 import zlib
 from array import array
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -154,6 +155,8 @@ class FileWriter:
             self._write(MAGIC + packed(mcap_records.Header(profile="", library=f"nep {__version__}")))
         except OSError:
             self._file.close()
+            with suppress(OSError):  # it has nothing
+                path.unlink()
             raise
 
     # ---- filling it

@@ -105,10 +105,15 @@ class Playback:
 
     def seek(self, at_ns: int) -> None:
         """Go to a time; the newest message of each topic up to there is due at once."""
-        self._position_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
-        newest = self._recording.newest(self._position_ns, self._topics)
+        at_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
+        self._show_and_read_from(at_ns, at_ns)
+
+    def _show_and_read_from(self, shown_ns: int, at_ns: int) -> None:
+        """Go to a time; due at once is what was there at `shown_ns`, and what came later comes as it came."""
+        self._position_ns = at_ns
+        newest = self._recording.newest(shown_ns, self._topics)
         self._jump = [self._renamed(each.message) for each in sorted(newest.values(), key=_log_ns)]
-        self._read_from(self._position_ns + 1)
+        self._read_from(shown_ns + 1)
         self._anchor_here()
 
     def step(self, topic: str, *, forward: bool = True) -> bool:
@@ -218,7 +223,7 @@ class Playback:
 
     def _come_to_end(self) -> None:
         if self._is_looping and self._last_ns() > self._first_ns():
-            self.seek(self._first_ns())
+            self._show_and_read_from(self._first_ns() - 1, self._first_ns())
         elif self._next is None or self._next.log_ns > self._last_ns():
             self._is_playing = False
             self._measured.clear()
@@ -289,7 +294,8 @@ class Player:
 
     `sink` is given messages in their order, a few at a time; `on_jump` the newest of each topic after a seek
     (without it they go to the sink, too). Both are called in the player's thread and may take their time:
-    then it is slower, and loses nothing. `on_end` is told when the end was reached.
+    then it is slower, and loses nothing. `on_end` is told when the end was reached, and when something that
+    they or the recording raised has ended it, which `problem` is then.
     """
 
     def __init__(
@@ -305,6 +311,7 @@ class Player:
         self._on_end = on_end
         self._lock = threading.Condition()
         self._is_closed = False
+        self.problem: Exception | None = None
         self._thread = threading.Thread(target=self._run, name="recording-player", daemon=True)
         self._thread.start()
 
@@ -322,6 +329,16 @@ class Player:
             return self._playback.status()
 
     def _run(self) -> None:
+        try:
+            self._play_until_closed()
+        except Exception as error:  # noqa: BLE001 - it belongs to who asked for the messages
+            with self._lock:
+                self.problem = error
+                self._playback.pause()
+            if self._on_end is not None:
+                self._on_end()
+
+    def _play_until_closed(self) -> None:
         was_playing = False
         while True:
             with self._lock:

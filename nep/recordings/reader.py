@@ -109,8 +109,8 @@ class Recording:
         counts = self._index.counts
         if counts is None:
             counts = {}
-            for chunk in self._chunks:
-                for channel, count in chunk.counts.items():
+            for at in range(len(self._chunks)):
+                for channel, count in self._counts(at).items():
                     counts[channel] = counts.get(channel, 0) + count
         made: dict[str, RecordedTopic] = {}
         for number, decoder in self._decoders.items():
@@ -324,7 +324,7 @@ class Recording:
         wanted = self._channels(topics)
         for number in range(first, last):
             chunk = self._chunks[number]
-            for channel, count in chunk.counts.items():
+            for channel, count in self._counts(number).items():
                 if channel not in wanted:
                     continue
                 counts = made.setdefault(self._decoders[channel].topic, [0] * buckets)
@@ -335,6 +335,17 @@ class Recording:
                     if start_ns <= log_ns < end_ns:
                         counts[(log_ns - start_ns) * buckets // span] += 1
         return made
+
+    def _counts(self, number: int) -> Mapping[int, int]:
+        """The messages of each channel in a chunk; it is read where its indexes are not there."""
+        chunk = self._chunks[number]
+        counts = chunk.counts
+        missing = set(chunk.channels) - counts.keys()
+        if missing:
+            for each in self._messages(number):
+                if each.channel in missing:
+                    counts[each.channel] = counts.get(each.channel, 0) + 1
+        return counts
 
     # ---- chunks
 
@@ -396,12 +407,21 @@ def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], c
     (start, end), (chunk_start, chunk_end), buckets = whole, chunk, len(counts)
     first = (chunk_start - start) * buckets // (end - start)
     last = (chunk_end - start) * buckets // (end - start)
-    before = 0
-    for at in range(first, last + 1):
-        until = start + (at + 1) * (end - start) // buckets
-        so_far = count if at == last else count * (until - chunk_start) // (chunk_end - chunk_start)
-        if 0 <= at < buckets:
-            counts[at] += so_far - before
+
+    def until(at: int) -> int:
+        """How many come before the end of a part."""
+        if at < first:
+            return 0
+        if at >= last:
+            return count
+        part_end = start + (at + 1) * (end - start) // buckets
+        return count * (part_end - chunk_start) // (chunk_end - chunk_start)
+
+    shown = range(max(0, first), min(last, buckets - 1) + 1)
+    before = until(shown.start - 1)
+    for at in shown:
+        so_far = until(at)
+        counts[at] += so_far - before
         before = so_far
 
 

@@ -200,7 +200,7 @@ def chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
         return None
     start_ns, end_ns, uncompressed, crc, letters = _CHUNK.unpack_from(record, HEAD_BYTES)
     at = HEAD_BYTES + _CHUNK.size + letters
-    if letters > 16 or len(record) < at + _SIZE.size or uncompressed > MOST_CHUNK_BYTES:
+    if letters > 16 or len(record) < at + _SIZE.size or max(uncompressed, length) > MOST_CHUNK_BYTES:
         return None
     compression = bytes(record[at - letters : at])
     (data_bytes,) = _SIZE.unpack_from(record, at)
@@ -335,15 +335,24 @@ class ChunkInfo:
         """Where the message index of each channel begins in the file."""
         return dict(_OFFSET.iter_unpack(self.packed_offsets))
 
+    def has_index_at(self, offset: int) -> bool:
+        """Whether a message index can be there: they stand one behind the other, after the chunk."""
+        after = self.offset + self.length
+        return after <= offset < after + self.index_bytes
+
     @property
     def counts(self) -> dict[int, int]:
-        """How many messages each channel has: its index has 16 bytes for each, and the next one follows."""
+        """How many messages each channel has: its index has 16 bytes for each, and the next one follows.
+
+        Channels without an index are missing: to count theirs the chunk must be read.
+        """
         end = self.offset + self.length + self.index_bytes
         counts = {}
         pairs = sorted(_OFFSET.iter_unpack(self.packed_offsets), key=_second, reverse=True)
         for channel, offset in pairs:
-            counts[channel] = max(0, end - offset - _INDEX_HEAD) // _ENTRY.size
-            end = offset
+            if self.has_index_at(offset):
+                counts[channel] = max(0, end - offset - _INDEX_HEAD) // _ENTRY.size
+                end = offset
         return counts
 
 

@@ -20,12 +20,13 @@ import orjson
 from nep.errors import RecordingError
 from nep.i18n import _
 from nep.recordings.channels import ChannelDecoder
-from nep.recordings.index import Definitions, Place, read_chunk, read_index
+from nep.recordings.index import MOST_SMALL_BYTES, Definitions, Place, read_chunk, read_index
 from nep.recordings.mcap_file import ChannelTable, FileWriter
 from nep.recordings.records import (
     CHUNK_HEAD_BYTES,
     HEAD_BYTES,
     MAGIC,
+    MOST_CHUNK_BYTES,
     RECORD_HEAD,
     ChunkHead,
     ChunkInfo,
@@ -49,6 +50,8 @@ _WINDOW = 4_000_000
 _LIKE_A_CHUNK = re.compile(rb"\x06.{4}[\x00-\x7f]\x00\x00\x00", re.DOTALL)
 """A chunk's opcode, and a length below 2^39."""
 _FLUSH_BYTES = 1_000_000
+_READ_HERE = frozenset({Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA})
+"""Those that are read here; one that is very long has a damaged length."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,11 @@ def repair(
         raise RecordingError(str(target), _("there is such a file already; choose another name"))
     unfinished = target.with_name(f"{target.name}.part")
     try:
-        with path.open("rb") as file:
+        file = path.open("rb")
+    except OSError as error:
+        raise disk_sentence(path, error) from error
+    try:
+        with file:
             mending = _Mending(file, path, unfinished, progress or _no_progress)
             try:
                 counts = mending.run()
@@ -222,6 +229,9 @@ class _Mending:
             return False
         if place.opcode == Opcode.CHUNK:
             return self._take_chunk(place)
+        most = MOST_CHUNK_BYTES if place.opcode == Opcode.MESSAGE else MOST_SMALL_BYTES
+        if place.opcode in _READ_HERE and place.length > most:
+            return False
         if place.opcode == Opcode.MESSAGE_INDEX:
             self._take_index(place)
         elif place.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
@@ -268,11 +278,12 @@ class _Mending:
 
     def _take_chunk(self, place: Place) -> bool:
         self._file.seek(place.offset)
-        record = memoryview(self._file.read(HEAD_BYTES + place.length))
-        head = chunk_head(record, place.length)
+        head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), place.length)
         self._damaged_chunk = None
         if head is None:
             return False
+        self._file.seek(place.offset)
+        record = memoryview(self._file.read(HEAD_BYTES + place.length))
         try:
             chunk = decompressed(record[head.data_at :], head)
         except ValueError:
@@ -409,13 +420,15 @@ class _Mending:
     def _take_cut_chunk(self, offset: int) -> int:
         """Keep the whole messages of a chunk of which the end is missing; how many bytes of it were there."""
         self._file.seek(offset)
-        record = memoryview(self._file.read())
-        if len(record) < HEAD_BYTES or record[0] != Opcode.CHUNK:
+        begin = self._file.read(CHUNK_HEAD_BYTES)
+        if len(begin) < HEAD_BYTES or begin[0] != Opcode.CHUNK:
             return 0
-        _opcode, length = RECORD_HEAD.unpack_from(record)
-        head = chunk_head(record, length)
-        if head is None or HEAD_BYTES + length <= len(record):
+        _opcode, length = RECORD_HEAD.unpack_from(begin)
+        head = chunk_head(begin, length)
+        if head is None or offset + HEAD_BYTES + length <= self._size:
             return 0
+        self._file.seek(offset)
+        record = memoryview(self._file.read(HEAD_BYTES + length))
         self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
         before = self._counts.recovered
         for each in messages_in(decompressed_part(record[head.data_at :], head)):

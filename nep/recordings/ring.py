@@ -44,6 +44,7 @@ __all__ = ["FlightRecorder", "KeptRecording", "RingStatus"]
 _SEGMENTS = 8
 """So many make the whole time, or all the bytes."""
 _PREFIX = "ring-"
+_MOST_SECONDS = 1e9
 
 
 @dataclass(frozen=True)
@@ -139,16 +140,20 @@ class _Segments:
             with self._lock:
                 if len(self._all) == 1:
                     raise RecordingError(str(self._folder), _("the disk is full"))
+                if self._all[0].users:  # it frees nothing yet, and whoever copies it is soon done
+                    return
                 self._remove_oldest()
 
     def finish(self) -> None:
         """Nothing of it is needed any more."""
         with self._lock:
             for each in self._all:
-                each.writer.close()
+                with suppress(OSError):
+                    each.writer.close()
                 each.is_unwanted = True
                 if not each.users:
                     _remove(each.path)
+            self._all = self._all[-1:]
 
     fail = finish
 
@@ -210,7 +215,7 @@ class FlightRecorder:
         on_problem: Callable[[str], object] | None = None,
     ) -> None:
         """Begin. `folder` is for its files alone; it is made. Raises `RecordingError`, and `ValueError`."""
-        if not 0.0 < seconds < 1e9 or size_bytes < 1:
+        if not 0.0 < seconds < _MOST_SECONDS or size_bytes < 1:
             raise ValueError(_("a ring has more than 0 seconds and bytes"))
         path = Path(folder)
         self._clock = LogClock() if clock is None else clock
@@ -238,13 +243,19 @@ class FlightRecorder:
         return RingStatus(seconds, size_bytes, status.unkept, status.problem)
 
     def keep(self, path: str | os.PathLike[str], seconds: float, note: str = "") -> KeptRecording:
-        """Make a recording of the last seconds, up to now; a chunk more at its begin, half a second at most.
+        """Make a recording of the last seconds that are there, and half a second before at most.
 
-        Takes as long as copying so many bytes, and what comes meanwhile is kept on. Raises `RecordingError`.
+        They end with the newest message. Takes as long as copying so many bytes, and what comes meanwhile is
+        kept on. Raises `RecordingError`, also when nothing has come yet, and `ValueError` for no time.
         """
+        if not 0.0 < seconds < _MOST_SECONDS:
+            raise ValueError(_("a ring has more than 0 seconds and bytes"))
         target = Path(path)
-        self._writer.flush()
+        if not self._writer.flush():
+            raise RecordingError(str(target), self._writer.problem or _("the disk does not answer"))
         taken = self._segments.take(seconds)
+        if not taken:
+            raise RecordingError(str(target), _("no message has come yet"))
         try:
             return self._copied(target, taken, note)
         except FileExistsError:

@@ -8,12 +8,14 @@ so a process that is killed loses less than a second, and a reader finds whole r
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import shutil
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -52,6 +54,7 @@ _CLOSE_S = 30.0
 _KNOWN = 10_000
 _OTHERS = ""
 """Where topics are counted of which there are too many."""
+_log = logging.getLogger("nep.recordings")
 
 
 @dataclass(frozen=True)
@@ -229,7 +232,7 @@ class RecordingWriter:
         self._queued_bytes = self._queued_messages = 0
         self._left_out: dict[tuple[str, int | None], list[int]] = {}
         self._flush_wanted = self._flush_done = 0
-        self._is_closing = False
+        self._is_closing = self._has_ended = False
         self._problem = ""
         self._last_ns = 0
         self._counters: dict[str, TopicCounter] = {}
@@ -306,13 +309,10 @@ class RecordingWriter:
             self._flush_wanted += 1
             wanted = self._flush_wanted
             self._lock.notify_all()
-            return (
-                self._lock.wait_for(
-                    lambda: self._flush_done >= wanted or not self._thread.is_alive() or bool(self._problem),
-                    timeout_s,
-                )
-                and not self._problem
+            is_done = self._lock.wait_for(
+                lambda: self._flush_done >= wanted or self._has_ended or bool(self._problem), timeout_s
             )
+            return is_done and not self._problem
 
     @property
     def status(self) -> RecordingStatus:
@@ -364,6 +364,20 @@ class RecordingWriter:
             self._fail(disk_sentence(self._destination.file.path, error))
         except RecordingError as error:
             self._end_early(error)
+        except Exception as error:  # noqa: BLE001 - whatever it is: nobody may think that it goes on
+            _log.exception("a recording has ended by an error of nep's own")
+            self._fail(
+                RecordingError(
+                    str(self._destination.file.path),
+                    _("it ended by an error of nep's own, {error}; what came before is kept").format(
+                        error=repr(error)
+                    ),
+                )
+            )
+        finally:
+            with self._lock:
+                self._has_ended = True
+                self._lock.notify_all()
 
     def _write_until_closed(self) -> None:
         flush_at = time.monotonic() + self._limits.flush_s
@@ -402,7 +416,7 @@ class RecordingWriter:
                     size += message.size_bytes
                     try:
                         self._write_message(message, self._log_ns(message, now))
-                    except OSError:
+                    except Exception:
                         self._rest = [
                             messages[at + 1 :],
                             *(each[1] for each in batch[number + 1 :] if not isinstance(each, _Said)),
@@ -530,10 +544,10 @@ class RecordingWriter:
         try:
             self._finish(error.reason)
         except (OSError, RecordingError):
-            self._destination.fail()
+            self._let_go()
 
     def _fail(self, error: RecordingError) -> None:
-        """The disk takes no more: the file ends with its last whole record."""
+        """Nothing more can be written: the file ends with its last whole record."""
         file = self._destination.file
         with self._lock:
             for messages in self._rest:
@@ -543,8 +557,12 @@ class RecordingWriter:
                 left = self._left_out.setdefault((definition.topic, None), [0, 0])
                 left[0] += 0 if number in self._own_numbers else count
         self._count_file(file)
-        self._destination.fail()
+        self._let_go()
         self._stop(error.reason)
+
+    def _let_go(self) -> None:
+        with suppress(OSError):  # what a disk says to the end, too, nobody needs
+            self._destination.fail()
 
     def _stop(self, reason: str) -> None:
         with self._lock:

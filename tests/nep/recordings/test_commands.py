@@ -31,7 +31,9 @@ def path(tmp_path_factory):
     messages = [json_message(seq, topic="/arm/joints", size=20) for seq in range(1, 21)]
     command = nep.Message("/pepper/command", b'{"op":"invoke"}', "json", "robot/command", seq=1, publisher=4)
     rize = nep.Message("robot_action", b'{"action":"wave"}', "json", "json", seq=1, publisher=5)
-    record(path, [[*messages, picture(1), command, rize]])
+    own = b'{"rb:topics":{"command":"/own/orders","world":7}}'
+    described = nep.Message("/own/description", own, "json", "robot/description", seq=1, publisher=6)
+    record(path, [[*messages, picture(1), command, rize, described]])
     return path
 
 
@@ -84,7 +86,7 @@ def test_a_recording_ends_after_its_time_and_tells_as_json(master, tmp_path, cap
 def test_info_tells_what_is_there_and_what_is_missing(path, tmp_path, capfd):
     run("recording", "info", path)
     out = capfd.readouterr().out
-    assert "23 messages in 0:00" in out
+    assert "24 messages in 0:00" in out
     line = next(line for line in out.splitlines() if line.startswith("/arm/joints"))
     assert line.split()[:3] == ["/arm/joints", "json", "20"]
     run("recording", "info", path, "--json")
@@ -100,9 +102,9 @@ def test_repair_says_what_came_back(path, tmp_path, capfd):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-200])
     run("recording", "repair", cut)
-    assert "23 messages recovered, 0:00, and read back" in capfd.readouterr().err
+    assert "24 messages recovered, 0:00, and read back" in capfd.readouterr().err
     run("recording", "repair", cut, "-o", tmp_path / "b.mcap", "--json")
-    assert json.loads(capfd.readouterr().out)["recovered"] == 23
+    assert json.loads(capfd.readouterr().out)["recovered"] == 24
 
 
 def test_export_makes_files_beside(path, tmp_path, capfd):
@@ -131,8 +133,8 @@ def test_play_publishes_what_is_named_and_nothing_else(path, master, capfd):
         heard.clear()
         run(*words, "--all")
         assert "'/pepper/command' moves a robot and is not sent" in capfd.readouterr().err
-        eventually(lambda: len(heard) >= 21)
-        assert {each.topic for each in heard} == {"/arm/joints", "/camera"}
+        eventually(lambda: len(heard) >= 22)
+        assert {each.topic for each in heard} == {"/arm/joints", "/camera", "/own/description"}
         assert next(each for each in heard if each.topic == "/camera").payload.shape == (12, 16, 3)
         heard.clear()
         run(*words, "/pepper/command", "robot_action", "--arm")
@@ -155,6 +157,11 @@ def test_play_publishes_what_is_named_and_nothing_else(path, master, capfd):
         (("--all", "--speed", "0"), typer.BadParameter, "is no speed"),
         (("/arm/joints", "--remap", "/x=/y"), typer.BadParameter, "--remap OLD=NEW"),
         (("/arm/joints", "--from", "5"), typer.BadParameter, "has no length"),
+        (("/arm/joints", "--remap", "/arm/joints=robot_action"), NepError, "moves a robot; add --arm"),
+        (("/arm/joints", "--remap", "/arm/joints=/Fido/command"), NepError, "moves a robot; add --arm"),
+        (("/arm/joints", "--remap", "/arm/joints=/own/orders"), NepError, "'/own/orders' moves a robot"),
+        (("/arm/joints", "--remap", "/arm/joints=/cmd_vel"), NepError, "moves a robot; add --arm"),
+        (("/arm/joints", "--remap", "/arm/joints=two words"), NepError, "two words"),
     ],
 )
 def test_play_asks_before_it_sends(path, words, error, said):

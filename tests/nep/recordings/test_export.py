@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import sys
+from contextlib import suppress
 
 import cv2
 import numpy as np
@@ -77,6 +79,25 @@ def test_parquet_keeps_kinds_of_values(recording, tmp_path):
     assert [row["big"] for row in rows] == [None, 1, None]  # 2^63 has no place there
 
 
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_fields_that_are_called_as_ours_and_letters_that_are_none_have_their_place(tmp_path, kind):
+    values = [{"seq": "seven", "time_s": 1, "publisher": None, "big": 2**70, "x": float("nan")}]
+    values += [{"seq": 2**70, "text": "\ud800", "big": 0.5, "x": 2**2000, "deep": {"\ud800": [{}] * 200}}]
+    record(tmp_path / "a.mcap", [[message(seq, value) for seq, value in enumerate(values, 1)]])
+    with Recording(tmp_path / "a.mcap") as recording:
+        (made,) = export(recording, kind, tmp_path / "out")
+    assert (made.count, made.unreadable) == (2, 0)
+    if kind == "csv":
+        with made.path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+    else:
+        pq = pytest.importorskip("pyarrow.parquet")
+        rows = pq.read_table(made.path).to_pylist()
+    assert [str(row["seq"]) for row in rows] == ["1", "2"]
+    assert [str(row["payload.seq"]) for row in rows] == ["seven", str(2**70)]
+    assert rows[1]["text"] == "\\ud800"
+
+
 def test_pictures_are_the_very_files(recording, tmp_path):
     made = export(recording, "pictures", tmp_path / "out")
     files = sorted(made[0].path.iterdir())
@@ -109,6 +130,26 @@ def test_a_film_has_the_recordings_time(tmp_path):
         100,
         ["camera.mp4"],
     )
+
+
+def test_a_film_that_cannot_be_is_a_sentence_and_leaves_nothing(tmp_path, monkeypatch):
+    record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 4)]])
+    with Recording(tmp_path / "a.mcap") as recording:
+        with monkeypatch.context() as patched:
+            patched.setattr("nep.recordings.export._LONGEST_FILM_S", 0.015)
+            with pytest.raises(RecordingError, match="more than a day"):
+                export(recording, "mp4", tmp_path / "out")
+        monkeypatch.setattr("nep.recordings.export._Film.close", truncate)
+        with pytest.raises(RecordingError, match="the disk may be full"):
+            export(recording, "mp4", tmp_path / "out")
+    assert not list((tmp_path / "out").iterdir())
+
+
+def truncate(film):
+    """As a full disk does it: OpenCV says nothing."""
+    film._film.release()
+    with suppress(FileNotFoundError):
+        os.truncate(film._written, 100)
 
 
 def test_a_part_of_it(recording, tmp_path):

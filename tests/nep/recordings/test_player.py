@@ -130,14 +130,15 @@ def test_a_part_is_played_again_and_again_until_that_ends(recording, times):
     playback.loop(times[20], times[24])
     playback.play()
     found = [seq for _at, seq in run(playback, clock, 0.5)]
-    assert found[:8] == [21, 22, 23, 24, 21, 22, 23, 24]
+    assert found[:9] == [21, 22, 23, 24, 20, 21, 22, 23, 24]
     playback.end_loop()
     found = [seq for _at, seq in run(playback, clock, 2.0)]
     assert found[-1] == COUNT - 1
     assert playback.status().is_at_end
     playback.loop()
     playback.play()
-    assert len(run(playback, clock, 3.0)) > 2 * COUNT
+    found = [seq for _at, seq in run(playback, clock, 3.0)]
+    assert found[: 2 * COUNT] == [*range(COUNT), *range(COUNT)]  # the first one, too, each time
     for part in ((5, 5), (times[9], times[3])):
         with pytest.raises(ValueError, match="no length"):
             playback.loop(*part)
@@ -235,3 +236,16 @@ def test_the_players_thread_gives_all_in_order_and_jumps_apart(recording, times)
             player.order(lambda each: setattr(each, "speed", 0.0))
         assert player.status.position_ns == times[50]
     player.close()
+
+
+def test_what_the_sink_raises_ends_it_and_is_told(recording):
+    ended = threading.Event()
+
+    def refuse(_messages):
+        raise ConnectionError("nobody is there")
+
+    with Player(Playback(recording), refuse, on_end=ended.set) as player:
+        player.order(Playback.play)
+        assert ended.wait(30)
+        assert str(player.problem) == "nobody is there"
+        assert not player.status.is_playing

@@ -140,6 +140,12 @@ def test_a_file_that_was_not_ended_tells_the_same(path, everything, tmp_path):
     with Recording(cut) as opened:
         assert [kept(each.message) for each in opened.read()] == [kept(each.message) for each in everything]
         assert opened.newest(2**64 - 1)["/a"].message.seq == 119
+        assert {each.name: each.message_count for each in opened.topics.values()} == {
+            "/a": 120,
+            "/b": 120,
+            "/rare": 2,
+        }
+        assert sum(opened.densities(opened.start_ns, opened.end_ns + 1, 9)["/a"]) == 120
 
 
 def test_a_damaged_piece_is_passed_over_and_counted(path, everything, tmp_path):
@@ -181,6 +187,48 @@ def test_any_damage_to_the_end_is_survived(path, tmp_path):
         damaged.write_bytes(made)
         with Recording(damaged) as opened:
             assert 0 < len(list(opened.read())) <= len(ALL)
+
+
+def resummed(data: bytes, changed: dict[str, int]) -> bytes:
+    """A recording whose summary says something else of each chunk, and has no CRC that would tell."""
+    made = bytearray(data)
+    start = int.from_bytes(made[-28:-20], "little")
+    places = {"offset": (9 + 16, 8), "length": (9 + 24, 8), "start": (9, 8), "end": (9 + 8, 8)}
+    at = start
+    while made[at] != 2:
+        length = int.from_bytes(made[at + 1 : at + 9], "little")
+        if made[at] == 8:
+            for name, value in changed.items():
+                place, size = places[name]
+                made[at + place : at + place + size] = value.to_bytes(size, "little")
+        at += 9 + length
+    made[-12:-8] = bytes(4)
+    return bytes(made)
+
+
+@pytest.mark.parametrize("name", ["offset", "length"])
+@pytest.mark.parametrize("value", [0, 1, 2**31 + 1, 2**63 - 1, 2**64 - 1])
+def test_a_summary_that_lies_about_places_is_not_believed(path, everything, tmp_path, name, value):
+    (tmp_path / "a.mcap").write_bytes(resummed(path.read_bytes(), {name: value}))
+    with Recording(tmp_path / "a.mcap") as opened:
+        found = [each.log_ns for each in opened.read()]
+        assert found in ([], [each.log_ns for each in everything])
+        opened.newest(2**64 - 1)
+        opened.densities(0, 2**64 - 1, 10)
+
+
+def test_a_summary_that_lies_about_times_costs_no_time(path, everything, tmp_path):
+    (tmp_path / "a.mcap").write_bytes(resummed(path.read_bytes(), {"start": 0, "end": 2**64 - 1}))
+    with Recording(tmp_path / "a.mcap") as opened:
+        assert [each.log_ns for each in opened.read()] == [each.log_ns for each in everything]
+        start = everything[0].log_ns
+        for number in range(300):
+            opened._chunks.append(opened._chunks[number % 12])
+            opened._starts.append(0)
+            opened._latest_ends.append(2**64 - 1)
+        counts = opened.densities(start, start + 1000, 1000, ("/a",))["/a"]
+        assert len(counts) == 1000
+        assert sum(counts) <= 12 * 120
 
 
 def test_messages_that_overlap_between_chunks_come_in_order(tmp_path, everything):

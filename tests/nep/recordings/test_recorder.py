@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 import subprocess
 import sys
 from collections.abc import Sequence
+from functools import partial
 
 import pytest
 
@@ -13,9 +15,11 @@ import nep
 from nep.errors import BadTopicError
 from nep.protocol.topic_glob import glob_matches, widened
 from nep.protocol.topic_pattern import matches
+from nep.recordings import child
 from nep.recordings.child import RecorderService
 from nep.recordings.reader import Recording
 from nep.recordings.recorder import Recorder, TopicSelection
+from nep.recordings.ring import FlightRecorder
 from nep.recordings.writer import RecordingWriter
 from tests.nep.programs import eventually as until
 from tests.nep.recordings.messages import limits
@@ -196,6 +200,43 @@ def test_orders_of_the_service(master, tmp_path):
         assert (recording.topics["/a"].message_count, recording.words["note"]) == (5, "the fall")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.mcap", "kept.mcap", "ring"]
     assert not list((tmp_path / "ring").iterdir())
+
+
+def test_what_ends_by_itself_is_told_and_something_new_may_begin(master, tmp_path, monkeypatch):
+    events: list[dict[str, object]] = []
+
+    def seen(kind: str) -> list[dict[str, object]]:
+        return [each for each in events if each["event"] == kind]
+
+    def order(**content: object) -> None:
+        service.order(json.dumps(content).encode())
+
+    soon = limits(figures_s=0.001)
+    monkeypatch.setattr(child, "RecordingWriter", partial(RecordingWriter, limits=soon))
+    full = limits(figures_s=0.001, least_free_bytes=2**62)
+    monkeypatch.setattr(child, "FlightRecorder", partial(FlightRecorder, limits=full))
+    path = tmp_path / "a.mcap"
+    with nep.node("recorder", master=master.address) as node:
+        service = RecorderService(node, lambda event: events.append(dict(event)), figures_s=1000.0)
+        order(op="record", path=str(path))
+        path.unlink()
+        until(lambda: seen("ended"))
+        assert "moved or deleted" in seen("ended")[0]["status"]["problem"]
+        order(op="ring", folder=str(tmp_path / "ring"))
+        until(lambda: seen("ring_ended"))
+        assert seen("ring_ended")[0]["status"]["problem"] == "the disk is full"
+        order(op="keep", path=str(tmp_path / "b.mcap"))
+        order(op="record", path=str(path))
+        order(op="stop")
+        assert [each["status"]["problem"] for each in seen("ended")][1:] == [""]
+        service.close()
+    assert [(each["op"], each["path"]) for each in seen("problem")] == [("keep", str(tmp_path / "b.mcap"))]
+
+
+def test_a_line_that_is_too_long_is_no_order(monkeypatch):
+    monkeypatch.setattr(child, "_LONGEST_LINE", 10)
+    lines = child._lines(io.BytesIO(b'{"a":1}\n' + b"x" * 25 + b'{"op":1}\n\n{"b":2}'))
+    assert list(lines) == [b'{"a":1}\n', b"", b"\n", b'{"b":2}']
 
 
 def test_a_process_of_its_own_finishes_when_its_input_ends(master, tmp_path):

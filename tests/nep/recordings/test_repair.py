@@ -137,6 +137,8 @@ def test_names_beside_are_new_and_nothing_is_written_over(path, tmp_path):
     assert repaired_path(damaged).name == "a.repaired-4.mcap"
     with pytest.raises(RecordingError, match="such a file already"):
         repair(damaged, damaged)
+    with pytest.raises(RecordingError, match=r"'.*none\.mcap'"):
+        repair(tmp_path / "none.mcap")
 
 
 @pytest.mark.parametrize("data", [b"", b"\x89MCAP0\r\n", b"nothing of the kind" * 100, bytes(100_000)])

@@ -150,6 +150,23 @@ def test_sentences(tmp_path):
         assert recording.words["damaged"] == "1"
 
 
+def test_nothing_is_kept_of_nothing_and_of_a_ring_that_has_ended(tmp_path):
+    ring = FlightRecorder(tmp_path / "ring", clock=TestClock(), limits=limits())
+    with pytest.raises(RecordingError, match="no message has come yet"):
+        ring.keep(tmp_path / "a.mcap", 1.0)
+    ring.post([json_message(1)])
+    for wrong in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="more than 0 seconds"):
+            ring.keep(tmp_path / "a.mcap", wrong)
+    ring.close()
+    ring.close()
+    ring.post([json_message(2)])
+    assert ring.status.unkept == 1
+    with pytest.raises(RecordingError):
+        ring.keep(tmp_path / "a.mcap", 1.0)
+    assert [each.name for each in tmp_path.iterdir()] == ["ring"]
+
+
 def test_a_full_disk_makes_it_shorter_before_it_ends(tmp_path):
     told = []
     ring = FlightRecorder(

@@ -13,6 +13,7 @@ import pytest
 from nep.errors import RecordingError
 from nep.messages.clocks import OWN_CLOCK, ClockDifference, PublisherClock
 from nep.messages.message import Message, arrived, kind_of
+from nep.recordings.figures import MOST_LOST
 from nep.recordings.mcap_file import FileWriter
 from nep.recordings.reader import Recording
 from nep.recordings.repair import repair
@@ -228,6 +229,46 @@ def test_a_file_that_is_gone_is_told(tmp_path):
     assert "moved or deleted" in writer.close().problem
     writer.post([json_message(2)])  # is counted, and nothing else
     assert writer.status.unkept == 1
+
+
+def test_an_error_of_our_own_ends_it_with_a_sentence_and_what_came_before_is_kept(tmp_path, monkeypatch):
+    path, told = tmp_path / "a.mcap", []
+    writer = RecordingWriter(path, clock=TestClock(), limits=limits(), on_problem=told.append)
+    writer.post([json_message(1), json_message(2)])
+    assert writer.flush()
+    monkeypatch.setattr("nep.recordings.writer.encoding_of", lambda *_args, **_more: 1 // 0)
+    writer.post([json_message(3), json_message(4)])
+    until(lambda: writer.problem)
+    status = writer.close()
+    assert not writer.flush()
+    assert "error of nep's own, ZeroDivisionError" in status.problem
+    assert told == [status.problem]
+    assert status.message_count == 2
+    assert [each.seq for each in read(path)] == [1, 2]
+
+
+def test_numbers_at_random_end_no_recording(tmp_path):
+    path = tmp_path / "a.mcap"
+    messages = [json_message(seq, publisher=who) for who in range(3) for seq in (0, 2**64 - 1)]
+    with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
+        writer.post(messages)
+    assert (writer.status.problem, writer.status.message_count) == ("", 6)
+    with Recording(path) as recording:
+        assert recording.figures()["/odom"].lost == MOST_LOST
+
+
+def test_a_disk_that_is_full_from_the_beginning_has_no_empty_file(tmp_path, monkeypatch):
+    monkeypatch.setattr("nep.recordings.mcap_file.MAGIC", FailingBytes())
+    with pytest.raises(RecordingError, match="disk is full"):
+        RecordingWriter(tmp_path / "a.mcap")
+    assert not list(tmp_path.iterdir())
+
+
+class FailingBytes:
+    """What cannot be written."""
+
+    def __add__(self, _other: bytes) -> bytes:
+        raise OSError(errno.ENOSPC, "No space left on device")
 
 
 def test_no_file_is_written_over_and_no_folder_is_no_reason_for_a_traceback(tmp_path):

@@ -1,0 +1,154 @@
+"""Bookmarks of a recording: places in its time with a name, to find them again.
+
+Those that were made while it was recorded are its notes, and stand in the file. Those that a person makes
+later are in a small file beside it: the recording itself is never changed.
+"""
+
+from __future__ import annotations
+
+import os
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import orjson
+
+from nep.errors import RecordingError
+from nep.i18n import _
+from nep.recordings.reader import Recording
+from nep.recordings.writer import disk_sentence
+from nep.system.replace_file import replace_file
+
+__all__ = ["MOST_BOOKMARKS", "Bookmark", "Bookmarks"]
+
+MOST_BOOKMARKS = 10_000
+_MOST_BYTES = 10_000_000
+_MOST_LETTERS = 200
+
+
+@dataclass(frozen=True)
+class Bookmark:
+    """A place: ns since 1970, and its name, which may be "". `is_note`: it stands in the recording itself."""
+
+    at_ns: int
+    name: str
+    is_note: bool = False
+
+
+class Bookmarks:
+    """Those of one recording, by their times. Used by one thread; what is changed is on the disk at once."""
+
+    def __init__(self, recording: Recording) -> None:
+        """Read them. A damaged file has none, and is kept under another name as soon as one is made."""
+        self._recording = recording
+        self.path = recording.path.with_name(f"{recording.path.name}.bookmarks.json")
+        """Where those are that are made here."""
+        self._is_damaged = False
+        notes = []
+        for at_ns, value in recording.said("notes"):
+            text = value.get("text") if isinstance(value, dict) else None
+            if isinstance(text, str) and len(notes) < MOST_BOOKMARKS:
+                notes.append(Bookmark(at_ns, text[:_MOST_LETTERS], is_note=True))
+        self._notes = notes
+        self._made = self._read()
+        self._sort()
+
+    def _sort(self) -> None:
+        self._all = tuple(sorted((*self._notes, *self._made), key=_at_ns))
+
+    @property
+    def all(self) -> Sequence[Bookmark]:
+        """All of them, the earliest first."""
+        return self._all
+
+    def before(self, at_ns: int) -> Bookmark | None:
+        """The last one before a time."""
+        place = bisect_left(self._all, at_ns, key=_at_ns)
+        return self._all[place - 1] if place else None
+
+    def after(self, at_ns: int) -> Bookmark | None:
+        """The first one after a time."""
+        place = bisect_right(self._all, at_ns, key=_at_ns)
+        return self._all[place] if place < len(self._all) else None
+
+    # ---- changing them
+
+    def add(self, at_ns: int, name: str = "") -> Bookmark:
+        """Make one, within the recording's time. Raises `RecordingError` when it cannot be kept."""
+        if len(self._made) >= MOST_BOOKMARKS:
+            reason = _("it has {most} bookmarks, and there is no room for more").format(most=MOST_BOOKMARKS)
+            raise RecordingError(str(self._recording.path), reason)
+        at_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
+        made = Bookmark(at_ns, name[:_MOST_LETTERS])
+        self._keep([*self._made, made])
+        return made
+
+    def rename(self, bookmark: Bookmark, name: str) -> Bookmark:
+        """Give it another name. Raises `ValueError` for a note, and for one that is gone; as `add` does."""
+        new = replace(bookmark, name=name[:_MOST_LETTERS])
+        made = list(self._made)
+        made[self._place(bookmark)] = new
+        self._keep(made)
+        return new
+
+    def remove(self, bookmark: Bookmark) -> None:
+        """Take it away. Raises as `rename` does."""
+        made = list(self._made)
+        del made[self._place(bookmark)]
+        self._keep(made)
+
+    def _place(self, bookmark: Bookmark) -> int:
+        if bookmark not in self._made:
+            raise ValueError(_("a note of the recording cannot be changed"))
+        return self._made.index(bookmark)
+
+    # ---- on the disk
+
+    def _read(self) -> list[Bookmark]:
+        try:
+            if self.path.stat().st_size > _MOST_BYTES:
+                raise ValueError("size")
+            told = orjson.loads(self.path.read_bytes())
+            return [_bookmark(each) for each in told["bookmarks"]][:MOST_BOOKMARKS]
+        except FileNotFoundError:
+            return []
+        except (OSError, ValueError, TypeError, KeyError):
+            self._is_damaged = True
+            return []
+
+    def _keep(self, made: list[Bookmark]) -> None:
+        plain = {"bookmarks": [{"at_ns": each.at_ns, "name": each.name} for each in made]}
+        unfinished = self.path.with_name(f"{self.path.name}.part")
+        try:
+            text = orjson.dumps(plain, option=orjson.OPT_INDENT_2)
+        except TypeError as error:  # half a letter, which no file can hold
+            raise RecordingError(str(self.path), _("the name has letters that are none")) from error
+        try:
+            if self._is_damaged:
+                replace_file(self.path, self.path.with_name(f"{self.path.name}.damaged"))
+                self._is_damaged = False
+            with unfinished.open("wb") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            replace_file(unfinished, self.path)
+        except OSError as error:
+            with suppress(OSError):
+                unfinished.unlink(missing_ok=True)
+            raise disk_sentence(self.path, error) from error
+        self._made = made
+        self._sort()
+
+
+def _bookmark(plain: object) -> Bookmark:
+    """Raises `ValueError` for what is none."""
+    at_ns = plain.get("at_ns") if isinstance(plain, dict) else None
+    name = plain.get("name") if isinstance(plain, dict) else None
+    if type(at_ns) is not int or not 0 <= at_ns < 2**64 or not isinstance(name, str):
+        raise ValueError("no bookmark")
+    return Bookmark(at_ns, name[:_MOST_LETTERS])
+
+
+def _at_ns(bookmark: Bookmark) -> int:
+    return bookmark.at_ns
