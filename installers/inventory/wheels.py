@@ -14,8 +14,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import lz4  # type: ignore[import-untyped]
 import numpy as np
 import zmq
+import zstandard
 from packaging.utils import canonicalize_name
 from pynng import lib as nng  # type: ignore[import-untyped]
 
@@ -300,11 +302,24 @@ def _in_pyzmq(found: metadata.Distribution) -> Iterator[Part]:
     yield Part("libsodium", _first(found, rb"\0(1\.0\.\d\d)\0"), "ISC", sodium, "generic", "pyzmq")
 
 
+def _in_lz4(_found: metadata.Distribution) -> Iterator[Part]:
+    text = own_text("Copyright (C) 2011-2023, Yann Collet.", "BSD-2-Clause")
+    yield Part("lz4-library", lz4.library_version_string(), "BSD-2-Clause", text, "generic", "lz4")
+
+
+def _in_zstandard(_found: metadata.Distribution) -> Iterator[Part]:
+    version = ".".join(map(str, zstandard.ZSTD_VERSION))
+    text = own_text("Copyright (c) Meta Platforms, Inc. and affiliates. All rights reserved.", "BSD-3-Clause")
+    yield Part("zstd", version, "BSD-3-Clause", text, "generic", "zstandard")
+
+
 _KNOWN: Mapping[str, Callable[[metadata.Distribution], Iterator[Part]]] = {
     "iceoryx2": _in_iceoryx2,
+    "lz4": _in_lz4,
     "numpy": _in_numpy,
     "opencv-python-headless": _in_opencv,
     "pynng": _in_pynng,
     "pyside6-addons": _in_pyside,
     "pyzmq": _in_pyzmq,
+    "zstandard": _in_zstandard,
 }

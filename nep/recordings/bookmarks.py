@@ -45,7 +45,7 @@ class Bookmarks:
         self.path = recording.path.with_name(f"{recording.path.name}.bookmarks.json")
         """Where those are that are made here."""
         self._is_damaged = False
-        notes = []
+        notes: list[Bookmark] = []
         for at_ns, value in recording.said("notes"):
             text = value.get("text") if isinstance(value, dict) else None
             if isinstance(text, str) and len(notes) < MOST_BOOKMARKS:

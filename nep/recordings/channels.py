@@ -126,9 +126,8 @@ def _packed(extra: Mapping[str, Any]) -> bytes:
         return pack(extra)
     except ValueError:  # an extension or a number that cannot have come over a wire
         plain = {key: value for key, value in extra.items() if key != "extension"}
-        return pack({
-            key: max(-(2**63), min(value, _U64)) if type(value) is int else value for key, value in plain.items()
-        })  # fmt: skip
+        numbers = {key: max(-(2**63), min(each, _U64)) for key, each in plain.items() if type(each) is int}
+        return pack(plain | numbers)
 
 
 def _form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:

@@ -13,7 +13,8 @@ Orders come as lines of JSON on the standard input, and what happens is told as 
     {"event": "recording", "path": ...}      {"event": "ended", "path": ..., "status": {...}}
     {"event": "ring"}                        {"event": "ring_ended", "status": {...}}
     {"event": "kept", "path": ..., "message_count": ..., "duration_s": ..., "note": ...}
-    {"event": "figures", "recording": {...} or null, "ring": {...} or null}     once a second
+    {"event": "figures", "recording": {...} or null, "ring": {...} or null, "free_bytes": ...}
+                                             once a second
     {"event": "problem", "op": ..., "sentence": ..., "path": ...}
 
 What ends by itself, such as on a full disk, is told in the same way: its status has the "problem". When its
@@ -24,6 +25,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -213,7 +215,7 @@ class RecorderService:
     # ---- once a second
 
     def _tell_figures(self) -> None:
-        while not self._is_ending:
+        while True:
             self._look_now.wait(self._figures_s)
             self._look_now.clear()
             if self._is_ending:
@@ -225,6 +227,7 @@ class RecorderService:
                     "figures",
                     recording=None if recording is None else _plain(recording[0].status),
                     ring=None if ring is None else _plain(ring[0].status),
+                    free_bytes=None if recording is None else _free_bytes(recording[2]),
                 )
 
     def _end_what_failed(self) -> None:
@@ -233,6 +236,13 @@ class RecorderService:
                 self._guarded("stop", self._recording[2], lambda: self._stop({}))
             if self._ring is not None and self._ring[0].status.problem:
                 self._guarded("end_ring", "", lambda: self._end_ring({}))
+
+
+def _free_bytes(path: str) -> int | None:
+    """What is free on the disk of a file; None when that does not tell."""
+    with suppress(OSError):
+        return shutil.disk_usage(Path(path).parent).free
+    return None
 
 
 def _plain(status: RecordingStatus | RingStatus) -> dict[str, object]:

@@ -1,0 +1,456 @@
+"""The recorder's process, as the window sees it: begin, end, keep the last seconds, and what is wrong.
+
+The process is `nep.recordings.child`: what it does goes on while the window is busy, and it finishes a
+recording also when Studio has gone. Orders are written and answers read by threads; the window never waits.
+"""
+
+from __future__ import annotations
+
+import queue
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import IO, Protocol
+
+import orjson
+
+from app.core.alerts import Alerts
+from app.core.own_process import module_command
+from nep.i18n import _, ngettext
+from nep.masters.process import NO_CONSOLE
+from nep.recordings.figures import TopicFigures, read_figures
+
+LOW_DISK_BYTES = 1_000_000_000
+"""With less of it free on the disk a person is warned; with 200 MB the recorder ends by itself."""
+AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
+"""After how long a flight recorder whose process has gone is started again: twice as long each time."""
+END_WAIT_S = 2.0
+MOST_ORDERS = 1000
+MOST_KEEPING = 100
+_TAIL_BYTES = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderSaid:
+    """The process of this number told an event, as `nep.recordings.child` describes them."""
+
+    process: int
+    content: Mapping[str, object]
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderGone:
+    """The process of this number has ended, or could not be started; ``detail`` is what it said at last."""
+
+    process: int
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class RingChoice:
+    """What the flight recorder keeps, in which folder, and how much of it."""
+
+    folder: Path
+    seconds: float = 60.0
+    size_bytes: int = 2_000_000_000
+    topics: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderState:
+    """What the recorder does now.
+
+    ``phase``: "" nothing, "starting", "recording", "ending". ``lost``: messages that did not come, by their
+    publishers' numbers; ``unkept``: that came and could not be written. ``free_bytes``: on its disk, None
+    while that is not known. ``ring_s``, ``ring_bytes``: what could be kept, None while there is no flight
+    recorder. ``keeping``: files that are being made of it. ``last``: the file that was finished last.
+    """
+
+    phase: str = ""
+    path: Path | None = None
+    message_count: int = 0
+    size_bytes: int = 0
+    duration_s: float = 0.0
+    lost: int = 0
+    unkept: int = 0
+    free_bytes: int | None = None
+    topics: Mapping[str, TopicFigures] = field(default_factory=dict)
+    ring_s: float | None = None
+    ring_bytes: int = 0
+    keeping: tuple[Path, ...] = ()
+    last: Path | None = None
+
+
+class OrderLine(Protocol):
+    """A process that carries out orders."""
+
+    def order(self, content: Mapping[str, object]) -> bool:
+        """Give it an order; False when there is no room for more. Never waits."""
+
+    def close(self, wait_s: float) -> None:
+        """No more orders come; wait so long for its end. It finishes what it has in any case."""
+
+
+StartRecorder = Callable[[int, str, Callable[[object], object]], OrderLine]
+"""Starts the process of a number for a master's address; events are given to the last, from any thread."""
+
+
+class RecorderProcess:
+    """`nep.recordings.child` with its pipes. See `StartRecorder`."""
+
+    def __init__(self, number: int, address: str, post_event: Callable[[object], object]) -> None:
+        """Start it, in a thread; what happens is posted as `RecorderSaid`, and at last a `RecorderGone`."""
+        self._number, self._address, self._post_event = number, address, post_event
+        self._orders: queue.Queue[bytes | None] = queue.Queue(MOST_ORDERS)
+        self._has_ended = threading.Event()
+        threading.Thread(target=self._run, name="recorder-process", daemon=True).start()
+
+    def order(self, content: Mapping[str, object]) -> bool:
+        """See `OrderLine`."""
+        try:
+            self._orders.put_nowait(orjson.dumps(content) + b"\n")
+        except queue.Full:
+            return False
+        return True
+
+    def close(self, wait_s: float) -> None:
+        """See `OrderLine`."""
+        with suppress(queue.Full):  # then it does not read, and what it has is ended with this process
+            self._orders.put_nowait(None)
+        self._has_ended.wait(wait_s)
+
+    def _run(self) -> None:
+        detail = ""
+        try:
+            with tempfile.TemporaryFile() as log:
+                try:
+                    detail = self._talk(log)
+                finally:
+                    detail = detail or _tail(log)
+        except OSError as error:
+            detail = str(error)
+        finally:
+            self._has_ended.set()
+            self._post_event(RecorderGone(self._number, detail))
+
+    def _talk(self, log: IO[bytes]) -> str:
+        process = subprocess.Popen(
+            [*module_command("nep.recordings.child"), "--master", self._address],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            creationflags=NO_CONSOLE,
+            start_new_session=True,  # Ctrl+C in a terminal is Studio's, which ends it well
+        )
+        writer = threading.Thread(target=self._write, args=(process,), name="recorder-orders", daemon=True)
+        writer.start()
+        with process:
+            for line in process.stdout or ():
+                with suppress(orjson.JSONDecodeError):
+                    content = orjson.loads(line)
+                    if isinstance(content, dict):
+                        self._post_event(RecorderSaid(self._number, content))
+            code = process.wait()
+            with suppress(queue.Full):
+                self._orders.put_nowait(None)  # lets the thread end that waits for orders
+            writer.join(END_WAIT_S)
+        return "" if code == 0 else _tail(log) or _("it ended with the code {code}").format(code=code)
+
+    def _write(self, process: subprocess.Popen[bytes]) -> None:
+        if process.stdin is None:
+            return
+        with suppress(OSError):  # it has gone, which the other thread tells
+            while (line := self._orders.get()) is not None:
+                process.stdin.write(line)
+                process.stdin.flush()
+        with suppress(OSError):
+            process.stdin.close()
+
+
+def _tail(log: IO[bytes]) -> str:
+    """The last line of what it said."""
+    size = log.seek(0, 2)
+    log.seek(max(0, size - _TAIL_BYTES))
+    lines = log.read().decode("utf-8", "replace").split("\n")
+    return next((each.strip() for each in reversed(lines) if each.strip()), "")
+
+
+class RecorderClient:
+    """Gives orders to the recorder and knows what it does. One thread uses it (the window's)."""
+
+    def __init__(
+        self,
+        address: str,
+        alerts: Alerts,
+        post_event: Callable[[object], object],
+        *,
+        start: StartRecorder = RecorderProcess,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``post_event`` brings what the process's threads tell to `on_event`. Nothing is started yet."""
+        self._address, self._alerts, self._post_event = address, alerts, post_event
+        self._start, self._clock = start, clock
+        self._line: OrderLine | None = None
+        self._number = 0
+        self._ring: RingChoice | None = None
+        self._again_at, self._again_s = 0.0, AGAIN_S
+        self._on: Mapping[str, Callable[[Mapping[str, object]], None]] = {
+            "recording": self._on_recording,
+            "figures": self._on_figures,
+            "ended": self._on_ended,
+            "ring": self._on_ring,
+            "ring_ended": self._on_ring_ended,
+            "kept": self._on_kept,
+            "problem": self._on_problem,
+        }
+        self.state = RecorderState()
+        self.revision = 0
+        """Grows when the state has changed."""
+
+    # ---- what a person does
+
+    def record(
+        self, path: Path, topics: Sequence[str] = (), left_out: Sequence[str] = (), note: str = ""
+    ) -> bool:
+        """Begin a recording; all topics when none are named. False when one goes on already."""
+        if self.state.phase:
+            return False
+        self._alerts.resolve_all("recorder:")
+        self._set(replace(RecorderState(), phase="starting", path=path, **_kept_of(self.state)))
+        self._order(op="record", path=str(path), topics=list(topics), left_out=list(left_out), note=note)
+        return True
+
+    def stop(self) -> None:
+        """End the recording; it is whole when ``phase`` is "" again."""
+        if self.state.phase in {"starting", "recording"}:
+            self._set(replace(self.state, phase="ending"))
+            self._order(op="stop")
+
+    def note(self, text: str) -> None:
+        """Put a bookmark with these words into the recording."""
+        if self.state.phase == "recording":
+            self._order(op="note", text=text)
+
+    def follow_ring(self, choice: RingChoice | None) -> None:
+        """Have the flight recorder on with this choice, or off. It comes back by itself when it has gone."""
+        if choice == self._ring:
+            return
+        was_on, self._ring = self._ring is not None, choice
+        self._again_at, self._again_s = 0.0, AGAIN_S
+        self._alerts.resolve("recorder:ring")
+        if was_on and self._line is not None:
+            self._order(op="end_ring")
+        if choice is not None:
+            self._begin_ring(choice)
+
+    def keep(self, path: Path, seconds: float, note: str = "") -> bool:
+        """Make a recording of the last seconds; False without a flight recorder, or with too many at once."""
+        if self._ring is None or self._line is None or len(self.state.keeping) >= MOST_KEEPING:
+            return False
+        self._set(replace(self.state, keeping=(*self.state.keeping, path)))
+        self._order(op="keep", path=str(path), seconds=seconds, note=note)
+        return True
+
+    def check(self) -> None:
+        """Once a second: a flight recorder that is wanted and has gone is started again."""
+        if self._ring is not None and self._line is None and self._clock() >= self._again_at:
+            self._begin_ring(self._ring)
+
+    def close(self, wait_s: float = END_WAIT_S) -> None:
+        """Studio ends. The process finishes what it has, also beyond the time that is waited here."""
+        line, self._line = self._line, None
+        if line is not None:
+            line.close(wait_s)
+
+    # ---- what the process tells
+
+    def on_event(self, event: RecorderSaid | RecorderGone) -> None:
+        """Take over what a thread posted; what an earlier process says does not count any more."""
+        if event.process != self._number or self._line is None:
+            return
+        if isinstance(event, RecorderGone):
+            self._on_gone(event.detail)
+            return
+        told = self._on.get(str(event.content.get("event")))
+        if told is not None:
+            told(event.content)
+
+    def _on_recording(self, _content: Mapping[str, object]) -> None:
+        if self.state.phase == "starting":
+            self._set(replace(self.state, phase="recording"))
+
+    def _on_figures(self, content: Mapping[str, object]) -> None:
+        state = self.state
+        recording, ring = content.get("recording"), content.get("ring")
+        if isinstance(recording, Mapping) and state.phase:
+            state = replace(_with_status(state, recording), free_bytes=_whole(content.get("free_bytes")))
+        if isinstance(ring, Mapping) and self._ring is not None:
+            seconds = ring.get("seconds")
+            state = replace(
+                state,
+                ring_s=float(seconds) if isinstance(seconds, int | float) else 0.0,
+                ring_bytes=_whole(ring.get("size_bytes")) or 0,
+            )
+        self._set(state)
+        self._warn()
+
+    def _on_ended(self, content: Mapping[str, object]) -> None:
+        status = content.get("status")
+        status = status if isinstance(status, Mapping) else {}
+        path = self.state.path
+        self._set(replace(_with_status(self.state, status), phase="", last=path, free_bytes=None))
+        self._alerts.resolve("recorder:low")
+        problem = status.get("problem")
+        if isinstance(problem, str) and problem:
+            self._alerts.put(
+                "recorder:ended",
+                "error",
+                _("The recording has ended: {reason}.").format(reason=problem),
+                _said(path),
+            )
+
+    def _on_ring(self, _content: Mapping[str, object]) -> None:
+        self._again_s = AGAIN_S
+        self._alerts.resolve("recorder:ring")
+        if self._ring is not None:
+            self._set(replace(self.state, ring_s=self.state.ring_s or 0.0))
+
+    def _on_ring_ended(self, content: Mapping[str, object]) -> None:
+        status = content.get("status")
+        problem = status.get("problem") if isinstance(status, Mapping) else ""
+        if isinstance(problem, str) and problem:
+            self._ring = None  # a person switches it on again, when there is room
+            self._tell_of_ring(problem)
+        if self._ring is None:
+            self._set(replace(self.state, ring_s=None, ring_bytes=0))
+
+    def _on_kept(self, content: Mapping[str, object]) -> None:
+        path = _path(content)
+        self._set(replace(self._no_longer_keeping(path), last=path or self.state.last))
+
+    def _on_problem(self, content: Mapping[str, object]) -> None:
+        op, sentence = content.get("op"), str(content.get("sentence", ""))
+        if op == "record":
+            self._set(replace(self.state, phase="", path=None))
+            self._alerts.put("recorder:ended", "error", _("Nothing is recorded."), sentence)
+        elif op == "keep":
+            self._set(self._no_longer_keeping(_path(content)))
+            self._alerts.put("recorder:keep", "error", _("The last seconds could not be kept."), sentence)
+        elif op == "ring":
+            self._ring = None
+            self._set(replace(self.state, ring_s=None, ring_bytes=0))
+            self._tell_of_ring(sentence)
+        elif op == "stop":
+            self._set(replace(self.state, phase=""))
+            self._alerts.put("recorder:ended", "error", _("The recording could not be ended."), sentence)
+
+    def _on_gone(self, detail: str) -> None:
+        """The process has ended by itself."""
+        before, self._line = self.state, None
+        self._again_at = self._clock() + self._again_s
+        self._again_s = min(2 * self._again_s, AGAIN_AT_MOST_S)
+        self._set(replace(before, phase="", free_bytes=None, ring_s=None, ring_bytes=0, keeping=()))
+        if before.phase:
+            title = _("The recorder has ended; what came until a second before is kept.")
+            self._alerts.put("recorder:ended", "error", title, detail or _said(before.path))
+        if before.keeping:
+            title = _("The last seconds could not be kept.")
+            self._alerts.put("recorder:keep", "error", title, detail)
+        if self._ring is not None:
+            self._tell_of_ring(detail)
+
+    # ---- inside
+
+    def _tell_of_ring(self, reason: str) -> None:
+        title = _("The flight recorder is off: the last seconds can't be kept.")
+        self._alerts.put("recorder:ring", "warn", title, reason)
+
+    def _warn(self) -> None:
+        state = self.state
+        if state.phase and state.free_bytes is not None and state.free_bytes < LOW_DISK_BYTES:
+            self._alerts.put(
+                "recorder:low",
+                "warn",
+                _("The disk is nearly full."),
+                _("The recording ends by itself before it is; all that came is kept."),
+                count=0,
+            )
+        else:
+            self._alerts.resolve("recorder:low")
+        if state.phase and state.unkept:
+            title = ngettext(
+                "{count} message is not in the recording: the disk is too slow.",
+                "{count} messages are not in the recording: the disk is too slow.",
+                state.unkept,
+            )
+            self._alerts.put("recorder:unkept", "warn", title.format(count=state.unkept), count=0)
+
+    def _begin_ring(self, choice: RingChoice) -> None:
+        self._order(
+            op="ring",
+            folder=str(choice.folder),
+            seconds=choice.seconds,
+            size_bytes=choice.size_bytes,
+            topics=list(choice.topics),
+            left_out=list(choice.left_out),
+        )
+
+    def _order(self, **content: object) -> None:
+        if self._line is None:
+            self._number += 1
+            self._line = self._start(self._number, self._address, self._post_event)
+        if not self._line.order(content):
+            self._on_problem({**content, "sentence": _("the recorder does not answer")})
+
+    def _no_longer_keeping(self, path: Path | None) -> RecorderState:
+        return replace(self.state, keeping=tuple(each for each in self.state.keeping if each != path))
+
+    def _set(self, state: RecorderState) -> None:
+        if state != self.state:
+            self.state = state
+            self.revision += 1
+
+
+def _kept_of(state: RecorderState) -> dict[str, object]:
+    """What a new recording does not change."""
+    return {
+        "ring_s": state.ring_s,
+        "ring_bytes": state.ring_bytes,
+        "keeping": state.keeping,
+        "last": state.last,
+    }
+
+
+def _with_status(state: RecorderState, status: Mapping[str, object]) -> RecorderState:
+    plain = status.get("topics")
+    named = plain.items() if isinstance(plain, Mapping) else ()
+    topics = {str(topic): each for topic, told in named if (each := read_figures(told)) is not None}
+    duration = status.get("duration_s")
+    return replace(
+        state,
+        message_count=_whole(status.get("message_count")) or 0,
+        size_bytes=_whole(status.get("size_bytes")) or 0,
+        duration_s=float(duration) if isinstance(duration, int | float) else 0.0,
+        lost=sum(each.lost or 0 for each in topics.values()),
+        unkept=_whole(status.get("unkept")) or 0,
+        topics=topics,
+    )
+
+
+def _whole(value: object) -> int | None:
+    return value if type(value) is int and value >= 0 else None
+
+
+def _path(content: Mapping[str, object]) -> Path | None:
+    path = content.get("path")
+    return Path(path) if isinstance(path, str) and path else None
+
+
+def _said(path: Path | None) -> str:
+    return "" if path is None else str(path)

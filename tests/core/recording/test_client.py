@@ -1,0 +1,233 @@
+"""The recorder's process, as the window sees it: what it does, and what is wrong."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.alerts import Alerts
+from app.core.recording import client as client_module
+from app.core.recording.client import RecorderClient, RecorderGone, RecorderSaid, RingChoice
+from nep.recordings.reader import Recording
+from tests.nep.programs import eventually
+
+
+class OrdersOnly:
+    """Takes orders and does nothing."""
+
+    def __init__(self) -> None:
+        self.orders: list[Mapping[str, object]] = []
+        self.is_full = False
+        self.is_closed = False
+
+    def order(self, content: Mapping[str, object]) -> bool:
+        self.orders.append(content)
+        return not self.is_full
+
+    def close(self, wait_s: float) -> None:
+        self.is_closed = True
+
+
+class DrivenRecorder:
+    """A client whose processes do nothing but what a test says."""
+
+    def __init__(self) -> None:
+        self.alerts, self.lines, self.now = Alerts(), list[OrdersOnly](), 100.0
+        self.client = RecorderClient("here:1", self.alerts, print, start=self._start, clock=lambda: self.now)
+
+    def _start(self, number: int, address: str, _post: Callable[[object], object]) -> OrdersOnly:
+        assert (number, address) == (len(self.lines) + 1, "here:1")
+        self.lines.append(OrdersOnly())
+        return self.lines[-1]
+
+    def say(self, event: str, **content: object) -> None:
+        self.client.on_event(RecorderSaid(len(self.lines), {"event": event, **content}))
+
+    def end(self, detail: str = "") -> None:
+        self.client.on_event(RecorderGone(len(self.lines), detail))
+
+    def told(self) -> dict[str, tuple[str, str]]:
+        return {each.id: (each.severity, each.title) for each in self.alerts.active}
+
+
+def status(**more: object) -> dict[str, object]:
+    figures = {"received": 5, "lost": 2, "late": 0, "undecodable": 0, "unkept": 1, "size_bytes": 9}
+    topics = {"/a": figures, "/broken": {"received": "x"}}
+    plain = {"message_count": 4, "size_bytes": 900, "duration_s": 1.5, "unkept": 0, "problem": ""}
+    return {**plain, "topics": topics, **more}
+
+
+@pytest.fixture
+def made() -> DrivenRecorder:
+    return DrivenRecorder()
+
+
+def test_nothing_is_started_before_it_is_needed(made):
+    made.client.stop()
+    made.client.note("x")
+    made.client.check()
+    assert not made.client.keep(Path("a.mcap"), 60.0)
+    made.client.close()
+    assert not made.lines
+
+
+def test_a_recording_begins_tells_its_figures_and_ends(made):
+    client = made.client
+    assert client.record(Path("a.mcap"), ("/a",), ("/b",), "first")
+    assert not client.record(Path("b.mcap"))
+    assert made.lines[0].orders == [
+        {"op": "record", "path": "a.mcap", "topics": ["/a"], "left_out": ["/b"], "note": "first"}
+    ]
+    assert client.state.phase == "starting"
+    made.say("ready")
+    made.say("recording", path="a.mcap")
+    assert client.state.phase == "recording"
+    client.note("it fell")
+    made.say("figures", recording=status(), ring=None, free_bytes=5_000_000_000)
+    state = client.state
+    assert (state.message_count, state.size_bytes, state.duration_s, state.lost) == (4, 900, 1.5, 2)
+    assert list(state.topics) == ["/a"]
+    assert not made.told()
+    before = client.revision
+    made.say("figures", recording=status(), ring=None, free_bytes=5_000_000_000)
+    assert client.revision == before
+    client.stop()
+    client.stop()
+    assert [each["op"] for each in made.lines[0].orders] == ["record", "note", "stop"]
+    made.say("ended", path="a.mcap", status=status(message_count=7))
+    assert (client.state.phase, client.state.message_count, client.state.last) == ("", 7, Path("a.mcap"))
+    assert not made.told()
+    client.close()
+    assert made.lines[0].is_closed
+
+
+def test_alerts_of_the_disk_come_and_go(made):
+    made.client.record(Path("a.mcap"))
+    made.say("recording")
+    for _each in range(3):
+        made.say("figures", recording=status(unkept=3), ring=None, free_bytes=900_000_000)
+    assert made.told() == {
+        "recorder:low": ("warn", "The disk is nearly full."),
+        "recorder:unkept": ("warn", "3 messages are not in the recording: the disk is too slow."),
+    }
+    made.say("figures", recording=status(unkept=3), ring=None, free_bytes=2_000_000_000)
+    assert "recorder:low" not in made.told()
+    made.say("ended", path="a.mcap", status=status(problem="the disk is full; what came before is kept"))
+    assert made.told()["recorder:ended"] == (
+        "error",
+        "The recording has ended: the disk is full; what came before is kept.",
+    )
+    assert made.client.state.phase == ""
+    made.client.record(Path("b.mcap"))
+    assert not made.told()
+    made.say("problem", op="record", sentence="no such folder", path="b.mcap")
+    assert made.told()["recorder:ended"][1] == "Nothing is recorded."
+    assert made.client.record(Path("c.mcap"))
+
+
+def test_a_recorder_that_dies_is_told_and_another_one_takes_its_place(made):
+    made.client.record(Path("a.mcap"))
+    made.say("recording")
+    made.end("killed")
+    assert made.client.state.phase == ""
+    assert made.alerts.active[0].detail == "killed"
+    assert "what came until a second before is kept" in made.told()["recorder:ended"][1]
+    assert made.client.record(Path("b.mcap"))
+    made.client.on_event(RecorderSaid(1, {"event": "ended", "status": status()}))  # of the first one
+    assert (len(made.lines), made.client.state.phase) == (2, "starting")
+
+
+def test_the_flight_recorder_keeps_the_last_seconds_and_comes_back(made):
+    client, choice = made.client, RingChoice(Path("ring"), 60.0, 10**9, ("/a",))
+    client.follow_ring(choice)
+    client.follow_ring(choice)
+    assert [each["op"] for each in made.lines[0].orders] == ["ring"]
+    made.say("ring")
+    made.say("figures", recording=None, ring={"seconds": 41.0, "size_bytes": 7}, free_bytes=None)
+    assert (client.state.ring_s, client.state.ring_bytes) == (41.0, 7)
+    assert client.keep(Path("a.mcap"), 60.0, "it fell")
+    assert client.keep(Path("b.mcap"), 60.0)
+    made.say("kept", path="a.mcap")
+    made.say("problem", op="keep", path="b.mcap", sentence="the disk is full")
+    assert (client.state.keeping, client.state.last) == ((), Path("a.mcap"))
+    assert "recorder:keep" in made.told()
+    waits = []
+    for _each in range(6):
+        made.end("gone")
+        assert client.state.ring_s is None
+        assert "recorder:ring" in made.told()
+        started = made.now
+        while client._line is None:
+            made.now += 1.0
+            client.check()
+        waits.append(made.now - started)
+    assert waits == [2.0, 4.0, 8.0, 16.0, 30.0, 30.0]
+    made.say("ring")
+    assert "recorder:ring" not in made.told()
+    made.say("ring_ended", status={"problem": "the disk is full"})
+    assert client.state.ring_s is None
+    client.check()
+    assert len(made.lines) == 7
+    client.follow_ring(choice)
+    client.follow_ring(None)
+    assert [each["op"] for each in made.lines[-1].orders][-2:] == ["ring", "end_ring"]
+    made.say("ring_ended", status={"problem": ""})
+    assert not client.keep(Path("c.mcap"), 60.0)
+
+
+def test_a_recorder_that_takes_no_orders_and_events_of_any_kind_harm_nobody(made):
+    made.client.follow_ring(RingChoice(Path("ring")))
+    made.lines[0].is_full = True
+    assert made.client.record(Path("a.mcap"))
+    assert made.client.state.phase == ""
+    assert "recorder:ended" in made.told()
+    for event in ("ready", "recording", "figures", "ended", "ring", "ring_ended", "kept", "problem", "x"):
+        for value in (None, 5, "x", [], {}, -1, 2**70, {"problem": 7, "topics": [], "duration_s": "x"}):
+            made.say(event, recording=value, ring=value, status=value, path=value, op=value, free_bytes=value)
+    made.client.on_event(RecorderSaid(1, {}))
+
+
+def test_the_real_process_records_keeps_and_finishes(master, tmp_path):
+    events: queue.SimpleQueue[object] = queue.SimpleQueue()
+    client = RecorderClient(master.address, Alerts(), events.put)
+
+    def until(is_met: Callable[[], bool]) -> None:
+        def look() -> bool:
+            while not events.empty():
+                client.on_event(events.get())
+            return is_met()
+
+        eventually(look)
+
+    with nep.node("robot", master=master.address) as robot:
+        publisher = robot.new_pub("/a")
+        client.follow_ring(RingChoice(tmp_path / "ring"))
+        assert client.record(tmp_path / "a.mcap", ("/a",), note="first")
+        until(lambda: client.state.phase == "recording" and client.state.ring_s is not None)
+        for n in range(20):
+            publisher.publish({"n": n})
+        until(lambda: client.state.topics.get("/a") is not None and client.state.topics["/a"].received == 20)
+        assert client.keep(tmp_path / "kept.mcap", 60.0, "it fell")
+        until(lambda: not client.state.keeping)
+        client.close(30.0)  # as Studio's end: the recording is finished
+    assert not [each.title for each in client._alerts.active]
+    with Recording(tmp_path / "a.mcap") as recording, Recording(tmp_path / "kept.mcap") as kept:
+        assert recording.is_complete
+        assert [each.message.payload["n"] for each in recording.read()] == list(range(20))
+        assert (kept.words["note"], kept.topics["/a"].message_count) == ("it fell", 20)
+
+
+def test_a_process_that_cannot_be_started_is_told(monkeypatch):
+    events: queue.SimpleQueue[object] = queue.SimpleQueue()
+    monkeypatch.setattr(client_module, "module_command", lambda _module: ["/nothing/of/the/kind"])
+    client = RecorderClient("127.0.0.1:1", Alerts(), events.put)
+    client.record(Path("a.mcap"))
+    gone = events.get(timeout=30.0)
+    assert isinstance(gone, RecorderGone)
+    client.on_event(gone)
+    assert client.state.phase == ""
+    assert client._alerts.has("recorder:ended")

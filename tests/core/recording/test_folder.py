@@ -1,0 +1,86 @@
+"""The list of recordings knows what is in each file, and never keeps the window waiting."""
+
+from __future__ import annotations
+
+from datetime import datetime, timezone
+from pathlib import Path
+
+import pytest
+
+from app.core.recording import folder as folder_module
+from app.core.recording.folder import FolderLook, RecordingFolder, new_path, usual_folder
+from nep.recordings.repair import repair
+from tests.nep.programs import eventually
+from tests.nep.recordings.messages import json_message, record
+
+
+def look(folder: RecordingFolder, being_written: Path | None = None) -> FolderLook:
+    found: list[FolderLook] = []
+
+    def is_found() -> bool:
+        made = folder.take()
+        if made is not None:
+            found.append(made)
+        return made is not None
+
+    folder.look(being_written)
+    eventually(is_found)
+    return found[0]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    made = RecordingFolder(tmp_path)
+    yield made
+    made.close()
+
+
+def test_each_file_with_what_is_in_it(folder, tmp_path, monkeypatch):
+    assert look(folder) == FolderLook()
+    record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(5)]])
+    (tmp_path / "cut.MCAP").write_bytes((tmp_path / "a.mcap").read_bytes()[:-100])
+    repair(tmp_path / "cut.MCAP", tmp_path / "mended.mcap")
+    (tmp_path / "none.mcap").write_bytes(b"nothing of the kind")
+    (tmp_path / "notes.txt").write_bytes(b"")
+    (tmp_path / "folder.mcap").mkdir()
+    found = {each.path.name: each for each in look(folder).files}
+    assert sorted(found) == ["a.mcap", "cut.MCAP", "mended.mcap", "none.mcap"]
+    whole = found["a.mcap"]
+    assert (whole.message_count, whole.topics, whole.is_complete, whole.problem) == (5, ("/odom",), True, "")
+    assert whole.size_bytes == whole.path.stat().st_size
+    assert not found["cut.MCAP"].is_complete
+    assert found["cut.MCAP"].message_count == 5
+    assert found["mended.mcap"].is_repaired
+    assert "no MCAP file" in found["none.mcap"].problem
+    monkeypatch.setattr(folder_module, "read_facts", pytest.fail)
+    assert {each.path.name: each for each in look(folder).files} == found  # nothing is opened again
+
+
+def test_what_is_being_written_is_not_opened_and_many_come_bit_by_bit(folder, tmp_path, monkeypatch):
+    for name in "abc":
+        record(tmp_path / f"{name}.mcap", [[json_message(1)]])
+    monkeypatch.setattr(folder_module, "AT_ONCE", 1)
+    counts = []
+    for _each in range(3):
+        found = look(folder, tmp_path / "b.mcap")
+        counts.append((sum(each.is_read for each in found.files), found.is_whole))
+    assert counts == [(1, False), (2, True), (2, True)]
+    monkeypatch.setattr(folder_module, "MOST_FILES", 2)
+    found = look(folder)
+    assert (len(found.files), found.left_out) == (2, 1)
+
+
+def test_a_folder_that_is_not_there_is_a_sentence(tmp_path):
+    folder = RecordingFolder(tmp_path / "nowhere")
+    assert "no such file" in look(folder).problem or look(folder).problem
+    folder.close()
+
+
+def test_names_are_new_ones(tmp_path, monkeypatch):
+    now = datetime(2026, 11, 26, 22, 1, 5, tzinfo=timezone.utc)
+    first = new_path(tmp_path, now)
+    assert first.name == "recording-2026-11-26-22-01-05.mcap"
+    first.touch()
+    assert new_path(tmp_path, now).name == "recording-2026-11-26-22-01-05-2.mcap"
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    assert usual_folder() == tmp_path / "Recordings"
