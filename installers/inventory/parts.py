@@ -60,6 +60,10 @@ class Part:
     authors: str = ""
 
 
+RIGHTS = {"mcap": ("Copyright (c) Foxglove Technologies Inc.", "MIT")}
+"""Distributions whose wheels have no licence text: who has the rights, and the text that is meant."""
+
+
 def own_text(copyright_lines: str, *licences: str) -> Texts:
     """The text of a part that comes without: who has the rights, and the standard texts of `LICENCES`.
 
@@ -106,6 +110,8 @@ def _licence(found: metadata.Distribution) -> str:
 
 def _common_text(licence: str, name: str) -> Texts:
     """For a distribution that comes without: the text, if it is one that we have."""
+    if name in RIGHTS:
+        return own_text(*RIGHTS[name])
     if name in QT_WHEELS or "apache" not in licence.lower():
         return ()
     text = LICENCES / "Apache-2.0.txt"

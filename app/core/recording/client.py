@@ -222,7 +222,17 @@ class RecorderClient:
         if self.state.phase:
             return False
         self._alerts.resolve_all("recorder:")
-        self._set(replace(RecorderState(), phase="starting", path=path, **_kept_of(self.state)))
+        old = self.state
+        self._set(
+            RecorderState(
+                "starting",
+                path,
+                ring_s=old.ring_s,
+                ring_bytes=old.ring_bytes,
+                keeping=old.keeping,
+                last=old.last,
+            )
+        )
         self._order(op="record", path=str(path), topics=list(topics), left_out=list(left_out), note=note)
         return True
 
@@ -415,16 +425,6 @@ class RecorderClient:
         if state != self.state:
             self.state = state
             self.revision += 1
-
-
-def _kept_of(state: RecorderState) -> dict[str, object]:
-    """What a new recording does not change."""
-    return {
-        "ring_s": state.ring_s,
-        "ring_bytes": state.ring_bytes,
-        "keeping": state.keeping,
-        "last": state.last,
-    }
 
 
 def _with_status(state: RecorderState, status: Mapping[str, object]) -> RecorderState:
