@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -207,10 +208,15 @@ def test_a_disk_that_is_really_full(tmp_path):
     assert is_in_order
 
 
-def test_it_ends_by_itself_and_whole_before_the_disk_is_full(tmp_path):
-    path = tmp_path / "a.mcap"
-    writer = RecordingWriter(path, clock=TestClock(), limits=limits(least_free_bytes=2**62, figures_s=0.001))
+def test_it_ends_by_itself_and_whole_before_the_disk_is_full(tmp_path, monkeypatch):
+    path, free = tmp_path / "a.mcap", [1000]
+    monkeypatch.setattr(
+        "nep.recordings.writer.shutil.disk_usage", lambda _folder: SimpleNamespace(free=free[0])
+    )
+    writer = RecordingWriter(path, clock=TestClock(), limits=limits(least_free_bytes=1000, figures_s=0.001))
     writer.post([json_message(1)])
+    assert writer.flush()
+    free[0] = 999
     until(lambda: writer.problem)
     assert "disk is full" in writer.close().problem
     assert McapDoctor(path).problems == []
