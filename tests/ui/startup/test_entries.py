@@ -61,6 +61,12 @@ def test_only_our_own_processes_are_started(capsys: pytest.CaptureFixture[str]) 
     assert "no process 'os'" in capsys.readouterr().err
 
 
+def test_the_recorder_of_a_frozen_build_is_a_process_of_its_own() -> None:
+    done = python("-m", "app", "--module", "nep.recordings.child", "--help")
+    assert done.returncode == 0, done.stderr
+    assert "--master" in done.stdout
+
+
 def test_a_module_gets_its_options() -> None:
     done = python("-m", "app", "--module", "nep", "--help")
     assert done.returncode == 0
