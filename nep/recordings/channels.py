@@ -202,6 +202,8 @@ def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
     schema = ("", "", b"")
     if form == "json":
         schema = (kind.msg_type, "jsonschema", schema_of(kind.msg_type))
+    elif form == "msgpack":  # of anything; `mcap doctor` calls it an error when a channel has no schema
+        schema = (kind.msg_type, "jsonschema", b"{}")
     elif form in _DATA_FIELD:
         name = _SCHEMAS.get(form, "nep.Bytes")
         schema = (name, "protobuf", descriptor_set(name))

@@ -340,8 +340,8 @@ class Recording:
         """The messages of each channel in a chunk; it is read where its indexes are not there."""
         chunk = self._chunks[number]
         counts = chunk.counts
-        missing = set(chunk.channels) - counts.keys()
-        if missing:
+        if len(counts) < chunk.channel_count:
+            missing = set(chunk.channels) - counts.keys()
             for each in self._messages(number):
                 if each.channel in missing:
                     counts[each.channel] = counts.get(each.channel, 0) + 1
@@ -407,6 +407,10 @@ def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], c
     (start, end), (chunk_start, chunk_end), buckets = whole, chunk, len(counts)
     first = (chunk_start - start) * buckets // (end - start)
     last = (chunk_end - start) * buckets // (end - start)
+    if first == last:
+        if 0 <= first < buckets:
+            counts[first] += count
+        return
 
     def until(at: int) -> int:
         """How many come before the end of a part."""

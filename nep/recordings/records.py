@@ -346,14 +346,20 @@ class ChunkInfo:
 
         Channels without an index are missing: to count theirs the chunk must be read.
         """
-        end = self.offset + self.length + self.index_bytes
+        after = self.offset + self.length
+        end = after + self.index_bytes
         counts = {}
         pairs = sorted(_OFFSET.iter_unpack(self.packed_offsets), key=_second, reverse=True)
         for channel, offset in pairs:
-            if self.has_index_at(offset):
+            if after <= offset < end:
                 counts[channel] = max(0, end - offset - _INDEX_HEAD) // _ENTRY.size
                 end = offset
         return counts
+
+    @property
+    def channel_count(self) -> int:
+        """How many channels have messages in it."""
+        return len(self.packed_offsets) // _OFFSET.size
 
 
 _INDEX_HEAD = HEAD_BYTES + _ENTRIES.size

@@ -166,6 +166,8 @@ class McapDoctor:
         self._say(len(opcodes) != len(set(opcodes)), "records of the summary are not grouped")
         self._say(self.channels.keys() != self.summary_channels.keys(), "the summary lacks a channel")
         self._say(self.schemas.keys() != self.summary_schemas.keys(), "the summary lacks a schema")
+        used = {self.channels[each].schema_id for each in self.counts if each in self.channels}
+        self._say(used - self.summary_schemas.keys(), "a channel with messages has no schema in the summary")
         self._say(len(self.statistics) != 1, "not one statistics")
         self._say(
             sorted(each.chunk_start_offset for each in self.indexes) != sorted(self.chunks), "chunk indexes"
