@@ -59,6 +59,12 @@ class Definitions:
     def __init__(self) -> None:
         self.channels: dict[int, ChannelDefinition] = {}
         self._schemas: dict[int, Schema] = {}
+        self._waiting: dict[int, list[Channel]] = {}
+
+    @property
+    def lacks_schemas(self) -> bool:
+        """Whether there are channels whose schemas have not been told yet."""
+        return bool(self._waiting)
 
     def add(self, opcode: int, content: bytes | memoryview) -> None:
         """A record of a schema or channel; others, and damaged ones, are passed over."""
@@ -66,11 +72,15 @@ class Definitions:
             if opcode == Opcode.SCHEMA:
                 schema = read_record("Schema", content)
                 self._schemas[schema.id] = schema
+                for channel in self._waiting.pop(schema.id, ()):
+                    self._add_channel(channel)
             elif opcode == Opcode.CHANNEL:
                 self._add_channel(read_record("Channel", content))
 
     def _add_channel(self, channel: Channel) -> None:
         schema = self._schemas.get(channel.schema_id)
+        if schema is None and channel.schema_id:
+            self._waiting.setdefault(channel.schema_id, []).append(channel)
         told = ("", "", b"") if schema is None else (schema.name, schema.encoding, schema.data)
         self.channels[channel.id] = ChannelDefinition(
             channel.topic, channel.message_encoding, *told, tuple(channel.metadata.items())
@@ -213,6 +223,9 @@ def _of_records(file: BinaryIO, size: int) -> FileIndex:
         if place.opcode == Opcode.DATA_END:
             break
     scanned.end_chunk()
+    for chunk in index.chunks:  # other programs put a schema into any chunk before that of its channel
+        if index.definitions.lacks_schemas:
+            _indexed_by_reading(file, chunk, index.definitions)
     index.chunks.sort(key=lambda each: each.start_ns)
     return index
 
@@ -278,7 +291,7 @@ def _indexed_by_reading(file: BinaryIO, info: ChunkInfo, definitions: Definition
         chunk = read_chunk(file, info)
     except ValueError:
         return info
-    channels = dict.fromkeys(info.channels, 0) | info.index_offsets
+    channels = info.index_offsets
     for record in messages_in(chunk):
         if isinstance(record, RawMessage):
             channels.setdefault(record.channel, 0)
