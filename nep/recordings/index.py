@@ -59,7 +59,8 @@ class Definitions:
     def __init__(self) -> None:
         self.channels: dict[int, ChannelDefinition] = {}
         self._schemas: dict[int, Schema] = {}
-        self._waiting: dict[int, list[Channel]] = {}
+        self._waiting: dict[int, dict[int, Channel]] = {}
+        """By the schema that they need, and their own number."""
 
     @property
     def lacks_schemas(self) -> bool:
@@ -72,7 +73,7 @@ class Definitions:
             if opcode == Opcode.SCHEMA:
                 schema = read_record("Schema", content)
                 self._schemas[schema.id] = schema
-                for channel in self._waiting.pop(schema.id, ()):
+                for channel in self._waiting.pop(schema.id, {}).values():
                     self._add_channel(channel)
             elif opcode == Opcode.CHANNEL:
                 self._add_channel(read_record("Channel", content))
@@ -80,7 +81,7 @@ class Definitions:
     def _add_channel(self, channel: Channel) -> None:
         schema = self._schemas.get(channel.schema_id)
         if schema is None and channel.schema_id:
-            self._waiting.setdefault(channel.schema_id, []).append(channel)
+            self._waiting.setdefault(channel.schema_id, {})[channel.id] = channel
         told = ("", "", b"") if schema is None else (schema.name, schema.encoding, schema.data)
         self.channels[channel.id] = ChannelDefinition(
             channel.topic, channel.message_encoding, *told, tuple(channel.metadata.items())
