@@ -8,6 +8,10 @@ os.environ["OPENCV_VIDEOIO_PRIORITY_FFMPEG"] = (
 
 import sys
 
+from nep.system.frozen_code import hold_code
+
+hold_code()  # before anything is imported late
+
 from app.__main__ import main
 
 sys.exit(main())

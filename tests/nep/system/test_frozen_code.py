@@ -1,0 +1,89 @@
+"""A frozen program whose file is replaced or removed while it runs: its modules are still its own."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from nep.system.frozen_code import LOADER, hold_code
+
+writers = pytest.importorskip("PyInstaller.archive.writers")
+reader = pytest.importorskip("PyInstaller.loader.pyimod01_archive")
+
+
+def frozen(path: Path, *names: str) -> Path:
+    """A file with modules in it, as PyInstaller makes it; each says its name and the file's first name."""
+    code = {name: compile(f"made = '{names[0]} {name}'", name, "exec") for name in names}
+    entries = [(name, str(path), "PYMODULE") for name in names]
+    writers.ZlibArchiveWriter(str(path), entries, code_dict=code)
+    return path
+
+
+@pytest.fixture
+def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """A program that runs, and the reader of its modules."""
+    file = frozen(tmp_path / "program", "old", "late")
+    importers = SimpleNamespace(pyz_archive=reader.ZlibArchiveReader(str(file)))
+    monkeypatch.setitem(sys.modules, LOADER, importers)
+    return SimpleNamespace(file=file, archive=importers.pyz_archive)
+
+
+def made_by(archive, name: str) -> str:
+    found: dict[str, str] = {}
+    exec(archive.extract(name), found)
+    return found["made"]
+
+
+@pytest.fixture
+def held(program: SimpleNamespace):
+    """The program, holding its code."""
+    assert hold_code()
+    yield program
+    os.close(int(program.archive._filename.rpartition("/")[2]))
+
+
+only_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Linux alone can hold it")
+
+
+@only_linux
+def test_an_update_leaves_the_modules_of_the_program_that_runs(held, tmp_path: Path) -> None:
+    names = (*(f"only_in_the_new_{number}" for number in range(50)), "late")
+    frozen(tmp_path / "next", *names).replace(held.file)
+    assert made_by(held.archive, "late") == "old late"
+    assert made_by(held.archive, "old") == "old old"
+
+
+@only_linux
+def test_a_program_that_was_removed_still_has_its_modules(held) -> None:
+    held.file.unlink()
+    assert made_by(held.archive, "late") == "old late"
+
+
+def test_without_it_a_click_would_have_ended_the_program(program) -> None:
+    program.file.unlink()
+    with pytest.raises(SystemExit):
+        program.archive.extract("late")
+
+
+def test_a_program_that_is_gone_already_is_left_as_it_is(program) -> None:
+    program.file.unlink()
+    assert not hold_code()
+    assert program.archive._filename == str(program.file)
+
+
+def test_from_source_there_is_nothing_to_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, LOADER, raising=False)
+    assert not hold_code()
+
+
+@only_linux
+def test_both_programs_of_a_package_hold_their_code() -> None:
+    entries = Path(__file__).resolve().parents[3] / "installers" / "entries"
+    for entry in sorted(entries.glob("*_program.py")):
+        lines = entry.read_text("utf-8").splitlines()
+        begun = next(number for number, line in enumerate(lines) if "import main" in line)
+        assert any(line.startswith("hold_code()") for line in lines[:begun]), entry.name
