@@ -71,6 +71,14 @@ def test_saving_is_said_with_its_time(session: fakes.Session) -> None:
     assert facts(session).saved()[1] == "Not saved, kept safe"
 
 
+def test_work_that_the_disk_does_not_take_is_not_called_safe(session: fakes.Session) -> None:
+    session.document.dirty = True
+    session.document._journal_error = "unsaved work can't be kept (No space left on device); save the file now"
+    assert facts(session).saved() == ("circle-x", "Not saved, not kept", "error")
+    session.document._journal_error = None
+    assert facts(session).saved()[1] == "Not saved, kept safe"
+
+
 def test_traffic_counts_live_topics_only(session: fakes.Session) -> None:
     session.traffic.messages_per_s = 268.6
     assert facts(session).traffic()[1] == "7 nodes, 12 topics, 269 messages/s"

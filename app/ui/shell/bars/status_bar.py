@@ -78,8 +78,10 @@ class StatusFacts:
         return "circle-dashed", words.format(robot=name, count=count), "off"
 
     def saved(self) -> Fact:
-        """When the behaviour was saved, or that it is not saved yet."""
+        """When the behaviour was saved, or that it is not saved yet, and whether it is kept all the same."""
         document = self._session.document
+        if document.dirty and document.journal_error is not None:
+            return "circle-x", _("Not saved, not kept"), "error"
         if document.dirty:
             words = _("Not saved, kept safe") if document.path is None else _("Changes kept safe")
             return "save", words, None
