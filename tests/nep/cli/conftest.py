@@ -6,6 +6,7 @@ What a process of its own shows (both streams as pipes, exit codes, Ctrl+C, term
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
@@ -33,10 +34,14 @@ def type_in(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) 
     def typed(*words: str) -> Typed:
         monkeypatch.setattr("sys.argv", ["nep", *words])
         before = signal.getsignal(signal.SIGTERM)  # some commands have a handler of their own
+        environment = dict(os.environ)  # where the master is, say, is told to what a command starts
         try:
             code = run()
         finally:
             signal.signal(signal.SIGTERM, before)
+            for name in os.environ.keys() - environment.keys():
+                del os.environ[name]
+            os.environ.update(environment)
         return Typed(code, *capfd.readouterr())
 
     return typed

@@ -125,6 +125,12 @@ def test_the_master_can_be_named_before_and_behind_the_command(running_master, m
     )
 
 
+def test_a_command_that_is_typed_here_leaves_the_environment_to_others(type_in):
+    before = dict(os.environ)
+    assert type_in("--master", "nosuchhost.invalid:7781", "topic", "list").returncode == 1
+    assert dict(os.environ) == before
+
+
 def test_a_name_that_no_computer_has_is_the_right_sentence(type_in):
     done = type_in("--master", "nosuchhost.invalid:7781", "topic", "list")
     assert done.returncode == 1

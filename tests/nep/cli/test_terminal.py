@@ -128,12 +128,13 @@ def test_a_record_moves_no_cursor() -> None:
     assert LineFormatter("%(name)s: %(message)s").format(record) == "n\\x1b[2J: two\nlines \\x9b31m \\u202ex"
 
 
-def master_writing_to(writing: int, state: Path) -> tuple[subprocess.Popen[bytes], str]:
+def master_writing_to(writing: int, state: Path, reading: int) -> tuple[subprocess.Popen[bytes], str]:
     """`nep master` in a process of its own, which serves, and where.
 
-    On another port when somebody else took the one that was free a moment ago.
+    On another port when somebody else took the one that was free a moment ago. What one that ended has
+    said is read from `reading`.
     """
-    ended: list[int | None] = []
+    ended: list[str] = []
     while len(ended) < 5:
         with nep.master("127.0.0.1:0", learn_s=0.0) as free:
             address = free.address
@@ -152,7 +153,7 @@ def master_writing_to(writing: int, state: Path) -> tuple[subprocess.Popen[bytes
             raise
         if process.poll() is None:
             return process, address
-        ended.append(process.returncode)
+        ended.append(f"{process.returncode}: {os.read(reading, 4096).decode()}")
     raise AssertionError(f"the master ended each time: {ended}")
 
 
@@ -160,7 +161,7 @@ def master_writing_to(writing: int, state: Path) -> tuple[subprocess.Popen[bytes
 def test_a_master_whose_terminal_is_blocked_serves_on_and_ends(tmp_path: Path) -> None:
     reading, writing = os.pipe()
     fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
-    process, address = master_writing_to(writing, tmp_path)
+    process, address = master_writing_to(writing, tmp_path, reading)
     os.close(writing)
     try:
         with nep.node("loud", master=address) as node:

@@ -73,7 +73,9 @@ def test_saving_is_said_with_its_time(session: fakes.Session) -> None:
 
 def test_work_that_the_disk_does_not_take_is_not_called_safe(session: fakes.Session) -> None:
     session.document.dirty = True
-    session.document._journal_error = "unsaved work can't be kept (No space left on device); save the file now"
+    session.document._journal_error = (
+        "unsaved work can't be kept (No space left on device); save the file now"
+    )
     assert facts(session).saved() == ("circle-x", "Not saved, not kept", "error")
     session.document._journal_error = None
     assert facts(session).saved()[1] == "Not saved, kept safe"
