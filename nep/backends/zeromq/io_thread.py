@@ -92,6 +92,8 @@ class IoThread:
         self._served: set[Served] = set()
         self._polled: dict[Served, tuple[int, int]] = {}
         """The descriptor of each, and what it is polled for."""
+        self._doubtful: set[Served] = set()
+        """Those that may be what could not be polled: each is tried alone before it is polled with the others."""
         self._due: dict[Served, float] = {}
         self._heap: list[tuple[float, int, Served]] = []
         self._numbers = itertools.count()
@@ -192,6 +194,7 @@ class IoThread:
                 _logger.exception("the sockets of this program cannot be polled; trying again")
                 self._pause.wait(_RETRY_S)
                 continue
+            self._doubtful = set(self._served)
             for served in tuple(self._served):
                 self._serve(served)
             return
@@ -223,6 +226,7 @@ class IoThread:
         except (OSError, ValueError, KeyError) as error:
             _logger.error("a socket cannot be polled, it is served each second: %s", error)  # noqa: TRY400
             self._polled.pop(served, None)
+            self._doubtful.add(served)
             rest = Rest(is_quiet=True, due=now + _RETRY_S)
         if rest.due is None:
             self._due.pop(served, None)
@@ -247,10 +251,22 @@ class IoThread:
             heapq.heappop(self._heap)
         return max(0.0, self._heap[0][0] - time.monotonic()) if self._heap else None
 
+    def _try_alone(self, served: Served, wanted: int) -> None:
+        """Raises OSError or ValueError when it can't be polled.
+
+        Windows' select says so only while it polls, and then serves none of all sockets.
+        """
+        with self._new_selector() as trial:
+            trial.register(served.fd, wanted)
+            trial.select(0)
+        self._doubtful.discard(served)
+
     def _poll(self, served: Served, wanted: int) -> None:
         polled = self._polled.get(served)
         if polled is None:
             if wanted:
+                if served in self._doubtful:
+                    self._try_alone(served, wanted)
                 self._selector.register(served.fd, wanted, (served,))
                 self._polled[served] = (served.fd, wanted)
         elif not wanted:
@@ -262,6 +278,7 @@ class IoThread:
 
     def _forget(self, served: Served) -> None:
         self._served.discard(served)
+        self._doubtful.discard(served)
         self._due.pop(served, None)
         if served in self._polled:
             with suppress(OSError, ValueError, KeyError):  # the poll is closed, or was begun anew without it

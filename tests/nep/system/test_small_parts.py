@@ -365,10 +365,12 @@ def test_the_io_thread_outlives_errors_of_its_poll(caplog: pytest.LogCaptureFixt
         each.close()
 
 
+# The second is what Windows has.
+@pytest.mark.parametrize("poller", [selectors.DefaultSelector, selectors.SelectSelector])
 def test_what_cannot_be_polled_is_served_each_second_and_the_others_at_once(
-    caplog: pytest.LogCaptureFixture,
+    caplog: pytest.LogCaptureFixture, poller: type[selectors.BaseSelector]
 ) -> None:
-    io = IoThread("nep-io-test")
+    io = IoThread("nep-io-test", poller)
     io.start()
     bad, fine = Bell([]), Bell([])
     bad.fd = 1_000_000
