@@ -93,7 +93,7 @@ class IoThread:
         self._polled: dict[Served, tuple[int, int]] = {}
         """The descriptor of each, and what it is polled for."""
         self._doubtful: set[Served] = set()
-        """Those that may be what could not be polled: each is tried alone before it is polled with the others."""
+        """Those that may be what could not be polled: tried alone before they are polled with the others."""
         self._due: dict[Served, float] = {}
         self._heap: list[tuple[float, int, Served]] = []
         self._numbers = itertools.count()
