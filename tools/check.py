@@ -53,7 +53,7 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Options of pytest-xdist: two processes more than processors, six at most; tests/conftest.py groups tests.
+    """Options of pytest-xdist: two processes more than processors, six at most (files: tests/conftest.py).
 
     Most tests wait for processes and windows: with one each processor, a third of the time is idle, with one
     more still a seventh.
