@@ -53,12 +53,12 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Options of pytest-xdist: two processes more than processors, six at most (files: tests/conftest.py).
+    """Options of pytest-xdist: one process more than processors, six at most; tests/conftest.py groups tests.
 
-    Most tests wait for processes and windows: with one each processor, a third of the time is idle, with one
-    more still a seventh.
+    Most tests wait for processes and windows: with one each processor, a third of the time is idle. With two
+    more everything took a third longer.
     """
-    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 2)
+    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 1)
     return ("-n", str(workers), "--dist", "loadfile")
 
 

@@ -155,7 +155,9 @@ def test_a_node_whose_computer_gets_another_address_is_reached_there(far, master
         pub.publish("on the first address")
         assert sub.listen(True, timeout_s=WAIT_S) == (True, "on the first address")
         address[0] = "127.0.0.4"
-        wait_for(near, lambda view: "127.0.0.4" in str(view.topics["t"].publishers[0].endpoints))
+        wait_for(
+            near, lambda view: "127.0.0.4" in str([each.endpoints for each in view.topics["t"].publishers])
+        )
         eventually(lambda: pub.publish("is it there?") is None and sub.listen(timeout_s=0.1)[0])
         pub.publish("on the second")
         heard = iter(lambda: sub.receive(WAIT_S), None)
