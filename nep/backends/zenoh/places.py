@@ -32,6 +32,11 @@ _ENDPOINT = re.compile(r"(?:tcp|tls|quic|udp|ws|unixsock-stream|serial|vsock)/[^
 _SECURED = re.compile(r"\b(?:tls|quic)/")
 _FILES = (".json5", ".json", ".yaml", ".yml")
 _DEFAULT_LISTENS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]}
+_LARGE_WAITS_S = 1.0
+"""So long in all the parts of a large message may wait for room, before it is dropped and counts as lost.
+
+Zenoh's own 50 ms are over before 8 MB have gone through a link of 100 MB/s, or on a busy computer.
+"""
 _LONGEST_S = 10**6
 _SESSION_FILES = 16
 _PEER_FILES = 2
@@ -158,7 +163,9 @@ def _open_as_told(path: Path) -> Any:  # noqa: ANN401 - zenoh's
 
 
 def _config(told: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh's
-    return library().Config.from_json5(json.dumps(told))
+    drop = {"max_wait_before_drop_fragments": round(1e6 * _LARGE_WAITS_S)}
+    queue = {"queue": {"congestion_control": {"drop": drop}}}
+    return library().Config.from_json5(json.dumps({**told, "transport": {"link": {"tx": queue}}}))
 
 
 def _config_of(path: Path) -> Any:  # noqa: ANN401 - zenoh's
