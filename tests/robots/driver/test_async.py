@@ -65,6 +65,7 @@ class Drone:
     @action("stubborn", "Movement", "move")
     async def stubborn(self, call: Call) -> None:
         """Does not listen."""
+        self.events.append("begun")
         while not self.let_go.is_set():
             try:
                 await pause(0.005)
@@ -178,7 +179,7 @@ def test_a_wait_that_would_hold_all_others_up_says_what_to_use(drone):
 def test_one_that_does_not_listen_is_named_until_it_ends(drone):
     body, ears, clock = drone
     ears.invoke("1", "stubborn")
-    eventually(lambda: "running" in ears.states("1"))
+    eventually(lambda: "begun" in body.events)  # "running" is told before; who has not begun need not listen
     ears.command(id="s", op="stop")
     eventually(lambda: "told" in body.events and "stopped" in body.events)
     clock.advance(STOP_ANSWER_S + 0.01)
