@@ -74,7 +74,7 @@ def record(
 
     Topics that appear later are recorded too. A pattern means all topics that match it: * is any letters
     between slashes, ? is one letter, ** is any parts or none. Put it into quotes, for the shell has patterns
-    too. The file opens in Foxglove, Lichtblick and NEP Studio; how many messages were lost stands in it.
+    too. The file is MCAP, the format of Foxglove and Lichtblick; how many messages were lost stands in it.
     """
     if duration_s is not None and not 0.0 < duration_s < 1e9:
         raise typer.BadParameter(
