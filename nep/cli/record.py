@@ -144,15 +144,16 @@ def _line(status: writer.RecordingStatus) -> str:
 
 
 def _say_end(path: Path, status: writer.RecordingStatus) -> None:
+    topics = ngettext("{count} topic", "{count} topics", len(status.topics))
     said = ngettext(
-        "{count} message of {topics} topics in {time}, {size}: '{path}'",
-        "{count} messages of {topics} topics in {time}, {size}: '{path}'",
+        "{count} message of {topics} in {time}, {size}: '{path}'",
+        "{count} messages of {topics} in {time}, {size}: '{path}'",
         status.message_count,
     )
     say(
         said.format(
             count=status.message_count,
-            topics=len(status.topics),
+            topics=topics.format(count=len(status.topics)),
             time=clock_text(status.duration_s),
             size=size(status.size_bytes),
             path=path,
