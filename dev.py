@@ -87,18 +87,8 @@ def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
             make = [sys.executable, "-m", "venv", "--clear", str(folder / ".venv")]
             if computer.do(make, computer.environ, None) != 0:
                 raise Trouble("the virtual environment could not be made; Python's own words are above")
-    quiet = [] if sys.stdout.isatty() else ["--quiet"]
-    pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *quiet]
-    # A file that is not the one that we tested with is refused, wherever it comes from. Ours has no hash:
-    # it is this folder, and what builds it is pinned with the others.
-    steps = (
-        [*pip, "--require-hashes", "-r", f"requirements/{extra}.txt"],
-        [*pip, "--no-deps", "--no-build-isolation", "-e", "."],
-    )
     with timed("installing the pinned packages (the first time some 250 MB are brought)"):
-        for step in steps:
-            if computer.do(step, computer.environ, None) != 0:
-                raise Trouble("the packages could not be installed; pip's own words are above")
+        install(computer, python, extra)
     probe = [str(python), "-c", "import PySide6.QtWebEngineWidgets"]
     with timed("loading Qt WebEngine once"):
         if computer.do(probe, computer.environ, None) != 0:
@@ -109,6 +99,30 @@ def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
         computer.do(compile_ours, computer.environ, None)
     (folder / ".venv" / "nep-stamp").write_text(stamp(folder, extra), encoding="utf-8")
     return python
+
+
+def install(computer: Computer, python: Path, extra: str) -> None:
+    """Install the pinned packages and this folder: by uv, which takes a third of the time, or else by pip.
+
+    uv knows nothing of pip's settings: a computer that gets its packages elsewhere has pip's way left.
+    """
+    quiet = [] if sys.stdout.isatty() else ["--quiet"]
+    pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *quiet]
+    # A file that is not the one that we tested with is refused, wherever it comes from. Ours has no hash:
+    # it is this folder, and what builds it is pinned with the others.
+    pinned = ["--require-hashes", "-r", f"requirements/{extra}.txt"]
+    uv = [str(python), "-m", "uv", "pip", "install", "--python", str(python), "--no-config", *quiet]
+    environ = {"UV_HTTP_RETRIES": "0", "UV_LINK_MODE": "copy"} | dict(computer.environ)
+    quickly = (
+        [*pip, "--no-deps", "--require-hashes", "-r", "requirements/installer.txt"],
+        [*uv, "--compile-bytecode", *pinned],
+    )
+    if any(computer.do(step, environ, None) != 0 for step in quickly):
+        print("· the quick way did not go, see above: now by pip, which takes longer", flush=True)
+        if computer.do([*pip, *pinned], computer.environ, None) != 0:
+            raise Trouble("the packages could not be installed; pip's own words are above")
+    if computer.do([*pip, "--no-deps", "--no-build-isolation", "-e", "."], computer.environ, None) != 0:
+        raise Trouble("Studio could not be installed; pip's own words are above")
 
 
 # ---- the screen -----------------------------------------------------------------------------------

@@ -166,20 +166,40 @@ def test_packages_are_installed_once_and_again_when_the_pins_change(folder: Path
     system = FakeSystem()
     for _ in range(2):
         assert dev.make_environment(fake_pip(system), folder, "dev") == folder / ".venv" / "bin" / "python"
-    assert [("install" in command) for command in system.ran] == [True, True, False, False]
-    assert "compileall" in system.ran[3], "the first start is to be as quick as the later ones"
+    assert [("install" in command) for command in system.ran] == [True, True, True, False, False]
+    assert "compileall" in system.ran[4], "the first start is to be as quick as the later ones"
     (folder / "requirements" / "dev.txt").write_text("other", encoding="utf-8")
     dev.make_environment(fake_pip(system), folder, "dev")
-    assert len(system.ran) == 8
+    assert len(system.ran) == 10
 
 
 @pytest.mark.parametrize("extra", ["studio", "dev"])
 def test_packages_are_taken_by_their_hashes_and_ours_brings_no_others(folder: Path, extra: str) -> None:
     system = FakeSystem()
     dev.make_environment(fake_pip(system), folder, extra)
-    packages, ours = (command for command in system.ran if "install" in command)
+    installer, packages, ours = (command for command in system.ran if "install" in command)
+    assert installer[-3:] == ("--require-hashes", "-r", "requirements/installer.txt")
     assert packages[-3:] == ("--require-hashes", "-r", f"requirements/{extra}.txt")
     assert ours[-4:] == ("--no-deps", "--no-build-isolation", "-e", ".")
+
+
+@pytest.mark.parametrize("missing", ["requirements/installer.txt", "uv"])
+def test_where_uv_cannot_be_had_or_cannot_reach_its_packages_pip_does_it(
+    folder: Path, missing: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    system = FakeSystem()
+
+    def do(command: Sequence[str], environ: Mapping[str, str], log: Path | None) -> int:
+        system.do(command, environ, log)
+        return 1 if missing in command else 0
+
+    dev.make_environment(replace(fake_pip(system), do=do), folder, "studio")
+    assert "by pip, which takes longer" in capsys.readouterr().out
+    packages, ours = [command for command in system.ran if "install" in command][-2:]
+    assert "uv" not in packages
+    assert packages[-3:] == ("--require-hashes", "-r", "requirements/studio.txt")
+    assert ours[-1] == "."
+    assert dev.is_fresh(folder, "studio")
 
 
 def test_what_demo_installed_is_not_enough_for_tests_but_the_other_way_round(folder: Path) -> None:

@@ -1,10 +1,12 @@
 """Every check of the project, in the order that finds mistakes cheapest first.
 
-    python tools/check.py            ruff, format, mypy, lint-imports, pytest
+    python tools/check.py            ruff, format, mypy, lint-imports, that all tests can be read, pytest
     python tools/check.py --fast     the same without pytest
     python tools/check.py -- ARGS    what comes after -- goes to pytest
 
-Everything runs, also after a failure; the exit code is 1 if anything failed.
+Everything runs, also after a failure; the exit code is 1 if anything failed. Reading the tests makes pytest
+write down their compiled form, as Python does with ours: else each of its processes would compile them all.
+It takes as long as mypy, which keeps one processor busy, and so runs beside it.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import sys
 import sysconfig
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,10 +27,14 @@ MOST_WORKERS = 6
 
 
 class Check(NamedTuple):
-    """One check: what it is called, and the command that decides it."""
+    """One check: what it is called, and the command that decides it.
+
+    ``is_beside``: it runs beside the others, and what it prints is shown when it failed.
+    """
 
     name: str
     command: tuple[str, ...]
+    is_beside: bool = False
 
 
 class Outcome(NamedTuple):
@@ -47,9 +54,12 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
         Check("ruff format", (python, "-m", "ruff", "format", "--check", ".")),
         Check("mypy", (python, "-m", "mypy")),
         Check("lint-imports", (lint_imports, "--no-logo", "--cache-dir", "build/import-linter")),
+        Check("tests read", (python, "-m", "pytest", "--collect-only", "-qq", "-n0"), is_beside=True),
         Check("pytest", (python, "-m", "pytest", *side_by_side(), *pytest_arguments)),
     )
-    return found[:-1] if fast else found
+    if fast:
+        return found[:-2]
+    return (*found[:-2], found[-1]) if pytest_arguments else found  # few tests are read as quickly
 
 
 def side_by_side() -> tuple[str, ...]:
@@ -64,10 +74,32 @@ def side_by_side() -> tuple[str, ...]:
 
 def run(check: Check) -> Outcome:
     """Run one check with its output on ours, and tell how it ended."""
-    print(f"\n=== {check.name}", flush=True)
+    if not check.is_beside:
+        print(f"\n=== {check.name}", flush=True)
+    # Also where this is set, as it is in many containers: what is compiled is under .gitignore.
+    environ = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     begin = time.monotonic()
-    code = subprocess.run(check.command, cwd=ROOT, check=False).returncode
-    return Outcome(check.name, code == 0, time.monotonic() - begin)
+    out, errors = (subprocess.PIPE, subprocess.STDOUT) if check.is_beside else (None, None)
+    done = subprocess.run(
+        check.command,
+        cwd=ROOT,
+        check=False,
+        env=environ,
+        stdout=out,
+        stderr=errors,
+        text=True,
+        errors="replace",
+    )
+    if check.is_beside and done.returncode != 0:
+        print(f"\n=== {check.name}\n{done.stdout}", flush=True)
+    return Outcome(check.name, done.returncode == 0, time.monotonic() - begin)
+
+
+def run_all(found: Sequence[Check]) -> list[Outcome]:
+    """Run the checks in their order: those beside others begin with the first, and end before the last."""
+    with ThreadPoolExecutor() as pool:
+        beside = {check: pool.submit(run, check) for check in found if check.is_beside}
+        return [beside[check].result() if check.is_beside else run(check) for check in found]
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
@@ -86,9 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("pytest_arguments", nargs="*", help="arguments for pytest, after --")
     options = parser.parse_args(arguments)
     try:
-        outcomes = [
-            run(check) for check in checks(fast=options.fast, pytest_arguments=options.pytest_arguments)
-        ]
+        outcomes = run_all(checks(fast=options.fast, pytest_arguments=options.pytest_arguments))
     except KeyboardInterrupt:
         print("\nstopped", flush=True)
         return 130

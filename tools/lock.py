@@ -4,7 +4,7 @@
     python tools/lock.py --upgrade   the newest versions that pyproject.toml allows
 
 uv resolves for every system and Python at once, which pip can't; install it by `pip install uv`. The files
-are for pip, so that nobody else needs uv.
+are for pip, too: dev.py installs them by the uv of requirements/installer.txt, and by pip where that fails.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ PLAIN = "library"
 """The file of what nep needs without any extra."""
 LOCKED = ("studio", "dev", "test", "fuzz", "package", PLAIN)
 """The files, each with the versions of those before it; all but the last are named after their extra."""
+INSTALLER = "installer"
+"""The file of what installs the others; uv alone, which needs nothing."""
 EDITABLE = ("editables",)
 """What hatchling asks for when it installs a checkout; it can't be told from pyproject.toml."""
 
@@ -36,6 +38,8 @@ def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
     found = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", OLDEST_PYTHON]
     found += ["--generate-hashes", "--no-annotate", "--no-header", "--no-emit-package", "nep-studio"]
     found += ["--output-file", str(output)]
+    if extra == INSTALLER:
+        return [*found, *(["--upgrade"] if upgrade else []), "-"]
     if extra != PLAIN:
         found += ["--extra", extra]
     found += [f"--constraint={output.with_name(f'{each}.txt')}" for each in LOCKED[: LOCKED.index(extra)]]
@@ -57,11 +61,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     builds = "\n".join((*project["build-system"]["requires"], *EDITABLE))
-    for extra in LOCKED:
+    for extra in (*LOCKED, INSTALLER):
         output = ROOT / "requirements" / f"{extra}.txt"
         output.parent.mkdir(exist_ok=True)
+        wanted = "uv>=0.9" if extra == INSTALLER else builds
         done = subprocess.run(
-            command(uv, extra, output, options.upgrade), cwd=ROOT, input=builds, text=True, check=False
+            command(uv, extra, output, options.upgrade), cwd=ROOT, input=wanted, text=True, check=False
         )
         if done.returncode != 0:
             return done.returncode
