@@ -48,15 +48,16 @@ def shape(them: Person) -> object:
 
 
 def press_button(them: Person, number: int) -> None:
-    """Press the button of that place: the plus is the first, then a minus for each branch."""
-    them.ask("document.querySelector('[data-test=button]')?.removeAttribute('data-test')")
-    top = "(e => e.getBoundingClientRect().top)"
-    script = (
-        "[...document.querySelectorAll('[data-id=if] > .nepButton')]"
-        f".sort((a, b) => {top}(a) - {top}(b))[{number}]"
-    )
-    them.ask(f"{script}.setAttribute('data-test', 'button')")
-    them.click("[data-test=button]", dx=9, dy=9)
+    """Press the button of that place: the plus is the first, then a minus for each branch.
+
+    The page has a new button before the block is drawn anew: until all stand still none is the first.
+    """
+    buttons = "[...document.querySelectorAll('[data-id=if] > .nepButton')]"
+    them.ask(f"{buttons}.forEach((each, at) => each.setAttribute('data-test', at))")
+    places = range(them.ask(f"{buttons}.length"))
+    tops = {at: them.box(f"[data-id=if] > [data-test='{at}']")["top"] for at in places}
+    pressed = sorted(tops, key=lambda at: tops[at])[number]
+    them.click(f"[data-id=if] > [data-test='{pressed}']", dx=9, dy=9)
 
 
 def test_a_file_with_branches_comes_back_as_it_was_and_an_old_one_too(person):
