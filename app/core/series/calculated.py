@@ -113,13 +113,13 @@ class ExpressionCurve(Calculated):
 
     def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         times = base.times[first:end].copy()
-        arrays = [base.values[first:end], *(_held(each, times) for each in self._inputs[1:])]
+        arrays = [base.values[first:end], *(held_values(each, times) for each in self._inputs[1:])]
         with np.errstate(all="ignore"):
             values = np.broadcast_to(np.asarray(self._calculate(arrays), dtype=float), times.shape).copy()
         return times, values, base.gaps[first:end].copy()
 
 
-def _held(samples: Samples, times: Floats) -> Floats:
+def held_values(samples: Samples, times: Floats) -> Floats:
     """The newest number up to each time; NaN before the first, in a gap, and long after the last."""
     if not len(samples):
         return np.full(len(times), np.nan)

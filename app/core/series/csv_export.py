@@ -5,24 +5,50 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from datetime import datetime, timezone
 from math import inf
 
 from app.core.series.curves import Curve
+from app.core.series.samples import Floats
 
 ROWS_AT_ONCE = 5000
 _START = ("=", "+", "-", "@", "\t", "\r")
 
 
-def csv_lines(
-    curves: Sequence[Curve], origin_ns: int, begin_s: float = -inf, end_s: float = inf
-) -> Iterator[str]:
+@dataclass(frozen=True, slots=True)
+class CsvColumn:
+    """One curve as it was: its name, its numbers by their times (s), and where its states began."""
+
+    name: str
+    times: Floats
+    values: Floats
+    states: tuple[tuple[float, str], ...]
+
+
+def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = inf) -> list[CsvColumn]:
+    """What curves have in a range, for a thread that writes it."""
+    made = []
+    for curve in curves:
+        first, end = curve.samples.places(begin_s, end_s)
+        runs = curve.states.runs(begin_s, end_s) if curve.states is not None else ()
+        states = tuple(
+            (run.begin_s, run.word)
+            for run in runs
+            if run.word is not None and begin_s <= run.begin_s <= end_s
+        )
+        times, values = curve.samples.times[first:end].copy(), curve.samples.values[first:end].copy()
+        made.append(CsvColumn(curve.text, times, values, states))
+    return made
+
+
+def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
     """The lines of a CSV file (RFC 4180), some thousands at a time: the head, then rows by their time.
 
     Times are nanoseconds since 1970 and ISO 8601 in UTC; a state stands where it begins.
     """
-    yield _line(["stamp_ns", "time_utc", *(_harmless(curve.text) for curve in curves)])
-    cells = [_cells_of(curve, begin_s, end_s) for curve in curves]
+    yield _line(["stamp_ns", "time_utc", *(_harmless(column.name) for column in columns)])
+    cells = [_cells_of(column) for column in columns]
     times = sorted({time_s for each in cells for time_s in each})
     for begin in range(0, len(times), ROWS_AT_ONCE):
         out = []
@@ -32,17 +58,11 @@ def csv_lines(
         yield "".join(out)
 
 
-def _cells_of(curve: Curve, begin_s: float, end_s: float) -> dict[float, str]:
-    first, end = curve.samples.places(begin_s, end_s)
-    times, values = curve.samples.times[first:end], curve.samples.values[first:end]
-    cells = {
-        time_s: repr(value) for time_s, value in zip(times.tolist(), values.tolist(), strict=True)
-    }  # of several at the same time the newest
-    if curve.states is not None:
-        for run in curve.states.runs(begin_s, end_s):
-            if run.word is not None and begin_s <= run.begin_s <= end_s:
-                cells[run.begin_s] = _harmless(run.word)
-    return cells
+def _cells_of(column: CsvColumn) -> dict[float, str]:
+    """By time what stands there; of several at the same time the newest."""
+    numbers = zip(column.times.tolist(), column.values.tolist(), strict=True)
+    cells = {time_s: repr(value) for time_s, value in numbers}
+    return cells | {time_s: _harmless(word) for time_s, word in column.states}
 
 
 def _iso(stamp_ns: int) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from app.core.network.topics import split_key
 from app.core.series.calculated import Calculated, ExpressionCurve, WindowCurve
 from app.core.series.feed import SeriesFeed
 from app.core.series.field_path import (
@@ -23,7 +22,6 @@ from app.core.series.formula import (
     Source,
     WindowSource,
     parse,
-    unknown_topic,
 )
 from app.core.series.samples import MOST_SAMPLES, Samples
 from app.core.series.states import States
@@ -65,6 +63,15 @@ class Curve:
         return float(self.samples.values[-1]) if len(self.samples) else MISSING
 
 
+def topics_of(source: Source) -> set[str]:
+    """The topics that a curve is made from."""
+    if isinstance(source, FieldSource):
+        return {source.topic}
+    if isinstance(source, WindowSource):
+        return topics_of(source.of)
+    return {topic for each in source.inputs for topic in topics_of(each)}
+
+
 @dataclass(slots=True, eq=False)
 class _Shared:
     """What several curves may be made from, and how many are."""
@@ -88,19 +95,19 @@ class Curves:
 
     # -- what a person does ----------------------------------------------------------------------------------
 
-    def add(self, text: str) -> list[Curve]:
+    def add(self, text: str, also: Iterable[str] = ()) -> list[Curve]:
         """The curves of what was typed; ``[*]`` brings one for each element that the newest message has.
+
+        ``also`` are topics that it may name although they are not there now.
 
         Raises `CurveError`: its sentence says what to change. Nothing is added then. Whether a field is there
         is only known when its topic was heard.
         """
-        source = parse(text, self._known_topics())
+        source = parse(text, [*self._known_topics(), *also])
         sources: Sequence[Source] = [source]
-        if isinstance(source, FieldSource):
-            self._check(source)
-            if source.path.has_every:
-                payload = self.payload_of(source.topic)
-                sources = [FieldSource(source.topic, path) for path in source.path.expanded(payload)]
+        if isinstance(source, FieldSource) and source.path.has_every:
+            payload = self.payload_of(source.topic)
+            sources = [FieldSource(source.topic, path) for path in source.path.expanded(payload)]
         return self.add_sources(sources, text)
 
     def add_field(self, topic: str, path: FieldPath) -> list[Curve]:
@@ -194,10 +201,6 @@ class Curves:
 
     def _known_topics(self) -> list[str]:
         return list(dict.fromkeys([*self._topics, *self._names()]))
-
-    def _check(self, source: FieldSource) -> None:
-        if source.topic not in self._known_topics():
-            raise unknown_topic(split_key(source.topic)[1], self._known_topics())
 
     def _enter(self, source: Source) -> _Shared:
         """What a source gives, made when it is the first time; one more uses it."""

@@ -1,7 +1,8 @@
 """Field paths: where a value is in a message: ``pose.x[2]``, ``joints[*].position``.
 
 A path is parsed once; then it only looks. A key that is no plain word stands in brackets as a JSON string,
-and ``[*]`` means every element of a list. The value of a message that is no object or list is called ``value``.
+as in ``people["first name"]``, and ``[*]`` means every element of a list. The value of a message that is no
+object or list is called ``value``.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.network.mailbox import Batch
-from app.core.series.csv_export import csv_lines
+from app.core.series.csv_export import columns_of, csv_lines
 from app.core.series.curves import Curve, Curves
 from app.core.series.feed import SeriesFeed
 from app.core.series.field_path import MISSING, FieldPath
@@ -174,7 +174,7 @@ def test_whatever_comes_the_curves_stay_in_order_and_finite(rows) -> None:
     for curve in made:
         assert bool(np.all(np.diff(curve.samples.times) >= 0))
         assert bool(np.all(np.isfinite(curve.samples.values)))
-        assert "".join(csv_lines([curve], ORIGIN)).count("\r\n") >= 1
+        assert "".join(csv_lines(columns_of([curve]), ORIGIN)).count("\r\n") >= 1
     assert points(made[4]) == points(made[0]) or any(
         isinstance(v, (int, float)) and not isinstance(v, bool) and abs(v) > 1e300 for _s, v in rows
     )
@@ -321,10 +321,10 @@ def test_csv_has_a_row_for_each_time_and_no_formulas() -> None:
     made = [case.curve(text) for text in ("/a.x", "/a.word", "/b.y")]
     case.send("/a", (0.0, {"x": 1.5, "word": "=1+1"}), (0.5, {"x": 2, "word": "=1+1"}))
     case.send("/b", (0.5, {"y": -1}), (0.75, {"y": 1e-9}))
-    rows = list(csv.reader("".join(csv_lines(made, ORIGIN)).splitlines()))
+    rows = list(csv.reader("".join(csv_lines(columns_of(made), ORIGIN)).splitlines()))
     assert rows[0] == ["stamp_ns", "time_utc", "/a.x", "/a.word", "/b.y"]
     assert [row[2:] for row in rows[1:]] == [["1.5", "'=1+1", ""], ["2.0", "", "-1.0"], ["", "", "1e-09"]]
     assert rows[1][0] == str(ORIGIN)
     assert rows[2][1].endswith(".500000000Z")
     assert math.isclose(int(rows[3][0]) - ORIGIN, 0.75e9)
-    assert len("".join(csv_lines(made, ORIGIN, 0.6, 0.8)).splitlines()) == 2
+    assert len("".join(csv_lines(columns_of(made, 0.6, 0.8), ORIGIN)).splitlines()) == 2
