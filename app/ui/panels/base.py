@@ -49,7 +49,8 @@ class PanelContext:
 
     ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run``
     does one of the window's commands by its name (`app.ui.shell.commands.table`), ``files`` asks for files,
-    ``keys_to_question`` gives the keyboard to what a running behaviour asks, if it asks something.
+    ``keys_to_question`` gives the keyboard to what a running behaviour asks, if it asks something. ``plot``
+    plots a field of a topic; without a path it asks which.
     """
 
     session: Session
@@ -59,6 +60,7 @@ class PanelContext:
     run: Callable[[str], None]
     files: FileDialogs
     keys_to_question: Callable[[], None] = lambda: None
+    plot: Callable[[str, str], None] = lambda _topic, _path: None
 
 
 @dataclass(frozen=True, slots=True)

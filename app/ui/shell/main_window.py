@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import Protocol, runtime_checkable
 
 from PySide6.QtCore import QKeyCombination, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QContextMenuEvent, QKeyEvent, QKeySequence
@@ -60,6 +61,14 @@ SOON_WORDS = {"behaviour": lazy("Getting the blocks ready.")}
 OTHER_SOON_WORDS = lazy("Getting the panels ready.")
 
 
+@runtime_checkable
+class SupportsFields(Protocol):
+    """A panel that shows fields of topics over time."""
+
+    def plot_field(self, topic: str, path: str) -> None:
+        """Show one more; without a path a person is asked which."""
+
+
 class MainWindow(QMainWindow):
     """One session in one window, and what is in it; for its commands it is a `Shell`."""
 
@@ -97,7 +106,9 @@ class MainWindow(QMainWindow):
         self._build(examples)
         files = asks if asks is not None else self._file_dialogs()
         asked = self.asked.take_keyboard
-        self.context = PanelContext(session, theme, self.open_topic, self.say, self._run, files, asked)
+        self.context = PanelContext(
+            session, theme, self.open_topic, self.say, self._run, files, asked, self.plot
+        )
         self.ring = FocusRing(theme, self)
         self.timer = QTimer(self)
         self.timer.setInterval(TICK_MS)
@@ -332,6 +343,13 @@ class MainWindow(QMainWindow):
             dock.show()
             dock.raise_()
             dock.panel.show_topic(topic)
+
+    def plot(self, topic: str, path: str) -> None:
+        """Plot a field of a topic; without a path the plot asks which."""
+        bench = self.bench if self.bench is not None else self.show_layout("developer")
+        dock = bench.open("plot")
+        if dock is not None and isinstance(dock.panel, SupportsFields):
+            dock.panel.plot_field(topic, path)
 
     def _run(self, name: str) -> None:
         self.commands.run(name)

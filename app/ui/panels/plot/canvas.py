@@ -46,28 +46,34 @@ LEAST_WINDOW_S, MOST_WINDOW_S = 1e-4, 1e9
 SMOOTH_POINTS = 3000
 """Above so many points smooth edges are not seen, and cost more than all else."""
 SIGNS = 5
+TICK_APART, TICK_ABOVE = 84, 34  # px between ticks
+BESIDE = 60
+FARTHEST = 1e300
+"""Values beyond are drawn at the edge: what axes are calculated with would overflow."""
 NEAR = 10  # px
 BETWEEN = 0.045
 
 
 @dataclass(slots=True)
 class Range:
-    """The values that an axis shows; ``held`` when a person chose them."""
+    """The values that an axis shows; ``held`` when a person chose them, ``is_new`` until values were seen."""
 
     low: float = 0.0
     high: float = 1.0
     held: bool = False
+    is_new: bool = True
 
     def fit(self, low: float, high: float) -> bool:
         """Show these, with some room; it stays as long as they fit well. Whether it changed."""
         if self.held or not (math.isfinite(low) and math.isfinite(high)):
             return False
         span = high - low
-        inside = self.low <= low and high <= self.high
+        inside = self.low <= low and high <= self.high and not self.is_new
         if inside and span >= 0.5 * (self.high - self.low):
             return False
         room = span * 0.08 or abs(high) * 0.1 or 1.0
-        self.low, self.high = max(-1e308, low - room), min(1e308, high + room)
+        self.low, self.high = max(-FARTHEST, low - room), min(FARTHEST, high + room)
+        self.is_new = False
         return True
 
 
@@ -78,8 +84,12 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph tells no types
         super().__init__("bottom")
         self.clock = ""
 
+    def boundingRect(self) -> QRectF:
+        """A word at the very edge, as the clock is, needs room beside it, else it is left out."""
+        return QRectF(super().boundingRect()).adjusted(-BESIDE, 0, BESIDE, 0)
+
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
-        return only_major(super().tickSpacing(least, most, size))
+        return readable(super().tickSpacing(least, most, size), most - least, size, TICK_APART)
 
     def tickStrings(self, values: Sequence[float], _scale: float, spacing: float) -> list[str]:
         return [self.clock if abs(value) < spacing / 100 else time_words(value, spacing) for value in values]
@@ -89,15 +99,19 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
     """Numbers with as many digits as their distance needs."""
 
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
-        return only_major(super().tickSpacing(least, most, size))
+        apart = TICK_ABOVE if self.orientation in {"left", "right"} else TICK_APART
+        return readable(super().tickSpacing(least, most, size), most - least, size, apart)
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
         return [axis_words(value * scale, spacing * scale) for value in values]
 
 
-def only_major(levels: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Of pyqtgraph's levels of ticks the finest that has words: lines between them say nothing."""
-    return levels[1:2] if len(levels) > 2 else levels[:1]
+def readable(
+    levels: list[tuple[float, float]], span: float, size: float, apart: float
+) -> list[tuple[float, float]]:
+    """Of pyqtgraph's levels of ticks the finest whose words are so many px ``apart``."""
+    fitting = [level for level in levels if span > 0 and level[0] / span * size >= apart]
+    return fitting[-1:] or levels[:1]
 
 
 def time_words(value_s: float, spacing_s: float) -> str:
@@ -174,7 +188,6 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         for axis in axes.values():
             axis.enableAutoSIPrefix(False)
             axis.setStyle(tickLength=0, autoExpandTextSpace=False, autoReduceTextSpace=False)
-        self.time_axis.setStyle(hideOverlappingLabels=False)  # the clock stands at the very edge
 
     def _fit_right(self) -> None:
         self.right_view.setGeometry(self.view.sceneBoundingRect())
@@ -194,6 +207,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             axis.setPen(pg.mkPen(theme.colour("border")))
             axis.setTickPen(pg.mkPen(grid, width=1))
             axis.setTextPen(theme.colour("textSecondary"))
+        self.setBackground(theme.colour("panel"))
         self.time_axis.setHeight(round(theme.scaled(AXIS_HEIGHT)))
         for name in ("left", "right"):
             self.plot.getAxis(name).setWidth(round(theme.scaled(AXIS_WIDTH)))
@@ -259,7 +273,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         # dashes of a dense line are only noise, and their lengths are what painting then takes
         item.setData(
             line.times - self.anchor_s,
-            line.values,
+            np.clip(line.values, -FARTHEST, FARTHEST),
             pen=curve.look.pen(self.theme, whole=dense),
             antialias=not dense,
         )
@@ -307,15 +321,14 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         for shown in self.ranges.values():
             middle, half = (shown.low + shown.high) / 2, (shown.high - shown.low) / 2 * factor
             middle += shift * 2 * half
-            if half > 1e-300 and math.isfinite(middle) and half < 1e307:
+            if 1e-300 < half < FARTHEST and abs(middle) < FARTHEST:
                 shown.low, shown.high, shown.held = middle - half, middle + half, True
         self.values_changed.emit()
 
     def release_values(self) -> None:
         """Show all values again."""
         for shown in self.ranges.values():
-            shown.held = False
-            shown.low, shown.high = math.inf, -math.inf
+            shown.held, shown.is_new = False, True
         self.values_changed.emit()
 
     # -- the cursors -----------------------------------------------------------------------------------------

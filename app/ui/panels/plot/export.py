@@ -6,23 +6,27 @@ import threading
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QBuffer, QIODevice, QRect, QRectF, QSize
+from PySide6.QtCore import QBuffer, QIODevice, QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
+from PySide6.QtWidgets import QWidget
 
-from app.core.series.csv_export import CsvColumn, csv_lines
+from app.core.series.csv_export import CsvColumn, columns_of, csv_lines
 from app.core.storage.atomic_file import write_atomically
+from app.ui.panels.base import PanelContext
 from app.ui.panels.plot.look import Stroke
 from app.ui.panels.plot.shown_curve import ShownCurve
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.file_dialogs import FileKind
-from nep.i18n import lazy
+from app.ui.widgets.menus import Menu
+from nep.i18n import _, lazy
 
 CSV = FileKind(lazy("Numbers (CSV)"), ".csv")
 PNG = FileKind(lazy("Picture (PNG)"), ".png")
 SVG = FileKind(lazy("Drawing (SVG)"), ".svg")
 RATIO = 2
+Part = tuple[QSize, Callable[[QPainter, QRectF], object]]
 LEGEND_ROW = 22
 
 
@@ -63,7 +67,7 @@ class PlotPicture:
     def __init__(
         self,
         theme: Theme,
-        parts: Iterable[tuple[QSize, Callable[[QPainter, QRectF], object]]],
+        parts: Iterable[Part],
         curves: Sequence[ShownCurve],
     ) -> None:
         """``parts`` from above: how large each is, and what paints it."""
@@ -124,3 +128,69 @@ class PlotPicture:
         self.paint(painter)
         painter.end()
         return bytes(buffer.data().data())
+
+
+class PlotExport:
+    """Asks where, writes what a plot shows, and tells by a toast that it is done, or why not."""
+
+    def __init__(
+        self,
+        context: PanelContext,
+        parts: Callable[[], Iterable[Part]],
+        curves: Callable[[], Sequence[ShownCurve]],
+        shown: Callable[[], tuple[float, float]],
+    ) -> None:
+        """``parts`` are those of its picture, ``shown`` is from when to when (s)."""
+        self._context, self._parts, self._curves, self._shown = context, parts, curves, shown
+        self._writer: CsvWriter | None = None
+
+    def menu(self, parent: QWidget) -> Menu:
+        """As what it can be written."""
+        menu = Menu(self._context.theme, parent)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        for kind in (CSV, PNG, SVG):
+            action = menu.addAction(_(kind.words))
+            action.triggered.connect(lambda _on=False, kind=kind: self.ask_where(kind))
+        return menu
+
+    def ask_where(self, kind: FileKind) -> None:
+        """Ask for a file, and write what is shown then."""
+        suggestion = Path.home() / f"{_('Plot')}{kind.ending}"
+        kinds = [kind, *(each for each in (CSV, PNG, SVG) if each is not kind)]
+        self._context.files.save_as(_("Export the plot"), suggestion, kinds, self.write)
+
+    def write(self, path: Path, kind: FileKind) -> None:
+        """Write it as this kind; numbers in a thread."""
+        if kind != CSV:
+            picture = PlotPicture(self._context.theme, self._parts(), self._curves())
+            try:
+                write_atomically(path, picture.png() if kind == PNG else picture.svg())
+            except OSError as error:
+                self._tell(path, error.strerror or type(error).__name__)
+            else:
+                self._tell(path, "")
+            return
+        if self._writer is not None and self._writer.take() is None:
+            self._context.toast(_("The export before is not done yet"))
+            return
+        curves = [each.curve for each in self._curves() if not each.hidden]
+        origin_ns = self._context.session.series.origin_ns
+        self._writer = CsvWriter(path, columns_of(curves, *self._shown()), origin_ns)
+
+    def follow(self) -> None:
+        """Tell when it is written; call it with every tick."""
+        if self._writer is not None and (failed := self._writer.take()) is not None:
+            self._tell(self._writer.path, failed)
+            self._writer = None
+
+    def _tell(self, path: Path, reason: str) -> None:
+        if reason:
+            said = _("{file} can't be written: {reason}").format(file=path.name, reason=reason)
+        else:
+            said = _("Exported {file}").format(file=path.name)
+        self._context.toast(said)
+
+    def close(self) -> None:
+        """Wait until what is being written is done."""
+        if self._writer is not None:
+            self._writer.close()

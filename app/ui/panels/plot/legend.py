@@ -186,6 +186,8 @@ class LegendTable(TableView[ShownCurve]):
             self.removed.emit(shown.name)
         elif shown is not None and event.key() == Qt.Key.Key_H and not event.modifiers():
             self.hide_or_show(shown)
+        elif event.text().isprintable() and event.text().strip() != "/" and event.text():
+            event.ignore()  # the plot's keys
         else:
             super().keyPressEvent(event)
 

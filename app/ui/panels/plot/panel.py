@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, QRectF, QSize, Qt
-from PySide6.QtGui import QAction, QColor, QContextMenuEvent, QGuiApplication, QKeyEvent, QPainter
+from PySide6.QtGui import (
+    QAction,
+    QContextMenuEvent,
+    QGuiApplication,
+    QKeyEvent,
+    QPainter,
+    QResizeEvent,
+)
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.series.csv_export import columns_of
 from app.core.series.curves import Curve, Curves, topics_of
 from app.core.series.field_path import FieldPath
-from app.core.storage.atomic_file import write_atomically
 from app.errors import CurveError
 from app.ui.panels.base import PanelContext, PanelWidget
-from app.ui.panels.plot.add_curve import AddCurve
 from app.ui.panels.plot.canvas import PlotCanvas
-from app.ui.panels.plot.export import CSV, PNG, SVG, CsvWriter, PlotPicture
+from app.ui.panels.plot.export import CSV, PNG, SVG, PlotExport
 from app.ui.panels.plot.lanes import StateLanes
 from app.ui.panels.plot.legend import LegendFigures, LegendTable, columns, next_look
 from app.ui.panels.plot.shown_curve import ShownCurve, look_of, number_words
 from app.ui.panels.plot.time_view import SPANS, TimeView
+from app.ui.panels.plot.tools import PlotTools
 from app.ui.panels.plot.xy_canvas import XYCanvas
 from app.ui.text.numbers import grouped
 from app.ui.widgets import (
@@ -32,41 +36,23 @@ from app.ui.widgets import (
     ElidedLabel,
     EmptyAction,
     EmptyState,
-    Segments,
     Separator,
     label,
 )
 from app.ui.widgets.field_drag import dropped_field
-from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.menus import Menu, drop_below
 from app.ui.widgets.paint import show_when
 from app.ui.widgets.table.model import TableModel
-from nep.i18n import _, lazy, ngettext
+from nep.i18n import _, ngettext
 
 if TYPE_CHECKING:
     from PySide6.QtGui import QDragEnterEvent, QDropEvent
 
-    from app.ui.widgets.file_dialogs import FileKind
 
 DRAW_EVERY, FIGURES_EVERY = 2, 6  # refreshes of 30 a second
 SLOW_S = 0.02
 """A drawing that takes longer is done half as often."""
-MOST_ROWS = 6
-SPAN_WORDS = {"12": lazy("12 s"), "60": lazy("1 min"), "300": lazy("5 min"), "all": lazy("All")}
-
-
-class ToggleButton(Button):
-    """A button that stays pressed: filled with what is chosen, edged in the accent."""
-
-    def __init__(self, context: PanelContext, text: str, icon: str) -> None:
-        super().__init__(context.theme, text, icon, size="small")
-        self.setCheckable(True)
-
-    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
-        if self.isChecked() and self.isEnabled():
-            role = self._theme.colour
-            return role("selected"), role("accent"), role("selectedText")
-        return super()._look()
+MOST_ROWS, TABLE_SHARE = 6, 0.32
 
 
 class PlotPanel(PanelWidget):
@@ -83,7 +69,9 @@ class PlotPanel(PanelWidget):
         self._drawing_s = 0.0
         self._points = (0, True)
         self._last_cursor = "A"
-        self._writer: CsvWriter | None = None
+        self.exporter = PlotExport(
+            context, self._picture_parts, lambda: self.shown, lambda: (self.canvas.begin_s, self.canvas.end_s)
+        )
         self._make_header()
         self._make_tools()
         self._make_body()
@@ -100,36 +88,16 @@ class PlotPanel(PanelWidget):
         self.chips, self.header = [self.paused], [self.freeze]
 
     def _make_tools(self) -> None:
-        theme = self.theme
-        self.add = AddCurve(theme, self.session, lambda: [each.name for each in self.shown])
+        self.tools = PlotTools(self.theme, self.session, lambda: [each.name for each in self.shown])
+        self.add, self.span, self.cursors = self.tools.add, self.tools.span, self.tools.cursors
+        self.states, self.across, self.export = self.tools.states, self.tools.across, self.tools.export
         self.add.wanted.connect(self._add_typed)
         self.add.left.connect(lambda: self.canvas.setFocus(Qt.FocusReason.OtherFocusReason))
-        self.span = Segments(
-            theme,
-            [(value, _(SPAN_WORDS[value]), None) for value, _s in SPANS],
-            "60",
-            size="small",
-            name=_("How much time is shown"),
-        )
         self.span.changed.connect(self._choose_span)
-        self.cursors = ToggleButton(self.context, _("A and B"), "ruler")
-        self.states = ToggleButton(self.context, _("States"), "rows-3")
-        self.states.setChecked(True)
-        self.across = ToggleButton(self.context, _("X and Y"), "chart-spline")
-        self.across.setToolTip(_("Draw the second curve over the first"))
-        self.export = Button(theme, _("Export"), "download", size="small")
         self.cursors.toggled.connect(self._show_cursors)
         self.states.toggled.connect(lambda _on: self._changed())
         self.across.toggled.connect(lambda _on: self._changed())
-        self.export.clicked.connect(lambda: drop_below(self._export_menu(), self.export))
-        self.tools = QWidget()
-        row = Flow(self.tools, gap=8, row_gap=6)
-        row.setContentsMargins(10, 6, 10, 6)
-        row.add_elastic(self.add, greedy=True)
-        row.push()
-        self._when_there = (self.span, self.cursors, self.states, self.across, self.export)
-        for widget in self._when_there:
-            row.addWidget(widget)
+        self.export.clicked.connect(lambda: drop_below(self.exporter.menu(self), self.export))
 
     def _make_body(self) -> None:
         theme = self.theme
@@ -273,7 +241,7 @@ class PlotPanel(PanelWidget):
     def refresh(self) -> None:
         self._ticks += 1
         self.curves.advance()
-        self._follow_export()
+        self.exporter.follow()
         if not self.shown:
             return
         every = DRAW_EVERY * (2 if self._drawing_s > SLOW_S else 1)
@@ -307,7 +275,7 @@ class PlotPanel(PanelWidget):
             if not each.hidden and not each.curve.is_state
         ]
         self._points = (sum(line.points for _c, line in lines), all(line.is_whole for _c, line in lines))
-        if self.across.isChecked():
+        if self.is_across:
             self.xy.cursors = canvas.cursors
             self.xy.show_pairs(self._pairs(), begin_s, end_s)
         else:
@@ -315,7 +283,15 @@ class PlotPanel(PanelWidget):
             clock_s = (self.session.series.origin_ns + end_s * 1e9) / 1e9
             canvas.show_lines(lines, clock_s)
         states = [each for each in self.shown if each.curve.is_state]
-        self.lanes.show_curves(states if self.states.isChecked() and not self.across.isChecked() else [])
+        self.lanes.show_curves(states if self.states.isChecked() and not self.is_across else [])
+
+    def _numbers(self) -> int:
+        return sum(not each.curve.is_state for each in self.shown)
+
+    @property
+    def is_across(self) -> bool:
+        """Whether curves are drawn over each other rather than over time."""
+        return self.across.isChecked() and self._numbers() > 1
 
     def _pairs(self) -> list[tuple[ShownCurve, ShownCurve]]:
         there = [each for each in self.shown if not each.hidden and not each.curve.is_state]
@@ -351,7 +327,7 @@ class PlotPanel(PanelWidget):
             if has_cursors
             else _("Min, max and mean of what is shown")
         ]
-        distance = self.xy.distance() if self.across.isChecked() else None
+        distance = self.xy.distance() if self.is_across else None
         if distance is not None:
             parts.append(_("A to B: {distance}").format(distance=number_words(distance)))
         lost = self.curves.lost
@@ -374,14 +350,9 @@ class PlotPanel(PanelWidget):
         """Curves came or went, or look otherwise."""
         there = bool(self.shown)
         self.pages.setCurrentIndex(1 if there else 0)
-        for widget in (*self._when_there, self.freeze):
-            show_when(widget, there)
-        has_states = any(each.curve.is_state for each in self.shown)
-        self.states.setVisible(there and has_states)
-        self.across.setVisible(sum(not each.curve.is_state for each in self.shown) > 1)
-        self.drawings.setCurrentIndex(
-            1 if self.across.isChecked() and self.across.isVisibleTo(self.tools) else 0
-        )
+        show_when(self.freeze, there)
+        self.tools.fit(len(self.shown), self._numbers())
+        self.drawings.setCurrentIndex(1 if self.is_across else 0)
         self.model.set_rows(self.shown)
         self._fit_table()
         topics = {topic for each in self.shown for topic in topics_of(each.curve.source)}
@@ -390,7 +361,8 @@ class PlotPanel(PanelWidget):
         self._soon()
 
     def _fit_table(self) -> None:
-        rows = min(MOST_ROWS, max(1, len(self.shown)))
+        room = round(self.height() * TABLE_SHARE / max(1, self.table.row_height)) - 1
+        rows = max(1, min(MOST_ROWS, room, len(self.shown)))
         self.table.setFixedHeight(self.table.row_height * rows + self.table.horizontalHeader().height() + 2)
         self.table.fit_columns()
 
@@ -533,22 +505,14 @@ class PlotPanel(PanelWidget):
 
     # -- export -------------------------------------------------------------------------------------------
 
-    def _export_menu(self) -> Menu:
-        menu = Menu(self.theme, self)
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        for kind in (CSV, PNG, SVG):
-            action = menu.addAction(_(kind.words))
-            action.triggered.connect(lambda _on=False, kind=kind: self.ask_where(kind))
-        return menu
-
     def more_actions(self) -> list[QAction]:
         made = []
         rows: tuple[tuple[str, str, Callable[[], object]], ...] = (
             (_("Add a curve"), "plus", self.focus_filter),
             (_("Show everything"), "maximize", self._show_all),
-            (_("Export numbers (CSV)"), "download", lambda: self.ask_where(CSV)),
-            (_("Export a picture (PNG)"), "image", lambda: self.ask_where(PNG)),
-            (_("Export a drawing (SVG)"), "spline", lambda: self.ask_where(SVG)),
+            (_("Export numbers (CSV)"), "download", lambda: self.exporter.ask_where(CSV)),
+            (_("Export a picture (PNG)"), "image", lambda: self.exporter.ask_where(PNG)),
+            (_("Export a drawing (SVG)"), "spline", lambda: self.exporter.ask_where(SVG)),
         )
         for words, icon, does in rows:
             action = QAction(self.theme.icon(icon), words, self)
@@ -562,52 +526,23 @@ class PlotPanel(PanelWidget):
 
     _listed: Sequence[QAction] = ()
 
-    def ask_where(self, kind: FileKind) -> None:
-        """Ask for a file, and write what is shown now."""
-        suggestion = Path.home() / f"{_('Plot')}{kind.ending}"
-        kinds = [kind, *(each for each in (CSV, PNG, SVG) if each is not kind)]
-        self.context.files.save_as(_("Export the plot"), suggestion, kinds, self.write)
-
-    def write(self, path: Path, kind: FileKind) -> None:
-        """Write the plot as this kind; a toast says that it is done, or why not."""
-        if kind == CSV:
-            curves = [each.curve for each in self.shown if not each.hidden]
-            parts = columns_of(curves, self.canvas.begin_s, self.canvas.end_s)
-            if self._writer is None or self._writer.take() is not None:
-                self._writer = CsvWriter(path, parts, self.session.series.origin_ns)
-            return
-        self._draw()
-        picture = PlotPicture(self.theme, self._picture_parts(), self.shown)
-        try:
-            write_atomically(path, picture.png() if kind == PNG else picture.svg())
-        except OSError as error:
-            self._say_written(path, error.strerror or type(error).__name__)
-        else:
-            self._say_written(path, "")
-
     def _picture_parts(self) -> list[tuple[QSize, Callable[[QPainter, QRectF], object]]]:
+        """What a picture of the plot has, from above."""
+        self._draw()
         canvas, xy, lanes = self.canvas, self.xy, self.lanes
 
         def curves(painter: QPainter, box: QRectF) -> None:
-            shown = xy if self.across.isChecked() else canvas
+            shown = xy if self.is_across else canvas
             shown.render(painter, box, shown.viewport().rect())
-            xy.paint_marks(painter) if shown is xy else canvas.paint_cursors(painter)
+            if shown is xy:
+                xy.paint_marks(painter)
+            else:
+                canvas.paint_cursors(painter)
 
         parts: list[tuple[QSize, Callable[[QPainter, QRectF], object]]] = [(self.drawings.size(), curves)]
         if not lanes.isHidden():
             parts.append((lanes.size(), lambda painter, _box: lanes.paint_lanes(painter)))
         return parts
-
-    def _follow_export(self) -> None:
-        if self._writer is not None and (failed := self._writer.take()) is not None:
-            self._say_written(self._writer.path, failed)
-            self._writer = None
-
-    def _say_written(self, path: Path, reason: str) -> None:
-        if reason:
-            self.context.toast(_("{file} can't be written: {reason}").format(file=path.name, reason=reason))
-        else:
-            self.context.toast(_("Exported {file}").format(file=path.name))
 
     # -- kept between starts ------------------------------------------------------------------------------
 
@@ -649,6 +584,10 @@ class PlotPanel(PanelWidget):
             shown.right, shown.hidden = saved.get("right") is True, saved.get("hidden") is True
             self.shown.append(shown)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit_table()
+
     def theme_changed(self) -> None:
         self.table.set_row_height(self.row_height(), large=self.density == "comfortable")
         self._fit_table()
@@ -657,8 +596,7 @@ class PlotPanel(PanelWidget):
     def shut(self) -> None:
         self.add.shut()
         self.curves.close()
-        if self._writer is not None:
-            self._writer.close()
+        self.exporter.close()
 
 
 def _sentence(error: CurveError) -> str:

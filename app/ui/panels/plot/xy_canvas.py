@@ -78,6 +78,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph tells no typ
             axis.setPen(pg.mkPen(theme.colour("border")))
             axis.setTickPen(pg.mkPen(theme.colour("controlBorder" if theme.high_contrast else "grid")))
             axis.setTextPen(theme.colour("textSecondary"))
+        self.setBackground(theme.colour("panel"))
         self.plot.getAxis("bottom").setHeight(round(theme.scaled(24)))
         self.plot.getAxis("left").setWidth(round(theme.scaled(54)))
         self.plot.showGrid(x=True, y=True, alpha=1.0)
