@@ -157,10 +157,20 @@ def test_a_message_without_a_stamp_has_the_time_at_which_it_came() -> None:
     assert points(x) == [(0.0, 2, False)]
 
 
+values_of_all_kinds = st.one_of(
+    st.integers(-(2**64), 2**64),
+    st.floats(),
+    st.none(),
+    st.booleans(),
+    st.text(max_size=3),
+    st.just([]),
+    st.just({}),
+)
+steps = st.sampled_from([0.01, 0.5, -0.3, -20.0, 1e6])
+
+
 @settings(max_examples=15, deadline=None)
-@given(st.lists(st.tuples(st.sampled_from([0.01, 0.5, -0.3, -20.0, 1e6]), st.one_of(
-    st.integers(-(2**64), 2**64), st.floats(), st.none(), st.booleans(), st.text(max_size=3), st.just([]), st.just({})
-)), max_size=40))  # fmt: skip
+@given(st.lists(st.tuples(steps, values_of_all_kinds), max_size=40))
 def test_whatever_comes_the_curves_stay_in_order_and_finite(rows) -> None:
     case = Case()
     made = [

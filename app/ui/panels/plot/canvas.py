@@ -55,7 +55,7 @@ BETWEEN = 0.045
 
 
 @dataclass(slots=True)
-class Range:
+class ValueRange:
     """The values that an axis shows; ``held`` when a person chose them, ``is_new`` until values were seen."""
 
     low: float = 0.0
@@ -156,7 +156,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.signs: list[tuple[ShownCurve, float, float]] = []  # the same, where a line has no dashes
         self._lines: dict[str, pg.PlotCurveItem] = {}
         self._held: tuple[str, QPointF] | None = None
-        self.ranges = {"left": Range(), "right": Range()}
+        self.ranges = {"left": ValueRange(), "right": ValueRange()}
         self._build()
         self.setAcceptDrops(True)
         self.setFrameShape(QGraphicsView.Shape.NoFrame)

@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from PySide6.QtCore import QModelIndex, QPoint, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
+from app.core.series.curves import Curves
 from app.core.series.formula import FieldSource
 from app.core.series.samples import Figures
 from app.ui.panels.plot.look import COLOURS, CurveLook, Stroke
 from app.ui.panels.plot.shown_curve import MINUS, ShownCurve, number_words, value_words
-from app.ui.text.numbers import seconds_words
+from app.ui.text.numbers import grouped, seconds_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import Cell, Column, TableModel
@@ -244,3 +245,20 @@ def next_look(there: Sequence[ShownCurve]) -> CurveLook:
     colour = min(range(len(COLOURS)), key=lambda each: (colours.count(each), each))
     pattern = min(range(4), key=lambda each: (patterns.count(each), each))
     return CurveLook(colour, pattern)
+
+
+def foot_words(curves: Curves, *, has_cursors: bool, distance: float | None) -> str:
+    """What the figures are about, how far A and B are apart, and what is not there."""
+    about = _("Min, max and mean are between A and B")
+    parts = [about if has_cursors else _("Min, max and mean of what is shown")]
+    if distance is not None:
+        parts.append(_("A to B: {distance}").format(distance=number_words(distance)))
+    lost = curves.lost
+    if lost:
+        said = ngettext("{count} message lost: a gap", "{count} messages lost: gaps", lost)
+        parts.append(said.format(count=grouped(lost)))
+    forgotten = sum(each.samples.begun for each in curves.all)
+    if forgotten:
+        said = ngettext("{count} old point forgotten", "{count} old points forgotten", forgotten)
+        parts.append(said.format(count=grouped(forgotten)))
+    return " · ".join(parts)

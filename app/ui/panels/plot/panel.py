@@ -24,8 +24,8 @@ from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.plot.canvas import PlotCanvas
 from app.ui.panels.plot.export import CSV, PNG, SVG, PlotExport
 from app.ui.panels.plot.lanes import StateLanes
-from app.ui.panels.plot.legend import LegendFigures, LegendTable, columns, next_look
-from app.ui.panels.plot.shown_curve import ShownCurve, look_of, number_words
+from app.ui.panels.plot.legend import LegendFigures, LegendTable, columns, foot_words, next_look
+from app.ui.panels.plot.shown_curve import ShownCurve, look_of
 from app.ui.panels.plot.time_view import SPANS, TimeView
 from app.ui.panels.plot.tools import PlotTools
 from app.ui.panels.plot.xy_canvas import XYCanvas
@@ -312,7 +312,8 @@ class PlotPanel(PanelWidget):
         begin_s, end_s = (min(both), max(both)) if both else (self.canvas.begin_s, self.canvas.end_s)
         self.figures.look_at(begin_s, end_s, both)
         self.table.tell_visible_changed()
-        self.about.setText(self._about(has_cursors=both is not None))
+        distance = self.xy.distance() if self.is_across else None
+        self.about.setText(foot_words(self.curves, has_cursors=both is not None, distance=distance))
         count, whole = self._points
         points = ngettext("{count} point", "{count} points", count).format(count=grouped(count))
         words = _("{points}, all drawn") if whole else _("{points}, 2 per px")
@@ -320,31 +321,6 @@ class PlotPanel(PanelWidget):
         advice = next(filter(None, (self.curves.advice(each.curve) for each in self.shown)), "")
         self.advice.setText(advice)
         show_when(self.advice, bool(advice))
-
-    def _about(self, *, has_cursors: bool) -> str:
-        parts = [
-            _("Min, max and mean are between A and B")
-            if has_cursors
-            else _("Min, max and mean of what is shown")
-        ]
-        distance = self.xy.distance() if self.is_across else None
-        if distance is not None:
-            parts.append(_("A to B: {distance}").format(distance=number_words(distance)))
-        lost = self.curves.lost
-        if lost:
-            parts.append(
-                ngettext("{count} message lost: a gap", "{count} messages lost: gaps", lost).format(
-                    count=grouped(lost)
-                )
-            )
-        forgotten = sum(each.curve.samples.begun for each in self.shown)
-        if forgotten:
-            parts.append(
-                ngettext("{count} old point forgotten", "{count} old points forgotten", forgotten).format(
-                    count=grouped(forgotten)
-                )
-            )
-        return " · ".join(parts)
 
     def _changed(self) -> None:
         """Curves came or went, or look otherwise."""

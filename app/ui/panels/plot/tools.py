@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
-from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
 from app.ui.panels.plot.add_curve import AddCurve
 from app.ui.panels.plot.time_view import SPANS
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Segments
+from app.ui.widgets import MenuButton, Segments, ToggleButton
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.paint import show_when
 from nep.i18n import _, lazy
@@ -20,20 +19,6 @@ if TYPE_CHECKING:
     from app.core.session import Session
 
 SPAN_WORDS = {"12": lazy("12 s"), "60": lazy("1 min"), "300": lazy("5 min"), "all": lazy("All")}
-
-
-class ToggleButton(Button):
-    """A button that stays pressed: filled with what is chosen, edged in the accent."""
-
-    def __init__(self, theme: Theme, text: str, icon: str) -> None:
-        super().__init__(theme, text, icon, size="small")
-        self.setCheckable(True)
-
-    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
-        if self.isChecked() and self.isEnabled():
-            role = self._theme.colour
-            return role("selected"), role("accent"), role("selectedText")
-        return super()._look()
 
 
 class PlotTools(QWidget):
@@ -56,7 +41,7 @@ class PlotTools(QWidget):
         self.across = ToggleButton(theme, _("X and Y"), "chart-spline")
         self.across.setToolTip(_("Draw the second curve over the first"))
         self.across.setProperty("tip", True)
-        self.export = Button(theme, _("Export"), "download", size="small")
+        self.export = MenuButton(theme, _("Export"), "download", size="small")
         row = Flow(self, gap=8, row_gap=6)
         row.setContentsMargins(10, 6, 10, 6)
         row.add_elastic(self.add, greedy=True)

@@ -79,14 +79,12 @@ def drawn(panel: PlotPanel, colour: QColor) -> list[int]:
     ratio = image.devicePixelRatio()
     wanted = colour.rgb()
     area = panel.canvas.area
-    found = []
-    for x in range(round(area.left() * ratio) + 1, round(area.right() * ratio) - 1):
-        if any(
-            _near(image.pixel(x, y), wanted)
-            for y in range(round(area.top() * ratio), round(area.bottom() * ratio))
-        ):
-            found.append(round(x / ratio - area.left()))
-    return found
+    rows = range(round(area.top() * ratio), round(area.bottom() * ratio))
+    return [
+        round(x / ratio - area.left())
+        for x in range(round(area.left() * ratio) + 1, round(area.right() * ratio) - 1)
+        if any(_near(image.pixel(x, y), wanted) for y in rows)
+    ]
 
 
 def _near(one: int, other: int) -> bool:
@@ -99,7 +97,7 @@ def cell(panel: PlotPanel, name: str, column: str) -> str:
     return panel.model.cell_at(row, place).text
 
 
-# -- curves -----------------------------------------------------------------------------------------------
+# -- curves ------------------------------------------------------------------------------------------------
 
 
 def test_with_no_curves_it_says_how_to_get_one(panel, window) -> None:
@@ -200,7 +198,7 @@ def test_the_largest_and_smallest_numbers_are_drawn(panel, values) -> None:
     assert drawn(panel, panel.theme.series(0))
 
 
-# -- time ----------------------------------------------------------------------------------------------------
+# -- time --------------------------------------------------------------------------------------------------
 
 
 def test_it_follows_what_comes_and_pauses_while_the_data_go_on(panel) -> None:
@@ -290,7 +288,7 @@ def test_zooming_never_leaves_what_numbers_can_say() -> None:
     assert view.shown(-7.0, 99.0) == (-7.0, 4.0)
 
 
-# -- A and B ----------------------------------------------------------------------------------------------------
+# -- A and B -----------------------------------------------------------------------------------------------
 
 
 def test_a_and_b_by_the_mouse_and_the_keys(panel) -> None:
@@ -323,7 +321,7 @@ def test_a_and_b_by_the_mouse_and_the_keys(panel) -> None:
     assert panel.canvas.cursors == {}
 
 
-# -- the table ----------------------------------------------------------------------------------------------------
+# -- the table ---------------------------------------------------------------------------------------------
 
 
 def test_the_eye_hides_and_the_menu_changes_axis_and_colour(panel, window) -> None:
@@ -379,7 +377,7 @@ def test_values_in_the_table(value, words) -> None:
     assert value_words(value) == words
 
 
-# -- adding -------------------------------------------------------------------------------------------------------
+# -- adding ------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -458,7 +456,7 @@ def test_pictures_are_not_subscribed_to_find_numbers_in_them(adding, window) -> 
     assert window.session.watched == []
 
 
-# -- from elsewhere -----------------------------------------------------------------------------------------------
+# -- from elsewhere ----------------------------------------------------------------------------------------
 
 
 def test_a_field_travels_in_the_hand() -> None:
@@ -476,7 +474,7 @@ def test_a_topic_of_which_nobody_knows_a_field_is_asked_for(panel) -> None:
     assert panel.add.text() == "/odom."
 
 
-# -- one over another ------------------------------------------------------------------------------------------
+# -- one over another --------------------------------------------------------------------------------------
 
 
 def test_the_second_curve_over_the_first(panel) -> None:
@@ -499,7 +497,7 @@ def test_the_second_curve_over_the_first(panel) -> None:
     assert panel.drawings.currentWidget() is panel.canvas
 
 
-# -- kept, exported -------------------------------------------------------------------------------------------------
+# -- kept, exported ----------------------------------------------------------------------------------------
 
 
 def test_a_layout_brings_it_back_also_when_the_topics_are_not_there(qtbot, panel, window) -> None:
