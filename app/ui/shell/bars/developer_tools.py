@@ -9,7 +9,7 @@ from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.freeze import all_frozen, freezable
 from app.ui.shell.commands.shell import Shell
 from app.ui.text import plain
-from app.ui.widgets import MenuButton, Separator, ToggleButton
+from app.ui.widgets import MenuButton, Separator, ToggleButton, paint
 from nep.i18n import _
 
 FREEZE = "view.freeze"
