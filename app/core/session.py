@@ -97,7 +97,10 @@ class Session:
         self.nodes = Nodes()
         self._mailbox, self._checks = Mailbox(), Checks()
         self._watches = Watches(self._begin_watch, self._end_watch, self._forget_watch)
-        self.images, self.series = Images(self.watch, clock), SeriesFeed(self.watch, clock_ns)
+        self.images, self.series = (
+            Images(self.watch, clock),
+            SeriesFeed(self.watch, clock_ns, self._mailbox.set_room),
+        )
         make_source = source if source is not None else partial(LiveSource, always=LOGS)
         sinks = [self._checks.look, self._mailbox.post, self._offer]
         self.source: Source = make_source(self.address, sinks, self._mailbox.post_event)

@@ -8,6 +8,9 @@ from typing import Protocol
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watching
 
+BETWEEN_TICKS = 8192
+"""Messages of a plotted topic that wait for the next tick: 1 kHz for 8 s, should the window be that late."""
+
 
 class SeriesTaker(Protocol):
     """Takes what arrived on one topic since the last tick."""
@@ -23,9 +26,17 @@ class SeriesFeed:
     looked at again has no hole. ``origin_ns`` is the time that all series count their seconds from.
     """
 
-    def __init__(self, watch: Callable[[str], Watching], clock_ns: Callable[[], int]) -> None:
-        """``watch`` looks at a topic by its name among those of all networks."""
-        self._watch, self._clock_ns = watch, clock_ns
+    def __init__(
+        self,
+        watch: Callable[[str], Watching],
+        clock_ns: Callable[[], int],
+        set_room: Callable[[str, int | None], None] = lambda _topic, _messages: None,
+    ) -> None:
+        """``watch`` looks at a topic by its name among those of all networks.
+
+        ``set_room`` says how many of its messages are to be kept between two ticks (`Mailbox.set_room`).
+        """
+        self._watch, self._clock_ns, self._set_room = watch, clock_ns, set_room
         self._takers: dict[str, list[SeriesTaker]] = {}
         self._watching: dict[str, Watching] = {}
         self.origin_ns = clock_ns()
@@ -44,6 +55,7 @@ class SeriesFeed:
         takers = self._takers.setdefault(topic, [])
         takers.append(taker)
         if topic not in self._watching:
+            self._set_room(topic, BETWEEN_TICKS)
             self._watching[topic] = self._watch(topic)
 
     def leave(self, topic: str, taker: SeriesTaker) -> None:
@@ -54,6 +66,7 @@ class SeriesFeed:
         if not takers and topic in self._watching:
             del self._takers[topic]
             self._watching.pop(topic).close()
+            self._set_room(topic, None)
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Hand over what arrived since the last tick, by topic."""

@@ -45,7 +45,7 @@ ZOOM_STEP = 1.2
 LEAST_WINDOW_S, MOST_WINDOW_S = 1e-4, 1e9
 SMOOTH_POINTS = 3000
 """Above so many points smooth edges are not seen, and cost more than all else."""
-SIGNS = 5
+SIGNS, BUSY = 5, 5.0
 TICK_APART, TICK_ABOVE = 84, 34  # px between ticks
 BESIDE = 60
 FARTHEST = 1e300
@@ -254,7 +254,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.signs = []
         for place, (curve, line) in enumerate(lines):
             self._show_line(curve, line)
-            if is_dense(line) and len(lines) > 1:
+            if len(lines) > 1 and self._is_dense(line, right=curve.right):
                 self._add_signs(curve, place / len(lines))
         self._show_clock(clock_s)
         self.view.setXRange(self.begin_s - self.anchor_s, self.end_s - self.anchor_s, padding=0)
@@ -269,14 +269,22 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         elif item.getViewBox() is not view:
             item.getViewBox().removeItem(item)
             view.addItem(item, ignoreBounds=True)
-        dense = is_dense(line)
-        # dashes of a dense line are only noise, and their lengths are what painting then takes
+        # what is so dense that dashes and smooth edges are not seen would take most of the time for them
+        dense = self._is_dense(line, right=curve.right)
         item.setData(
             line.times - self.anchor_s,
             np.clip(line.values, -FARTHEST, FARTHEST),
-            pen=curve.look.pen(self.theme, whole=dense),
+            pen=curve.look.pen(self.theme, is_dense=dense),
             antialias=not dense,
         )
+
+    def _is_dense(self, line: Line, *, right: bool) -> bool:
+        """Whether a line has so many points, or goes up and down so much, that dashes in it are noise."""
+        if len(line.times) > SMOOTH_POINTS or not line.is_whole:
+            return True
+        shown = self.ranges["right" if right else "left"]
+        travelled = float(np.nansum(np.abs(np.diff(line.values)))) / (shown.high - shown.low)
+        return not travelled * self.area.height() < BUSY * self.area.width()
 
     def _add_signs(self, curve: ShownCurve, shift: float) -> None:
         """A dense line has no dashes: its mark stands on it here and there, at the same times always."""
@@ -462,11 +470,6 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         if found is not None:
             event.acceptProposedAction()
             self.field_dropped.emit(*found)
-
-
-def is_dense(line: Line) -> bool:
-    """Whether a line has more points than dashes and smooth edges can be seen in."""
-    return len(line.times) > SMOOTH_POINTS or not line.is_whole
 
 
 def distance_words(distance_s: float) -> str:

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from PySide6.QtGui import QDragEnterEvent, QDropEvent
 
 
-DRAW_EVERY, FIGURES_EVERY = 2, 6  # refreshes of 30 a second
+DRAW_EVERY, FIGURES_EVERY = (2, 8), 6  # refreshes of 30 a second
 SLOW_S = 0.02
 """A drawing that takes longer is done half as often."""
 MOST_ROWS, TABLE_SHARE = 6, 0.32
@@ -244,7 +244,7 @@ class PlotPanel(PanelWidget):
         self.exporter.follow()
         if not self.shown:
             return
-        every = DRAW_EVERY * (2 if self._drawing_s > SLOW_S else 1)
+        every = self._draw_every()
         if self._due or (self.view.follows and self._ticks % every == 0):
             self._due = False
             began = time.perf_counter()
@@ -252,6 +252,13 @@ class PlotPanel(PanelWidget):
             self._drawing_s = time.perf_counter() - began
         if self._ticks % FIGURES_EVERY == 0:
             self._show_figures()
+
+    def _draw_every(self) -> int:
+        """After how many refreshes it is drawn again: not before it has moved on by a pixel or so."""
+        pixel_s = (self.canvas.end_s - self.canvas.begin_s) / self.canvas.columns
+        least, most = DRAW_EVERY
+        every = round(min(most, max(least, pixel_s * 30)))
+        return min(most, 2 * every) if self._drawing_s > SLOW_S else every
 
     def _soon(self) -> None:
         """Draw at the next tick, also while it is paused."""
