@@ -2,8 +2,8 @@
 
     python bench/studio_plot.py [--seconds 6]
 
-Another process publishes ten topics at 1 kHz each (10 000 messages a second), or one topic with ten numbers at
-1 kHz; the Plot panel draws ten curves of them, whose last minute was put there before. Measured is the
+Another process publishes ten topics at 1 kHz each (10 000 messages a second), or one topic with ten numbers
+at 1 kHz; the Plot panel draws ten curves of them, whose last minute was put there before. Measured is the
 processor time of the whole process beyond that of the window whose plot is empty ("plain"; "plain again" is
 the A/A row), and how long a drawing takes. At last one curve has a million points and gets a thousand more
 each second.

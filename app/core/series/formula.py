@@ -255,7 +255,7 @@ class _Reader:
             hint = (
                 _("did you mean '{near}'?").format(near=near)
                 if near
-                else _("topics begin with a stroke, as /odom.speed")
+                else _("topics begin with a slash, as /odom.speed")
             )
             raise CurveError(said.format(name=name[:40], hint=hint))
         source = self._source(node)
