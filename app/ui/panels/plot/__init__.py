@@ -1,6 +1,6 @@
 """Plot: numbers and states of messages over their own time; what is calculated from them; one over another.
 
-`canvas` draws the curves, `lanes` the states, `legend` is the table below, `add_curve` the field above.
+`canvas` draws the curves, `lanes` the states, `legend` is the table below, `tools` the row above.
 Nothing but this is loaded before somebody opens a plot: pyqtgraph and numpy take a fifth of a second.
 """
 
