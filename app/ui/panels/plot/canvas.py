@@ -283,7 +283,8 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         if len(line.times) > SMOOTH_POINTS or not line.is_whole:
             return True
         shown = self.ranges["right" if right else "left"]
-        travelled = float(np.nansum(np.abs(np.diff(line.values)))) / (shown.high - shown.low)
+        with np.errstate(over="ignore", invalid="ignore"):
+            travelled = float(np.nansum(np.abs(np.diff(line.values)))) / (shown.high - shown.low)
         return not travelled * self.area.height() < BUSY * self.area.width()
 
     def _add_signs(self, curve: ShownCurve, shift: float) -> None:
