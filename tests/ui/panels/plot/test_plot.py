@@ -547,7 +547,8 @@ def test_numbers_pictures_and_drawings_are_exported(qtbot, panel, window, tmp_pa
     panel.exporter.write(tmp_path / "a.png", PNG)
     image = QImage(str(tmp_path / "a.png"))
     assert image.width() == 2 * panel.drawings.width()
-    assert len({image.pixel(x, image.height() // 3) for x in range(0, image.width(), 3)}) > 3
+    row = image.height() // 3
+    assert any(_near(image.pixel(x, row), panel.theme.series(0).rgb()) for x in range(image.width()))
     panel.exporter.write(tmp_path / "a.svg", SVG)
     assert (tmp_path / "a.svg").read_text().count("<path") + (tmp_path / "a.svg").read_text().count(
         "<poly"
