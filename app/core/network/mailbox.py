@@ -73,12 +73,12 @@ class Mailbox:
         self._rooms: dict[str, int] = {}
 
     def set_room(self, topic: str, messages: int | None) -> None:
-        """Keep so many messages of a topic, within the same bytes; None: as many as of any other."""
+        """Keep so many messages of a topic (1 at least), within the same bytes; None: as of any other."""
         with self._lock:
             if messages is None:
                 self._rooms.pop(topic, None)
             else:
-                self._rooms[topic] = messages
+                self._rooms[topic] = max(1, messages)
 
     def post(self, topic: str, messages: Sequence[Message]) -> None:
         """Hand over a batch of one topic, oldest first; one lock for all of it.

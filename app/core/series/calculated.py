@@ -42,9 +42,8 @@ class Calculated:
         first = max(self._next, base.begun) - base.begun
         end = min(self._ready(base), first + AT_ONCE)
         if end > first:
-            times, values, gaps = self._calculated(base, first, end)
-            with np.errstate(invalid="ignore"):
-                self.samples.extend(times, values, gaps)
+            with np.errstate(all="ignore"):  # what is no number then is a gap
+                self.samples.extend(*self._calculated(base, first, end))
             self._next = base.begun + end
 
     def _ready(self, base: Samples) -> int:
@@ -77,11 +76,9 @@ class WindowCurve(Calculated):
             parts[~joined] = 0.0  # what was between is not known
             begin = float(self.samples.values[-1]) if len(self.samples) else 0.0
             return times, begin + np.cumsum(parts), gaps
-        with np.errstate(over="ignore"):
-            changes = np.diff(values, prepend=np.nan if before == first else [])
+        changes = np.diff(values, prepend=np.nan if before == first else [])
         if self._kind == "derivative":
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                changes = changes / steps_s
+            changes = changes / steps_s
         changes[~joined] = np.nan
         return times, changes, gaps
 
@@ -114,8 +111,7 @@ class ExpressionCurve(Calculated):
     def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         times = base.times[first:end].copy()
         arrays = [base.values[first:end], *(held_values(each, times) for each in self._inputs[1:])]
-        with np.errstate(all="ignore"):
-            values = np.broadcast_to(np.asarray(self._calculate(arrays), dtype=float), times.shape).copy()
+        values = np.broadcast_to(np.asarray(self._calculate(arrays), dtype=float), times.shape).copy()
         return times, values, base.gaps[first:end].copy()
 
 

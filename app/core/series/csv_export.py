@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from datetime import datetime, timezone
 from math import inf
 
+import numpy as np
+
 from app.core.series.curves import Curve
 from app.core.series.samples import Floats
 
@@ -47,22 +49,34 @@ def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
 
     Times are nanoseconds since 1970 and ISO 8601 in UTC; a state stands where it begins.
     """
-    yield _line(["stamp_ns", "time_utc", *(_harmless(column.name) for column in columns)])
-    cells = [_cells_of(column) for column in columns]
-    times = sorted({time_s for each in cells for time_s in each})
+    yield _lines([["stamp_ns", "time_utc", *(_harmless(column.name) for column in columns)]])
+    states = [np.array([time_s for time_s, _word in column.states]) for column in columns]
+    times = np.unique(np.concatenate([np.empty(0), *states, *(column.times for column in columns)]))
     for begin in range(0, len(times), ROWS_AT_ONCE):
-        out = []
-        for time_s in times[begin : begin + ROWS_AT_ONCE]:
+        part = times[begin : begin + ROWS_AT_ONCE]
+        cells = [
+            _cells_of(column, begins, float(part[0]), float(part[-1]))
+            for column, begins in zip(columns, states, strict=True)
+        ]
+        rows = []
+        for time_s in part.tolist():
             stamp_ns = origin_ns + round(time_s * 1e9)
-            out.append(_line([str(stamp_ns), _iso(stamp_ns), *(each.get(time_s, "") for each in cells)]))
-        yield "".join(out)
+            rows.append([str(stamp_ns), _iso(stamp_ns), *(each.get(time_s, "") for each in cells)])
+        yield _lines(rows)
 
 
-def _cells_of(column: CsvColumn) -> dict[float, str]:
-    """By time what stands there; of several at the same time the newest."""
-    numbers = zip(column.times.tolist(), column.values.tolist(), strict=True)
+def _cells_of(column: CsvColumn, states: Floats, begin_s: float, end_s: float) -> dict[float, str]:
+    """What stands where in some rows; of several at the same time the newest."""
+    first, last = _places(column.times, begin_s, end_s)
+    numbers = zip(column.times[first:last].tolist(), column.values[first:last].tolist(), strict=True)
     cells = {time_s: repr(value) for time_s, value in numbers}
-    return cells | {time_s: _harmless(word) for time_s, word in column.states}
+    first, last = _places(states, begin_s, end_s)
+    return cells | {time_s: _harmless(word) for time_s, word in column.states[first:last]}
+
+
+def _places(times: Floats, begin_s: float, end_s: float) -> tuple[int, int]:
+    first, last = np.searchsorted(times, begin_s, "left"), np.searchsorted(times, end_s, "right")
+    return int(first), int(last)
 
 
 def _iso(stamp_ns: int) -> str:
@@ -78,7 +92,7 @@ def _harmless(text: str) -> str:
     return f"'{text}" if text.startswith(_START) else text
 
 
-def _line(cells: Sequence[str]) -> str:
-    out = io.StringIO()
-    csv.writer(out).writerow(cells)
+def _lines(rows: Sequence[Sequence[str]]) -> str:
+    out = io.StringIO(newline="")
+    csv.writer(out).writerows(rows)
     return out.getvalue()

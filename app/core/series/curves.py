@@ -167,6 +167,23 @@ class Curves:
         return sum(each.lost for each in self._topics.values())
 
     @property
+    def unread(self) -> int:
+        """Messages that can't be read, are too large, or have a stamp that is no time."""
+        return sum(each.unread + each.unplaced for each in self._topics.values())
+
+    @property
+    def undone(self) -> int:
+        """Numbers and states that went because a clock was set back."""
+        fields = [field for topic in self._topics.values() for field in topic.fields]
+        return sum(field.numbers.undone + field.states.undone for field in fields)
+
+    @property
+    def forgotten(self) -> int:
+        """The oldest numbers and states, for which there was no room."""
+        states = [each.states for each in self.all if each.states is not None]
+        return sum(each.samples.begun for each in self.all) + sum(each.forgotten for each in states)
+
+    @property
     def newest_s(self) -> float | None:
         """When the newest number or state of any curve was."""
         found = [

@@ -20,14 +20,15 @@ from nep.i18n import _
 
 EVERY: Final = "*"
 """The step that means every element of a list; as a key it would stand in brackets and quotes."""
-MOST_STEPS, MOST_EVERY, MOST_FIELDS = 32, 64, 2000
+MOST_STEPS, MOST_EVERY, MOST_FIELDS = 32, 65, 2000
 LONGEST = 400
 ALONE = "value"
 _STEP = re.compile(
     r"""\.?(?P<name>[^.\[\]"\s]+)|\[(?P<index>-?\d{1,9})\]"""
     r"""|\[(?P<every>\*)\]|\[(?P<key>"(?:[^"\\]|\\.)*")\]"""
 )
-_PLAIN = re.compile(r"""[^.\[\]"\s]+\Z""")
+_PLAIN = re.compile(r"""[^.\[\]"\s,()+*/%^-]+\Z""")
+"""Keys that are nothing to calculate: `head-yaw` would be a difference, so it is written `["head-yaw"]`."""
 
 FieldKind = Literal["number", "state", "list"]
 
@@ -108,7 +109,10 @@ class FieldPath:
         return here
 
     def expanded(self, payload: object) -> list[FieldPath]:
-        """The paths without `ALL` that a message has for it, 64 at most; itself when it has none."""
+        """The paths without `ALL` that a message has for it, 65 at most; itself when it has none.
+
+        That is one more than a plot has curves, so that too many are told and not cut off.
+        """
         if not self.has_every:
             return [self]
         place = self.steps.index(ALL)
@@ -169,7 +173,8 @@ def fields_of(payload: object, most: int = MOST_FIELDS) -> Iterator[FieldFound]:
         if len(steps) >= MOST_STEPS or len(waiting) > most:
             continue
         if isinstance(here, Mapping):
-            waiting += [((*steps, str(key)), below) for key, below in islice(here.items(), most)]
+            named = ((key, below) for key, below in here.items() if isinstance(key, str))
+            waiting += [((*steps, key), below) for key, below in islice(named, most)]
         elif is_list(here):
             waiting += [((*steps, place), below) for place, below in enumerate(islice(here, 4))]  # type: ignore[call-overload]
 

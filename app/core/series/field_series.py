@@ -22,6 +22,8 @@ LATEST_STAMP_NS = 1 << 63
 """Later stamps (the year 2262) are none: such a message has no place in time, and is counted."""
 SILENCE_S, SILENCES = 1.0, 8.0
 """A silence is a gap when it is longer than a second and than eight usual pauses."""
+SILENCES_IN_A_ROW = 3
+"""After so many silences that is how often the topic comes now: each message as a gap would be no line."""
 MOST_PUBLISHERS = 64
 UNREAD = object()
 """What stands for a message that can't be read."""
@@ -103,11 +105,11 @@ class TopicSeries:
         self.fields: list[FieldSeries] = []
         self.received = self.lost = self.unread = self.unplaced = 0
         self.payload: object = MISSING
-        self.has_own_time = True
         self._gap = False  # something is missing before whatever comes next
         self._seqs: dict[int | None, int] = {}
         self._last_s: float | None = None
         self._usual_s: float | None = None
+        self._silences = 0  # in a row
 
     def join(self, field: FieldSeries) -> None:
         """One more field is looked up from now on, in the newest message too."""
@@ -117,14 +119,19 @@ class TopicSeries:
 
     def take(self, batch: Batch, now_ns: int) -> None:
         """Take over what arrived."""
-        lost = batch.dropped
+        seen: set[int | None] = set()  # publishers: what was dropped are jumps of their first numbers, too
+        lost = first_jumps = 0
         times: list[float] = []
         payloads: list[object] = []
         gaps: list[bool] = []
         pending = self._gap or batch.dropped > 0
         for message in batch.messages:
             jump = self._missed(message)
-            lost = max(lost, jump) if jump and pending else lost + jump
+            if message.publisher in seen:
+                lost += jump
+            else:
+                seen.add(message.publisher)
+                first_jumps += jump
             time_s = self._time_of(message, now_ns)
             pending = pending or jump > 0
             if time_s is None:
@@ -138,7 +145,7 @@ class TopicSeries:
             pending = False
         self._gap = pending
         self.received += len(batch.messages)
-        self.lost += lost
+        self.lost += lost + max(batch.dropped, first_jumps)
         for field in self.fields:
             field.take(times, payloads, gaps)
 
@@ -155,7 +162,6 @@ class TopicSeries:
 
     def _time_of(self, message: Message, now_ns: int) -> float | None:
         stamp_ns = message.stamp_ns
-        self.has_own_time = stamp_ns is not None
         if stamp_ns is None:
             stamp_ns = now_ns
         if not 0 <= stamp_ns < LATEST_STAMP_NS:
@@ -181,6 +187,10 @@ class TopicSeries:
         if pause_s <= 0 or not isfinite(pause_s):
             return False
         if usual_s is not None and pause_s > max(SILENCE_S, SILENCES * usual_s):
-            return True
+            self._silences += 1
+            if self._silences < SILENCES_IN_A_ROW:
+                return True
+            usual_s = None
+        self._silences = 0
         self._usual_s = pause_s if usual_s is None else usual_s + 0.1 * (pause_s - usual_s)
         return False

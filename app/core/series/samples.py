@@ -236,6 +236,12 @@ class Samples:
                 new[: self._count] = old[: self._count]
                 setattr(self, name, new)
 
+    def _give_room_back(self) -> None:
+        """Where the limit has become much smaller, as more curves share what a plot may keep."""
+        if len(self._times) > 4 * max(self.limit, self._count, _FIRST_ROOM):
+            for name in ("_times", "_values", "_gaps"):
+                setattr(self, name, getattr(self, name)[: self._count].copy())
+
     def _forget_old(self) -> None:
         if self._count <= self.limit:
             return
@@ -251,6 +257,7 @@ class Samples:
         for level in self._levels:
             level.forget(drop >> level.shift)
         self._count, self.begun = kept, self.begun + drop
+        self._give_room_back()
 
     # -- what is asked ---------------------------------------------------------------------------------------
 
@@ -295,12 +302,25 @@ class Samples:
         first, end = max(0, first - 1), min(self._count, end + 1)
         columns = max(1, columns)
         if end - first <= RAW_PER_COLUMN * columns or end_s <= begin_s:
-            part = slice(first, end)
-            broken = np.flatnonzero(self._gaps[part])
-            broken = broken[broken > 0]
-            times = np.insert(self._times[part], broken, self._times[part][broken])
-            return Line(times, np.insert(self._values[part], broken, np.nan), points, is_whole=True)
+            pixel_s = max(0.0, end_s - begin_s) / columns
+            return Line(*self._whole(first, end, pixel_s), points, is_whole=True)
         return self._peaks(begin_s, end_s, columns, (first, end))
+
+    def _whole(self, first: int, end: int, pixel_s: float) -> tuple[Floats, Floats]:
+        """All numbers between two indexes, NaN in the gaps; one alone between two gaps is a pixel wide."""
+        times, values, gaps = self._times[first:end], self._values[first:end], self._gaps[first:end]
+        begins, ends = gaps.copy(), np.append(gaps[1:], end == self._count or self._gaps[end])
+        if first == 0:
+            begins[:1] = True
+        alone = np.flatnonzero(begins & ends[: len(begins)])
+        until = np.minimum(times[alone] + pixel_s, np.append(times[1:], np.inf)[alone])
+        broken = np.flatnonzero(gaps)
+        broken = broken[broken > 0]
+        places = np.concatenate([alone + 1, broken])
+        return (
+            np.insert(times, places, np.concatenate([until, times[broken]])),
+            np.insert(values, places, np.concatenate([values[alone], np.full(len(broken), np.nan)])),
+        )
 
     def _peaks(self, begin_s: float, end_s: float, columns: int, part: tuple[int, int]) -> Line:
         width = (end_s - begin_s) / columns
@@ -318,6 +338,7 @@ class Samples:
         rising = self._values[ends - 1] < self._values[starts]  # nearer to how the line really runs
         values[0::2], values[1::2] = np.where(rising, high, low), np.where(rising, low, high)
         times = np.repeat(middles, 2)
+        times[1::2] += np.where(low == high, width / 2, 0.0)  # or one alone between two gaps would be nothing
         broken = 2 * np.flatnonzero(self._gaps[starts])
         broken = broken[broken > 0]
         points = part[1] - part[0]

@@ -114,6 +114,32 @@ def test_a_long_silence_is_a_gap_and_a_short_one_is_none() -> None:
     assert [t for t, _v, gap in points(x) if gap] == [9.0]
 
 
+def test_a_topic_that_comes_slower_from_now_on_is_a_line_again() -> None:
+    case = Case()
+    x = case.curve("/a.x")
+    case.send("/a", *((n / 1000, {"x": n}) for n in range(50)))
+    case.send("/a", *((float(n), {"x": n}) for n in range(5, 60, 5)))
+    assert [t for t, _v, gap in points(x) if gap] == [5.0, 10.0], "not each of them is after a gap"
+
+
+@pytest.mark.parametrize(("dropped", "skip", "lost"), [(5, 0, 5), (5, 3, 8), (0, 3, 3)])
+def test_what_is_lost_is_counted_once(dropped, skip, lost) -> None:
+    case = Case()
+    case.curve("/a.x")
+    case.send("/a", (0.0, {"x": 1}))
+    case.send("/a", (0.1, {"x": 2}), dropped=dropped, skip=skip)
+    assert case.curves.lost == lost
+
+
+def test_what_is_lost_behind_a_message_without_a_place_is_counted_too() -> None:
+    case = Case()
+    case.curve("/a.x")
+    seqs = ((1, ORIGIN), (2, 2**64 - 1), (5, ORIGIN + 10**8), (5 + 4, ORIGIN + 2 * 10**8))
+    made = [Message("/a", b'{"x": 2}', "json", "json", stamp_ns=s, seq=n, publisher=1) for n, s in seqs]
+    case.feed.add({"/a": Batch(made)})
+    assert (case.curves.lost, case.curves.unread) == (2 + 3, 1)
+
+
 def test_a_value_may_change_its_type() -> None:
     case = Case()
     x = case.curve("/a.x")
@@ -216,6 +242,15 @@ def test_what_is_calculated_does_not_reach_over_a_gap() -> None:
     assert [v for _t, v, _g in points(integral)] == pytest.approx([0, 1, 1, 101.5])
 
 
+def test_what_grows_beyond_all_numbers_is_a_gap_and_no_warning() -> None:
+    case = Case()
+    made = [case.curve(f"{kind}(/a.x)") for kind in ("integral", "derivative", "difference")]
+    case.send("/a", *((n / 10, {"x": value}) for n, value in enumerate([1.7e308, 1.7e308, -1.7e308, 1, 2])))
+    for curve in made:
+        assert bool(np.all(np.isfinite(curve.samples.values)))
+    assert [v for _t, v, _g in points(made[2])][-1] == 1
+
+
 def batch_wise(
     calculate: Callable[[list[float]], list[float]], text: str, values: list[float], cuts: list[int]
 ) -> None:
@@ -313,6 +348,12 @@ def test_a_plot_has_a_bound() -> None:
         case.curve(f"/a.x{number}")
     with pytest.raises(CurveError, match="64"):
         case.curve("/a.one_more")
+    many = Case()
+    many.curve("/a.n")
+    many.send("/a", (0.0, {"n": 1, "all": list(range(65))}))
+    with pytest.raises(CurveError, match="64"):
+        many.curves.add("/a.all[*]")
+    assert len(many.curves.all) == 1, "not the first 64 of them, as if there were no more"
     assert sum(curve.samples.limit for curve in case.curves.all) <= 8 << 20
 
 
@@ -338,3 +379,17 @@ def test_csv_has_a_row_for_each_time_and_no_formulas() -> None:
     assert rows[2][1].endswith(".500000000Z")
     assert math.isclose(int(rows[3][0]) - ORIGIN, 0.75e9)
     assert len("".join(csv_lines(columns_of(made, 0.6, 0.8), ORIGIN)).splitlines()) == 2
+
+
+@pytest.mark.parametrize("rows_at_once", [1, 3, 5000])
+def test_csv_in_parts_is_the_same(monkeypatch, rows_at_once) -> None:
+    case = Case()
+    made = [case.curve(text) for text in ("/a.x", "/a.word", "/b.y")]
+    case.send("/a", *((n / 10, {"x": n, "word": "up" if n % 4 < 2 else "down"}) for n in range(20)))
+    case.send("/b", *((n / 7, {"y": -n}) for n in range(14)))
+    whole = "".join(csv_lines(columns_of(made), ORIGIN))
+    monkeypatch.setattr("app.core.series.csv_export.ROWS_AT_ONCE", rows_at_once)
+    parts = list(csv_lines(columns_of(made), ORIGIN))
+    assert "".join(parts) == whole
+    assert len(whole.splitlines()) == 1 + len({*(n / 10 for n in range(20)), *(n / 7 for n in range(14))})
+    assert len(parts) == 1 + -(-(len(whole.splitlines()) - 1) // rows_at_once)

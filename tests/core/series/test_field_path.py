@@ -15,6 +15,7 @@ from app.core.series.field_path import (
     kind_of_value,
     meant_field,
 )
+from app.core.series.formula import ExpressionSource, FieldSource, parse
 from app.errors import CurveError
 
 MESSAGE = {
@@ -88,7 +89,7 @@ def test_every_field_that_is_offered_is_found_where_it_is_said_to_be(payload) ->
         for one in found.path.expanded(payload):
             value = one.value_in(payload)
             assert kind_of_value(value) in {"number", "state"}
-        assert len(found.path.expanded(payload)) == min(found.count, 64)
+        assert len(found.path.expanded(payload)) == min(found.count, 65)
 
 
 def test_every_element_of_a_list() -> None:
@@ -97,7 +98,21 @@ def test_every_element_of_a_list() -> None:
     ]
     assert len(FieldPath.parse("joints[*].position").expanded(MESSAGE)) == 3
     assert FieldPath.parse("ok[*]").expanded(MESSAGE) == []
-    assert len(FieldPath.parse("a[*][*]").expanded({"a": [[1] * 100] * 100})) == 64
+    assert len(FieldPath.parse("a[*][*]").expanded({"a": [[1] * 100] * 100})) == 65, "one more than fit"
+
+
+@pytest.mark.parametrize("key", ["head-yaw", "a+b", "1/2", "50%", "x^2", "f(x)", "a,b", "*", "x y", "a.b", ""])
+def test_a_key_that_looks_like_a_calculation_can_be_typed_as_it_is_offered(key) -> None:
+    (found,) = fields_of({key: 3})
+    typed = str(FieldSource("/head", found.path))
+    assert parse(typed, ["/head"]) == FieldSource("/head", FieldPath((key,)))
+    doubled = parse(f"{typed} * 2", ["/head"])
+    assert isinstance(doubled, ExpressionSource)
+    assert doubled.inputs == (FieldSource("/head", FieldPath((key,))),)
+
+
+def test_keys_that_are_no_text_are_not_offered() -> None:
+    assert list(fields_of({1: 2, b"x": 3, None: 4})) == []
 
 
 def test_what_is_offered_of_a_message() -> None:

@@ -185,6 +185,40 @@ def test_a_long_gap_is_no_line_however_far_one_looks_from() -> None:
     assert line.times[broken + 1] > 69.5
 
 
+def test_a_number_alone_between_two_gaps_can_be_seen() -> None:
+    samples = filled([(1.0, 1, False), (2.0, 2, False), (3.0, 7, True), (4.0, 4, True), (4.1, 4, False)])
+    line = samples.line(0, 10, 100)
+    assert line.times[2:6].tolist() == pytest.approx([3.0, 3.0, 3.1, 4.0])
+    assert line.values[2:6].tolist() == pytest.approx([math.nan, 7, 7, math.nan], nan_ok=True)
+    assert filled([(1.0, 1, False)]).line(0, 10, 100).times.tolist() == pytest.approx([1.0, 1.1])
+    assert filled([]).line(0, 10, 100).times.tolist() == []
+    same = filled([(1.0, 1, False), (1.0, 2, True), (1.0, 3, True)]).line(0, 10, 100)
+    assert bool(np.all(np.diff(same.times) >= 0))
+    far = np.concatenate([np.arange(0, 50, 0.001), [60.0], np.arange(70, 120, 0.001)])
+    gaps = np.zeros(len(far), dtype=bool)
+    gaps[50_000:50_002] = True
+    many = Samples()
+    many.extend(far, np.where(far == 60.0, 5.0, 0.0), gaps)
+    seen = many.line(0, 120, 300)
+    (alone,) = np.flatnonzero(seen.values[:-1] == 5.0)[:1]
+    assert seen.values[alone + 1] == 5.0
+    assert 0 < seen.times[alone + 1] - seen.times[alone] < 120 / 300
+
+
+def test_room_is_given_back_when_a_plot_has_more_curves() -> None:
+    samples = Samples()
+    times = np.arange(200_000) / 1000
+    samples.extend(times, times, np.zeros(len(times), dtype=bool))
+    samples.limit = 8192
+    samples.add(201.0, 1.0)
+    assert len(samples) <= 8192
+    assert samples.times.base is not None
+    assert samples.times.base.nbytes < 8192 * 8 * 4
+    assert samples.values[-1] == 1.0
+    samples.extend(times + 300, times, np.zeros(len(times), dtype=bool))
+    assert samples.begun + len(samples) == 400_001
+
+
 def test_columns_stay_where_they_are_while_the_plot_moves_on() -> None:
     samples = Samples()
     times = np.arange(0, 100, 0.001)
