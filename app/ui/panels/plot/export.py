@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QBuffer, QIODevice, QRect, QRectF, QSize, Qt
@@ -26,6 +28,7 @@ CSV = FileKind(lazy("Numbers (CSV)"), ".csv")
 PNG = FileKind(lazy("Picture (PNG)"), ".png")
 SVG = FileKind(lazy("Drawing (SVG)"), ".svg")
 RATIO = 2
+WAITS_S = 3.0
 Part = tuple[QSize, Callable[[QPainter, QRectF], object]]
 LEGEND_ROW = 22
 
@@ -37,6 +40,7 @@ class CsvWriter:
         """Begin at once; ``columns`` are never changed by anybody."""
         self.path = path
         self._done: str | None = None
+        self._given_up = threading.Event()
         self._thread = threading.Thread(
             target=self._run, args=(columns, origin_ns), name="studio-plot-export", daemon=True
         )
@@ -44,21 +48,29 @@ class CsvWriter:
 
     def _run(self, columns: Sequence[CsvColumn], origin_ns: int) -> None:
         try:
-            write_atomically(self.path, "".join(csv_lines(columns, origin_ns)).encode())
+            write_atomically(self.path, self._parts(columns, origin_ns))
         except OSError as error:
             self._done = error.strerror or type(error).__name__
         except MemoryError:
-            self._done = "memory"
+            self._done = _("there is not enough memory")
         else:
             self._done = ""
+
+    def _parts(self, columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[bytes]:
+        for lines in csv_lines(columns, origin_ns):
+            if self._given_up.is_set():
+                raise OSError(errno.ECANCELED, os.strerror(errno.ECANCELED))
+            yield lines.encode()
 
     def take(self) -> str | None:
         """None while it writes, "" when it is written, else why not."""
         return self._done
 
     def close(self) -> None:
-        """Wait until it is written, some seconds at most."""
-        self._thread.join(5.0)
+        """Wait until it is written, some seconds at most; then it is given up, and no part of it stays."""
+        self._thread.join(WAITS_S)
+        self._given_up.set()
+        self._thread.join(WAITS_S)
 
 
 class PlotPicture:
@@ -105,6 +117,8 @@ class PlotPicture:
     def png(self) -> bytes:
         """As PNG, twice as fine as on the screen."""
         image = QImage(self.size * RATIO, QImage.Format.Format_RGB32)
+        if image.isNull():
+            raise OSError(errno.ENOMEM, _("there is not enough memory"))
         image.setDevicePixelRatio(RATIO)
         painter = QPainter(image)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -112,7 +126,8 @@ class PlotPicture:
         painter.end()
         buffer = QBuffer()
         buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-        image.save(buffer, "PNG")  # type: ignore[call-overload]
+        if not image.save(buffer, "PNG"):  # type: ignore[call-overload]
+            raise OSError(errno.ENOMEM, _("there is not enough memory"))
         return bytes(buffer.data().data())
 
     def svg(self) -> bytes:

@@ -19,6 +19,7 @@ from nep.i18n import _
 
 LANE, LEAST_WORD = 26, 34
 MOST_LANES = 8
+LEAST_BOX = 2.0
 
 
 class StateLanes(QWidget):
@@ -60,13 +61,15 @@ class StateLanes(QWidget):
             top = row * self._lane()
             runs = list(states.runs(canvas.begin_s, canvas.end_s))
             is_yes_or_no = {run.word for run in runs} <= {"true", "false", None}
+            painted = -1.0  # up to here: of what changes within a pixel one is enough
             for run in runs:
                 if run.word is None or (is_yes_or_no and run.word == "false"):
                     continue
                 left = max(area.left(), canvas.x_of(run.begin_s))
                 right = min(area.right(), canvas.x_of(run.end_s))
-                if right >= left:
-                    yield curve, run, QRectF(left, top + 2, max(2.0, right - left), self._lane() - 3)
+                if right >= left and max(right, left + LEAST_BOX) > painted + 0.5:
+                    painted = max(right, left + LEAST_BOX)
+                    yield curve, run, QRectF(left, top + 2, max(LEAST_BOX, right - left), self._lane() - 3)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)

@@ -253,12 +253,25 @@ def foot_words(curves: Curves, *, has_cursors: bool, distance: float | None) -> 
     parts = [about if has_cursors else _("Min, max and mean of what is shown")]
     if distance is not None:
         parts.append(_("A to B: {distance}").format(distance=number_words(distance)))
-    lost = curves.lost
-    if lost:
-        said = ngettext("{count} message lost: a gap", "{count} messages lost: gaps", lost)
-        parts.append(said.format(count=grouped(lost)))
-    forgotten = sum(each.samples.begun for each in curves.all)
-    if forgotten:
-        said = ngettext("{count} old point forgotten", "{count} old points forgotten", forgotten)
-        parts.append(said.format(count=grouped(forgotten)))
+    for count, words in (
+        (curves.lost, ngettext("{count} message lost: a gap", "{count} messages lost: gaps", curves.lost)),
+        (
+            curves.unread,
+            ngettext("{count} message can't be read", "{count} messages can't be read", curves.unread),
+        ),
+        (
+            curves.undone,
+            ngettext(
+                "{count} point gone: the clock was set back",
+                "{count} points gone: the clock was set back",
+                curves.undone,
+            ),
+        ),
+        (
+            curves.forgotten,
+            ngettext("{count} old point forgotten", "{count} old points forgotten", curves.forgotten),
+        ),
+    ):
+        if count:
+            parts.append(words.format(count=grouped(count)))
     return " · ".join(parts)
