@@ -340,4 +340,4 @@ def chip_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
     return pgettext("message", "live"), "info", ""
 
 
-PANEL = Panel("inspector", lazy("Inspector"), "list-tree", (ANY_TYPE,), InspectorPanel)
+PANEL = Panel("inspector", lazy("Inspector"), "list-tree", (ANY_TYPE,), InspectorPanel, several=True)

@@ -150,6 +150,7 @@ class TopicsPanel(NetworkTable["Topic"]):
         menu = Menu(self.theme, self)
         rows: tuple[tuple[str, str, Callable[[], object]], ...] = (
             (_("Show it"), "list-tree", lambda: self.open_row(key)),
+            (_("Show it in one more panel"), "plus", lambda: self.context.open_beside(key)),
             (_("Plot a field of it"), "chart-line", lambda: self.context.plot(key, "")),
             (_("Copy its name"), "copy", lambda: self._copy(key)),
         )

@@ -112,6 +112,8 @@ class ViewCommands:
             dock = shell.open_panel(name)
             if dock is not None and shell.bench is not None:
                 shell.bench.focus_panel(dock)
+        elif kind == "another" and shell.bench is not None:
+            shell.bench.open_another(name)
         elif kind == "topic":
             if shell.bench is None:
                 self.show_layout("developer")
@@ -129,7 +131,8 @@ class ViewCommands:
     def inspect(self, topic: str) -> None:
         """Show a topic in the inspector."""
         self.show_layout("developer")
-        dock = self._shell.open_panel("inspector")
+        bench = self._shell.bench
+        dock = bench.open_latest("inspector") if bench is not None else None
         if dock is not None:
             dock.panel.show_topic(topic)
             self._mark_topic(topic)
