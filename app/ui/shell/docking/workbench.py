@@ -495,17 +495,24 @@ def put_beside(
     if other is None or other.isHidden() or other.isFloating():
         join(bench, layout, docks, dock)
         return
-    way = Qt.Orientation.Horizontal if other.width() >= other.height() else Qt.Orientation.Vertical
-    # Qt makes a tab of whatever is split off a tab: for a moment the place has one panel only
+    ways = (ACROSS, DOWN) if other.width() >= other.height() else (DOWN, ACROSS)
+    # Qt makes a tab of whatever is split off a tab: for a moment the place has one panel only. Along one of the
+    # two ways that is still the place with tabs for Qt; where it is so for both, one more tab is what remains.
     together = [each for each in bench.tabifiedDockWidgets(other) if isinstance(each, Dock)]
     shown = [each for each in together if not each.isHidden()]
-    for each in together:
-        bench.removeDockWidget(each)
-    bench.splitDockWidget(other, dock, way)
-    for each in together:
-        bench.tabifyDockWidget(other, each)
-    for each in shown:
-        each.show()
+    for way in ways:
+        for each in together:
+            bench.removeDockWidget(each)
+        bench.splitDockWidget(other, dock, way)
+        is_tab = dock in bench.tabifiedDockWidgets(other)
+        for each in together:
+            bench.tabifyDockWidget(other, each)
+        for each in shown:
+            each.show()
+        if not is_tab and dock not in bench.tabifiedDockWidgets(other):
+            break
+        if way is ways[0]:
+            bench.removeDockWidget(dock)
     other.raise_()
 
 
