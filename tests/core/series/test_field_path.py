@@ -101,7 +101,9 @@ def test_every_element_of_a_list() -> None:
     assert len(FieldPath.parse("a[*][*]").expanded({"a": [[1] * 100] * 100})) == 65, "one more than fit"
 
 
-@pytest.mark.parametrize("key", ["head-yaw", "a+b", "1/2", "50%", "x^2", "f(x)", "a,b", "*", "x y", "a.b", ""])
+@pytest.mark.parametrize(
+    "key", ["head-yaw", "a+b", "1/2", "50%", "x^2", "f(x)", "a,b", "*", "x y", "a.b", ""]
+)
 def test_a_key_that_looks_like_a_calculation_can_be_typed_as_it_is_offered(key) -> None:
     (found,) = fields_of({key: 3})
     typed = str(FieldSource("/head", found.path))

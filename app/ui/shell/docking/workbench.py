@@ -496,8 +496,8 @@ def put_beside(
         join(bench, layout, docks, dock)
         return
     ways = (ACROSS, DOWN) if other.width() >= other.height() else (DOWN, ACROSS)
-    # Qt makes a tab of whatever is split off a tab: for a moment the place has one panel only. Along one of the
-    # two ways that is still the place with tabs for Qt; where it is so for both, one more tab is what remains.
+    # Qt makes a tab of whatever is split off a tab: for a moment the place has one panel only. Along one of
+    # the two ways that is still a place with tabs for Qt; where both are so, one more tab is what remains.
     together = [each for each in bench.tabifiedDockWidgets(other) if isinstance(each, Dock)]
     shown = [each for each in together if not each.isHidden()]
     for way in ways:
