@@ -75,16 +75,14 @@ def sine(begin: float, end: float, step: float = 0.05) -> list[tuple[float, obje
 
 def drawn(panel: PlotPanel, colour: QColor) -> list[int]:
     """The columns of the canvas in which a colour is painted."""
-    image = panel.canvas.grab().toImage()
+    image = panel.canvas.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     ratio = image.devicePixelRatio()
-    wanted = colour.rgb()
     area = panel.canvas.area
-    rows = range(round(area.top() * ratio), round(area.bottom() * ratio))
-    return [
-        round(x / ratio - area.left())
-        for x in range(round(area.left() * ratio) + 1, round(area.right() * ratio) - 1)
-        if any(_near(image.pixel(x, y), wanted) for y in rows)
-    ]
+    pixels = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1, 4)[..., 2::-1].astype(int)
+    left, right = round(area.left() * ratio) + 1, round(area.right() * ratio) - 1
+    part = pixels[round(area.top() * ratio) : round(area.bottom() * ratio), left:right]
+    near = np.abs(part - [colour.red(), colour.green(), colour.blue()]).max(axis=2) < 60
+    return [round((left + int(x)) / ratio - area.left()) for x in np.flatnonzero(near.any(axis=0))]
 
 
 def _near(one: int, other: int) -> bool:
@@ -196,6 +194,39 @@ def test_the_largest_and_smallest_numbers_are_drawn(panel, values) -> None:
     shown = panel.canvas.ranges["left"]
     assert shown.low < shown.high
     assert drawn(panel, panel.theme.series(0))
+
+
+def test_a_number_alone_between_two_gaps_is_a_dot(panel) -> None:
+    show(panel, "/odom.speed")
+    for begin in (0, 20, 40):
+        send(panel, "/odom", [(begin, {"speed": 5})], dropped=3)
+    send(panel, "/odom", [(60, {"speed": 5})], dropped=3)
+    look(panel)
+    wide = panel.canvas.area.width()
+    places = drawn(panel, panel.theme.series(0))
+    assert {round(3 * x / wide) for x in places} >= {1, 2}
+    assert len(places) < 20
+
+
+def test_what_changes_within_a_pixel_is_painted_once(panel) -> None:
+    show(panel, "/odom.mode")
+    send(panel, "/odom", [(t / 100, {"mode": f"step {t}"}) for t in range(6000)])
+    panel._changed()
+    look(panel)
+    boxes = [box for _curve, _run, box in panel.lanes.boxes()]
+    wide = panel.canvas.area.width()
+    assert wide / 3 < len(boxes) < 2.5 * wide
+
+
+def test_what_is_missing_is_told_below(panel) -> None:
+    show(panel, "/odom.speed")
+    send(panel, "/odom", sine(0, 60))
+    bad = Message("/odom", b"{", "json", "json", stamp_ns=panel.session.series.origin_ns, publisher=1)
+    panel.session.series.add({"/odom": Batch([bad])})
+    send(panel, "/odom", [(30, {"speed": 1})])
+    look(panel)
+    assert "1 message can't be read" in panel.about.text()
+    assert "600 points gone: the clock was set back" in panel.about.text()
 
 
 # -- time --------------------------------------------------------------------------------------------------
