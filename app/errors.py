@@ -9,6 +9,7 @@
     ├── SettingsError        settings that can't be kept
     ├── BackpackError        a backpack that can't be read or kept
     ├── ReportError          a report of a problem that can't be written
+    ├── CurveError           what was typed is no curve that can be plotted
     ├── DescriptionError     a robot's description that can't be understood
     │   └── DeclarationError one that a driver's Python declares
     ├── RobotInputError      an action's input that the robot would refuse
@@ -93,6 +94,10 @@ class ReportError(AppError):
                 file=path.name, reason=reason, advice=advice
             )
         )
+
+
+class CurveError(AppError):
+    """What was typed is no curve that can be plotted."""
 
 
 class DescriptionError(AppError):

@@ -10,9 +10,14 @@ from __future__ import annotations
 import re
 from pathlib import PurePosixPath
 
-__all__ = ["EXCLUDED_MODULES", "is_wanted"]
+__all__ = ["EXCLUDED_MODULES", "UNUSED_OF_PYQTGRAPH", "is_wanted"]
+
+UNUSED_OF_PYQTGRAPH = ("console", "dockarea", "examples", "exporters", "flowchart", "jupyter", "opengl")
+"""What the plot does not use: of menus of pyqtgraph's that Studio does not show."""
 
 EXCLUDED_MODULES = (
+    *(f"pyqtgraph.{name}" for name in UNUSED_OF_PYQTGRAPH),
+    "PySide6.QtTest", "OpenGL", "numba", "cupy", "scipy",  # asked for by pyqtgraph, which does without them
     "PySide6.QtQml", "PySide6.QtQuick",  # their libraries come with Chromium; their hooks bring all of QML
     "tkinter", "_tkinter", "turtle", "idlelib", "lib2to3", "pydoc_data", "ensurepip", "pip", "setuptools",
     "wheel", "pkg_resources", "IPython", "matplotlib", "PIL", "pytest", "_pytest", "hypothesis", "mypy",
@@ -76,6 +81,10 @@ def is_wanted(name: str) -> bool:
         return False
     if _FFMPEG_OF_QT.match(path.name) and ("PySide6" in parts or len(parts) == 1):
         return False
+    if parts[:1] == ("pyqtgraph",):
+        return not {*UNUSED_OF_PYQTGRAPH, "maps"} & set(
+            parts[1:3]
+        )  # maps of colours have licences of their own
     if parts[:2] == ("cv2", "data"):
         return path.suffix != ".xml"  # trained classifiers, which nothing here reads
     if path.name.startswith("opencv_videoio_ffmpeg"):  # Windows; elsewhere: film_libraries.py

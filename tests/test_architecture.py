@@ -194,10 +194,12 @@ def test_imports_inside_functions_are_of_heavy_packages_only() -> None:
     # Entries choose what to load: `python -m app run` must not load Qt, `nep --help` not all of nep.
     entries = {"app.__main__", "nep.__main__", "nep.cli"}
     # Our view is Qt WebEngine, a subclass of it by the line: a fifth of a second that only the editor pays.
+    # A plot is a subclass of pyqtgraph's view, which takes as long; only who opens one pays.
     # Nodes of ROS need XML-RPC, which takes 20 ms to load, and no other node does.
     heavy_of_ours = {
         "app.ui.blockly.view",
         "app.ui.blockly.view.BlocklyView",
+        "app.ui.panels.plot.panel.PlotPanel",
         "nep.backends.ros.transport.RospyTransport",
     }
     only_on_some_systems = {"fcntl", "msvcrt", "resource", "winreg"}

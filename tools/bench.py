@@ -27,6 +27,7 @@ NAMES = (
     "studio_load",
     "studio_images",
     "studio_topics",
+    "studio_plot",
     "studio_start",
     "blocks_editor",
     "studio_tabs",

@@ -54,6 +54,7 @@ from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, S
 from app.core.robots.voices import RobotVoices
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
+from app.core.series.feed import SeriesFeed
 from app.core.storage.settings import Settings
 from nep.i18n import _, lazy, ngettext
 from nep.masters.master import master_address
@@ -96,7 +97,10 @@ class Session:
         self.nodes = Nodes()
         self._mailbox, self._checks = Mailbox(), Checks()
         self._watches = Watches(self._begin_watch, self._end_watch, self._forget_watch)
-        self.images = Images(self.watch, clock)
+        self.images, self.series = (
+            Images(self.watch, clock),
+            SeriesFeed(self.watch, clock_ns, self._mailbox.set_room),
+        )
         make_source = source if source is not None else partial(LiveSource, always=LOGS)
         sinks = [self._checks.look, self._mailbox.post, self._offer]
         self.source: Source = make_source(self.address, sinks, self._mailbox.post_event)
@@ -300,6 +304,8 @@ class Session:
         for key, batch in others.items():
             with self.guarded(lazy("take over messages of {topic}"), topic=key):
                 self.networks.add(key, batch, now)
+        with self.guarded(lazy("take over what is plotted")):
+            self.series.add(drained.batches)
         with self.guarded(lazy("count messages")):
             self.traffic.add(batches, now)
         with self.guarded(lazy("take over what robots say")):

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import pytest
 
-from installers.contents import is_wanted
+from installers.contents import EXCLUDED_MODULES, UNUSED_OF_PYQTGRAPH, is_wanted
 
 WANTED = [
     "PySide6/Qt/lib/libQt6WebEngineCore.so.6",
@@ -41,6 +45,8 @@ WANTED = [
     "libbrotlidec.so.1",
     "libsqlite3.so.0",
     "nep_studio-0.1.0.dist-info/METADATA",
+    "pyqtgraph/icons/invisibleEye.svg",
+    "pyqtgraph-0.14.0.dist-info/METADATA",
 ]
 
 UNWANTED = [
@@ -65,6 +71,9 @@ UNWANTED = [
     "PySide6/Qt/translations/qtbase_de.qm",
     "PySide6/Qt/translations/designer_es.qm",
     "cv2/data/haarcascade_eye.xml",
+    "pyqtgraph/colors/maps/CET-C1.csv",
+    "pyqtgraph\\flowchart\\library\\a.ui",
+    "pyqtgraph/examples/a.png",
     "cv2\\opencv_videoio_ffmpeg4140_64.dll",
     "libstdc++.so.6",
     "libX11.so.6",
@@ -81,6 +90,32 @@ UNWANTED = [
 @pytest.mark.parametrize("name", WANTED)
 def test_what_studio_uses_goes_in(name: str) -> None:
     assert is_wanted(name)
+
+
+PLOT_WITHOUT_THEM = """
+import pathlib, sys
+sys.modules.update(dict.fromkeys(sys.argv[1:]))
+opened = []
+sys.addaudithook(lambda event, given: opened.append(given[0]) if event == "open" else None)
+from PySide6.QtWidgets import QApplication
+application = QApplication([])
+import app.ui.panels.plot.panel
+from app.ui.panels.plot.canvas import PlotCanvas
+from app.ui.theme.theme import Theme
+canvas = PlotCanvas(Theme("light"))
+canvas.show_lines([], 0.0)
+assert not canvas.grab().isNull()
+print([name for name in opened if "colors" in str(name) and "maps" in str(name)])
+"""
+
+
+def test_a_plot_needs_nothing_of_what_is_left_out() -> None:
+    left_out = [name for name in EXCLUDED_MODULES if name.startswith(("pyqtgraph.", "PySide6.QtTest"))]
+    assert len(left_out) == len(UNUSED_OF_PYQTGRAPH) + 1
+    command = [sys.executable, "-c", PLOT_WITHOUT_THEM, *left_out]
+    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+    ran = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert (ran.returncode, ran.stdout.strip()) == (0, "[]"), ran.stderr
 
 
 @pytest.mark.parametrize("name", UNWANTED)

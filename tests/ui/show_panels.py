@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.ui.blockly.scheme import register_scheme
-from app.ui.panels import alerts, camera, doctor, health, problems, robot, sensors
+from app.ui.panels import alerts, camera, doctor, health, plot, problems, robot, sensors
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.behaviour import panel as behaviour
 from app.ui.panels.console import panel as console
@@ -35,6 +35,7 @@ SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "topics": (topics.PANEL, 640, 461, "compact"),
     "inspector": (inspector.PANEL, 330, 782, "compact"),
     "image": (image.PANEL, 220, 220, "compact"),
+    "plot": (plot.PANEL, 760, 520, "compact"),
     "console": (console.PANEL, 446, 222, "compact"),
     "nodes": (nodes.PANEL, 446, 260, "compact"),
     "alerts": (alerts.PANEL, 446, 222, "compact"),
@@ -116,6 +117,12 @@ def prepare(name: str, widget: PanelWidget) -> None:
         widget.refresh()
         widget.table.opened.emit(widget.model.key_of(widget.model.row_at(widget.model.index(1, 0))))  # type: ignore[arg-type]
         widget.table.setCurrentIndex(widget.model.index(5, 0))
+    if name == "plot" and "/blackboard" in widget.session.topics:
+        for path in ("robots.Pepper.pose.x", "robots.Pepper.pose.y", "robots.Pepper.emotion"):
+            widget.plot_field("/blackboard", path)  # type: ignore[attr-defined]
+        widget.session.send("/blackboard", blackboard())  # type: ignore[attr-defined]
+        widget.cursors.setChecked(True)  # type: ignore[attr-defined]
+        widget.freeze.setChecked(True)  # type: ignore[attr-defined]
     if name == "topics" and isinstance(widget, topics.TopicsPanel):
         widget.refresh()
         widget.show_topic("/blackboard")

@@ -70,13 +70,23 @@ class Mailbox:
         self._rings: dict[str, _Ring] = {}
         self._events: deque[object] = deque()
         self._lost_events = 0
+        self._rooms: dict[str, int] = {}
+
+    def set_room(self, topic: str, messages: int | None) -> None:
+        """Keep so many messages of a topic (1 at least), within the same bytes; None: as of any other."""
+        with self._lock:
+            if messages is None:
+                self._rooms.pop(topic, None)
+            else:
+                self._rooms[topic] = max(1, messages)
 
     def post(self, topic: str, messages: Sequence[Message]) -> None:
         """Hand over a batch of one topic, oldest first; one lock for all of it.
 
         What a ring can't hold anyway is only counted: a batch of thousands costs no more than a full ring.
         """
-        newest = messages[-self._messages_per_topic :]
+        room = self._rooms.get(topic, self._messages_per_topic)
+        newest = messages[-room:]
         size_bytes = sum(message.size_bytes for message in newest)
         with self._lock:
             ring = self._rings.get(topic)
@@ -87,7 +97,7 @@ class Mailbox:
             ring.dropped += len(messages) - len(newest)
             # the newest message always stays, however large it is
             while len(ring.messages) > 1 and (
-                len(ring.messages) > self._messages_per_topic or ring.size_bytes > self._bytes_per_topic
+                len(ring.messages) > room or ring.size_bytes > self._bytes_per_topic
             ):
                 ring.size_bytes -= ring.messages.popleft().size_bytes
                 ring.dropped += 1

@@ -12,6 +12,7 @@ import os
 import stat
 import tempfile
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 from nep.i18n import _, number
@@ -50,14 +51,18 @@ def read_whole(path: Path, most_bytes: int = LARGEST_BYTES) -> bytes:
     return data
 
 
-def write_atomically(path: Path, data: bytes, *, durable: bool = True, private: bool = False) -> None:
+def write_atomically(
+    path: Path, data: bytes | Iterable[bytes], *, durable: bool = True, private: bool = False
+) -> None:
     """Replace ``path`` by ``data``: readers see the old file or the new one, never a part.
 
     With ``durable`` the data are on the disk before the old file goes (a power cut leaves one of the two);
     without, only the death of this process is survived. A ``private`` file is for its owner only, and so is a
     folder that is made for it. Raises OSError, and then the old file is untouched.
+
+    ``data`` may come in parts, so that no large file is whole in memory; what they raise ends the writing.
     """
-    if not data:
+    if isinstance(data, bytes) and not data:
         raise ValueError("an empty file is never written over a full one")
     if private:
         private_folder(path.parent)
@@ -65,7 +70,7 @@ def write_atomically(path: Path, data: bytes, *, durable: bool = True, private: 
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            file.writelines((data,) if isinstance(data, bytes) else data)
             file.flush()
             if durable:
                 os.fsync(file.fileno())

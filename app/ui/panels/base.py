@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets.file_dialogs import FileDialogs
+from nep.i18n import _
 
 if TYPE_CHECKING:
     from app.core.network.watches import Suspendable
@@ -49,7 +50,8 @@ class PanelContext:
 
     ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run``
     does one of the window's commands by its name (`app.ui.shell.commands.table`), ``files`` asks for files,
-    ``keys_to_question`` gives the keyboard to what a running behaviour asks, if it asks something.
+    ``keys_to_question`` gives the keyboard to what a running behaviour asks, if it asks something. ``plot``
+    plots a field of a topic; without a path it asks which. ``open_beside`` shows a topic in one more panel.
     """
 
     session: Session
@@ -59,6 +61,13 @@ class PanelContext:
     run: Callable[[str], None]
     files: FileDialogs
     keys_to_question: Callable[[], None] = lambda: None
+    plot: Callable[[str, str], None] = lambda _topic, _path: None
+    open_beside: Callable[[str], None] = lambda _topic: None
+
+
+def numbered(title: str, number: int) -> str:
+    """A title that tells one panel from others of its kind: "Plot", "Plot 2"."""
+    return title if number < 2 else _("{panel} {number}").format(panel=title, number=number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +75,8 @@ class Panel:
     """A panel's description.
 
     ``name`` is its id in saved layouts, ``icon`` a Lucide name, ``accepts`` the codecs of the topics that it
-    can show ("image"), or `ANY_TYPE`; ``make`` builds one.
+    can show ("image"), or `ANY_TYPE`; ``make`` builds one. Where ``several`` make sense,
+    each with its own topic, they may be open side by side.
     """
 
     name: str
@@ -74,6 +84,7 @@ class Panel:
     icon: str
     accepts: tuple[str, ...]
     make: Callable[[PanelContext], PanelWidget]
+    several: bool = False
 
 
 class PanelWidget(QWidget):
@@ -98,6 +109,7 @@ class PanelWidget(QWidget):
         self.header: list[QWidget] = []
         self._title = title
         self._subtitle = ""
+        self._number = 1
         self.setAccessibleName(title)
         self.theme.changed.connect(self.theme_changed)
 
@@ -112,8 +124,13 @@ class PanelWidget(QWidget):
         return stack
 
     def title(self) -> str:
-        """Its name in the title."""
-        return self._title
+        """Its name in the title: "Plot", and "Plot 2" for the second one."""
+        return numbered(self._title, self._number)
+
+    def set_number(self, number: int) -> None:
+        """Which one of its kind it is, from 1."""
+        self._number = number
+        self.setAccessibleName(self.title())
 
     def subtitle(self) -> str:
         """What it shows: a topic; empty when it shows one thing only."""
@@ -138,7 +155,7 @@ class PanelWidget(QWidget):
         wanted = (title, self._subtitle if subtitle is None else subtitle)
         if wanted != (self._title, self._subtitle):
             self._title, self._subtitle = wanted
-            self.setAccessibleName(title)
+            self.setAccessibleName(self.title())
             self.title_changed.emit()
 
     def refresh(self) -> None:

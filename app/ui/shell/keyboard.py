@@ -81,7 +81,10 @@ class PanelFocus(QObject):
         if new is None or bench is None:
             return
         for dock in bench.docks.values():
-            dock.title.set_active(_has(dock, new))
+            has = _has(dock, new)
+            dock.title.set_active(has)
+            if has:
+                bench.used(dock)
 
 
 def _has(dock: Dock, widget: QWidget) -> bool:

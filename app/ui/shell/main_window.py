@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import Protocol, runtime_checkable
 
 from PySide6.QtCore import QKeyCombination, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QContextMenuEvent, QKeyEvent, QKeySequence
@@ -60,6 +61,14 @@ SOON_WORDS = {"behaviour": lazy("Getting the blocks ready.")}
 OTHER_SOON_WORDS = lazy("Getting the panels ready.")
 
 
+@runtime_checkable
+class SupportsFields(Protocol):
+    """A panel that shows fields of topics over time."""
+
+    def plot_field(self, topic: str, path: str) -> None:
+        """Show one more; without a path a person is asked which."""
+
+
 class MainWindow(QMainWindow):
     """One session in one window, and what is in it; for its commands it is a `Shell`."""
 
@@ -97,7 +106,10 @@ class MainWindow(QMainWindow):
         self._build(examples)
         files = asks if asks is not None else self._file_dialogs()
         asked = self.asked.take_keyboard
-        self.context = PanelContext(session, theme, self.open_topic, self.say, self._run, files, asked)
+        self.context = PanelContext(
+            session, theme, self.open_topic, self.say, self._run, files, asked, self.plot,
+            partial(self.open_topic, beside=True),
+        )  # fmt: skip
         self.ring = FocusRing(theme, self)
         self.timer = QTimer(self)
         self.timer.setInterval(TICK_MS)
@@ -319,19 +331,31 @@ class MainWindow(QMainWindow):
         wanted = "behaviour" if name == "behaviour" or self.bench is None else self.showing
         return self.show_layout(wanted).open(name)
 
-    def open_topic(self, topic: str) -> None:
-        """Show a topic in the open panel that fits it best, else in the inspector."""
+    def open_topic(self, topic: str, *, beside: bool = False) -> None:
+        """Show a topic in the open panel that fits it best, else in the inspector.
+
+        ``beside``: in one more panel of that kind, unless the one that is there shows nothing yet.
+        """
         known = self.session.topic(topic)
         kinds = {known.codec, known.msg_type} if known is not None else set()
         bench = self.bench if self.bench is not None else self.show_layout("developer")
-        dock = fitting(bench.docks, bench.open_names(), kinds)
+        dock = fitting(bench.docks, bench.by_use(), kinds)
         if dock is None:
             bench = self.show_layout("developer")
-            dock = fitting(bench.docks, bench.open_names(), kinds) or bench.open("inspector")
+            dock = fitting(bench.docks, bench.by_use(), kinds) or bench.open("inspector")
+        if dock is not None and beside and dock.panel.subtitle():
+            dock = bench.open_another(dock.key)
         if dock is not None:
             dock.show()
             dock.raise_()
             dock.panel.show_topic(topic)
+
+    def plot(self, topic: str, path: str) -> None:
+        """Plot a field of a topic; without a path the plot asks which."""
+        bench = self.bench if self.bench is not None else self.show_layout("developer")
+        dock = bench.open_latest("plot")
+        if dock is not None and isinstance(dock.panel, SupportsFields):
+            dock.panel.plot_field(topic, path)
 
     def _run(self, name: str) -> None:
         self.commands.run(name)

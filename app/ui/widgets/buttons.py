@@ -30,6 +30,7 @@ _COLOURS: dict[str, tuple[str | None, str | None, str | None, str | None, str]] 
     "stop": ("stop", "stopHover", "stopHover", None, "onStop"),
 }
 ARROW = 16
+CHEVRON, CHEVRON_GAP = 14, 6
 Place = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112
 BARE_WIDTH = 56
@@ -245,6 +246,38 @@ class Button(PaintedButton):
             theme.colour(border) if border else None,
             theme.colour(ink),
         )
+
+
+class MenuButton(Button):
+    """A button that opens a menu: a chevron after its word says so."""
+
+    def sizeHint(self) -> QSize:
+        return super().sizeHint() + QSize(round(self._theme.scaled(CHEVRON)) + CHEVRON_GAP, 0)
+
+    def paint_content(self, painter: QPainter, ink: QColor) -> None:
+        side = self._theme.scaled(CHEVRON)
+        whole = QRectF(self.rect())
+        square = QRectF(whole.right() - side - CHEVRON_GAP, whole.center().y() - side / 2, side, side)
+        paint_icon(painter, square, "chevron-down", ink)
+        painter.save()
+        painter.setClipRect(whole.adjusted(0, 0, -side - CHEVRON_GAP, 0))
+        painter.translate(-(side + CHEVRON_GAP) / 2, 0)
+        super().paint_content(painter, ink)
+        painter.restore()
+
+
+class ToggleButton(Button):
+    """A button that stays on: in the colours of what is chosen."""
+
+    def __init__(self, theme: Theme, text: str, icon: str) -> None:
+        super().__init__(theme, text, icon, size="small")
+        self.setCheckable(True)
+
+    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+        colour = self._theme.colour
+        if self.isChecked() and self.isEnabled():
+            return colour("selected"), colour("accent"), colour("selectedText")
+        return super()._look()
 
 
 class IconButton(PaintedButton):

@@ -77,3 +77,16 @@ def test_no_message_is_unaccounted_for_with_many_threads() -> None:
     batch = mailbox.drain().batches.get("a")
     arrived += batch.arrived if batch else 0
     assert arrived == 8000
+
+
+def test_a_topic_may_have_more_room_than_others_for_as_long_as_it_is_asked_for() -> None:
+    mailbox = Mailbox(messages_per_topic=4)
+    messages = [Message("/a", b"1", "json", "json", seq=n) for n in range(10)]
+    mailbox.set_room("/a", 8)
+    mailbox.post("/a", messages)
+    mailbox.post("/b", messages)
+    drained = mailbox.drain().batches
+    assert [(len(each.messages), each.dropped) for each in drained.values()] == [(8, 2), (4, 6)]
+    mailbox.set_room("/a", None)
+    mailbox.post("/a", messages)
+    assert len(mailbox.drain().batches["/a"].messages) == 4

@@ -47,6 +47,21 @@ def test_nothing_is_never_written_over_something(tmp_path: Path) -> None:
     assert path.read_bytes() == b"one"
 
 
+def test_what_comes_in_parts_is_whole_or_not_there(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    write_atomically(path, (f"{n}\n".encode() for n in range(1000)))
+    assert path.read_text().splitlines() == [str(n) for n in range(1000)]
+
+    def parts() -> Iterator[bytes]:
+        yield b"half"
+        raise OSError(28, "no space left")
+
+    with pytest.raises(OSError, match="no space left"):
+        write_atomically(path, parts())
+    assert len(path.read_text().splitlines()) == 1000
+    assert [file.name for file in tmp_path.iterdir()] == ["a.csv"]
+
+
 def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.mkdir()

@@ -4,12 +4,13 @@ import json
 import threading
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
+from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, Qt
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QMouseEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.messages import lazy_json
 from app.core.messages.reader import LARGE_BYTES
@@ -562,3 +563,41 @@ def test_its_ctrl_f_goes_before_the_window_s(qtbot, panel, window) -> None:
     QTest.keyClick(panel.tree, Qt.Key.Key_F, Qt.KeyboardModifier.ControlModifier)
     assert panel.finder.field.hasFocus()
     assert asked == []
+
+
+def test_a_value_is_plotted_by_its_menu_its_key_the_foot_and_by_dragging_it(
+    panel, window, monkeypatch
+) -> None:
+    plotted: list[tuple[str, str]] = []
+    dragged: list[tuple[str, str]] = []
+    monkeypatch.setattr(panel, "context", replace(panel.context, plot=lambda *field: plotted.append(field)))
+    monkeypatch.setattr(
+        "app.ui.panels.inspector.panel.drag_field", lambda _tree, *field: dragged.append(field)
+    )
+    panel.show_topic("/blackboard")
+    window.session.send("/blackboard", {**blackboard(), "a b.c": [1, 2]})
+    panel.refresh()
+    for path, said in (
+        (("robots", "Pepper", "pose", "y"), "robots.Pepper.pose.y"),
+        (("robots", "Pepper", "joints"), "robots.Pepper.joints[*]"),
+        (("robots", "Pepper", "joints", 3), "robots.Pepper.joints[3]"),
+        (("a b.c",), '["a b.c"][*]'),
+    ):
+        choose(panel, *path)
+        panel.own.plot()
+        press(panel.foot.plot)
+        assert plotted[-2:] == [("/blackboard", said)] * 2
+        place = panel.tree.visualRect(panel.tree.currentIndex()).center()
+        viewport = panel.tree.viewport()
+        QTest.mousePress(viewport, Qt.MouseButton.LeftButton, pos=place)
+        for at in (place, place + QPoint(60, 0)):
+            held, nothing = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+            move = QEvent.Type.MouseMove
+            global_at = QPointF(viewport.mapToGlobal(at))
+            QApplication.sendEvent(viewport, QMouseEvent(move, QPointF(at), global_at, held, held, nothing))
+        QTest.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=place)
+        assert dragged[-1] == ("/blackboard", said)
+    choose(panel, "robots", "Pepper", "pose")
+    panel.own.plot()
+    assert window.toasts[-1] == "robots.Pepper.pose is no number, text or yes or no"
+    assert len(plotted) == 8

@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy, QTest
 
 from app.core.network.master import MasterState
@@ -270,3 +273,14 @@ def test_a_name_of_twenty_letters_fits_at_the_usual_width(qtbot, panel) -> None:
     qtbot.wait(10)
     room = panel.table.columnWidth(place_of(panel, "topic"))
     assert room >= panel.theme.font("mono").pixelSize() * 0.6 * len("/Pepper/head_touched")
+
+
+def test_a_right_click_on_a_topic_opens_it_plots_it_or_copies_its_name(panel, window, monkeypatch) -> None:
+    plotted: list[tuple[str, str]] = []
+    monkeypatch.setattr(panel, "context", replace(panel.context, plot=lambda *field: plotted.append(field)))
+    menu = panel.menu_of("/blackboard")
+    for action in menu.actions():
+        action.trigger()
+    assert window.opened == ["/blackboard"]
+    assert plotted == [("/blackboard", "")]
+    assert QGuiApplication.clipboard().text() == "/blackboard"

@@ -32,6 +32,7 @@ from tools import words
 pytest_plugins = ["tests.ui.shell_fixtures"]
 Show = Callable[[str, Session], AbstractContextManager[tuple[Dock, PanelWidget]]]
 CHOSEN = "robots.Pepper.pose.y"  # in the inspector
+PLOTTED = ("robots.Pepper.pose.x", "robots.Pepper.pose.y", "robots.Pepper.emotion", "happy")
 SHOWING = frozenset({
     "Button", "EmptyAction", "EmptyState", "FilterField", "IconButton", "LinkButton", "Menu", "Panel",
     "QAction", "QLabel", "SearchField", "addAction", "label", "say", "set", "setAccessibleDescription",
@@ -165,7 +166,7 @@ def shown(qtbot, theme: Theme) -> Show:
 def test_a_panel_says_every_word_in_the_chosen_language(pseudo, shown, name, session) -> None:
     there = session()
     with shown(name, there) as (_dock, panel):
-        data = {each for each in (*data_of(there), "#33aaff", CHOSEN) if each}
+        data = {each for each in (*data_of(there), "#33aaff", CHOSEN, *PLOTTED) if each}
         forgotten = {f"{place}: {text}" for place, text in said_in(panel) if untranslated(text, *data)}
     assert "\n".join(sorted(forgotten)) == ""
 

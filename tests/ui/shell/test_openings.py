@@ -31,8 +31,8 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 TIMES = 50
 PANELS = [
-    "alerts", "behaviour", "camera", "console", "doctor", "health", "image", "inspector", "nodes", "problems",
-    "robot", "robots", "sensors", "topics",
+    "alerts", "behaviour", "camera", "console", "doctor", "health", "image", "inspector", "nodes", "plot",
+    "problems", "robot", "robots", "sensors", "topics",
 ]  # fmt: skip
 COMMANDS = [
     "file.earlier", "settings.open", "palette.open", "layout.keep", "help.shortcuts", "help.about",
@@ -149,7 +149,12 @@ def test_the_menu_in_a_title(window: MainWindow, panel: str, opener: str) -> Non
 
 @pytest.mark.parametrize(
     ("panel", "opener"),
-    [("image", "_show_actions"), ("console", "_show_actions"), ("inspector", "_show_menu")],
+    [
+        ("image", "_show_actions"),
+        ("console", "_show_actions"),
+        ("inspector", "_show_menu"),
+        ("topics", "_show_menu"),
+    ],
 )
 def test_the_menu_under_the_mouse(window: MainWindow, panel: str, opener: str) -> None:
     window.show()

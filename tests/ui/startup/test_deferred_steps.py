@@ -105,7 +105,7 @@ def test_the_steps_find_every_panel() -> None:
 def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: Path) -> None:
     """What the first paint needs: a line more here is time that every start takes."""
     late = ["PySide6.QtWebEngineCore", "PySide6.QtNetwork", "cv2", "numpy", "psutil", "nep.programs.doctor"]
-    late += ["app.ui.blockly.view", "app.ui.panels.console.panel", "importlib.metadata"]
+    late += ["pyqtgraph", "app.ui.blockly.view", "app.ui.panels.console.panel", "importlib.metadata"]
     program = (
         "import sys\n"
         "from app.ui import application\n"
@@ -113,6 +113,9 @@ def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: 
         "application.make_application()\n"
         "application.make_window(Session(start_processes=False), application.Options(new_window=True))\n"
         f"print([name for name in {late} if name in sys.modules])\n"
+        "from app.ui.panels.registry import PanelRegistry\n"
+        "assert 'plot' in list(PanelRegistry())\n"
+        "assert 'pyqtgraph' not in sys.modules, 'only who opens a plot loads it'\n"
     )
     environ = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "NEP_STUDIO_HOME": str(tmp_path)}
     done = subprocess.run(

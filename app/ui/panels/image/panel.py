@@ -263,4 +263,4 @@ class ImagePanel(PanelWidget):
             self._stream = None
 
 
-PANEL = Panel("image", lazy("Image"), "image", (CODEC,), ImagePanel)
+PANEL = Panel("image", lazy("Image"), "image", (CODEC,), ImagePanel, several=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QEvent, QKeyCombination, QObject, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeyEvent, QKeySequence
 
+from app.ui.panels.inspector.tree_model import field_of
 from app.ui.panels.inspector.values import plain_words
 from nep.i18n import _
 
@@ -36,14 +37,19 @@ class InspectorActions(QObject):
         *,
         find: Callable[[], object],
         toast: Callable[[str], None],
+        plot: Callable[[str], None],
     ) -> None:
-        """Keys work in ``panel``; ``shown`` is its message, ``find`` goes to its field."""
+        """Keys work in ``panel``; ``shown`` is its message, ``find`` goes to its field.
+
+        ``plot`` plots a field by its path.
+        """
         super().__init__(panel)
-        self._body, self._shown, self._toast = body, shown, toast
+        self._body, self._shown, self._toast, self._plot = body, shown, toast, plot
         rows: tuple[tuple[str, str, str, Callable[[], object]], ...] = (
             (_("Copy value"), "Ctrl+C", "copy", self.copy_value),
             (_("Copy path"), "Ctrl+Shift+C", "link", self.copy_path),
             (_("Copy the message as JSON"), "Ctrl+Shift+J", "braces", self.copy_message),
+            (_("Plot"), "Ctrl+Shift+L", "chart-line", self.plot),
             (_("Find a key or value"), "Ctrl+F", "search", find),
             (_("Next one"), "F3", "", lambda: body.finder.step(1)),
             (_("Previous one"), "Shift+F3", "", lambda: body.finder.step(-1)),
@@ -92,6 +98,15 @@ class InspectorActions(QObject):
         node = self._chosen()
         if node is not None:
             self._copied(node.path, _("Copied the path {path}").format(path=node.path))
+
+    def plot(self) -> None:
+        """Plot the chosen value, where it is a number, a text, yes or no, or a list of numbers."""
+        node = self._chosen()
+        path = field_of(node) if node is not None else ""
+        if path:
+            self._plot(path)
+        elif node is not None:
+            self._toast(_("{path} is no number, text or yes or no").format(path=node.path))
 
     def copy_message(self) -> None:
         """Put the whole message on the clipboard: JSON as it was sent, anything else as JSON."""

@@ -107,13 +107,14 @@ class Footer(QWidget):
         self.path.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.copy_value = IconButton(theme, "copy", _("Copy value"), "Ctrl+C", size=26)
         self.copy_path = IconButton(theme, "link", _("Copy path"), "Ctrl+Shift+C", size=26)
+        self.plot = IconButton(theme, "chart-line", _("Plot"), "Ctrl+Shift+L", size=26)
         self.facts = FixedWidthLabel("small", "textTertiary")
         self._facts_next, self._facts_due = "", -FACTS_S
         self.legend = Legend(theme)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
         rows.setSpacing(0)
-        for parts in ((self.path, self.copy_value, self.copy_path), (self.facts, self.legend)):
+        for parts in ((self.path, self.copy_value, self.copy_path, self.plot), (self.facts, self.legend)):
             rows.addWidget(Separator(theme))
             row = QHBoxLayout()
             row.setContentsMargins(10, 3, 8, 3)
@@ -127,7 +128,7 @@ class Footer(QWidget):
         """The path of the chosen value; empty when none is."""
         self.path.setText(path)
         self.path.setToolTip(plain.tip(path))
-        for button in (self.copy_value, self.copy_path):
+        for button in (self.copy_value, self.copy_path, self.plot):
             button.setEnabled(bool(path))
 
     def clear(self) -> None:

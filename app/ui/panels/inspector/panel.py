@@ -19,8 +19,10 @@ from app.ui.panels.inspector.actions import InspectorActions
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE, InspectorBody
 from app.ui.panels.inspector.diff import OFF, count_changes
 from app.ui.panels.inspector.footer import message_facts
+from app.ui.panels.inspector.tree_model import TreeNode, field_of
 from app.ui.panels.inspector.values import payload_or, read_at_once
 from app.ui.widgets import Chip, IconButton
+from app.ui.widgets.field_drag import drag_field
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy, pgettext
 
@@ -74,10 +76,14 @@ class InspectorPanel(PanelWidget):
         self.model, self.tree, self.finder = body.model, body.tree, body.finder
         self.mode, self.strip, self.foot, self.bytes = body.mode, body.strip, body.foot, body.bytes
         self.own = InspectorActions(
-            self.theme, self, body, lambda: self._shown, find=self.focus_filter, toast=self.context.toast
-        )
+            self.theme, self, body, lambda: self._shown,
+            find=self.focus_filter, toast=self.context.toast,
+            plot=lambda path: self.context.plot(self._topic, path),
+        )  # fmt: skip
         self.foot.copy_value.clicked.connect(self.own.copy_value)
         self.foot.copy_path.clicked.connect(self.own.copy_path)
+        self.foot.plot.clicked.connect(self.own.plot)
+        self.tree.dragged.connect(self._drag)
         self.tree.selectionModel().currentChanged.connect(self._chosen)
         self.tree.customContextMenuRequested.connect(self._show_menu)
         self.mode.changed.connect(self._set_mode)
@@ -260,6 +266,12 @@ class InspectorPanel(PanelWidget):
     def _chosen(self, index: QModelIndex) -> None:
         self.foot.show_path(self.model.node(index).path if index.isValid() else "")
 
+    def _drag(self, node: TreeNode) -> None:
+        """A value leaves the tree in a person's hand."""
+        path = field_of(node)
+        if path:
+            drag_field(self.tree, self._topic, path)
+
     def _looked_through(self) -> tuple[object, JsonIndex | None]:
         return self.model.value(), self._reading.index if self._reading is not None else None
 
@@ -328,4 +340,4 @@ def chip_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
     return pgettext("message", "live"), "info", ""
 
 
-PANEL = Panel("inspector", lazy("Inspector"), "list-tree", (ANY_TYPE,), InspectorPanel)
+PANEL = Panel("inspector", lazy("Inspector"), "list-tree", (ANY_TYPE,), InspectorPanel, several=True)

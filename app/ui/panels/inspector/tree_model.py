@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt
 
+from app.core.series.field_path import ALL, FieldPath, Step, kind_of_value
 from app.ui.panels.inspector.diff import MARK_WORDS, MISSING, OFF, Mark, Part, differs, parts_of
 from app.ui.panels.inspector.values import is_container, keys_of, size_of, values_of, words_of
 from app.ui.text import plain
@@ -55,6 +56,17 @@ class TreeNode:
         if isinstance(self.key, int):
             return f"{above}[{self.key}]"
         return f"{above}.{self.key}" if above else self.key
+
+
+def field_of(node: TreeNode) -> str:
+    """The field path of a value that can be plotted, of a list of numbers all elements'; else ""."""
+    kind = kind_of_value(node.value)
+    steps: list[Step] = [ALL] if kind == "list" else []
+    above: TreeNode | None = node
+    while above is not None and above.parent is not None:
+        steps.insert(0, above.key)
+        above = above.parent
+    return str(FieldPath(tuple(steps))) if kind is not None else ""
 
 
 class TreeModel(QAbstractItemModel):

@@ -5,9 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtCore import (
+    QModelIndex,
+    QPersistentModelIndex,
+    QPoint,
+    QPointF,
+    QRect,
+    QRectF,
+    QSize,
+    Qt,
+    Signal,
+)
 from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QMouseEvent, QPainter, QPen
-from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem, QTreeView
+from PySide6.QtWidgets import QApplication, QStyledItemDelegate, QStyleOptionViewItem, QTreeView
 
 from app.ui.panels.inspector.diff import OFF
 from app.ui.panels.inspector.tree_model import NODE_ROLE, TreeModel, TreeNode
@@ -45,7 +55,9 @@ class _Height(QStyledItemDelegate):
 
 
 class TreeView(QTreeView):
-    """The tree of one message."""
+    """The tree of one message; `dragged` when a person begins to drag a value out of it."""
+
+    dragged = Signal(object)
 
     def __init__(self, theme: Theme, model: TreeModel, clock: Callable[[], float] = time.monotonic) -> None:
         """Show ``model``; ``clock`` is that of the changes' times."""
@@ -55,6 +67,7 @@ class TreeView(QTreeView):
         self._tree = model
         self.row_height = theme.size("row", "tree")
         self._keyboard = False
+        self._pressed_at: tuple[QPoint, TreeNode] | None = None
         self.setModel(model)
         self.setItemDelegate(_Height(self))
         self.setHeaderHidden(True)
@@ -197,10 +210,26 @@ class TreeView(QTreeView):
         if isinstance(node, TreeNode) and event.button() == Qt.MouseButton.LeftButton:
             self.setCurrentIndex(index)
             self.setFocus(Qt.FocusReason.MouseFocusReason)
+            self._pressed_at = (event.position().toPoint(), node)
             if node.is_container and _on_chevron(event.position(), node):
                 self.setExpanded(index, not self.isExpanded(index))
             return
         super().mousePressEvent(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """The left button held and moved far enough drags what was pressed."""
+        if self._pressed_at is not None and event.buttons() & Qt.MouseButton.LeftButton:
+            began, node = self._pressed_at
+            far = (event.position().toPoint() - began).manhattanLength()
+            if far >= QApplication.startDragDistance():
+                self._pressed_at = None
+                self.dragged.emit(node)
+            return
+        super().mouseMoveEvent(event)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self._pressed_at = None
+        super().mouseReleaseEvent(event)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         index = self.indexAt(event.position().toPoint())

@@ -2,57 +2,20 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QRectF, QSize
-from PySide6.QtGui import QColor, QPainter
+from PySide6.QtCore import QEvent, QObject
 
 from app.ui.shell.bars.run_bar import ToolBar
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.freeze import all_frozen, freezable
 from app.ui.shell.commands.shell import Shell
 from app.ui.text import plain
-from app.ui.theme.icons import paint_icon
-from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Separator, paint
+from app.ui.widgets import MenuButton, Separator, ToggleButton, paint
 from nep.i18n import _
 
 FREEZE = "view.freeze"
 EVERY = 8  # half ticks
-CHEVRON = 14
 ROOM_PX = 780  # what the whole bar needs at 100 % text
 FREEZE_ROOM_PX = 520  # below that nothing of what a stop brought would be whole beside it
-GAP = 6
-
-
-class MenuButton(Button):
-    """A button that opens a menu: a chevron after its word says so."""
-
-    def sizeHint(self) -> QSize:
-        return super().sizeHint() + QSize(round(self._theme.scaled(CHEVRON)) + GAP, 0)
-
-    def paint_content(self, painter: QPainter, ink: QColor) -> None:
-        side = self._theme.scaled(CHEVRON)
-        whole = QRectF(self.rect())
-        square = QRectF(whole.right() - side - GAP, whole.center().y() - side / 2, side, side)
-        paint_icon(painter, square, "chevron-down", ink)
-        painter.save()
-        painter.setClipRect(whole.adjusted(0, 0, -side - GAP, 0))
-        painter.translate(-(side + GAP) / 2, 0)
-        super().paint_content(painter, ink)
-        painter.restore()
-
-
-class ToggleButton(Button):
-    """A button that stays on: in the colours of what is chosen."""
-
-    def __init__(self, theme: Theme, text: str, icon: str) -> None:
-        super().__init__(theme, text, icon, size="small")
-        self.setCheckable(True)
-
-    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
-        colour = self._theme.colour
-        if self.isChecked() and self.isEnabled():
-            return colour("selected"), colour("accent"), colour("selectedText")
-        return super()._look()
 
 
 class DeveloperTools(QObject):

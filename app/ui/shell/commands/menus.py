@@ -9,9 +9,11 @@ from PySide6.QtWidgets import QWidget
 
 from app.core.documents.titles import recent_titles
 from app.core.session import Session
+from app.ui.panels.base import Panel, numbered
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.commands.view import ViewCommands
+from app.ui.shell.docking.dock import kind_of
 from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.text import plain
 from app.ui.widgets.menus import Menu, drop_below
@@ -119,6 +121,17 @@ class MenuLists:
             entry.setCheckable(True)
             entry.setChecked(panel.name in opened)
             entry.triggered.connect(lambda on=False, name=panel.name: self._toggle(name, on))
+            for key in opened:
+                name, number = kind_of(key)
+                if name == panel.name and number > 1:
+                    self._list_one_more(panel, key, number)
+
+    def _list_one_more(self, panel: Panel, key: str, number: int) -> None:
+        words = numbered(_(panel.title), number)
+        entry = self._panels.addAction(self._shell.theme.icon(panel.icon), words)
+        entry.setCheckable(True)
+        entry.setChecked(True)
+        entry.triggered.connect(lambda on=False, key=key: self._toggle(key, on))
 
     def _toggle(self, name: str, on: bool) -> None:
         bench = self._shell.bench

@@ -66,6 +66,9 @@ class PaletteEntries:
             place = opened.index(panel.name) + 1 if panel.name in opened else 0
             key = self._shortcuts.first(f"panel.{place}") if 0 < place < 10 else ""
             made.append(Entry(f"panel:{panel.name}", _(panel.title), panel.icon, "", key))
+            if panel.several and panel.name in opened:
+                words = _("One more: {panel}").format(panel=_(panel.title))
+                made.append(Entry(f"another:{panel.name}", words, "plus"))
         return made
 
     def _robots(self) -> list[Entry]:

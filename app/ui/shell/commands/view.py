@@ -108,10 +108,8 @@ class ViewCommands:
         kind, name, shell = entry.kind, entry.name, self._shell
         if kind == "command":
             self._actions.run(name)
-        elif kind == "panel":
-            dock = shell.open_panel(name)
-            if dock is not None and shell.bench is not None:
-                shell.bench.focus_panel(dock)
+        elif kind in {"panel", "another"}:
+            self._open_panel(name, one_more=kind == "another")
         elif kind == "topic":
             if shell.bench is None:
                 self.show_layout("developer")
@@ -126,10 +124,17 @@ class ViewCommands:
         elif kind in {"file", "example"}:
             (self._files.open if kind == "file" else self._files.example)(Path(name))
 
+    def _open_panel(self, name: str, *, one_more: bool) -> None:
+        bench = self._shell.bench
+        dock = bench.open_another(name) if one_more and bench is not None else self._shell.open_panel(name)
+        if dock is not None and self._shell.bench is not None:
+            self._shell.bench.focus_panel(dock)
+
     def inspect(self, topic: str) -> None:
         """Show a topic in the inspector."""
         self.show_layout("developer")
-        dock = self._shell.open_panel("inspector")
+        bench = self._shell.bench
+        dock = bench.open_latest("inspector") if bench is not None else None
         if dock is not None:
             dock.panel.show_topic(topic)
             self._mark_topic(topic)

@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QCloseEvent, QCursor, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import (
     QApplication,
@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.faults import IN_CONSOLE, error_words
-from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelContext, PanelWidget
+from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelContext, PanelWidget, numbered
 from app.ui.shell.docking.dock_title import DockTitle
 from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
@@ -145,20 +145,28 @@ class FailedPanel(PanelWidget):
 class Dock(QDockWidget):
     """One panel in a workbench: moves, floats, closes, shares its place; `failed` panels are skipped."""
 
-    def __init__(self, theme: Theme, description: Panel, panel: PanelWidget, density: Density) -> None:
-        super().__init__(_(description.title))
+    another_wanted = Signal(str)
+    closed = Signal(str)
+
+    def __init__(
+        self, theme: Theme, description: Panel, panel: PanelWidget, density: Density, number: int = 1
+    ) -> None:
+        """``number`` tells it from others of its kind; `key` is its name among all docks of a workbench."""
+        super().__init__(numbered(_(description.title), number))
         self.description, self.panel = description, panel
+        self.number, self.key = number, key_of(description.name, number)
         self.failed = False
         self.front = False
         self._seen_s = -RESTS_AFTER_S
         self._theme, self._density = theme, density
-        self.setObjectName(f"panel.{description.name}")
-        self.setAccessibleName(_(description.title))
+        self.setObjectName(f"panel.{self.key}")
+        self.setAccessibleName(self.windowTitle())
         self._hold(panel)
         self.visibilityChanged.connect(self._visibility)
         theme.changed.connect(self._restyle)
 
     def _hold(self, panel: PanelWidget) -> None:
+        panel.set_number(self.number)
         title, body = DockTitle(self._theme, panel, self._density), DockBody(self._theme, panel)
         panel.set_density(self._density)
         panel.setFont(panel.text_font())
@@ -282,6 +290,9 @@ class Dock(QDockWidget):
         menu.addActions(own)
         if own:
             menu.addSeparator()
+        if self.description.several:
+            more = menu.addAction(self._theme.icon("plus"), _("One more beside it"))
+            more.triggered.connect(lambda: self.another_wanted.emit(self.key))
         icon = self._theme.icon("picture-in-picture-2")
         floating = menu.addAction(icon, _("Dock it") if self.isFloating() else _("Float"))
         floating.triggered.connect(self._float)
@@ -309,6 +320,8 @@ class Dock(QDockWidget):
     def closeEvent(self, event: QCloseEvent) -> None:
         self._let_go()
         super().closeEvent(event)
+        if event.isAccepted():
+            self.closed.emit(self.key)
 
     def _let_go(self) -> None:
         """Give up the keyboard: Qt would hand it on as by Tab, and the editor then opens a category."""
@@ -325,14 +338,27 @@ class Dock(QDockWidget):
             menu.popup(QCursor.pos())
 
 
-def make_dock(description: Panel, context: PanelContext, density: Density) -> Dock:
+def key_of(name: str, number: int) -> str:
+    """What tells the docks of a workbench apart: "plot" is the first plot, "plot#2" the second one."""
+    return name if number < 2 else f"{name}#{number}"
+
+
+def kind_of(key: str) -> tuple[str, int]:
+    """What `key_of` made a key of. Anything else is a name, and the first of its kind."""
+    name, _sign, number = key.rpartition("#")
+    if name and number.isascii() and number.isdigit() and key_of(name, int(number[:9])) == key:
+        return name, int(number)
+    return key, 1
+
+
+def make_dock(description: Panel, context: PanelContext, density: Density, number: int = 1) -> Dock:
     """A dock with a new panel; when that can't be made, what stands in its place says so when it is seen."""
     try:
-        return Dock(context.theme, description, description.make(context), density)
+        return Dock(context.theme, description, description.make(context), density, number)
     except FAULTS as error:
         traceback.clear_frames(error.__traceback__)
         unmade = FailedPanel(context, description, error)
-    dock = Dock(context.theme, description, unmade, density)
+    dock = Dock(context.theme, description, unmade, density, number)
     unmade.take = dock.replace
     return dock
 

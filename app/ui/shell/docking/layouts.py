@@ -92,6 +92,7 @@ BEHAVIOUR = Layout(
     {
         "robots": "behaviour",
         "doctor": "behaviour",
+        "plot": "behaviour",
         "console": "problems",
         "alerts": "problems",
         "nodes": "problems",
@@ -123,6 +124,7 @@ DEVELOPER = Layout(
         "camera": "image",
         "health": "console",
         "variables": "console",
+        "plot": "topics",
     },
 )
 LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)

@@ -10,8 +10,8 @@ from PySide6.QtCore import QByteArray, QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
-from app.ui.panels.base import Panel, PanelContext
-from app.ui.shell.docking.dock import Dock, make_dock
+from app.ui.panels.base import Panel, PanelContext, numbered
+from app.ui.shell.docking.dock import Dock, key_of, kind_of, make_dock
 from app.ui.shell.docking.layouts import Fold, Layout
 from app.ui.shell.docking.sizes import fit
 from app.ui.theme.theme import Theme
@@ -21,10 +21,15 @@ ACROSS = Qt.Orientation.Horizontal
 DOWN = Qt.Orientation.Vertical
 AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 STATE_VERSION = 1  # with another one, app.core.storage.settings.FORMAT is another one, too
+MOST_OF_A_KIND = 8
 
 
 class Workbench(QMainWindow):
-    """The docks of one layout. Panels are made when they are first opened."""
+    """The docks of one layout, by their keys. Panels are made when they are first opened.
+
+    One that is closed is kept as it is. Of a kind of which several may be open the others end when they are
+    closed: whoever made many plots does not pay for those that are gone.
+    """
 
     panel_failed = Signal(str, str)
 
@@ -45,6 +50,8 @@ class Workbench(QMainWindow):
         self._wide = QByteArray()  # the state before that
         self._arranged = False
         self._moved = False  # a person moved the lines between panels
+        self._used: list[str] = []  # the panels that had the keyboard, the last one at the end
+        self._halves: tuple[Dock, Dock] | None = None  # to be made equally large
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setProperty("density", layout.density)
         # the width of the gaps was asked for before the property was there, and is remembered
@@ -80,6 +87,9 @@ class Workbench(QMainWindow):
         for old in list(self.docks.values()):
             old.setFloating(False)
             self.removeDockWidget(old)
+            if old.number > 1:
+                self._end(old)
+        self._halves = None
         # All columns first, then what is below in each: the other way round the rows would cross the columns.
         waiting: list[tuple[Dock, list[tuple[str, ...]]]] = []
         last: Dock | None = None
@@ -122,6 +132,10 @@ class Workbench(QMainWindow):
 
     def _size(self) -> None:
         """Give everything its size, unless a person moved the lines between the panels."""
+        halves, self._halves = self._halves, None
+        if halves is not None:
+            way = ACROSS if halves[0].y() == halves[1].y() else DOWN
+            self.resizeDocks(halves, [1, 1], way)
         if self._arranged and not self._moved and not self._fold_timer.isActive():
             gap, scale = self._theme.size("gap", self._layout.density), self._theme.scaled(1)
             fit(self, self._layout, self.docks, gap, scale, self._behind())
@@ -131,20 +145,24 @@ class Workbench(QMainWindow):
             self._moved = self._moved or self.isSeparator(event.position().toPoint())
         return super().event(event)
 
-    def _dock(self, name: str) -> Dock | None:
+    def _dock(self, key: str) -> Dock | None:
         """The dock of a panel, made when it is the first time; None when there is no such panel."""
-        if name in self.docks:
-            return self.docks[name]
+        if key in self.docks:
+            return self.docks[key]
+        name, number = kind_of(key)
         description = self._panels.get(name)
-        if description is None:
+        if description is None or number > (MOST_OF_A_KIND if description.several else 1):
             return None
-        dock = self._ahead.pop(name, None) or make_dock(description, self._context, self._layout.density)
+        dock = self._ahead.pop(key, None)
+        dock = dock or make_dock(description, self._context, self._layout.density, number)
+        dock.another_wanted.connect(self.open_another)
+        dock.closed.connect(self._closed)
         dock.dockLocationChanged.connect(self._tabs_soon)
         dock.topLevelChanged.connect(self._tabs_soon)
         dock.visibilityChanged.connect(self._tabs_soon)
         if name in self._layout.taller:
             dock.visibilityChanged.connect(lambda: self._size_timer.start(0))
-        self.docks[name] = dock
+        self.docks[key] = dock
         return dock
 
     def open(self, name: str) -> Dock | None:
@@ -167,6 +185,77 @@ class Workbench(QMainWindow):
         self._tabs_soon()
         return dock
 
+    def open_latest(self, name: str) -> Dock | None:
+        """Show, of the panels of a kind that are open, the one that a person used last; else the first."""
+        return self.open(next((key for key in self.by_use() if kind_of(key)[0] == name), name))
+
+    def open_another(self, key: str) -> Dock | None:
+        """Open one more panel of a kind, beside the one that is there; None when there can't be one more."""
+        name = kind_of(key)[0]
+        free = (number for number in range(1, MOST_OF_A_KIND + 1) if not self._is_open(key_of(name, number)))
+        number = next(free, 0)
+        if not number:
+            said = _("There are {count} already, and no more fit")
+            self._context.toast(said.format(count=MOST_OF_A_KIND))
+            return None
+        if number == 1:
+            return self.open(name)
+        dock = self._dock(key_of(name, number))
+        if dock is None:
+            return None
+        old = self.docks.get(key)
+        put_beside(self, self._layout, self.docks, dock, old)
+        self._moved, self._halves = True, (old, dock) if old is not None else None
+        self._size_timer.start(0)
+        dock.show()
+        dock.raise_()
+        self._tabs_soon()
+        self.focus_panel(dock)
+        return dock
+
+    def _is_open(self, key: str) -> bool:
+        return key in self.docks and not self.docks[key].isHidden()
+
+    def used(self, dock: Dock) -> None:
+        """A panel has the keyboard now."""
+        if self._used[-1:] != [dock.key]:
+            self._used = [*(key for key in self._used if key != dock.key), dock.key]
+
+    def by_use(self) -> tuple[str, ...]:
+        """The panels that are open, those that had the keyboard last first."""
+        opened = self.open_names()
+        return tuple(sorted(opened, key=lambda key: -self._used.index(key) if key in self._used else 1))
+
+    def _closed(self, key: str) -> None:
+        """A panel was closed: one beside the first of its kind ends, unless it is wanted back at once."""
+        dock = self.docks.get(key)
+        if dock is None or dock.number == 1:
+            return
+        state = dock.saved_state()
+        self._end(dock)
+        self._tabs_soon()
+
+        def bring_back() -> None:
+            again = self.open(key)
+            if again is not None:
+                again.give_back(state)
+
+        title = numbered(_(dock.description.title), dock.number)
+        self._context.toast(_("Closed {panel}").format(panel=title), _("Undo"), bring_back)
+
+    def _end(self, dock: Dock) -> None:
+        self.docks.pop(dock.key, None)
+        self._sharing.pop(dock, None)
+        for together in self._sharing.values():
+            if dock in together:
+                together.remove(dock)
+        self._used = [key for key in self._used if key != dock.key]
+        self._floating = [each for each in self._floating if each is not dock]
+        self._halves = None
+        dock.shut()
+        self.removeDockWidget(dock)
+        dock.deleteLater()
+
     def open_names(self) -> tuple[str, ...]:
         """The panels that are open, also those behind a tab."""
         return tuple(name for name, dock in self.docks.items() if not dock.isHidden())
@@ -178,7 +267,7 @@ class Workbench(QMainWindow):
 
     def _show_tabs(self) -> None:
         later = {name: place for place, name in enumerate(n for f in self._folded for n in f.panels)}
-        order = sorted(self.docks.values(), key=lambda dock: later.get(dock.description.name, -1))
+        order = sorted(self.docks.values(), key=lambda dock: later.get(dock.key, -1))
         for dock in order:
             together = [
                 other
@@ -262,7 +351,7 @@ class Workbench(QMainWindow):
         opened = self.open_names()
         if not self.restoreState(self._wide, STATE_VERSION):
             self.arrange()
-        for name, dock in self.docks.items():
+        for name, dock in list(self.docks.items()):
             if name not in opened:
                 dock.close()
             elif dock.isHidden():
@@ -286,7 +375,7 @@ class Workbench(QMainWindow):
 
     def follow(self, now: float) -> None:
         """Panels that nobody can see rest, others wake; called with every tick, also while it is hidden."""
-        for name, dock in self.docks.items():
+        for name, dock in list(self.docks.items()):
             self._tell_failure(name, dock.follow(now))
 
     def shows_pictures(self) -> bool:
@@ -295,7 +384,7 @@ class Workbench(QMainWindow):
 
     def refresh(self, *, pictures: bool = False) -> None:
         """Let every panel that can be seen show what is new, or only those with ``pictures``."""
-        for name, dock in self.docks.items():
+        for name, dock in list(self.docks.items()):
             if pictures and not dock.panel.shows_pictures:
                 continue
             self._tell_failure(name, dock.refresh())
@@ -383,20 +472,48 @@ def join(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Do
     """Give a panel a place: below the row above its own, beside its home, else beside the last panel."""
     name = dock.description.name
     placed = {
-        other.description.name: other
+        other.key: other
         for other in docks.values()
         if other is not dock
         and not other.isFloating()
         and bench.dockWidgetArea(other) != Qt.DockWidgetArea.NoDockWidgetArea
     }
     above = _above(layout, name)
-    home = layout.homes.get(name, "")
+    home = name if dock.number > 1 else layout.homes.get(name, "")
     if above in placed and not placed[above].isHidden() and not bench.tabifiedDockWidgets(placed[above]):
         bench.splitDockWidget(placed[above], dock, Qt.Orientation.Vertical)
     elif placed:
         bench.tabifyDockWidget(placed[home] if home in placed else list(placed.values())[-1], dock)
     else:
         bench.addDockWidget(AREA, dock)
+
+
+def put_beside(
+    bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock, other: Dock | None
+) -> None:
+    """Give a panel half the place of another one, along its longer side, also where that has tabs."""
+    if other is None or other.isHidden() or other.isFloating():
+        join(bench, layout, docks, dock)
+        return
+    ways = (ACROSS, DOWN) if other.width() >= other.height() else (DOWN, ACROSS)
+    # Qt makes a tab of whatever is split off a tab: for a moment the place has one panel only. Along one of
+    # the two ways that is still a place with tabs for Qt; where both are so, one more tab is what remains.
+    together = [each for each in bench.tabifiedDockWidgets(other) if isinstance(each, Dock)]
+    shown = [each for each in together if not each.isHidden()]
+    for way in ways:
+        for each in together:
+            bench.removeDockWidget(each)
+        bench.splitDockWidget(other, dock, way)
+        is_tab = dock in bench.tabifiedDockWidgets(other)
+        for each in together:
+            bench.tabifyDockWidget(other, each)
+        for each in shown:
+            each.show()
+        if not is_tab and dock not in bench.tabifiedDockWidgets(other):
+            break
+        if way is ways[0]:
+            bench.removeDockWidget(dock)
+    other.raise_()
 
 
 def _above(layout: Layout, name: str) -> str:

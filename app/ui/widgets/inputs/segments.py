@@ -147,6 +147,13 @@ class Segments(QWidget):
         if value in self._segments:
             self._segments[value].setChecked(True)
 
+    def choose_none(self) -> None:
+        """What is so is none of them; a person may choose one again."""
+        for segment in self._segments.values():
+            segment.setAutoExclusive(False)
+            segment.setChecked(False)
+            segment.setAutoExclusive(True)
+
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         theme = self._theme

@@ -122,6 +122,9 @@ class CellDelegate(QStyledItemDelegate):
             place = QRectF(box.left(), box.center().y() - SPARK.height() / 2, box.width(), SPARK.height())
             paint_sparkline(painter, place, cell.curve, theme.colour(role))
             return
+        if cell.mark is not None:
+            cell.mark.paint(painter, box, theme)
+            return
         box = box.adjusted(cell.indent, 0, 0, 0)
         if cell.is_blank:
             return

@@ -8,12 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 
 from app.ui.text import plain
 from nep.i18n import _
+
+if TYPE_CHECKING:
+    from PySide6.QtCore import QRectF
+    from PySide6.QtGui import QPainter
+
+    from app.ui.theme.theme import Theme
 
 Row = TypeVar("Row")
 Index = QModelIndex | QPersistentModelIndex
@@ -22,13 +28,21 @@ RUNS_AT_MOST = 40  # more removed runs than this, and a reset is cheaper than te
 _ROOT = QModelIndex()
 
 
+class CellMark(Protocol):
+    """Paints itself in a cell; equal ones look the same."""
+
+    def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
+        """Paint it in the inside of a cell."""
+
+
 @dataclass(frozen=True, slots=True)
 class Cell:
     """What one cell shows; ``role`` is its colour's role, ``chip`` a state word behind the text.
 
     Text that does not fit is shortened at its end, or in its ``middle``. ``curve`` are values to draw as a
     sparkline in place of the text, ``indent`` pixels to stand further in, ``tint`` the role of a box behind
-    the text. Text that ``spills`` goes on over the blank cells at its left.
+    the text. Text that ``spills`` goes on over the blank cells at its left. A ``mark`` is painted in place of
+    the text; ``said`` is what a screen reader says for it or for an icon.
     """
 
     text: str = ""
@@ -43,11 +57,13 @@ class Cell:
     indent: int = 0
     tint: str = ""
     spills: bool = False
+    mark: CellMark | None = None
+    said: str = ""
 
     @property
     def is_blank(self) -> bool:
         """Whether nothing is painted."""
-        return not (self.text or self.icon or self.chip or self.curve)
+        return not (self.text or self.icon or self.chip or self.curve or self.mark)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +145,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
             return plain.tip(column.tip(row)) if column.tip is not None else None
         if role == Qt.ItemDataRole.AccessibleTextRole:
             cell, head = column.cell(row), _(column.title or column.words)
-            return ", ".join(part for part in (head, cell.text, cell.chip) if part)
+            return ", ".join(part for part in (head, cell.text or cell.said, cell.chip) if part)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column.figures)
         return None

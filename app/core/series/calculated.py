@@ -1,0 +1,133 @@
+"""Curves that are calculated from others: each is appended to as its inputs grow, and never anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.series.formula import Calculation, Windowed
+from app.core.series.samples import Floats, Samples
+
+WAITS_S = 0.5
+"""So long, by the messages' times, the newest number of one input waits for those of the others."""
+HOLDS_S, HOLDS = 1.0, 8.0
+"""A number of another input counts until its next one, but not longer than this, or eight usual pauses."""
+AT_ONCE = 200_000
+"""Numbers that one tick calculates at most."""
+
+
+class Calculated:
+    """Samples made from others; `advance` takes over what is new in them."""
+
+    def __init__(self, inputs: Sequence[Samples]) -> None:
+        """At the times of the first input."""
+        self.samples = Samples()
+        self._inputs = tuple(inputs)
+        self._seen = [each.rewritten for each in inputs]
+        self._next = self._inputs[0].begun  # absolute, in the first input
+
+    def advance(self) -> None:
+        """Calculate what can be calculated now."""
+        base = self._inputs[0]
+        changed = [each.rewritten_from(seen) for each, seen in zip(self._inputs, self._seen, strict=True)]
+        self._seen = [each.rewritten for each in self._inputs]
+        anew = min((each for each in changed if each is not None), default=None)
+        if anew is not None:
+            self.samples.truncate(anew)
+            self._next = min(self._next, base.begun + int(np.searchsorted(base.times, anew, side="left")))
+        if self._next < base.begun:
+            self.samples.break_line()
+        first = max(self._next, base.begun) - base.begun
+        end = min(self._ready(base), first + AT_ONCE)
+        if end > first:
+            with np.errstate(all="ignore"):  # what is no number then is a gap
+                self.samples.extend(*self._calculated(base, first, end))
+            self._next = base.begun + end
+
+    def _ready(self, base: Samples) -> int:
+        """How many of the first input's numbers need not wait any longer."""
+        return len(base)
+
+    def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        raise NotImplementedError
+
+
+class WindowCurve(Calculated):
+    """How another curve changes from number to number or by time, its integral, its mean of the last time."""
+
+    def __init__(self, kind: Windowed, of: Samples, window_s: float) -> None:
+        """``window_s`` is only of "mean"."""
+        super().__init__([of])
+        self._kind, self._window_s = kind, window_s
+
+    def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        times, gaps = base.times[first:end].copy(), base.gaps[first:end].copy()
+        if self._kind == "mean":
+            return times, self._means(base, first, end), gaps
+        before = max(0, first - 1)
+        steps_s = np.diff(base.times[before:end], prepend=np.nan if before == first else [])
+        values = base.values[before:end]
+        joined = ~gaps
+        if self._kind == "integral":
+            means = 0.5 * (values[1:] + values[:-1])
+            parts = np.concatenate([[0.0], means * np.diff(base.times[before:end])])[-(end - first) :]
+            parts[~joined] = 0.0  # what was between is not known
+            begin = float(self.samples.values[-1]) if len(self.samples) else 0.0
+            return times, begin + np.cumsum(parts), gaps
+        changes = np.diff(values, prepend=np.nan if before == first else [])
+        if self._kind == "derivative":
+            changes = changes / steps_s
+        changes[~joined] = np.nan
+        return times, changes, gaps
+
+    def _means(self, base: Samples, first: int, end: int) -> Floats:
+        times, values = base.times, base.values
+        begins = np.searchsorted(times, times[first:end] - self._window_s, side="right")
+        low = int(begins[0])
+        scale = max(1.0, float(np.abs(values[low:end]).max()) / 1e290)  # or the sum would overflow
+        sums = np.concatenate([[0.0], np.cumsum(values[low:end] / scale)])
+        counts = np.arange(first, end) + 1 - begins
+        means: Floats = (sums[first + 1 - low : end + 1 - low] - sums[begins - low]) / counts * scale
+        return means
+
+
+class ExpressionCurve(Calculated):
+    """An expression of several curves, at the times of the first, with the newest number of each other."""
+
+    def __init__(self, calculate: Calculation, inputs: Sequence[Samples]) -> None:
+        super().__init__(inputs)
+        self._calculate = calculate
+
+    def _ready(self, base: Samples) -> int:
+        last_s = base.last_s
+        if last_s is None:
+            return 0
+        theirs = [-np.inf if each.last_s is None else each.last_s for each in self._inputs[1:]]
+        until_s = max(min(theirs, default=last_s), last_s - WAITS_S)
+        return int(np.searchsorted(base.times, until_s, side="right"))
+
+    def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        times = base.times[first:end].copy()
+        arrays = [base.values[first:end], *(held_values(each, times) for each in self._inputs[1:])]
+        values = np.broadcast_to(np.asarray(self._calculate(arrays), dtype=float), times.shape).copy()
+        return times, values, base.gaps[first:end].copy()
+
+
+def held_values(samples: Samples, times: Floats) -> Floats:
+    """The newest number up to each time; NaN before the first, in a gap, and long after the last."""
+    if not len(samples):
+        return np.full(len(times), np.nan)
+    places = np.searchsorted(samples.times, times, side="right") - 1
+    at = np.maximum(places, 0)
+    values: Floats = samples.values[at].copy()
+    age_s = times - samples.times[at]
+    after = np.minimum(at + 1, len(samples) - 1)
+    in_gap = samples.gaps[after] & (after > at) & (age_s > 0)
+    old = np.zeros(len(times), dtype=bool)
+    if len(samples) > 1:
+        usual_s = float(samples.times[-1] - samples.times[0]) / (len(samples) - 1)
+        old = age_s > max(HOLDS_S, HOLDS * usual_s)
+    values[(places < 0) | in_gap | old] = np.nan
+    return values

@@ -1,0 +1,98 @@
+"""Curves as CSV: one row for each time at which any of them has something, blank where one has nothing."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from math import inf
+
+import numpy as np
+
+from app.core.series.curves import Curve
+from app.core.series.samples import Floats
+
+ROWS_AT_ONCE = 5000
+_START = ("=", "+", "-", "@", "\t", "\r")
+
+
+@dataclass(frozen=True, slots=True)
+class CsvColumn:
+    """One curve as it was: its name, its numbers by their times (s), and where its states began."""
+
+    name: str
+    times: Floats
+    values: Floats
+    states: tuple[tuple[float, str], ...]
+
+
+def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = inf) -> list[CsvColumn]:
+    """What curves have in a range, for a thread that writes it."""
+    made = []
+    for curve in curves:
+        first, end = curve.samples.places(begin_s, end_s)
+        runs = curve.states.runs(begin_s, end_s) if curve.states is not None else ()
+        states = tuple(
+            (run.begin_s, run.word)
+            for run in runs
+            if run.word is not None and begin_s <= run.begin_s <= end_s
+        )
+        times, values = curve.samples.times[first:end].copy(), curve.samples.values[first:end].copy()
+        made.append(CsvColumn(curve.text, times, values, states))
+    return made
+
+
+def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
+    """The lines of a CSV file (RFC 4180), some thousands at a time: the head, then rows by their time.
+
+    Times are nanoseconds since 1970 and ISO 8601 in UTC; a state stands where it begins.
+    """
+    yield _lines([["stamp_ns", "time_utc", *(_harmless(column.name) for column in columns)]])
+    states = [np.array([time_s for time_s, _word in column.states]) for column in columns]
+    times = np.unique(np.concatenate([np.empty(0), *states, *(column.times for column in columns)]))
+    for begin in range(0, len(times), ROWS_AT_ONCE):
+        part = times[begin : begin + ROWS_AT_ONCE]
+        cells = [
+            _cells_of(column, begins, float(part[0]), float(part[-1]))
+            for column, begins in zip(columns, states, strict=True)
+        ]
+        rows = []
+        for time_s in part.tolist():
+            stamp_ns = origin_ns + round(time_s * 1e9)
+            rows.append([str(stamp_ns), _iso(stamp_ns), *(each.get(time_s, "") for each in cells)])
+        yield _lines(rows)
+
+
+def _cells_of(column: CsvColumn, states: Floats, begin_s: float, end_s: float) -> dict[float, str]:
+    """What stands where in some rows; of several at the same time the newest."""
+    first, last = _places(column.times, begin_s, end_s)
+    numbers = zip(column.times[first:last].tolist(), column.values[first:last].tolist(), strict=True)
+    cells = {time_s: repr(value) for time_s, value in numbers}
+    first, last = _places(states, begin_s, end_s)
+    return cells | {time_s: _harmless(word) for time_s, word in column.states[first:last]}
+
+
+def _places(times: Floats, begin_s: float, end_s: float) -> tuple[int, int]:
+    first, last = np.searchsorted(times, begin_s, "left"), np.searchsorted(times, end_s, "right")
+    return int(first), int(last)
+
+
+def _iso(stamp_ns: int) -> str:
+    try:
+        at = datetime.fromtimestamp(stamp_ns // 10**9, timezone.utc)
+    except (OverflowError, ValueError, OSError):
+        return ""
+    return f"{at:%Y-%m-%dT%H:%M:%S}.{stamp_ns % 10**9:09d}Z"
+
+
+def _harmless(text: str) -> str:
+    """A text that no spreadsheet takes for a formula: one that begins like one gets an apostrophe."""
+    return f"'{text}" if text.startswith(_START) else text
+
+
+def _lines(rows: Sequence[Sequence[str]]) -> str:
+    out = io.StringIO(newline="")
+    csv.writer(out).writerows(rows)
+    return out.getvalue()

@@ -1,0 +1,271 @@
+"""The curves of one plot: what they are picked or calculated from, shared where several need the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+from app.core.series.calculated import Calculated, ExpressionCurve, WindowCurve
+from app.core.series.feed import SeriesFeed
+from app.core.series.field_path import (
+    MISSING,
+    FieldFound,
+    FieldPath,
+    fields_of,
+    kind_of_value,
+    meant_field,
+)
+from app.core.series.field_series import FieldSeries, TopicSeries
+from app.core.series.formula import (
+    ExpressionSource,
+    FieldSource,
+    Source,
+    WindowSource,
+    parse,
+)
+from app.core.series.samples import MOST_SAMPLES, Samples
+from app.core.series.states import States
+from app.errors import CurveError
+from nep.i18n import _
+
+MOST_CURVES = 64
+MOST_SAMPLES_TOGETHER = 8 * MOST_SAMPLES
+"""What all curves of a plot keep together (some 150 MB); more curves keep less each."""
+LEAST_SAMPLES = 8192
+
+
+@dataclass(eq=False, slots=True)
+class Curve:
+    """One curve of a plot: ``text`` as it is typed, its ``source``, its numbers, and a field's states."""
+
+    text: str
+    source: Source
+    samples: Samples
+    of: FieldSeries | None = None
+
+    @property
+    def states(self) -> States | None:
+        """The states of a field that had texts, or yes or no."""
+        return self.of.states if self.of is not None and len(self.of.states) else None
+
+    @property
+    def is_state(self) -> bool:
+        """Whether it is shown as a lane of states."""
+        return self.of is not None and (
+            self.of.is_state or (not len(self.samples) and len(self.of.states) > 0)
+        )
+
+    @property
+    def last(self) -> object:
+        """The newest value as it came; `MISSING` before the first."""
+        if self.of is not None:
+            return self.of.last
+        return float(self.samples.values[-1]) if len(self.samples) else MISSING
+
+
+def topics_of(source: Source) -> set[str]:
+    """The topics that a curve is made from."""
+    if isinstance(source, FieldSource):
+        return {source.topic}
+    if isinstance(source, WindowSource):
+        return topics_of(source.of)
+    return {topic for each in source.inputs for topic in topics_of(each)}
+
+
+@dataclass(slots=True, eq=False)
+class _Shared:
+    """What several curves may be made from, and how many are."""
+
+    samples: Samples
+    users: int = 0
+    needs: list[str] = field(default_factory=list)
+    of: FieldSeries | None = None
+    calculated: Calculated | None = None
+
+
+class Curves:
+    """All curves of one plot. One thread uses it (the window's)."""
+
+    def __init__(self, feed: SeriesFeed, topics: Callable[[], Iterable[str]]) -> None:
+        """``topics`` tells the names of those that there are."""
+        self._feed, self._names = feed, topics
+        self._topics: dict[str, TopicSeries] = {}
+        self._shared: dict[str, _Shared] = {}  # each after what it needs
+        self.all: list[Curve] = []
+
+    # -- what a person does ----------------------------------------------------------------------------------
+
+    def add(self, text: str, also: Iterable[str] = ()) -> list[Curve]:
+        """The curves of what was typed; ``[*]`` brings one for each element that the newest message has.
+
+        ``also`` are topics that it may name although they are not there now.
+
+        Raises `CurveError`: its sentence says what to change. Nothing is added then. Whether a field is there
+        is only known when its topic was heard.
+        """
+        source = parse(text, [*self._known_topics(), *also])
+        sources: Sequence[Source] = [source]
+        if isinstance(source, FieldSource) and source.path.has_every:
+            payload = self.payload_of(source.topic)
+            sources = [FieldSource(source.topic, path) for path in source.path.expanded(payload)]
+        return self.add_sources(sources, text)
+
+    def add_field(self, topic: str, path: FieldPath) -> list[Curve]:
+        """The curves of a field, whether its topic is there or not: it may still come."""
+        paths = path.expanded(self.payload_of(topic)) if path.has_every else [path]
+        return self.add_sources([FieldSource(topic, each) for each in paths], str(FieldSource(topic, path)))
+
+    def add_sources(self, sources: Sequence[Source], text: str) -> list[Curve]:
+        """Curves of these; what is plotted already is not added again."""
+        there = {each.text for each in self.all}
+        new = [each for each in sources if str(each) not in there]
+        if not sources:
+            raise CurveError(_("{text} has no elements now").format(text=text))
+        if len(self.all) + len(new) > MOST_CURVES:
+            raise CurveError(_("a plot has at most {count} curves").format(count=MOST_CURVES))
+        made = []
+        for source in new:
+            shared = self._enter(source)
+            made.append(Curve(str(source), source, shared.samples, shared.of))
+        self.all += made
+        self._share_room()
+        return made
+
+    def remove(self, curve: Curve) -> None:
+        """Forget a curve; its topic is not looked at any more when no other needs it."""
+        if curve in self.all:
+            self.all.remove(curve)
+            self._leave(curve.text)
+            self._share_room()
+
+    def close(self) -> None:
+        """Forget all."""
+        for curve in list(self.all):
+            self.remove(curve)
+
+    def advance(self) -> None:
+        """Calculate what is new; call it once a tick, after the messages came."""
+        for shared in self._shared.values():
+            if shared.calculated is not None:
+                shared.calculated.advance()
+
+    # -- what is asked ---------------------------------------------------------------------------------------
+
+    def payload_of(self, topic: str) -> object:
+        """The newest message of a topic that is plotted; `MISSING` otherwise."""
+        known = self._topics.get(topic)
+        return known.payload if known is not None else MISSING
+
+    def fields(self, topic: str) -> list[FieldFound]:
+        """What can be plotted of a topic that is plotted."""
+        payload = self.payload_of(topic)
+        return [] if payload is MISSING else list(fields_of(payload))
+
+    @property
+    def lost(self) -> int:
+        """Messages of the plotted topics that did not get here."""
+        return sum(each.lost for each in self._topics.values())
+
+    @property
+    def unread(self) -> int:
+        """Messages that can't be read, are too large, or have a stamp that is no time."""
+        return sum(each.unread + each.unplaced for each in self._topics.values())
+
+    @property
+    def undone(self) -> int:
+        """Numbers and states that went because a clock was set back."""
+        fields = [field for topic in self._topics.values() for field in topic.fields]
+        return sum(field.numbers.undone + field.states.undone for field in fields)
+
+    @property
+    def forgotten(self) -> int:
+        """The oldest numbers and states, for which there was no room."""
+        states = [each.states for each in self.all if each.states is not None]
+        return sum(each.samples.begun for each in self.all) + sum(each.forgotten for each in states)
+
+    @property
+    def newest_s(self) -> float | None:
+        """When the newest number or state of any curve was."""
+        found = [
+            last
+            for curve in self.all
+            for last in (curve.samples.last_s, curve.states.last_s if curve.states is not None else None)
+            if last is not None
+        ]
+        return max(found, default=None)
+
+    def advice(self, curve: Curve) -> str:
+        """Why nothing of a curve can be plotted, in a sentence; empty where something can or may still."""
+        if curve.of is None or len(curve.samples) or len(curve.of.states):
+            return ""
+        payload = self.payload_of(curve.of.topic)
+        if payload is MISSING:
+            return ""
+        found = curve.of.path.value_in(payload)
+        if kind_of_value(found) in {"number", "state"}:
+            return ""
+        if found is MISSING:
+            near = meant_field(curve.of.path, payload)
+            if near is None:
+                return _("There is no {field}.").format(field=curve.text)
+            meant = FieldSource(curve.of.topic, FieldPath.parse(near))
+            return _("There is no {field}. Did you mean {near}?").format(field=curve.text, near=meant)
+        return _("{field} is no number, text or yes or no. Choose one of its fields.").format(
+            field=curve.text
+        )
+
+    # -- inside ----------------------------------------------------------------------------------------------
+
+    def _known_topics(self) -> list[str]:
+        return list(dict.fromkeys([*self._topics, *self._names()]))
+
+    def _enter(self, source: Source) -> _Shared:
+        """What a source gives, made when it is the first time; one more uses it."""
+        name = str(source)
+        shared = self._shared.get(name)
+        if shared is None:
+            shared = self._make(source)
+            self._shared[name] = shared
+        shared.users += 1
+        return shared
+
+    def _make(self, source: Source) -> _Shared:
+        if isinstance(source, FieldSource):
+            return self._make_field(source)
+        if isinstance(source, WindowSource):
+            of = self._enter(source.of)
+            calculated: Calculated = WindowCurve(source.kind, of.samples, source.window_s)
+            return _Shared(calculated.samples, needs=[str(source.of)], calculated=calculated)
+        assert isinstance(source, ExpressionSource)  # noqa: S101  there is no other
+        inputs = [self._enter(each).samples for each in source.inputs]
+        calculated = ExpressionCurve(source.calculate, inputs)
+        return _Shared(calculated.samples, needs=[str(each) for each in source.inputs], calculated=calculated)
+
+    def _make_field(self, source: FieldSource) -> _Shared:
+        topic = self._topics.get(source.topic)
+        if topic is None:
+            topic = self._topics[source.topic] = TopicSeries(source.topic, self._feed.origin_ns)
+            self._feed.join(source.topic, topic)
+        made = FieldSeries(source.topic, source.path)
+        topic.join(made)
+        return _Shared(made.numbers, of=made)
+
+    def _leave(self, name: str) -> None:
+        shared = self._shared[name]
+        shared.users -= 1
+        if shared.users > 0:
+            return
+        del self._shared[name]
+        for each in shared.needs:
+            self._leave(each)
+        if shared.of is not None:
+            topic = self._topics[shared.of.topic]
+            topic.fields.remove(shared.of)
+            if not topic.fields:
+                del self._topics[topic.topic]
+                self._feed.leave(topic.topic, topic)
+
+    def _share_room(self) -> None:
+        each = max(LEAST_SAMPLES, min(MOST_SAMPLES, MOST_SAMPLES_TOGETHER // max(1, len(self._shared))))
+        for shared in self._shared.values():
+            shared.samples.limit = each

@@ -1,0 +1,286 @@
+"""What a person types as a curve: a field of a topic, or something calculated from fields.
+
+::
+
+    /odom.pose.x          difference(/odom.speed)          mean(/odom.speed, 2 s)
+    hypot(/odom.pose.x, /odom.pose.y)                      /odom.speed - 2 * /cmd_vel.linear
+
+Fields are found first and stand as names in what is left, which `ast` reads; only what is listed here is
+carried out, on arrays of numpy. Nothing that was typed is ever run as Python.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from app.core.series.field_path import FieldPath
+from app.core.series.samples import Floats
+from app.errors import CurveError
+from nep.errors import nearest
+from nep.i18n import _
+
+LONGEST, MOST_NODES = 400, 120
+LONGEST_WINDOW_S = 600.0
+Windowed = Literal["difference", "derivative", "integral", "mean"]
+WINDOWED: tuple[Windowed, ...] = ("difference", "derivative", "integral", "mean")
+Calculation = Callable[[Sequence[Floats]], Floats]
+
+FUNCTIONS: dict[str, tuple[int, Callable[..., Floats]]] = {
+    "abs": (1, np.abs), "sqrt": (1, np.sqrt), "exp": (1, np.exp), "log": (1, np.log), "log10": (1, np.log10),
+    "sin": (1, np.sin), "cos": (1, np.cos), "tan": (1, np.tan), "asin": (1, np.arcsin),
+    "acos": (1, np.arccos), "atan": (1, np.arctan), "atan2": (2, np.arctan2), "hypot": (2, np.hypot),
+    "min": (2, np.minimum), "max": (2, np.maximum), "floor": (1, np.floor), "ceil": (1, np.ceil),
+    "sign": (1, np.sign), "deg": (1, np.degrees), "rad": (1, np.radians),
+}  # fmt: skip
+"""What may be called, with how many numbers."""
+CONSTANTS = {"pi": np.pi, "e": np.e}
+OPERATORS: dict[type[ast.operator], Callable[[Floats, Floats], Floats]] = {
+    ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Mod: np.mod,
+    ast.Pow: np.power,
+}  # fmt: skip
+_FIELD = re.compile(r"""(?:\.[^.\[\]"\s,()+*/%^-]+|\[-?\d+\]|\[\*\]|\["(?:[^"\\]|\\.)*"\])+""")
+_UNKNOWN_TOPIC = re.compile(r"/[\w/]+")
+_DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|min)\b")
+_UNITS = {"ms": 0.001, "s": 1.0, "min": 60.0}
+
+
+@dataclass(frozen=True, slots=True)
+class FieldSource:
+    """A field of a topic."""
+
+    topic: str
+    path: FieldPath
+
+    def __str__(self) -> str:
+        """As it is typed."""
+        written = str(self.path)
+        return f"{self.topic}{written}" if written.startswith("[") else f"{self.topic}.{written}"
+
+
+@dataclass(frozen=True, slots=True)
+class WindowSource:
+    """How something changes, or its mean over the last ``window_s``."""
+
+    kind: Windowed
+    of: Source
+    window_s: float = 0.0
+
+    def __str__(self) -> str:
+        """As it is typed."""
+        return f"mean({self.of}, {self.window_s:g} s)" if self.kind == "mean" else f"{self.kind}({self.of})"
+
+
+@dataclass(frozen=True, slots=True)
+class ExpressionSource:
+    """A number calculated from others: ``calculate`` has ``inputs`` in their order; ``text`` is its name."""
+
+    text: str
+    inputs: tuple[Source, ...]
+    calculate: Calculation
+
+    def __str__(self) -> str:
+        """As it is typed."""
+        return self.text
+
+
+Source = FieldSource | WindowSource | ExpressionSource
+
+
+def address(text: str, topics: Sequence[str]) -> FieldSource | None:
+    """The field that is written at the beginning and nowhere else; None when the text is something else.
+
+    Raises `CurveError` when it names a topic, and what follows is no path.
+    """
+    topic = _topic_at(text, topics)
+    if topic is None:
+        return None
+    rest = text[len(topic) :]
+    if rest and not _FIELD.fullmatch(rest):
+        return None
+    return FieldSource(topic, FieldPath.parse(rest.removeprefix(".")))
+
+
+def parse(text: str, topics: Sequence[str]) -> Source:
+    """The curve that a person typed; ``topics`` are those that there are.
+
+    Raises `CurveError` with the sentence that says what to change.
+    """
+    text = text.strip()
+    if not text or len(text) > LONGEST:
+        raise CurveError(_("type a field, as /odom.speed, or something to calculate from fields"))
+    found = address(text, topics)
+    return found if found is not None else _Reader(text, topics).read()
+
+
+def _topic_at(text: str, topics: Sequence[str]) -> str | None:
+    """The longest topic that stands at the beginning of a text."""
+    fitting = [name for name in topics if text.startswith(name) and _ends(text, len(name))]
+    return max(fitting, key=len, default=None)
+
+
+def _ends(text: str, place: int) -> bool:
+    return place == len(text) or not (text[place].isalnum() or text[place] in "_/")
+
+
+class _Reader:
+    """Reads one expression."""
+
+    def __init__(self, text: str, topics: Sequence[str]) -> None:
+        self._text, self._topics = text, topics
+        self._fields: list[FieldSource] = []
+
+    def read(self) -> Source:
+        python = self._without_fields()
+        try:
+            tree = ast.parse(python, mode="eval")
+        except (SyntaxError, ValueError, MemoryError, RecursionError):
+            raise CurveError(_("'{text}' can't be read").format(text=self._text[:80])) from None
+        if sum(1 for _node in ast.walk(tree)) > MOST_NODES:
+            raise CurveError(_("this is too much for one curve; make curves of its parts"))
+        source = self._source(tree.body)
+        if source is None:
+            raise CurveError(_("a field is missing: this is the same number always"))
+        return source
+
+    def _without_fields(self) -> str:
+        """The text as Python would have it: a name for each field, seconds for each duration."""
+        out: list[str] = []
+        place, wants_value = 0, True
+        while place < len(self._text):
+            letter = self._text[place]
+            if wants_value and (letter == "/" or _topic_at(self._text[place:], self._topics)):
+                end = self._field(place)
+                out.append(f"_{len(self._fields) - 1}")
+                place, wants_value = end, False
+                continue
+            duration = _DURATION.match(self._text, place) if wants_value else None
+            if duration is not None:
+                out.append(repr(float(duration[1]) * _UNITS[duration[2]]))
+                place, wants_value = duration.end(), False
+                continue
+            if letter == "_" and wants_value:
+                raise CurveError(_("'{text}' can't be read").format(text=self._text[:80]))
+            out.append("**" if letter == "^" else letter)
+            if not letter.isspace():
+                wants_value = letter in "(,+-*/%^"
+            place += 1
+        return "".join(out)
+
+    def _field(self, place: int) -> int:
+        """Take over the field that stands there; where it ends."""
+        rest = self._text[place:]
+        topic = _topic_at(rest, self._topics)
+        if topic is None:
+            unknown = _UNKNOWN_TOPIC.match(rest)
+            raise unknown_topic(unknown[0] if unknown is not None else rest[:40], self._topics)
+        path = _FIELD.match(rest, len(topic))
+        if path is None:
+            raise CurveError(_("a field is missing behind {topic}").format(topic=topic))
+        found = FieldSource(topic, FieldPath.parse(path[0].removeprefix(".")))
+        if found.path.has_every:
+            raise CurveError(_("[*] means several curves; calculate with one of them"))
+        self._fields.append(found)
+        return place + path.end()
+
+    def _source(self, node: ast.expr) -> Source | None:
+        """What a node is made from; None for a number."""
+        if isinstance(node, ast.Name) and node.id[1:].isdigit() and node.id.startswith("_"):
+            return self._fields[int(node.id[1:])]
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in WINDOWED:
+            return self._windowed(node, node.func.id)
+        inputs: list[Source] = []
+        calculate = self._calculation(node, inputs)
+        return ExpressionSource(self._words(node), tuple(inputs), calculate) if inputs else None
+
+    def _windowed(self, node: ast.Call, kind: str) -> WindowSource:
+        wanted = 2 if kind == "mean" else 1
+        if len(node.args) != wanted or node.keywords:
+            example = "mean(/odom.speed, 2 s)" if kind == "mean" else f"{kind}(/odom.speed)"
+            raise CurveError(_("{name} is written as {example}").format(name=kind, example=example))
+        of = self._source(node.args[0])
+        if of is None:
+            raise CurveError(_("a field is missing: this is the same number always"))
+        window_s = 0.0
+        if kind == "mean":
+            window = node.args[1]
+            if isinstance(window, ast.Constant) and type(window.value) in {int, float}:
+                window_s = float(window.value)  # type: ignore[arg-type]
+            if not 0 < window_s <= LONGEST_WINDOW_S:
+                raise CurveError(_("a mean is taken over more than 0 and at most 600 s"))
+        return WindowSource(next(each for each in WINDOWED if each == kind), of, window_s)
+
+    def _calculation(self, node: ast.expr, inputs: list[Source]) -> Calculation:
+        """How a node is calculated from ``inputs``, to which it adds those that it needs."""
+        if isinstance(node, ast.Constant) and type(node.value) in {int, float}:
+            number = _constant(node.value)
+            return lambda _arrays: number
+        if isinstance(node, ast.Name) and node.id in CONSTANTS:
+            known = np.float64(CONSTANTS[node.id])
+            return lambda _arrays: known  # type: ignore[return-value]
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
+            inner = self._calculation(node.operand, inputs)
+            sign = -1.0 if isinstance(node.op, ast.USub) else 1.0
+            return lambda arrays: sign * inner(arrays)
+        if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+            operator = OPERATORS[type(node.op)]
+            left, right = self._calculation(node.left, inputs), self._calculation(node.right, inputs)
+            return lambda arrays: operator(left(arrays), right(arrays))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
+            return self._call(node, node.func.id, inputs)
+        if isinstance(node, (ast.Name, ast.Call)):
+            return self._input(node, inputs)
+        raise CurveError(_("'{text}' can't be calculated").format(text=self._words(node)[:80]))
+
+    def _call(self, node: ast.Call, name: str, inputs: list[Source]) -> Calculation:
+        wanted, function = FUNCTIONS[name]
+        if len(node.args) != wanted or node.keywords:
+            raise CurveError(_("{name} needs {count} numbers").format(name=name, count=wanted))
+        given = [self._calculation(each, inputs) for each in node.args]
+        return lambda arrays: function(*(each(arrays) for each in given))
+
+    def _input(self, node: ast.Name | ast.Call, inputs: list[Source]) -> Calculation:
+        """A field, or something that needs more than the numbers of one moment."""
+        called = node.func if isinstance(node, ast.Call) else node
+        name = called.id if isinstance(called, ast.Name) else self._words(called)
+        is_field = isinstance(node, ast.Name) and re.fullmatch(r"_\d+", name)
+        if not is_field and not (isinstance(node, ast.Call) and name in WINDOWED):
+            near = nearest(name, [*FUNCTIONS, *WINDOWED])
+            said = _("there is no '{name}'; {hint}")
+            hint = (
+                _("did you mean '{near}'?").format(near=near)
+                if near
+                else _("topics begin with a slash, as /odom.speed")
+            )
+            raise CurveError(said.format(name=name[:40], hint=hint))
+        source = self._source(node)
+        assert source is not None  # noqa: S101  it is a field or needs one
+        if source not in inputs:
+            inputs.append(source)
+        place = inputs.index(source)
+        return lambda arrays: arrays[place]
+
+    def _words(self, node: ast.expr) -> str:
+        """A node as it is typed."""
+        written = ast.unparse(node).replace("**", "^")
+        return re.sub(r"\b_(\d+)\b", lambda found: str(self._fields[int(found[1])]), written)
+
+
+def _constant(value: object) -> Floats:
+    try:
+        return np.float64(value)  # type: ignore[arg-type, return-value]
+    except OverflowError:
+        raise CurveError(_("'{text}' can't be calculated").format(text=str(value)[:40])) from None
+
+
+def unknown_topic(name: str, topics: Sequence[str]) -> CurveError:
+    """The sentence for a topic that is not there, with the nearest one."""
+    near = nearest(name, list(topics))
+    if near is None:
+        return CurveError(_("there is no topic {topic}").format(topic=name))
+    return CurveError(_("there is no topic {topic}; did you mean {near}?").format(topic=name, near=near))

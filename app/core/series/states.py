@@ -1,0 +1,101 @@
+"""States over time: texts, and yes or no, as runs of the same value; bounded, with their gaps."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from app.core.series.samples import LATE_S
+
+MOST_RUNS = 10_000
+LONGEST_STATE = 200
+
+
+@dataclass(frozen=True, slots=True)
+class StateRun:
+    """A value that was there from ``begin_s`` until ``end_s``; ``word`` is None where nothing is known."""
+
+    begin_s: float
+    end_s: float
+    word: str | None
+
+
+class States:
+    """The runs of one field. Of more than 10 000 changes the oldest are forgotten, and counted."""
+
+    def __init__(self, limit: int = MOST_RUNS) -> None:
+        """Nothing is known yet."""
+        self._limit = limit
+        self._begins: list[float] = []
+        self._words: list[str | None] = []
+        self.last_s: float | None = None
+        self.forgotten = self.undone = 0
+
+    def __len__(self) -> int:
+        """How many runs are kept."""
+        return len(self._begins)
+
+    def add(self, time_s: float, word: str | None, *, gap: bool = False) -> None:
+        """The field had this value at this time; ``gap``: something is missing right before. None: no value.
+
+        What comes a little too late changes nothing; much too late says that the clock was set back.
+        """
+        if self.last_s is not None and time_s < self.last_s:
+            if self.last_s - time_s <= LATE_S:
+                return
+            self._truncate(time_s)
+            gap = True
+        word = word if word is None else word[:LONGEST_STATE]
+        if gap and self._words and self._words[-1] is not None and self.last_s is not None:
+            self._begin(self.last_s, None)
+        if not self._words or self._words[-1] != word:
+            self._begin(time_s, word)
+        self.last_s = time_s
+
+    def _begin(self, time_s: float, word: str | None) -> None:
+        self._begins.append(time_s)
+        self._words.append(word)
+        if len(self._begins) > self._limit:
+            drop = len(self._begins) - self._limit * 3 // 4
+            del self._begins[:drop], self._words[:drop]
+            self.forgotten += drop
+
+    def _truncate(self, time_s: float) -> None:
+        place = bisect_left(self._begins, time_s)
+        self.undone += len(self._begins) - place
+        del self._begins[place:], self._words[place:]
+        self.last_s = time_s if self._begins else None
+
+    def runs(self, begin_s: float, end_s: float) -> Iterator[StateRun]:
+        """The runs that a range sees, oldest first; the newest one ends with the last message."""
+        first = max(0, bisect_right(self._begins, begin_s) - 1)
+        for place in range(first, len(self._begins)):
+            if self._begins[place] > end_s:
+                return
+            is_last = place + 1 == len(self._begins)
+            until = self.last_s if is_last else self._begins[place + 1]
+            yield StateRun(self._begins[place], until or self._begins[place], self._words[place])
+
+    def at(self, time_s: float) -> str | None:
+        """The value at a time; None when none is known."""
+        place = bisect_right(self._begins, time_s) - 1
+        return self._words[place] if place >= 0 else None
+
+    def changes(self, begin_s: float, end_s: float) -> int:
+        """How often it changed in a range."""
+        first = self.at(begin_s)
+        count = 0
+        for run in self.runs(begin_s, end_s):
+            if run.word is not None and run.word != first:
+                count += first is not None
+                first = run.word
+        return count
+
+    def lasted_s(self, word: str, begin_s: float, end_s: float) -> float:
+        """How long it had a value in a range."""
+        return sum(
+            max(0.0, min(run.end_s, end_s) - max(run.begin_s, begin_s))
+            for run in self.runs(begin_s, end_s)
+            if run.word == word
+        )

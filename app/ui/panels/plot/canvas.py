@@ -1,0 +1,484 @@
+"""The curves over time: axes and lines by pyqtgraph, the two cursors and their marks on top.
+
+The horizontal axis counts seconds from a moment at its right (`TimeView.anchor_s`): while a plot follows what
+comes, that moment moves and the axis does not, so it is not painted again. The mouse belongs to us: the wheel
+zooms time, with Ctrl values, a drag moves, a double click shows all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QDragEnterEvent,
+    QDragMoveEvent,
+    QDropEvent,
+    QFont,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QResizeEvent,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QGraphicsView
+
+from app.core.series.samples import Line
+from app.ui.panels.plot.shown_curve import MINUS, ShownCurve
+from app.ui.text.numbers import seconds_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.field_drag import dropped_field
+from nep.i18n import _, number
+
+AXIS_WIDTH, AXIS_HEIGHT = 54, 24
+FLAG = QSize(22, 19)
+ABOVE = 24  # px for the cursors' flags
+ZOOM_STEP = 1.2
+LEAST_WINDOW_S, MOST_WINDOW_S = 1e-4, 1e9
+SMOOTH_POINTS = 3000
+"""Above so many points smooth edges are not seen, and cost more than all else."""
+SIGNS, BUSY = 5, 5.0
+TICK_APART, TICK_ABOVE = 84, 34  # px between ticks
+BESIDE = 60
+FARTHEST = 1e300
+"""Values beyond are drawn at the edge: what axes are calculated with would overflow."""
+NEAR = 10  # px
+BETWEEN = 0.045
+
+
+@dataclass(slots=True)
+class ValueRange:
+    """The values that an axis shows; ``held`` when a person chose them, ``is_new`` until values were seen."""
+
+    low: float = 0.0
+    high: float = 1.0
+    held: bool = False
+    is_new: bool = True
+
+    def fit(self, low: float, high: float) -> bool:
+        """Show these, with some room; it stays as long as they fit well. Whether it changed."""
+        if self.held or not (math.isfinite(low) and math.isfinite(high)):
+            return False
+        span = high - low
+        inside = self.low <= low and high <= self.high and not self.is_new
+        if inside and span >= 0.5 * (self.high - self.low):
+            return False
+        room = span * 0.08 or abs(high) * 0.1 or 1.0
+        self.low, self.high = max(-FARTHEST, low - room), min(FARTHEST, high + room)
+        self.is_new = False
+        return True
+
+
+class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph tells no types
+    """Seconds before the moment at the right, whose clock stands there."""
+
+    def __init__(self) -> None:
+        super().__init__("bottom")
+        self.clock = ""
+
+    def boundingRect(self) -> QRectF:
+        """A word at the very edge, as the clock is, needs room beside it, else it is left out."""
+        return QRectF(super().boundingRect()).adjusted(-BESIDE, 0, BESIDE, 0)
+
+    def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
+        return readable(super().tickSpacing(least, most, size), most - least, size, TICK_APART)
+
+    def tickStrings(self, values: Sequence[float], _scale: float, spacing: float) -> list[str]:
+        return [self.clock if abs(value) < spacing / 100 else time_words(value, spacing) for value in values]
+
+
+class ValueAxis(pg.AxisItem):  # type: ignore[misc]
+    """Numbers with as many digits as their distance needs."""
+
+    def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
+        apart = TICK_ABOVE if self.orientation in {"left", "right"} else TICK_APART
+        return readable(super().tickSpacing(least, most, size), most - least, size, apart)
+
+    def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
+        return [axis_words(value * scale, spacing * scale) for value in values]
+
+
+def readable(
+    levels: list[tuple[float, float]], span: float, size: float, apart: float
+) -> list[tuple[float, float]]:
+    """Of pyqtgraph's levels of ticks the finest whose words are so many px ``apart``."""
+    fitting = [level for level in levels if span > 0 and level[0] / span * size >= apart]
+    return fitting[-1:] or levels[:1]
+
+
+def time_words(value_s: float, spacing_s: float) -> str:
+    """A tick of the time axis: seconds or minutes before (or after) the moment at its right."""
+    if spacing_s >= 60:
+        words = _("{minutes} min").format(minutes=number(round(abs(value_s) / 60, 3)))
+    else:
+        digits = max(0, math.ceil(-math.log10(spacing_s) - 1e-9)) if spacing_s < 1 else 0
+        words = f"{number(abs(value_s), f'.{min(digits, 6)}f')} s"
+    return f"{MINUS if value_s < 0 else '+'}{words}"
+
+
+def axis_words(value: float, spacing: float) -> str:
+    """A tick of a value axis."""
+    if value and not 1e-4 <= abs(spacing) < 1e6:
+        return number(value, ".3g").replace("-", MINUS)
+    digits = max(0, math.ceil(-math.log10(abs(spacing)) - 1e-9)) if spacing else 0
+    return number(round(value, digits) + 0.0, f".{digits}f").replace("-", MINUS)
+
+
+class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
+    """Draws what it is given; says what a person does with the mouse.
+
+    ``begin_s`` and ``end_s`` are what it shows, in the seconds of all series, ``anchor_s`` where the axis
+    counts from.
+    """
+
+    zoomed = Signal(float, float)  # factor of the time, at which second
+    moved = Signal(float)  # seconds
+    values_changed = Signal()
+    all_wanted = Signal()
+    cursor_moved = Signal(str, float)
+    field_dropped = Signal(str, str)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(background=None)
+        self.theme = theme
+        self.begin_s, self.end_s, self.anchor_s = -60.0, 0.0, 0.0
+        self.cursors: dict[str, float] = {}
+        self.marks: list[tuple[ShownCurve, float, float]] = []  # curve, time, value
+        self.mouse_s: float | None = None
+        self.signs: list[tuple[ShownCurve, float, float]] = []  # the same, where a line has no dashes
+        self._lines: dict[str, pg.PlotCurveItem] = {}
+        self._held: tuple[str, QPointF] | None = None
+        self.ranges = {"left": ValueRange(), "right": ValueRange()}
+        self._build()
+        self.setAcceptDrops(True)
+        self.setFrameShape(QGraphicsView.Shape.NoFrame)
+        self.setViewportUpdateMode(QGraphicsView.ViewportUpdateMode.FullViewportUpdate)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName(_("Curves"))
+        self.setMinimumSize(120, 80)
+        self.restyle()
+        theme.changed.connect(self.restyle)
+
+    def _build(self) -> None:
+        self.time_axis = TimeAxis()
+        left, right = ValueAxis("left"), ValueAxis("right")
+        axes: dict[str, Any] = {"bottom": self.time_axis, "left": left, "right": right}
+        self.view = pg.ViewBox(enableMenu=False)
+        self.plot = pg.PlotItem(viewBox=self.view, axisItems=axes, enableMenu=False)
+        self.plot.hideButtons()
+        self.plot.layout.setContentsMargins(6, ABOVE, 6, 0)
+        self.setCentralItem(self.plot)
+        self.right_view = pg.ViewBox(enableMenu=False)
+        self.plot.showAxis("right")
+        self.plot.scene().addItem(self.right_view)
+        self.plot.getAxis("right").linkToView(self.right_view)
+        for view in (self.view, self.right_view):
+            view.setMouseEnabled(x=False, y=False)
+            view.disableAutoRange()
+        self.right_view.setXLink(self.view)
+        self.view.sigResized.connect(self._fit_right)
+        for axis in axes.values():
+            axis.enableAutoSIPrefix(False)
+            axis.setStyle(tickLength=0, autoExpandTextSpace=False, autoReduceTextSpace=False)
+
+    def _fit_right(self) -> None:
+        self.right_view.setGeometry(self.view.sceneBoundingRect())
+        self.right_view.linkedViewChanged(self.view, pg.ViewBox.XAxis)
+
+    def axis_font(self) -> QFont:
+        """The font of the figures at the axes."""
+        return self.theme.font("caption")
+
+    def restyle(self) -> None:
+        """Take over the theme's colours, fonts and sizes."""
+        theme = self.theme
+        grid = theme.colour("controlBorder" if theme.high_contrast else "grid")
+        for name in ("bottom", "left", "right"):
+            axis = self.plot.getAxis(name)
+            axis.setTickFont(self.axis_font())
+            axis.setPen(pg.mkPen(theme.colour("border")))
+            axis.setTickPen(pg.mkPen(grid, width=1))
+            axis.setTextPen(theme.colour("textSecondary"))
+        self.setBackground(theme.colour("panel"))
+        self.time_axis.setHeight(round(theme.scaled(AXIS_HEIGHT)))
+        for name in ("left", "right"):
+            self.plot.getAxis(name).setWidth(round(theme.scaled(AXIS_WIDTH)))
+        self.plot.showGrid(x=True, y=True, alpha=1.0)
+        self.plot.getAxis("right").setGrid(False)
+        self.viewport().update()
+
+    # -- what is shown ---------------------------------------------------------------------------------------
+
+    @property
+    def area(self) -> QRectF:
+        """Where the curves are, in this widget."""
+        return QRectF(self.view.sceneBoundingRect())
+
+    @property
+    def columns(self) -> int:
+        """How many pixels the curves have from left to right."""
+        return max(16, round(self.area.width()))
+
+    def x_of(self, time_s: float) -> float:
+        """Where a time is, in this widget."""
+        area = self.area
+        return area.left() + (time_s - self.begin_s) / (self.end_s - self.begin_s) * area.width()
+
+    def time_at(self, x: float) -> float:
+        """The time at a place in this widget."""
+        area = self.area
+        share = (x - area.left()) / max(1.0, area.width())
+        return self.begin_s + share * (self.end_s - self.begin_s)
+
+    def y_of(self, value: float, *, right: bool) -> float:
+        """Where a value is, in this widget."""
+        area, shown = self.area, self.ranges["right" if right else "left"]
+        return area.bottom() - (value - shown.low) / (shown.high - shown.low) * area.height()
+
+    def show_lines(self, lines: Sequence[tuple[ShownCurve, Line]], clock_s: float) -> None:
+        """Draw these curves; ``clock_s`` is what time of day (s since 1970) it is at the anchor."""
+        shown = {curve.name for curve, _line in lines}
+        for name in [name for name in self._lines if name not in shown]:
+            item = self._lines.pop(name)
+            item.getViewBox().removeItem(item)
+        self._show_axes([curve for curve, _line in lines])
+        self._fit_values(lines)
+        self.signs = []
+        for place, (curve, line) in enumerate(lines):
+            self._show_line(curve, line)
+            if len(lines) > 1 and self._is_dense(line, right=curve.right):
+                self._add_signs(curve, place / len(lines))
+        self._show_clock(clock_s)
+        self.view.setXRange(self.begin_s - self.anchor_s, self.end_s - self.anchor_s, padding=0)
+        self.viewport().update()
+
+    def _show_line(self, curve: ShownCurve, line: Line) -> None:
+        item = self._lines.get(curve.name)
+        view = self.right_view if curve.right else self.view
+        if item is None:
+            item = self._lines[curve.name] = pg.PlotCurveItem(connect="finite")
+            view.addItem(item, ignoreBounds=True)
+        elif item.getViewBox() is not view:
+            item.getViewBox().removeItem(item)
+            view.addItem(item, ignoreBounds=True)
+        # what is so dense that dashes and smooth edges are not seen would take most of the time for them
+        dense = self._is_dense(line, right=curve.right)
+        item.setData(
+            line.times - self.anchor_s,
+            np.clip(line.values, -FARTHEST, FARTHEST),
+            pen=curve.look.pen(self.theme, is_dense=dense),
+            antialias=not dense,
+        )
+
+    def _is_dense(self, line: Line, *, right: bool) -> bool:
+        """Whether a line has so many points, or goes up and down so much, that dashes in it are noise."""
+        if len(line.times) > SMOOTH_POINTS or not line.is_whole:
+            return True
+        shown = self.ranges["right" if right else "left"]
+        with np.errstate(over="ignore", invalid="ignore"):
+            travelled = float(np.nansum(np.abs(np.diff(line.values)))) / (shown.high - shown.low)
+        return not travelled * self.area.height() < BUSY * self.area.width()
+
+    def _add_signs(self, curve: ShownCurve, shift: float) -> None:
+        """A dense line has no dashes: its mark stands on it here and there, at the same times always."""
+        step_s = (self.end_s - self.begin_s) / SIGNS
+        first = math.floor(self.begin_s / step_s) + shift
+        for place in range(SIGNS + 1):
+            time_s = (first + place) * step_s
+            found = curve.curve.samples.at(time_s)
+            if found is not None and self.begin_s <= time_s <= self.end_s:
+                self.signs.append((curve, *found))
+
+    def _show_axes(self, curves: Sequence[ShownCurve]) -> None:
+        for name, right in (("left", False), ("right", True)):
+            there = [curve for curve in curves if curve.right is right]
+            axis = self.plot.getAxis(name)
+            ink = there[0].look.ink(self.theme) if len(there) == 1 else self.theme.colour("textSecondary")
+            axis.setTextPen(ink)
+            axis.setStyle(showValues=bool(there))
+
+    def _fit_values(self, lines: Sequence[tuple[ShownCurve, Line]]) -> None:
+        for name, right, view in (("left", False, self.view), ("right", True, self.right_view)):
+            shown = self.ranges[name]
+            found = [line.values for curve, line in lines if curve.right is right and len(line.values)]
+            good = [each[np.isfinite(each)] for each in found]
+            good = [each for each in good if len(each)]
+            if good:
+                shown.fit(min(float(each.min()) for each in good), max(float(each.max()) for each in good))
+            view.setYRange(shown.low, shown.high, padding=0)
+
+    def _show_clock(self, clock_s: float) -> None:
+        try:
+            words = f"{datetime.fromtimestamp(clock_s):%H:%M:%S}"  # noqa: DTZ006  as people's clocks show it
+        except (OverflowError, ValueError, OSError):
+            words = "0 s"
+        if words != self.time_axis.clock:
+            self.time_axis.clock = words
+            self.time_axis.picture = None
+            self.time_axis.update()
+
+    def hold_values(self, factor: float = 1.0, shift: float = 0.0) -> None:
+        """Zoom the values, or move them by a share of what is shown; they stay so until `release_values`."""
+        for shown in self.ranges.values():
+            middle, half = (shown.low + shown.high) / 2, (shown.high - shown.low) / 2 * factor
+            middle += shift * 2 * half
+            if 1e-300 < half < FARTHEST and abs(middle) < FARTHEST:
+                shown.low, shown.high, shown.held = middle - half, middle + half, True
+        self.values_changed.emit()
+
+    def release_values(self) -> None:
+        """Show all values again."""
+        for shown in self.ranges.values():
+            shown.held, shown.is_new = False, True
+        self.values_changed.emit()
+
+    # -- the cursors -----------------------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        painter = QPainter(self.viewport())
+        self.paint_cursors(painter)
+        painter.end()
+
+    def paint_cursors(self, painter: QPainter) -> None:
+        """Paint A and B over the curves."""
+        area, theme = self.area, self.theme
+        places = {name: self.x_of(time_s) for name, time_s in self.cursors.items()}
+        inside = {name: x for name, x in places.items() if area.left() - 1 <= x <= area.right() + 1}
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if len(places) == 2:
+            left, right = sorted(min(max(x, area.left()), area.right()) for x in places.values())
+            tint = theme.colour("text")
+            tint.setAlphaF(BETWEEN)
+            painter.fillRect(QRectF(left, area.top(), right - left, area.height()), tint)
+        pen = QPen(theme.colour("text"), 1.25)
+        pen.setDashPattern([1.5, 2.5])
+        for x in inside.values():
+            painter.setPen(pen)
+            painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
+        for curve, time_s, value in (*self.signs, *self.marks):
+            x, y = self.x_of(time_s), self.y_of(value, right=curve.right)
+            if area.left() <= x <= area.right() and area.top() - 1 <= y <= area.bottom() + 1:
+                curve.look.paint_mark(painter, theme, QPointF(x, y), 9)
+        self._paint_distance(painter, places)
+        for name, x in inside.items():
+            flag = self._flag(x)
+            paint.box(painter, flag, theme.radius("key"), theme.colour("tooltip"))
+            font = theme.font("small")
+            font.setWeight(QFont.Weight.DemiBold)
+            paint.words(painter, flag, name, font, theme.colour("tooltipText"), paint.CENTRE)
+
+    def _flag(self, x: float) -> QRectF:
+        wide, high = self.theme.scaled(FLAG.width()), min(ABOVE - 2.0, self.theme.scaled(FLAG.height()))
+        return QRectF(x - wide / 2, self.area.top() - high - 3, wide, high)
+
+    def _paint_distance(self, painter: QPainter, places: dict[str, float]) -> None:
+        if len(places) < 2:
+            return
+        left, right = sorted(places.values())
+        distance_s = abs(self.cursors["A"] - self.cursors["B"])
+        words = distance_words(distance_s)
+        font = self.theme.font("small")
+        font.setWeight(QFont.Weight.DemiBold)
+        wide, edge = paint.width_of(font, words), self.theme.scaled(FLAG.width()) / 2
+        if right - left > wide + 2 * edge + 12:
+            place = self._flag((left + right) / 2)
+            box = QRectF(place.center().x() - wide / 2 - 1, place.top(), wide + 3, place.height())
+            paint.words(painter, box, words, font, self.theme.colour("text"), paint.CENTRE)
+
+    def _cursor_at(self, place: QPointF) -> str | None:
+        """The cursor under the mouse: its flag, or its line."""
+        for name, time_s in reversed(self.cursors.items()):
+            x = self.x_of(time_s)
+            if self._flag(x).adjusted(-4, -4, 4, 4).contains(place):
+                return name
+            if abs(place.x() - x) <= NEAR / 2 and self.area.contains(place):
+                return name
+        return None
+
+    # -- the mouse -------------------------------------------------------------------------------------------
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self.setFocus(Qt.FocusReason.MouseFocusReason)
+        place = event.position()
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._held = (self._cursor_at(place) or "", place)
+            event.accept()
+        else:
+            event.ignore()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        place = event.position()
+        self.mouse_s = self.time_at(place.x()) if self.area.contains(place) else None
+        if self._held is None:
+            over = self._cursor_at(place) is not None
+            self.setCursor(Qt.CursorShape.SizeHorCursor if over else Qt.CursorShape.ArrowCursor)
+            return
+        name, before = self._held
+        if name:
+            self.cursor_moved.emit(name, self.time_at(place.x()))
+        else:
+            self.moved.emit(self.time_at(before.x()) - self.time_at(place.x()))
+            if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+                self.hold_values(shift=(place.y() - before.y()) / max(1.0, self.area.height()))
+        self._held = (name, place)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self._held = None
+        event.accept()
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.release_values()
+            self.all_wanted.emit()
+
+    def leaveEvent(self, _event: object) -> None:
+        self.mouse_s = None
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        steps = (event.angleDelta().y() or event.angleDelta().x()) / 120
+        factor = ZOOM_STEP ** -max(-5.0, min(5.0, steps))
+        if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+            self.hold_values(factor)
+        else:
+            self.zoomed.emit(factor, self.time_at(event.position().x()))
+        event.accept()
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        super().resizeEvent(event)
+        if event is not None:
+            self.values_changed.emit()
+
+    # -- a field that is dropped -----------------------------------------------------------------------------
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if dropped_field(event.mimeData()) is not None:
+            event.acceptProposedAction()
+
+    def dragMoveEvent(self, event: QDragMoveEvent) -> None:
+        event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        found = dropped_field(event.mimeData())
+        if found is not None:
+            event.acceptProposedAction()
+            self.field_dropped.emit(*found)
+
+
+def distance_words(distance_s: float) -> str:
+    """How far A and B are apart: 12 ms, 7.5 s, 3 min."""
+    if distance_s < 1:
+        return f"{number(distance_s * 1000, '.3g')} ms"
+    return (
+        f"{number(distance_s, '.2f' if distance_s < 10 else '.1f')} s"
+        if distance_s < 120
+        else seconds_words(distance_s)
+    )

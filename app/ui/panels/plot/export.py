@@ -1,0 +1,211 @@
+"""A plot as a file: its numbers as CSV, written in a thread; what it shows as PNG or SVG."""
+
+from __future__ import annotations
+
+import errno
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QBuffer, QIODevice, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QImage, QPainter
+from PySide6.QtSvg import QSvgGenerator
+from PySide6.QtWidgets import QWidget
+
+from app.core.series.csv_export import CsvColumn, columns_of, csv_lines
+from app.core.storage.atomic_file import write_atomically
+from app.ui.panels.base import PanelContext
+from app.ui.panels.plot.look import Stroke
+from app.ui.panels.plot.shown_curve import ShownCurve
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.file_dialogs import FileKind
+from app.ui.widgets.menus import Menu
+from nep.i18n import _, lazy
+
+CSV = FileKind(lazy("Numbers (CSV)"), ".csv")
+PNG = FileKind(lazy("Picture (PNG)"), ".png")
+SVG = FileKind(lazy("Drawing (SVG)"), ".svg")
+RATIO = 2
+WAITS_S = 3.0
+Part = tuple[QSize, Callable[[QPainter, QRectF], object]]
+LEGEND_ROW = 22
+
+
+class CsvWriter:
+    """Writes one CSV file in a thread of its own; `take` says how it ended."""
+
+    def __init__(self, path: Path, columns: Sequence[CsvColumn], origin_ns: int) -> None:
+        """Begin at once; ``columns`` are never changed by anybody."""
+        self.path = path
+        self._done: str | None = None
+        self._given_up = threading.Event()
+        self._thread = threading.Thread(
+            target=self._run, args=(columns, origin_ns), name="studio-plot-export", daemon=True
+        )
+        self._thread.start()
+
+    def _run(self, columns: Sequence[CsvColumn], origin_ns: int) -> None:
+        try:
+            write_atomically(self.path, self._parts(columns, origin_ns))
+        except OSError as error:
+            self._done = error.strerror or type(error).__name__
+        except MemoryError:
+            self._done = _("there is not enough memory")
+        else:
+            self._done = ""
+
+    def _parts(self, columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[bytes]:
+        for lines in csv_lines(columns, origin_ns):
+            if self._given_up.is_set():
+                raise OSError(errno.ECANCELED, os.strerror(errno.ECANCELED))
+            yield lines.encode()
+
+    def take(self) -> str | None:
+        """None while it writes, "" when it is written, else why not."""
+        return self._done
+
+    def close(self) -> None:
+        """Wait until it is written, some seconds at most; then it is given up, and no part of it stays."""
+        self._thread.join(WAITS_S)
+        self._given_up.set()
+        self._thread.join(WAITS_S)
+
+
+class PlotPicture:
+    """What a plot shows, painted anywhere: the canvas, what stands below it, and the names of the curves."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        parts: Iterable[Part],
+        curves: Sequence[ShownCurve],
+    ) -> None:
+        """``parts`` from above: how large each is, and what paints it."""
+        self._theme, self._parts, self._curves = (
+            theme,
+            list(parts),
+            [each for each in curves if not each.hidden],
+        )
+
+    @property
+    def size(self) -> QSize:
+        """How large it is, in px."""
+        row = round(self._theme.scaled(LEGEND_ROW))
+        high = sum(size.height() for size, _paint in self._parts) + row * len(self._curves) + 8
+        return QSize(max(size.width() for size, _paint in self._parts), high)
+
+    def paint(self, painter: QPainter) -> None:
+        """Paint all of it at the left upper corner."""
+        painter.fillRect(QRect(0, 0, self.size.width(), self.size.height()), self._theme.colour("panel"))
+        top = 0.0
+        for size, painted in self._parts:
+            painter.save()
+            painter.translate(0, top)
+            painted(painter, QRectF(0, 0, size.width(), size.height()))
+            painter.restore()
+            top += size.height()
+        row = self._theme.scaled(LEGEND_ROW)
+        for curve in self._curves:
+            box = QRectF(12, top + 4, self.size.width() - 24, row)
+            Stroke(curve.look, curve.curve.is_state, hidden=False).paint(painter, box, self._theme)
+            font = self._theme.font("code")
+            paint.words(painter, box.adjusted(46, 0, 0, 0), curve.name, font, self._theme.colour("text"))
+            top += row
+
+    def png(self) -> bytes:
+        """As PNG, twice as fine as on the screen."""
+        image = QImage(self.size * RATIO, QImage.Format.Format_RGB32)
+        if image.isNull():
+            raise OSError(errno.ENOMEM, _("there is not enough memory"))
+        image.setDevicePixelRatio(RATIO)
+        painter = QPainter(image)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self.paint(painter)
+        painter.end()
+        buffer = QBuffer()
+        buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+        if not image.save(buffer, "PNG"):  # type: ignore[call-overload]
+            raise OSError(errno.ENOMEM, _("there is not enough memory"))
+        return bytes(buffer.data().data())
+
+    def svg(self) -> bytes:
+        """As SVG."""
+        buffer = QBuffer()
+        buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+        made = QSvgGenerator()
+        made.setOutputDevice(buffer)
+        made.setSize(self.size)
+        made.setViewBox(QRect(0, 0, self.size.width(), self.size.height()))
+        made.setTitle("NEP Studio")
+        painter = QPainter(made)
+        self.paint(painter)
+        painter.end()
+        return bytes(buffer.data().data())
+
+
+class PlotExport:
+    """Asks where, writes what a plot shows, and tells by a toast that it is done, or why not."""
+
+    def __init__(
+        self,
+        context: PanelContext,
+        parts: Callable[[], Iterable[Part]],
+        curves: Callable[[], Sequence[ShownCurve]],
+        shown: Callable[[], tuple[float, float]],
+    ) -> None:
+        """``parts`` are those of its picture, ``shown`` is from when to when (s)."""
+        self._context, self._parts, self._curves, self._shown = context, parts, curves, shown
+        self._writer: CsvWriter | None = None
+
+    def menu(self, parent: QWidget) -> Menu:
+        """As what it can be written."""
+        menu = Menu(self._context.theme, parent)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        for kind in (CSV, PNG, SVG):
+            action = menu.addAction(_(kind.words))
+            action.triggered.connect(lambda _on=False, kind=kind: self.ask_where(kind))
+        return menu
+
+    def ask_where(self, kind: FileKind) -> None:
+        """Ask for a file, and write what is shown then."""
+        suggestion = Path.home() / f"{_('Plot')}{kind.ending}"
+        kinds = [kind, *(each for each in (CSV, PNG, SVG) if each is not kind)]
+        self._context.files.save_as(_("Export the plot"), suggestion, kinds, self.write)
+
+    def write(self, path: Path, kind: FileKind) -> None:
+        """Write it as this kind; numbers in a thread."""
+        if kind != CSV:
+            picture = PlotPicture(self._context.theme, self._parts(), self._curves())
+            try:
+                write_atomically(path, picture.png() if kind == PNG else picture.svg())
+            except OSError as error:
+                self._tell(path, error.strerror or type(error).__name__)
+            else:
+                self._tell(path, "")
+            return
+        if self._writer is not None and self._writer.take() is None:
+            self._context.toast(_("The export before is not done yet"))
+            return
+        curves = [each.curve for each in self._curves() if not each.hidden]
+        origin_ns = self._context.session.series.origin_ns
+        self._writer = CsvWriter(path, columns_of(curves, *self._shown()), origin_ns)
+
+    def follow(self) -> None:
+        """Tell when it is written; call it with every tick."""
+        if self._writer is not None and (failed := self._writer.take()) is not None:
+            self._tell(self._writer.path, failed)
+            self._writer = None
+
+    def _tell(self, path: Path, reason: str) -> None:
+        if reason:
+            said = _("{file} can't be written: {reason}").format(file=path.name, reason=reason)
+        else:
+            said = _("Exported {file}").format(file=path.name)
+        self._context.toast(said)
+
+    def close(self) -> None:
+        """Wait until what is being written is done."""
+        if self._writer is not None:
+            self._writer.close()

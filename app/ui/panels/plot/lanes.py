@@ -1,0 +1,122 @@
+"""States over time: a lane for each field that is a text, or yes or no, in line with the curves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize
+from PySide6.QtGui import QHelpEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
+
+from app.core.series.states import StateRun
+from app.ui.panels.plot.canvas import PlotCanvas
+from app.ui.panels.plot.look import paint_state
+from app.ui.panels.plot.shown_curve import ShownCurve
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from nep.i18n import _
+
+LANE, LEAST_WORD = 26, 34
+MOST_LANES = 8
+LEAST_BOX = 2.0
+
+
+class StateLanes(QWidget):
+    """Paints the states of some curves over the time that the canvas shows."""
+
+    def __init__(self, theme: Theme, canvas: PlotCanvas) -> None:
+        super().__init__()
+        self._theme, self._canvas = theme, canvas
+        self.curves: Sequence[ShownCurve] = ()
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(_("States"))
+        theme.changed.connect(self.updateGeometry)
+
+    def show_curves(self, curves: Sequence[ShownCurve]) -> None:
+        """Show these, eight at most; more are in the table only."""
+        count = len(self.curves)
+        self.curves = curves[:MOST_LANES]
+        if len(self.curves) != count:
+            self.updateGeometry()
+        paint.show_when(self, bool(self.curves))
+        self.update()
+
+    def _lane(self) -> float:
+        return max(float(LANE), self._theme.scaled(LANE))
+
+    def sizeHint(self) -> QSize:
+        return QSize(200, round(self._lane() * len(self.curves)))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(60, self.sizeHint().height())
+
+    def boxes(self) -> Iterator[tuple[ShownCurve, StateRun, QRectF]]:
+        """What is painted: each run that can be seen, and where. Of yes or no only true."""
+        canvas, area = self._canvas, self._canvas.area
+        for row, curve in enumerate(self.curves):
+            states = curve.curve.states
+            if states is None or curve.hidden:
+                continue
+            top = row * self._lane()
+            runs = list(states.runs(canvas.begin_s, canvas.end_s))
+            is_yes_or_no = {run.word for run in runs} <= {"true", "false", None}
+            painted = -1.0  # up to here: of what changes within a pixel one is enough
+            for run in runs:
+                if run.word is None or (is_yes_or_no and run.word == "false"):
+                    continue
+                left = max(area.left(), canvas.x_of(run.begin_s))
+                right = min(area.right(), canvas.x_of(run.end_s))
+                if right >= left and max(right, left + LEAST_BOX) > painted + 0.5:
+                    painted = max(right, left + LEAST_BOX)
+                    yield curve, run, QRectF(left, top + 2, max(LEAST_BOX, right - left), self._lane() - 3)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        self.paint_lanes(painter)
+        painter.end()
+
+    def paint_lanes(self, painter: QPainter) -> None:
+        """Paint all lanes at the left upper corner."""
+        theme, area = self._theme, self._canvas.area
+        font = theme.font("code")
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for row, curve in enumerate(self.curves):
+            ground = QRectF(area.left(), row * self._lane() + 1, area.width(), self._lane() - 1)
+            painter.fillRect(ground, theme.colour("sunken"))
+            name = QRectF(4, ground.top(), area.left() - 10, ground.height())
+            role = "textDisabled" if curve.hidden else "textSecondary"
+            paint.words(painter, name, short_name(curve.name), font, theme.colour(role), paint.RIGHT)
+        for curve, run, box in self.boxes():
+            paint_state(painter, theme, box, curve.look)
+            if box.width() >= LEAST_WORD:
+                inside = box.adjusted(6, 0, -4, 0)
+                paint.words(painter, inside, run.word or "", theme.font("small"), theme.colour("text"))
+        self._paint_cursors(painter)
+
+    def _paint_cursors(self, painter: QPainter) -> None:
+        area = self._canvas.area
+        pen = QPen(self._theme.colour("text"), 1.25)
+        pen.setDashPattern([1.5, 2.5])
+        painter.setPen(pen)
+        high = self._lane() * len(self.curves)
+        for time_s in self._canvas.cursors.values():
+            x = self._canvas.x_of(time_s)
+            if area.left() <= x <= area.right():
+                painter.drawLine(QPointF(x, 0), QPointF(x, high))
+
+    def event(self, event: QEvent) -> bool:
+        if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
+            place = QPointF(event.pos())
+            found = (run.word for _curve, run, box in self.boxes() if box.contains(place))
+            word = next(found, None)
+            row = int(place.y() // self._lane())
+            name = self.curves[row].name if row < len(self.curves) else ""
+            QToolTip.showText(event.globalPos(), plain.tip(word or name), self)
+            return True
+        return super().event(event)
+
+
+def short_name(name: str) -> str:
+    """The last word of a field's path: "emotion" of "/blackboard.robots.Pepper.emotion"."""
+    return name.rpartition(".")[2] or name

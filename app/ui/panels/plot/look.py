@@ -1,0 +1,91 @@
+"""How curves differ: by colour, by dash and by the shape of their marks, never by colour alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from nep.i18n import lazy
+
+WIDTH = 1.75
+COLOURS = (lazy("Blue"), lazy("Orange"), lazy("Green"), lazy("Pink"), lazy("Yellow"), lazy("Violet"))
+"""The names of the theme's curve colours, in their order."""
+DASHES: tuple[tuple[float, ...], ...] = ((), (6, 4), (2, 4), (12, 4))
+"""Pixels drawn and left out; the first is a whole line."""
+LANE_FILL, LANE_EDGE = 0.20, 0.55
+
+
+@dataclass(frozen=True, slots=True)
+class CurveLook:
+    """A colour of the theme, and a pattern: which dash and which mark."""
+
+    colour: int
+    pattern: int
+
+    def ink(self, theme: Theme) -> QColor:
+        """The colour of the line."""
+        return theme.series(self.colour)
+
+    def pen(self, theme: Theme, *, is_dense: bool = False) -> QPen:
+        """The pen of the line; that of a dense one has no dashes, and is thin: quickly painted."""
+        pen = QPen(self.ink(theme), 1.0 if is_dense else WIDTH)
+        pen.setCosmetic(True)
+        dash = DASHES[self.pattern % len(DASHES)]
+        if dash and not is_dense:
+            pen.setDashPattern([pixels / WIDTH for pixels in dash])
+            pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+        return pen
+
+    def paint_mark(self, painter: QPainter, theme: Theme, centre: QPointF, size: float = 8.0) -> None:
+        """Its mark: disc, square, triangle or diamond, with an edge that parts it from the line."""
+        half = size / 2
+        painter.setPen(QPen(theme.colour("panel"), 1))
+        painter.setBrush(self.ink(theme))
+        match self.pattern % 4:
+            case 0:
+                painter.drawEllipse(centre, half, half)
+            case 1:
+                painter.drawRect(QRectF(centre.x() - half, centre.y() - half, size, size))
+            case 2:
+                far = half + 0.5
+                around = [(0.0, -far), (far, half), (-far, half)]
+                painter.drawPolygon(QPolygonF([centre + QPointF(x, y) for x, y in around]))
+            case _:
+                far = half + 1
+                around = [(0.0, -far), (far, 0.0), (0.0, far), (-far, 0.0)]
+                painter.drawPolygon(QPolygonF([centre + QPointF(x, y) for x, y in around]))
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """A curve's line with its mark as a cell of the table shows it, or the box of a state."""
+
+    look: CurveLook
+    is_state: bool
+    hidden: bool
+
+    def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
+        """Paint it in the middle of a cell's height."""
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setOpacity(0.35 if self.hidden else 1.0)
+        middle = box.center().y()
+        wide = min(box.width(), 34.0)
+        if self.is_state:
+            paint_state(painter, theme, QRectF(box.left(), middle - 7, wide, 14), self.look)
+        else:
+            painter.setPen(self.look.pen(theme))
+            painter.drawLine(QPointF(box.left(), middle), QPointF(box.left() + wide, middle))
+            self.look.paint_mark(painter, theme, QPointF(box.left() + wide / 2, middle))
+        painter.setOpacity(1.0)
+
+
+def paint_state(painter: QPainter, theme: Theme, box: QRectF, look: CurveLook) -> None:
+    """The box of a state."""
+    fill, edge = look.ink(theme), look.ink(theme)
+    fill.setAlphaF(LANE_FILL)
+    edge.setAlphaF(1.0 if theme.high_contrast else LANE_EDGE)
+    paint.box(painter, box, theme.radius("key"), fill, edge)

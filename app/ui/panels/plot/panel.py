@@ -1,0 +1,587 @@
+"""Plot: curves of numbers over the messages' own time, states in lanes, a table of figures, A and B."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPoint, QRectF, QSize, Qt
+from PySide6.QtGui import (
+    QAction,
+    QContextMenuEvent,
+    QGuiApplication,
+    QKeyEvent,
+    QPainter,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.series.curves import MOST_CURVES, Curve, Curves, topics_of
+from app.core.series.field_path import FieldPath
+from app.errors import CurveError
+from app.ui.panels.base import PanelContext, PanelWidget
+from app.ui.panels.plot.canvas import PlotCanvas
+from app.ui.panels.plot.export import CSV, PNG, SVG, PlotExport
+from app.ui.panels.plot.lanes import StateLanes
+from app.ui.panels.plot.legend import LegendFigures, LegendTable, columns, foot_words, next_look
+from app.ui.panels.plot.shown_curve import ShownCurve, look_of
+from app.ui.panels.plot.time_view import SPANS, TimeView
+from app.ui.panels.plot.tools import PlotTools
+from app.ui.panels.plot.xy_canvas import XYCanvas
+from app.ui.text.numbers import grouped
+from app.ui.widgets import (
+    Button,
+    Chip,
+    ElidedLabel,
+    EmptyAction,
+    EmptyState,
+    Separator,
+    label,
+)
+from app.ui.widgets.field_drag import dropped_field
+from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.paint import show_when
+from app.ui.widgets.table.model import TableModel
+from nep.i18n import _, ngettext
+
+if TYPE_CHECKING:
+    from PySide6.QtGui import QDragEnterEvent, QDropEvent
+
+
+DRAW_EVERY, FIGURES_EVERY = (2, 8), 6  # refreshes of 30 a second
+SLOW_S = 0.02
+"""A drawing that takes longer is done half as often."""
+MOST_ROWS, TABLE_SHARE = 6, 0.32
+
+
+class PlotPanel(PanelWidget):
+    """One plot. It takes the messages of what it plots also while nobody sees it."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, _("Plot"))
+        self.curves = Curves(self.session.series, self._topic_names)
+        self.shown: list[ShownCurve] = []
+        self.view = TimeView()
+        self.figures = LegendFigures()
+        self._ticks = 0
+        self._due = True
+        self._drawing_s = 0.0
+        self._points = (0, True)
+        self._last_cursor = "A"
+        self.exporter = PlotExport(
+            context, self._picture_parts, lambda: self.shown, lambda: (self.canvas.begin_s, self.canvas.end_s)
+        )
+        self._make_header()
+        self._make_tools()
+        self._make_body()
+        self.setAcceptDrops(True)
+        self._changed()
+
+    # -- its parts ----------------------------------------------------------------------------------------
+
+    def _make_header(self) -> None:
+        self.paused = Chip(self.theme, "", "off", "pause")
+        self.freeze = Button(self.theme, _("Pause"), "pause", size="small")
+        self.freeze.setCheckable(True)
+        self.freeze.toggled.connect(self._pause)
+        self.chips, self.header = [self.paused], [self.freeze]
+
+    def _make_tools(self) -> None:
+        self.tools = PlotTools(self.theme, self.session, lambda: [each.name for each in self.shown])
+        self.add, self.span, self.cursors = self.tools.add, self.tools.span, self.tools.cursors
+        self.states, self.across, self.export = self.tools.states, self.tools.across, self.tools.export
+        self.add.wanted.connect(self._add_typed)
+        self.add.left.connect(lambda: self.canvas.setFocus(Qt.FocusReason.OtherFocusReason))
+        self.span.changed.connect(self._choose_span)
+        self.cursors.toggled.connect(self._show_cursors)
+        self.states.toggled.connect(lambda _on: self._changed())
+        self.across.toggled.connect(lambda _on: self._changed())
+        self.export.clicked.connect(lambda: drop_below(self.exporter.menu(self), self.export))
+
+    def _make_body(self) -> None:
+        theme = self.theme
+        self.canvas = PlotCanvas(theme)
+        self.xy = XYCanvas(theme)
+        self.lanes = StateLanes(theme, self.canvas)
+        self.model: TableModel[ShownCurve] = TableModel(
+            columns(self.figures, self.cursors.isChecked, self._is_gone), lambda shown: shown.name
+        )
+        self.table = LegendTable(theme, self.model)
+        self.table.changed.connect(self._changed)
+        self.table.removed.connect(self.remove)
+        self.table.chosen_copy.connect(self._copy)
+        self._connect_canvas()
+        body = self._make_lower()
+        self.empty = EmptyState(
+            theme,
+            "chart-line",
+            _("No curves yet"),
+            _("Drag a number from the Inspector here, or type its path."),
+            [EmptyAction(_("Add a curve"), self.focus_filter, "plus", primary=True)],
+        )
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(body)
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.setSpacing(0)
+        whole.addWidget(self.tools)
+        whole.addWidget(self.pages, 1)
+        self.setFocusProxy(self.canvas)
+
+    def _make_lower(self) -> QWidget:
+        """Everything below the tools, for when there are curves."""
+        self.drawings = QStackedWidget()
+        self.drawings.addWidget(self.canvas)
+        self.drawings.addWidget(self.xy)
+        self.drawings.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.about, self.points = (
+            ElidedLabel("small", "textTertiary"),
+            label("", "small", role="textTertiary"),
+        )
+        self.about.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(12, 4, 12, 5)
+        foot.addWidget(self.about, 1)
+        foot.addWidget(self.points)
+        self.advice = label("", "small", role="warn", wrap=True)
+        self.advice.setContentsMargins(12, 2, 12, 2)
+        self.advice.setMinimumWidth(0)
+        body = QWidget()
+        column = QVBoxLayout(body)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget, stretch in ((self.drawings, 1), (self.lanes, 0), (self.advice, 0)):
+            column.addWidget(widget, stretch)
+        column.addWidget(Separator(self.theme))
+        column.addWidget(self.table)
+        column.addWidget(Separator(self.theme))
+        column.addLayout(foot)
+        return body
+
+    def _connect_canvas(self) -> None:
+        self.canvas.zoomed.connect(self._zoom)
+        self.canvas.moved.connect(self._move)
+        self.canvas.values_changed.connect(self._soon)
+        self.canvas.all_wanted.connect(lambda: self._choose_span("all"))
+        self.canvas.cursor_moved.connect(self._put_cursor)
+        self.canvas.field_dropped.connect(self.plot_field)
+
+    def _topic_names(self) -> list[str]:
+        topics = [*self.session.topics, *self.session.networks.topics]
+        return [topic.key for topic in topics]
+
+    # -- curves -------------------------------------------------------------------------------------------
+
+    def plot_field(self, topic: str, path: str) -> None:
+        """Add a field of a topic; without a path a person is asked for it."""
+        if not path:
+            self.add.ask(f"{topic}.")
+            return
+        try:
+            self._show_new(self.curves.add_field(topic, FieldPath.parse(path)), right=False)
+        except CurveError as error:
+            self.context.toast(_sentence(error))
+
+    def show_topic(self, name: str) -> None:
+        """Ask which field of a topic."""
+        self.plot_field(name, "")
+
+    def _add_typed(self, text: str, right: bool) -> None:
+        try:
+            made = self.curves.add(text)
+        except CurveError as error:
+            self.add.complain(_sentence(error))
+            return
+        if not made:
+            self.add.complain(_("{field} is there already.").format(field=text))
+            return
+        self.add.clear()
+        self.add.shut()
+        self._show_new(made, right=right)
+        self.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _show_new(self, made: Sequence[Curve], *, right: bool) -> None:
+        for curve in made:
+            self.shown.append(ShownCurve(curve, next_look(self.shown), right))
+        self._changed()
+
+    def remove(self, name: str) -> None:
+        """Take a curve away; it can be brought back."""
+        found = next((each for each in self.shown if each.name == name), None)
+        if found is None:
+            return
+        place = self.shown.index(found)
+        self.shown.remove(found)
+        self.curves.remove(found.curve)
+        self._changed()
+        said = _("Removed {field}").format(field=name)
+        self.context.toast(said, _("Undo"), lambda: self._bring_back(found, place))
+
+    def _bring_back(self, before: ShownCurve, place: int) -> None:
+        self._restore_curve(before.saved())
+        if self.shown and self.shown[-1].name == before.name:
+            self.shown.insert(place, self.shown.pop())
+        self._changed()
+
+    def _copy(self, name: str) -> None:
+        QGuiApplication.clipboard().setText(name)
+        self.context.toast(_("Copied {path}").format(path=name))
+
+    def _is_gone(self, shown: ShownCurve) -> bool:
+        for name in topics_of(shown.curve.source):
+            topic = self.session.topic(name)
+            if topic is None or topic.gone_s is not None:
+                return True
+        return False
+
+    # -- the tick -----------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        self._ticks += 1
+        self.curves.advance()
+        self.exporter.follow()
+        if not self.shown:
+            return
+        every = self._draw_every()
+        if self._due or (self.view.follows and self._ticks % every == 0):
+            self._due = False
+            began = time.perf_counter()
+            self._draw()
+            self._drawing_s = time.perf_counter() - began
+        if self._ticks % FIGURES_EVERY == 0:
+            self._show_figures()
+
+    def _draw_every(self) -> int:
+        """After how many refreshes it is drawn again: not before it has moved on by a pixel or so."""
+        pixel_s = (self.canvas.end_s - self.canvas.begin_s) / self.canvas.columns
+        least, most = DRAW_EVERY
+        every = round(min(most, max(least, pixel_s * 30)))
+        return min(most, 2 * every) if self._drawing_s > SLOW_S else every
+
+    def _soon(self) -> None:
+        """Draw at the next tick, also while it is paused."""
+        self._due = True
+
+    def _range(self) -> tuple[float, float]:
+        newest = self.curves.newest_s
+        newest = self.session.series.now_s() if newest is None else newest
+        starts = [float(each.curve.samples.times[0]) for each in self.shown if len(each.curve.samples)]
+        return self.view.shown(min(starts, default=newest - self.view.span_s), newest)
+
+    def _draw(self) -> None:
+        begin_s, end_s = self._range()
+        canvas = self.canvas
+        canvas.begin_s, canvas.end_s, canvas.anchor_s = begin_s, end_s, end_s
+        if self.cursors.isChecked() and not canvas.cursors:
+            self._place_cursors()
+        lines = [
+            (each, each.curve.samples.line(begin_s, end_s, canvas.columns))
+            for each in self.shown
+            if not each.hidden and not each.curve.is_state
+        ]
+        self._points = (sum(line.points for _c, line in lines), all(line.is_whole for _c, line in lines))
+        if self.is_across:
+            self.xy.cursors = canvas.cursors
+            self.xy.show_pairs(self._pairs(), begin_s, end_s)
+        else:
+            self._mark_cursors(lines)
+            clock_s = (self.session.series.origin_ns + end_s * 1e9) / 1e9
+            canvas.show_lines(lines, clock_s)
+        states = [each for each in self.shown if each.curve.is_state]
+        self.lanes.show_curves(states if self.states.isChecked() and not self.is_across else [])
+
+    def _numbers(self) -> int:
+        return sum(not each.curve.is_state for each in self.shown)
+
+    @property
+    def is_across(self) -> bool:
+        """Whether curves are drawn over each other rather than over time."""
+        return self.across.isChecked() and self._numbers() > 1
+
+    def _pairs(self) -> list[tuple[ShownCurve, ShownCurve]]:
+        there = [each for each in self.shown if not each.hidden and not each.curve.is_state]
+        return list(zip(there[0::2], there[1::2], strict=False))
+
+    def _mark_cursors(self, lines: Sequence[tuple[ShownCurve, object]]) -> None:
+        marks = []
+        for curve, _line in lines:
+            for time_s in self.canvas.cursors.values():
+                found = curve.curve.samples.at(time_s)
+                if found is not None:
+                    marks.append((curve, time_s, found[1]))
+        self.canvas.marks = marks
+
+    def _show_figures(self) -> None:
+        cursors = self.canvas.cursors
+        both = (cursors["A"], cursors["B"]) if len(cursors) == 2 else None
+        begin_s, end_s = (min(both), max(both)) if both else (self.canvas.begin_s, self.canvas.end_s)
+        self.figures.look_at(begin_s, end_s, both)
+        self.table.tell_visible_changed()
+        distance = self.xy.distance() if self.is_across else None
+        self.about.setText(foot_words(self.curves, has_cursors=both is not None, distance=distance))
+        count, whole = self._points
+        points = ngettext("{count} point", "{count} points", count).format(count=grouped(count))
+        words = _("{points}, all drawn") if whole else _("{points}, 2 per px")
+        self.points.setText(words.format(points=points))
+        advice = next(filter(None, (self.curves.advice(each.curve) for each in self.shown)), "")
+        self.advice.setText(advice)
+        show_when(self.advice, bool(advice))
+
+    def _changed(self) -> None:
+        """Curves came or went, or look otherwise."""
+        there = bool(self.shown)
+        self.pages.setCurrentIndex(1 if there else 0)
+        show_when(self.freeze, there)
+        self.tools.fit(len(self.shown), self._numbers())
+        self.drawings.setCurrentIndex(1 if self.is_across else 0)
+        self.model.set_rows(self.shown)
+        self._fit_table()
+        topics = {topic for each in self.shown for topic in topics_of(each.curve.source)}
+        self.set_title(_("Plot"), next(iter(topics)) if len(topics) == 1 else "")
+        self.table.viewport().update()
+        self._soon()
+
+    def _fit_table(self) -> None:
+        room = round(self.height() * TABLE_SHARE / max(1, self.table.row_height)) - 1
+        rows = max(1, min(MOST_ROWS, room, len(self.shown)))
+        self.table.setFixedHeight(self.table.row_height * rows + self.table.horizontalHeader().height() + 2)
+        self.table.fit_columns()
+
+    # -- time ---------------------------------------------------------------------------------------------
+
+    def _pause(self, paused: bool) -> None:
+        if paused:
+            self.view.hold((self.canvas.begin_s, self.canvas.end_s))
+        else:
+            self.view.go_on()
+        self.freeze.set_word(_("Go on") if paused else _("Pause"), "play" if paused else "pause")
+        self.paused.set(_("paused, the data goes on") if paused else "", "off", "pause")
+        self._say_span()
+        self._soon()
+
+    def _zoom(self, factor: float, at_s: float) -> None:
+        self.view.zoom(factor, at_s, (self.canvas.begin_s, self.canvas.end_s))
+        self._say_span()
+        self._soon()
+
+    def _move(self, by_s: float) -> None:
+        self.view.move(by_s, (self.canvas.begin_s, self.canvas.end_s))
+        self.canvas.begin_s, self.canvas.end_s = self.canvas.begin_s + by_s, self.canvas.end_s + by_s
+        self.freeze.setChecked(True)
+        self._soon()
+
+    def _choose_span(self, value: str) -> None:
+        self.view.choose(dict(SPANS)[value])
+        self._say_span()
+        self._soon()
+
+    def _say_span(self) -> None:
+        chosen = self.view.chosen()
+        if chosen:
+            self.span.set_value(chosen)
+        else:
+            self.span.choose_none()
+
+    # -- A and B ------------------------------------------------------------------------------------------
+
+    def _show_cursors(self, shown: bool) -> None:
+        if not shown:
+            self.canvas.cursors.clear()
+            self.canvas.marks = []
+        else:
+            self._place_cursors()
+        self.table.fit_columns()
+        self._soon()
+        self._show_figures()
+
+    def _place_cursors(self) -> None:
+        span = self.canvas.end_s - self.canvas.begin_s
+        self.canvas.cursors.update(A=self.canvas.begin_s + span / 3, B=self.canvas.begin_s + span * 2 / 3)
+
+    def _put_cursor(self, name: str, time_s: float) -> None:
+        self.cursors.setChecked(True)
+        self.canvas.cursors[name] = time_s
+        self._last_cursor = name
+        self._soon()
+        self._show_figures()
+
+    def _step_cursor(self, steps: int) -> bool:
+        """Move the cursor that was moved last by so many numbers of the first curve that is shown."""
+        time_s = self.canvas.cursors.get(self._last_cursor)
+        first = next((each for each in self.shown if not each.hidden and len(each.curve.samples)), None)
+        if time_s is None or first is None:
+            return False
+        beside = first.curve.samples.beside(time_s, steps)
+        if beside is not None:
+            self._put_cursor(self._last_cursor, beside)
+        return True
+
+    # -- the keyboard and drops ---------------------------------------------------------------------------
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not self._key(event):
+            super().keyPressEvent(event)
+
+    def _key(self, event: QKeyEvent) -> bool:
+        if event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier):
+            return False
+        far = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
+        does: dict[int, Callable[[], object]] = {
+            Qt.Key.Key_C: self.focus_filter,
+            Qt.Key.Key_M: self.cursors.toggle,
+            Qt.Key.Key_A: lambda: self._put_here("A"),
+            Qt.Key.Key_B: lambda: self._put_here("B"),
+            Qt.Key.Key_Space: self.freeze.toggle,
+            Qt.Key.Key_Left: lambda: self._arrow(-far),
+            Qt.Key.Key_Right: lambda: self._arrow(far),
+            Qt.Key.Key_Plus: lambda: self._zoom(1 / 1.5, self._middle_s()),
+            Qt.Key.Key_Minus: lambda: self._zoom(1.5, self._middle_s()),
+            Qt.Key.Key_0: self._show_all,
+        }
+        wanted = does.get(event.key())
+        if wanted is None or (event.key() != Qt.Key.Key_C and not self.shown):
+            return False
+        wanted()
+        return True
+
+    def _middle_s(self) -> float:
+        return (self.canvas.begin_s + self.canvas.end_s) / 2
+
+    def _arrow(self, steps: int) -> None:
+        """Move a cursor; where there is none, the time."""
+        if not self._step_cursor(steps):
+            self._move(steps * (self.canvas.end_s - self.canvas.begin_s) / 20)
+
+    def _show_all(self) -> None:
+        self.canvas.release_values()
+        self._choose_span("all")
+
+    def _put_here(self, name: str) -> None:
+        """Place a cursor under the mouse, or in the middle when the mouse is elsewhere."""
+        here = self.canvas.mouse_s
+        self._put_cursor(name, self._middle_s() if here is None else here)
+
+    def focus_filter(self) -> bool:
+        self.add.ask(self.add.text())
+        return True
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if dropped_field(event.mimeData()) is not None:
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        found = dropped_field(event.mimeData())
+        if found is not None:
+            event.acceptProposedAction()
+            self.plot_field(*found)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        self._show_menu(event.globalPos())
+
+    def _show_menu(self, at: QPoint) -> None:
+        menu = Menu(self.theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.addActions(self.more_actions())
+        menu.popup(at)
+
+    # -- export -------------------------------------------------------------------------------------------
+
+    def more_actions(self) -> list[QAction]:
+        made = []
+        rows: tuple[tuple[str, str, Callable[[], object]], ...] = (
+            (_("Add a curve"), "plus", self.focus_filter),
+            (_("Show everything"), "maximize", self._show_all),
+            (_("Export numbers (CSV)"), "download", lambda: self.exporter.ask_where(CSV)),
+            (_("Export a picture (PNG)"), "image", lambda: self.exporter.ask_where(PNG)),
+            (_("Export a drawing (SVG)"), "spline", lambda: self.exporter.ask_where(SVG)),
+        )
+        for words, icon, does in rows:
+            action = QAction(self.theme.icon(icon), words, self)
+            action.triggered.connect(lambda _on=False, does=does: does())
+            action.setEnabled(bool(self.shown) or does == self.focus_filter)
+            made.append(action)
+        for old in self._listed:
+            old.deleteLater()
+        self._listed = made
+        return made
+
+    _listed: Sequence[QAction] = ()
+
+    def _picture_parts(self) -> list[tuple[QSize, Callable[[QPainter, QRectF], object]]]:
+        """What a picture of the plot has, from above."""
+        self._draw()
+        canvas, xy, lanes = self.canvas, self.xy, self.lanes
+
+        def curves(painter: QPainter, box: QRectF) -> None:
+            shown = xy if self.is_across else canvas
+            shown.render(painter, box, shown.viewport().rect())
+            if shown is xy:
+                xy.paint_marks(painter)
+            else:
+                canvas.paint_cursors(painter)
+
+        parts: list[tuple[QSize, Callable[[QPainter, QRectF], object]]] = [(self.drawings.size(), curves)]
+        if not lanes.isHidden():
+            parts.append((lanes.size(), lambda painter, _box: lanes.paint_lanes(painter)))
+        return parts
+
+    # -- kept between starts ------------------------------------------------------------------------------
+
+    def save_state(self) -> dict[str, object]:
+        return {
+            "curves": [
+                {**each.saved(), "topics": sorted(topics_of(each.curve.source))} for each in self.shown
+            ],
+            "span": 0.0 if self.view.is_all else self.view.span_s,
+            "states": self.states.isChecked(),
+            "across": self.across.isChecked(),
+        }
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        kept = state.get("curves")
+        for each in kept[:MOST_CURVES] if isinstance(kept, list) else ():
+            if isinstance(each, Mapping):
+                self._restore_curve(each)
+        span = state.get("span")
+        if isinstance(span, (int, float)) and 0 <= span <= 1e8:
+            self.view.choose(float(span))
+            self._say_span()
+        self.states.setChecked(state.get("states") is not False)
+        self.across.setChecked(state.get("across") is True)
+        self._changed()
+
+    def _restore_curve(self, saved: Mapping[str, object]) -> None:
+        topic, path, text, topics = (saved.get(name) for name in ("topic", "path", "text", "topics"))
+        known = [each for each in topics if isinstance(each, str)] if isinstance(topics, list) else []
+        try:
+            if isinstance(topic, str) and isinstance(path, str):
+                made = self.curves.add_field(topic, FieldPath.parse(path))
+            else:
+                made = self.curves.add(text if isinstance(text, str) else "", known)
+        except CurveError:
+            return
+        for curve in made:
+            shown = ShownCurve(curve, look_of(saved, next_look(self.shown)))
+            shown.right, shown.hidden = saved.get("right") is True, saved.get("hidden") is True
+            self.shown.append(shown)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit_table()
+
+    def theme_changed(self) -> None:
+        self.table.set_row_height(self.row_height(), large=self.density == "comfortable")
+        self._fit_table()
+        self._soon()
+
+    def shut(self) -> None:
+        self.add.shut()
+        self.curves.close()
+        self.exporter.close()
+
+
+def _sentence(error: CurveError) -> str:
+    words = str(error)
+    return f"{words[:1].upper()}{words[1:]}" if words.endswith("?") else f"{words[:1].upper()}{words[1:]}."

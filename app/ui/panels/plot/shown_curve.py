@@ -1,0 +1,88 @@
+"""A curve as a plot shows it: its axis, its look, whether it is hidden; and how its values are written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+
+from app.core.series.curves import Curve
+from app.core.series.field_path import MISSING
+from app.core.series.formula import FieldSource
+from app.ui.panels.plot.look import CurveLook
+from app.ui.text.numbers import grouped
+from nep.i18n import number
+
+MINUS = "\u2212"
+
+
+@dataclass(slots=True, eq=False)
+class ShownCurve:
+    """One curve: ``right`` axis or left, and whether a person hid it."""
+
+    curve: Curve
+    look: CurveLook
+    right: bool = False
+    hidden: bool = False
+
+    @property
+    def name(self) -> str:
+        """As it is typed; also its key."""
+        return self.curve.text
+
+    def saved(self) -> dict[str, object]:
+        """What a layout keeps of it."""
+        source = self.curve.source
+        kept: dict[str, object] = {
+            "text": self.name,
+            "right": self.right,
+            "hidden": self.hidden,
+            "colour": self.look.colour,
+            "pattern": self.look.pattern,
+        }
+        if isinstance(source, FieldSource):
+            kept |= {"topic": source.topic, "path": str(source.path)}
+        return kept
+
+
+def look_of(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
+    """The look that a layout kept; what does not fit is as it would be for a new curve."""
+    colour, pattern = saved.get("colour"), saved.get("pattern")
+    return CurveLook(
+        colour % 6 if isinstance(colour, int) else otherwise.colour,
+        pattern % 4 if isinstance(pattern, int) else otherwise.pattern,
+    )
+
+
+def value_words(value: object) -> str:
+    """A value for the table: four digits, a true minus; a state's word; blank for nothing."""
+    if value is MISSING or value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        if abs(value) < 10**15:
+            return grouped(value).replace("-", MINUS)
+        return str(value).replace("-", MINUS) if abs(value) < 10**21 else number_words(_float(value))
+    if isinstance(value, float):
+        return number_words(value)
+    return value[:60] if isinstance(value, str) else ""
+
+
+def number_words(value: float) -> str:
+    """0.0042, 1.284, 128.4, 12840, 2.1e+09; 0 is exactly that."""
+    if not isfinite(value):
+        return {"inf": "∞", "-inf": f"{MINUS}∞"}.get(str(value), "NaN")
+    size = abs(value)
+    if size and not 1e-4 <= size < 1e7:
+        return number(value, ".1e").replace("-", MINUS)
+    digits = 0 if not size else 4 if size < 0.1 else 3 if size < 100 else 1 if size < 10_000 else 0
+    words = number(round(value, digits) + 0.0, f".{digits}f")
+    return words.replace("-", MINUS)
+
+
+def _float(value: int) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return float("inf") if value > 0 else float("-inf")

@@ -1,0 +1,368 @@
+"""The row above the curves, first of all the field that adds one: Tab completes, Enter takes what fits.
+
+While it is open it looks at the topics that may be meant (no pictures, no streams of megabytes), so that
+their fields can be offered with the values that they have now.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QEvent, QPoint, QRectF, Qt, QTimer, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.core.messages.reader import LARGE_BYTES, read
+from app.core.series.field_path import FieldFound, completed, fields_of
+from app.core.series.formula import FUNCTIONS, WINDOWED, FieldSource
+from app.ui.panels.plot.shown_curve import value_words
+from app.ui.panels.plot.time_view import SPANS
+from app.ui.theme.theme import Theme
+from app.ui.widgets import MenuButton, Segments, ToggleButton, label, paint
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.fields import SearchField
+from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
+from app.ui.widgets.lists.fuzzy import Entry, Finder, Match, match
+from nep.i18n import _, lazy, ngettext
+
+if TYPE_CHECKING:
+    from app.core.network.topics import Topic
+    from app.core.network.watches import Watch
+    from app.core.session import Session
+
+WIDE, HIGH = 470, 300
+MOST_TOPICS, MOST_BYTES_PER_S = 40, 2e6
+MOST_SHOWN, MOST_OFFERED = 60, 4000
+RENEW_MS = 250
+ICONS = {"number": "hash", "state": "toggle-left", "list": "brackets"}
+EXAMPLES = ("difference({})", "derivative({})", "integral({})", "mean({}, 2 s)")
+
+
+class FieldOffers:
+    """The fields of the topics that are looked at while somebody adds a curve."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._watches: dict[str, Watch] = {}
+
+    def open(self) -> None:
+        """Look at the topics that can be plotted."""
+        for topic in self._some():
+            if topic.key not in self._watches:
+                self._watches[topic.key] = self._session.watch(topic.key)
+
+    def close(self) -> None:
+        """Look no more."""
+        for watch in self._watches.values():
+            watch.close()
+        self._watches.clear()
+
+    def _some(self) -> list[Topic]:
+        topics = [*self._session.topics.live(), *self._session.networks.topics]
+        fitting = [
+            topic
+            for topic in topics
+            if topic.codec not in {"image", "bytes"} and (topic.bandwidth_Bps or 0.0) <= MOST_BYTES_PER_S
+        ]
+        return fitting[:MOST_TOPICS]
+
+    def names(self) -> list[str]:
+        """The topics that there are, by their names among all networks."""
+        return [topic.key for topic in (*self._session.topics.live(), *self._session.networks.topics)]
+
+    def fields(self) -> Iterable[tuple[str, FieldFound]]:
+        """Everything that can be plotted now: (as it is typed, what it is)."""
+        told = 0
+        for key in self._watches:
+            topic = self._session.topic(key)
+            newest = topic.newest if topic is not None else None
+            if newest is None or newest.size_bytes > LARGE_BYTES:
+                continue
+            reading = read(newest)
+            for found in fields_of(reading.value, 400) if reading.error is None else ():
+                yield str(FieldSource(key, found.path)), found
+                told += 1
+                if told >= MOST_OFFERED:
+                    return
+
+
+class _Matches(QWidget):
+    """What fits, below the field, over everything else of the window."""
+
+    def __init__(self, theme: Theme, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self.list = EntryList(theme, _("Fields that fit"))
+        self.foot = label("", "small", role="textTertiary")
+        self.foot.setContentsMargins(14, 2, 10, 5)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 5, 1, 1)
+        column.setSpacing(2)
+        column.addWidget(self.list, 1)
+        column.addWidget(self.foot)
+        self.hide()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect = QRectF(self.rect())
+        paint.box(painter, rect, theme.radius("panel"), theme.colour("raised"), theme.colour("borderStrong"))
+        painter.end()
+
+
+class AddCurve(SearchField):
+    """The field; `wanted` with what was typed or chosen, and whether it is for the right axis."""
+
+    icon_name = "plus"
+    wanted = Signal(str, bool)
+    left = Signal()
+
+    def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
+        """``plotted`` tells the curves that there are already: they may be calculated with."""
+        super().__init__(theme, _("Add a curve"), "C")
+        self.setMinimumWidth(round(theme.scaled(150)))
+        self._plotted = plotted
+        self.offers = FieldOffers(session)
+        self.sentence = ""
+        self._matches: _Matches | None = None
+        self._known: dict[str, FieldFound] = {}
+        self._timer = QTimer(self)
+        self._timer.setInterval(RENEW_MS)
+        self._timer.timeout.connect(self._renew)
+        self.textEdited.connect(self._search)
+
+    # -- opening and closing ---------------------------------------------------------------------------------
+
+    @property
+    def matches(self) -> _Matches:
+        """The list below."""
+        window = self.window()
+        if self._matches is None or self._matches.parentWidget() is not window:
+            self._drop_matches()
+            self._matches = _Matches(self._theme, window)
+            self._matches.list.pressed_row.connect(lambda: self._take(right=False))
+        return self._matches
+
+    def _drop_matches(self) -> None:
+        if self._matches is not None:
+            self._matches.deleteLater()
+            self._matches = None
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.offers.open()
+        self._timer.start()
+        self._search()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if event.reason() != Qt.FocusReason.PopupFocusReason:
+            self.shut()
+
+    def hideEvent(self, event: QEvent) -> None:
+        super().hideEvent(event)  # type: ignore[arg-type]
+        self.shut()
+
+    def shut(self) -> None:
+        """Look at no topics any more, and hide the list."""
+        self._timer.stop()
+        self.offers.close()
+        self._known.clear()
+        if self._matches is not None:
+            self._matches.hide()
+
+    def ask(self, text: str) -> None:
+        """Get the keyboard, with this typed already."""
+        self.setText(text)
+        self.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self._search()
+
+    def complain(self, sentence: str) -> None:
+        """Say why what was typed is no curve; it stays as it was typed."""
+        self.sentence = sentence
+        self.setProperty("wrong", "true" if sentence else "false")
+        self.style().unpolish(self)
+        self.style().polish(self)
+        self._show_foot(0)
+
+    # -- what fits -------------------------------------------------------------------------------------------
+
+    def _renew(self) -> None:
+        """Fields and values as they are now."""
+        self.offers.open()
+        before = len(self._known)
+        self._read()
+        if len(self._known) != before:
+            self._search(keep=True)
+            return
+        shown = self.matches.list
+        for line in list(shown.lines.lines):
+            found = None if isinstance(line, Heading) else self._known.get(line.entry.words)
+            if found is not None and not isinstance(line, Heading):
+                shown.tell(line.entry.id, _note(found))
+
+    def _read(self) -> None:
+        self._known = dict(self.offers.fields())
+
+    def _search(self, *_text: object, keep: bool = False) -> None:
+        if not self.hasFocus():
+            return
+        if not keep:
+            if self.sentence:
+                self.complain("")
+            self._read()
+        typed = self.text().strip()
+        lines, count = self._lines(typed)
+        matches = self.matches
+        chosen = matches.list.entry if keep else None
+        matches.list.show_lines(lines, chosen.id if chosen is not None else "")
+        self._show_foot(count)
+        self._place(bool(lines))
+
+    def _lines(self, typed: str) -> tuple[list[Line], int]:
+        fields = [
+            Entry(f"topic:{text}", text, ICONS[found.kind], _note(found))
+            for text, found in self._known.items()
+        ]
+        if typed:
+            found, count = Finder(fields).find(typed, MOST_SHOWN)
+        else:
+            found, count = [Match(entry) for entry in fields[:MOST_SHOWN]], len(fields)
+        lines: list[Line] = [Heading(_("Fields")), *found] if found else []
+        names = [example.split("(")[0] for example in EXAMPLES]
+        of = next(iter(self._plotted()), None) or (found[0].entry.words if found else "/odom.speed")
+        calculated = [
+            Entry(f"topic:{example.format(of)}", example.format(of), "square-function")
+            for name, example in zip(names, EXAMPLES, strict=True)
+            if not typed or name.startswith(typed.partition("(")[0])
+        ]
+        if calculated:
+            lines += [Heading(_("Calculated")), *(Match(entry) for entry in calculated)]
+        return lines, count
+
+    def _show_foot(self, count: int) -> None:
+        if self._matches is None:
+            return
+        words = _("Tab completes, Enter: left axis, Shift+Enter: right axis")
+        fit = ngettext("{count} field", "{count} fields", count).format(count=count)
+        self._matches.foot.setText(self.sentence or f"{words} · {fit}")
+        self._matches.foot.setProperty("role", "error" if self.sentence else "textTertiary")
+        self._matches.foot.style().unpolish(self._matches.foot)
+        self._matches.foot.style().polish(self._matches.foot)
+
+    def _place(self, shown: bool) -> None:
+        matches = self.matches
+        if not shown and not self.sentence:
+            matches.hide()
+            return
+        window = self.window()
+        at = self.mapTo(window, QPoint(0, self.height() + 4))
+        foot = matches.foot.sizeHint()
+        wide = min(max(round(self._theme.scaled(WIDE)), foot.width() + 4), window.width() - 8)
+        high = min(matches.list.height_of_all() + foot.height() + 12, round(self._theme.scaled(HIGH)))
+        high = min(high, window.height() - at.y() - 4)
+        matches.setGeometry(min(at.x(), window.width() - wide - 4), at.y(), wide, max(60, high))
+        matches.show()
+        matches.raise_()
+
+    # -- keys ------------------------------------------------------------------------------------------------
+
+    def event(self, event: QEvent) -> bool:
+        """Tab completes while there is something to complete; else it goes on as ever."""
+        if (
+            isinstance(event, QKeyEvent)
+            and event.type() == QEvent.Type.KeyPress
+            and event.key() == Qt.Key.Key_Tab
+        ):
+            longer = self._completed()
+            if longer != self.text():
+                self.setText(longer)
+                self._search()
+                return True
+        return super().event(event)
+
+    def _completed(self) -> str:
+        typed = self.text()
+        if not typed:
+            return typed
+        head = max(typed.rfind(sign) for sign in "( ,+*") + 1
+        before, last = typed[:head], typed[head:]
+        known = [*self._known, *self.offers.names(), *(f"{name}(" for name in (*FUNCTIONS, *WINDOWED))]
+        longer = completed(last, known) if last else last
+        if longer == last and self._matches is not None and not head:
+            entry = self._matches.list.entry
+            if entry is not None and last and entry.words != last and match(last, entry.words) is not None:
+                return entry.words
+        return before + longer
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        key = event.key()
+        if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self._take(right=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
+        elif key == Qt.Key.Key_Escape:
+            self.clear()
+            self.shut()
+            self.left.emit()
+        elif (
+            key not in {Qt.Key.Key_Home, Qt.Key.Key_End}
+            and self._matches is not None
+            and self._matches.list.handle(key)
+        ):
+            return
+        else:
+            super().keyPressEvent(event)
+
+    def _take(self, *, right: bool) -> None:
+        """What was typed, when it is a whole curve; else what is chosen in the list."""
+        typed = self.text().strip()
+        entry = self._matches.list.entry if self._matches is not None and self._matches.isVisible() else None
+        is_whole = typed in self._known or any(sign in typed for sign in "(+*") or " " in typed
+        text = typed if is_whole or entry is None else entry.words
+        if text:
+            self.wanted.emit(text, right)
+
+
+def _note(found: FieldFound) -> str:
+    if found.kind == "list":
+        return ngettext("{count} curve", "{count} curves", found.count).format(count=found.count)
+    return value_words(found.value)
+
+
+SPAN_WORDS = {"12": lazy("12 s"), "60": lazy("1 min"), "300": lazy("5 min"), "all": lazy("All")}
+
+
+class PlotTools(QWidget):
+    """The row; in narrow places it becomes several."""
+
+    def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
+        """``plotted`` tells the curves that there are."""
+        super().__init__()
+        self.add = AddCurve(theme, session, plotted)
+        self.span = Segments(
+            theme,
+            [(value, _(SPAN_WORDS[value]), None) for value, _s in SPANS],
+            "60",
+            size="small",
+            name=_("How much time is shown"),
+        )
+        self.cursors = ToggleButton(theme, _("A and B"), "ruler")
+        self.states = ToggleButton(theme, _("States"), "rows-3")
+        self.states.setChecked(True)
+        self.across = ToggleButton(theme, _("X and Y"), "chart-spline")
+        self.across.setToolTip(_("Draw the second curve over the first"))
+        self.across.setProperty("tip", True)
+        self.export = MenuButton(theme, _("Export"), "download", size="small")
+        row = Flow(self, gap=8, row_gap=6)
+        row.setContentsMargins(10, 6, 10, 6)
+        row.add_elastic(self.add, greedy=True)
+        row.push()
+        self._when_there = (self.span, self.cursors, self.states, self.across, self.export)
+        for widget in self._when_there:
+            row.addWidget(widget)
+
+    def fit(self, curves: int, numbers: int) -> None:
+        """Show what makes sense for so many curves, of which so many are of numbers."""
+        for widget in self._when_there:
+            paint.show_when(widget, curves > 0)
+        paint.show_when(self.states, curves > numbers)
+        paint.show_when(self.across, numbers > 1)

@@ -1,0 +1,193 @@
+"""One curve over another: equal scales, what is older is fainter, an arrow is now."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QPolygonF
+from PySide6.QtWidgets import QGraphicsView
+
+from app.core.series.calculated import held_values
+from app.core.series.samples import Floats
+from app.ui.panels.plot.canvas import FLAG, ValueAxis
+from app.ui.panels.plot.shown_curve import ShownCurve
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from nep.i18n import _
+
+SHADES = 8
+FAINTEST = 0.25
+MOST_POINTS = 4000
+ARROW = 7.0
+Path = tuple[ShownCurve, ShownCurve, Floats, Floats, Floats]
+
+
+def path_of(
+    across: ShownCurve, up: ShownCurve, begin_s: float, end_s: float
+) -> tuple[Floats, Floats, Floats]:
+    """Times, x and y of one curve over another in a range: at the times of the first, 4 000 at most."""
+    samples = across.curve.samples
+    first, end = samples.places(begin_s, end_s)
+    step = max(1, math.ceil((end - first) / MOST_POINTS))
+    part = slice(first, end, step)
+    times, xs = samples.times[part].copy(), samples.values[part].copy()
+    gaps = samples.gaps[part]
+    ys = held_values(up.curve.samples, times)
+    if step == 1:
+        xs[gaps] = np.nan
+    return times, xs, ys
+
+
+class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph tells no types
+    """Draws pairs of curves: the first across and the second up, the third and the fourth, ..."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(background=None)
+        self.theme = theme
+        self.setAccessibleName(_("One curve over another"))
+        self.setFrameShape(QGraphicsView.Shape.NoFrame)
+        self.setViewportUpdateMode(QGraphicsView.ViewportUpdateMode.FullViewportUpdate)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMinimumSize(120, 80)
+        self.view = pg.ViewBox(enableMenu=False, lockAspect=1.0)
+        axes = {"bottom": ValueAxis("bottom"), "left": ValueAxis("left")}
+        self.plot = pg.PlotItem(viewBox=self.view, axisItems=axes, enableMenu=False)
+        self.plot.hideButtons()
+        self.plot.layout.setContentsMargins(6, 10, 12, 0)
+        self.setCentralItem(self.plot)
+        self.view.setMouseEnabled(x=False, y=False)
+        self.view.disableAutoRange()
+        self._lines: list[pg.PlotCurveItem] = []
+        self._paths: list[Path] = []
+        self.cursors: dict[str, float] = {}
+        self.restyle()
+        theme.changed.connect(self.restyle)
+
+    def restyle(self) -> None:
+        """Take over the theme's colours, fonts and sizes."""
+        theme = self.theme
+        for name in ("bottom", "left"):
+            axis = self.plot.getAxis(name)
+            axis.enableAutoSIPrefix(False)
+            axis.setStyle(tickLength=0, autoExpandTextSpace=False, autoReduceTextSpace=False)
+            axis.setTickFont(theme.font("caption"))
+            axis.setPen(pg.mkPen(theme.colour("border")))
+            axis.setTickPen(pg.mkPen(theme.colour("controlBorder" if theme.high_contrast else "grid")))
+            axis.setTextPen(theme.colour("textSecondary"))
+        self.setBackground(theme.colour("panel"))
+        self.plot.getAxis("bottom").setHeight(round(theme.scaled(24)))
+        self.plot.getAxis("left").setWidth(round(theme.scaled(54)))
+        self.plot.showGrid(x=True, y=True, alpha=1.0)
+        self.viewport().update()
+
+    def show_pairs(
+        self, pairs: Sequence[tuple[ShownCurve, ShownCurve]], begin_s: float, end_s: float
+    ) -> None:
+        """Draw these over a range of time."""
+        self._paths = [(across, up, *path_of(across, up, begin_s, end_s)) for across, up in pairs]
+        used = 0
+        for _across, up, times, xs, ys in self._paths:
+            for shade in range(SHADES):
+                first = shade * len(times) // SHADES
+                last = (shade + 1) * len(times) // SHADES + 1
+                ink = up.look.ink(self.theme)
+                ink.setAlphaF(FAINTEST + (1 - FAINTEST) * (shade + 1) / SHADES)
+                self._line(used).setData(xs[first:last], ys[first:last], pen=pg.mkPen(ink, width=1.75))
+                used += 1
+        for line in self._lines[used:]:
+            line.setData([], [])
+        self._fit()
+        self.viewport().update()
+
+    def _line(self, number: int) -> pg.PlotCurveItem:
+        if number == len(self._lines):
+            self._lines.append(pg.PlotCurveItem(connect="finite", antialias=True))
+            self.view.addItem(self._lines[-1], ignoreBounds=True)
+        return self._lines[number]
+
+    def _fit(self) -> None:
+        found = [(xs[good], ys[good]) for _a, _u, _t, xs, ys in self._paths if (good := _whole(xs, ys)).any()]
+        if not found:
+            return
+        edges = [
+            (min(float(each[axis].min()) for each in found), max(float(each[axis].max()) for each in found))
+            for axis in (0, 1)
+        ]
+        (left, right), (low, high) = ((a, b) if b > a else (a - 1, b + 1) for a, b in edges)
+        self.view.setRange(QRectF(left, low, right - left, high - low), padding=0.08)
+
+    def place_of(self, x: float, y: float) -> QPointF:
+        """Where a point is, in this widget."""
+        return QPointF(self.view.mapViewToScene(QPointF(x, y)))
+
+    def distance(self) -> float | None:
+        """How far A and B are apart on the first path; None when that is not known."""
+        if len(self.cursors) < 2 or not self._paths:
+            return None
+        points = [self._point_at(self._paths[0], time_s) for time_s in self.cursors.values()]
+        if points[0] is None or points[1] is None:
+            return None
+        return math.dist(points[0], points[1])
+
+    @staticmethod
+    def _point_at(path: Path, time_s: float) -> tuple[float, float] | None:
+        across, up = path[0].curve.samples.at(time_s), path[1].curve.samples.at(time_s)
+        return (across[1], up[1]) if across is not None and up is not None else None
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        painter = QPainter(self.viewport())
+        self.paint_marks(painter)
+        painter.end()
+
+    def paint_marks(self, painter: QPainter) -> None:
+        """Paint the arrows and the cursors over the curves."""
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for path in self._paths:
+            self._paint_arrow(painter, path)
+        for name, time_s in self.cursors.items():
+            point = self._point_at(self._paths[0], time_s) if self._paths else None
+            if point is not None:
+                centre = self.place_of(*point)
+                side = self.theme.scaled(FLAG.height())
+                flag = QRectF(centre.x() - side / 2, centre.y() - side / 2, side, side)
+                paint.box(painter, flag, side / 2, self.theme.colour("tooltip"))
+                font = self.theme.font("small")
+                paint.words(painter, flag, name, font, self.theme.colour("tooltipText"), paint.CENTRE)
+
+    def _paint_arrow(self, painter: QPainter, path: Path) -> None:
+        _across, up, _times, xs, ys = path
+        (good,) = np.nonzero(_whole(xs, ys))
+        if len(good) < 2:
+            return
+        tip = self.place_of(float(xs[good[-1]]), float(ys[good[-1]]))
+        before = next(
+            (
+                place
+                for index in reversed(good[-60:-1].tolist())
+                if _far(place := self.place_of(float(xs[index]), float(ys[index])), tip) > 3
+            ),
+            None,
+        )
+        if before is None:
+            return
+        angle = math.atan2(tip.y() - before.y(), tip.x() - before.x())
+        corners = [
+            tip + QPointF(length * math.cos(angle + turn), length * math.sin(angle + turn))
+            for length, turn in ((ARROW, 0.0), (ARROW, 2.5), (ARROW * 0.35, math.pi), (ARROW, -2.5))
+        ]
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(up.look.ink(self.theme))
+        painter.drawPolygon(QPolygonF(corners))
+
+
+def _whole(xs: Floats, ys: Floats) -> np.ndarray:
+    return np.isfinite(xs) & np.isfinite(ys)
+
+
+def _far(one: QPointF, other: QPointF) -> float:
+    return math.hypot(one.x() - other.x(), one.y() - other.y())

@@ -1,0 +1,82 @@
+"""A plot by mouse and keyboard in the real window: a value dragged from the Inspector, and typed."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+import nep
+from tests.e2e.person import middle
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = [pytest.mark.long, pytest.mark.timeout(240)]
+
+
+@contextmanager
+def odometry(address: str) -> Iterator[None]:
+    """Publishes /odom 50 times a second."""
+    ended = threading.Event()
+    with nep.node("wheels", master=address) as node:
+        publisher = node.new_pub("/odom", "json")
+
+        def run() -> None:
+            count = 0
+            while not ended.wait(0.02):
+                count += 1
+                publisher.publish(
+                    {"speed": math.sin(count / 20), "mode": "up" if count % 200 < 100 else "down"}
+                )
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            thread.join()
+
+
+def curves(studio: Studio) -> list[str]:
+    return [row["texts"][2] for row in studio.rows("Curves and their figures")]
+
+
+def coloured(studio: Studio) -> int:
+    """Pixels of the canvas in a strong colour: what a curve has and axes have not."""
+    picture = studio.picture(studio.find("Curves")).astype(int)[..., :3]
+    return int((np.ptp(picture, axis=2) > 60).sum())
+
+
+def test_a_value_is_dragged_from_the_inspector_and_another_typed(studio: Studio, address: str) -> None:
+    studio.find("Use the virtual robot", enabled=True)
+    studio.screen.key("2", held=["Alt"])
+    studio.says(f"Master {address}", 40)
+    with odometry(address):
+        studio.screen.click(*middle(studio.row("Topics", "/odom")["rect"]))
+        until(lambda: "speed" in studio.values("Newest message"), "the inspector shows the message")
+        studio.click("Panels")
+        studio.pick("Plot")
+        studio.says("No curves yet")
+        studio.screen.move(*middle(studio.row("Newest message", "speed")["rect"]))
+        studio.screen.press()
+        x, y = middle(studio.find("Add a curve", kind="AddCurve")["rect"])
+        studio.screen.glide(x + 20, y + 200)
+        studio.screen.release()
+        until(lambda: curves(studio) == ["/odom.speed"], "the value is plotted")
+        until(lambda: coloured(studio) > 100, "its curve is drawn")
+
+        studio.click("Add a curve", kind="AddCurve")
+        studio.screen.type("mean(/odom.speed, 1 s)")
+        studio.screen.key("Return")
+        until(lambda: len(curves(studio)) == 2, "what was typed is plotted")
+        studio.screen.key(" ")
+        studio.says("paused, the data goes on")
+        studio.screen.key("m")
+        studio.says("Min, max and mean are between A and B")
+        studio.click("Go on")
+    assert studio.quit() == 0

@@ -1,0 +1,222 @@
+"""Several panels of a kind side by side, each with its own topic, now and at the next start."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from app.core.session import Session
+from app.ui.panels.base import PanelContext
+from app.ui.shell.docking.dock import Dock, key_of, kind_of
+from app.ui.shell.docking.layouts import layout_named
+from app.ui.shell.docking.workbench import MOST_OF_A_KIND, Workbench
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
+from tests.ui.shell_parts import PANELS, Answers, PlainPanel
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+MORE = "One more beside it"
+
+
+class TopicPanel(PlainPanel):
+    """Shows a topic in its title, as an inspector does, and keeps it."""
+
+    def show_topic(self, name: str) -> None:
+        self.set_title(self._title, name)
+
+    def save_state(self) -> dict[str, object]:
+        return {"topic": self.subtitle()}
+
+    def restore_state(self, state) -> None:
+        self.show_topic(str(state.get("topic", "")))
+
+
+def of_topics(name: str):
+    def make(context: PanelContext) -> TopicPanel:
+        return TopicPanel(context, PANELS[name].title)
+
+    return replace(PANELS[name], make=make, several=True)
+
+
+SEVERAL = {**PANELS, "inspector": of_topics("inspector"), "image": of_topics("image")}
+
+
+@pytest.fixture
+def window(qtbot, theme: Theme, session: Session, answers: Answers) -> Iterator[MainWindow]:
+    made = MainWindow(session, theme, SEVERAL, [], asks=answers)
+    qtbot.addWidget(made)
+    theme.set_motion("on")
+    theme.apply()
+    made.resize(1440, 900)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def bench(qtbot, window: MainWindow) -> Workbench:
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    made = window.show_layout("developer")
+    qtbot.waitUntil(made.docks["inspector"].shown)
+    return made
+
+
+def choose(dock: Dock, words: str) -> None:
+    next(action for action in dock.menu().actions() if action.text() == words).trigger()
+
+
+def topic_of(bench: Workbench, key: str) -> str:
+    return bench.docks[key].panel.subtitle()
+
+
+def apart(one: Dock, other: Dock) -> bool:
+    return not one.geometry().intersects(other.geometry()) and other not in one.parent().tabifiedDockWidgets(
+        one
+    )
+
+
+@pytest.mark.parametrize(
+    ("key", "kind"),
+    [
+        ("plot", ("plot", 1)), ("plot#2", ("plot", 2)), ("plot#12", ("plot", 12)), ("plot#1", ("plot#1", 1)),
+        ("plot#0", ("plot#0", 1)), ("plot#02", ("plot#02", 1)), ("plot#-2", ("plot#-2", 1)),
+        ("#2", ("#2", 1)), ("", ("", 1)), ("plot#", ("plot#", 1)), ("a#b#3", ("a#b", 3)),
+        ("plot#²", ("plot#²", 1)), (f"plot#{2**64}", (f"plot#{2**64}", 1)),
+    ],
+)  # fmt: skip
+def test_a_key_says_the_kind_and_which_one(key, kind) -> None:
+    assert kind_of(key) == kind
+    assert key_of(*kind) == key
+
+
+def test_one_more_is_beside_the_first_with_a_number_and_its_own_topic(qtbot, bench, window) -> None:
+    first = bench.docks["inspector"]
+    first.panel.show_topic("/odom")
+    choose(first, MORE)
+    second = bench.docks["inspector#2"]
+    qtbot.waitUntil(lambda: first.shown() and second.shown() and apart(first, second))
+    assert (first.panel.title(), second.panel.title()) == ("Inspector", "Inspector 2")
+    assert second.accessibleName() == second.panel.accessibleName() == "Inspector 2"
+    assert second.isAncestorOf(QApplication.focusWidget())
+    second.panel.show_topic("/cmd")
+    assert (first.panel.subtitle(), second.panel.subtitle()) == ("/odom", "/cmd")
+    # the first is higher than wide: one is above the other, and they have about the same height
+    qtbot.waitUntil(lambda: abs(first.height() - second.height()) < 0.2 * first.height())
+    assert first.x() == second.x()
+
+
+def test_one_more_beside_a_place_with_tabs_leaves_the_tabs(qtbot, bench, window) -> None:
+    first = bench.docks["image"]
+    bench.tabifyDockWidget(first, bench.docks["console"])
+    first.raise_()
+    qtbot.waitUntil(lambda: bench.docks["console"] in bench.tabifiedDockWidgets(first))
+    choose(first, MORE)
+    second = bench.docks["image#2"]
+    qtbot.waitUntil(lambda: first.shown() and second.shown() and apart(first, second))
+    qtbot.waitUntil(lambda: first.title.tabs == ("Image", "Console"))
+    assert second.title.tabs == ()
+
+
+def test_a_panel_that_makes_sense_once_offers_no_more(bench) -> None:
+    assert MORE not in [action.text() for action in bench.docks["topics"].menu().actions()]
+    assert bench.open("topics#2") is None
+    assert bench.open("inspector#9") is None
+    assert bench.open(f"inspector#{2**64}") is None
+
+
+def test_there_is_a_bound(bench, window) -> None:
+    opened = [bench.open_another("image") for _ in range(MOST_OF_A_KIND)]
+    assert len([dock for dock in opened if dock is not None]) == MOST_OF_A_KIND - 1
+    assert window.toast.text == f"There are {MOST_OF_A_KIND} already, and no more fit"
+
+
+def test_they_come_back_with_their_topics_at_the_next_start(qtbot, bench, window) -> None:
+    for key, topic in (("inspector", "/odom"), ("inspector#2", "/cmd"), ("image#2", "/camera")):
+        dock = bench.docks.get(key) or bench.open_another(kind_of(key)[0])
+        assert dock is not None
+        assert dock.key == key
+        dock.panel.show_topic(topic)
+    qtbot.waitUntil(lambda: all(bench.docks[key].shown() for key in ("inspector", "inspector#2", "image#2")))
+    places = {key: dock.geometry() for key, dock in bench.docks.items() if dock.shown()}
+    kept = json.loads(json.dumps(bench.save()))
+    bench.arrange()
+    assert "inspector#2" not in bench.docks
+    again = Workbench(window.theme, layout_named("developer"), SEVERAL, window.context)
+    qtbot.addWidget(again)
+    again.resize(bench.size())
+    assert again.restore(kept)
+    again.show()
+    assert [topic_of(again, key) for key in ("inspector", "inspector#2", "image#2")] == [
+        "/odom", "/cmd", "/camera",
+    ]  # fmt: skip
+    qtbot.waitUntil(lambda: places == {key: again.docks[key].geometry() for key in places})
+    again.shut()
+
+
+def test_a_layout_of_an_earlier_version_comes_back_and_one_of_a_later_version_too(qtbot, bench) -> None:
+    kept = json.loads(json.dumps(bench.save()))
+    bench.open_another("inspector")
+    assert bench.restore(kept)
+    assert "inspector#2" not in bench.docks
+    later = {**kept, "open": [*kept["open"], "inspector#3", "hologram#2", "topics#2", "inspector#99", 7]}
+    assert bench.restore(later)
+    assert [key for key in bench.open_names() if "#" in key] == ["inspector#3"]
+
+
+def test_one_that_is_closed_ends_and_can_be_brought_back(qtbot, bench, window) -> None:
+    second = bench.open_another("inspector")
+    assert second is not None
+    panel = second.panel
+    assert isinstance(panel, TopicPanel)
+    panel.show_topic("/cmd")
+    choose(second, "Close")
+    assert panel.closed, "it looks at nothing any more"
+    assert "inspector#2" not in bench.docks
+    window.tick()
+    assert window.toast.text == "Closed Inspector 2"
+    window.toast.button.click()
+    assert topic_of(bench, "inspector#2") == "/cmd"
+    assert bench.docks["inspector#2"] is not second
+
+
+def test_the_first_is_kept_as_it_is_when_it_is_closed(bench) -> None:
+    first, second = bench.docks["inspector"], bench.open_another("inspector")
+    assert second is not None
+    first.close()
+    assert bench.docks["inspector"] is first
+    again = bench.open_another("inspector#2")
+    assert again is first, "the free number is the first"
+
+
+def test_a_topic_goes_to_the_one_that_was_used_last_or_to_one_more(qtbot, bench, window) -> None:
+    window.open_topic("/a")
+    assert topic_of(bench, "inspector") == "/a"
+    window.context.open_beside("/b")
+    assert topic_of(bench, "inspector#2") == "/b"
+    window.open_topic("/c")
+    assert (topic_of(bench, "inspector"), topic_of(bench, "inspector#2")) == ("/a", "/c")
+    bench.focus_panel(bench.docks["inspector"])
+    bench.focus_panel(bench.docks["topics"])
+    window.open_topic("/d")
+    assert (topic_of(bench, "inspector"), topic_of(bench, "inspector#2")) == ("/d", "/c")
+    bench.docks["inspector"].panel.show_topic("")
+    window.context.open_beside("/e")
+    assert topic_of(bench, "inspector") == "/e", "one that shows nothing yet is taken first"
+
+
+def test_the_menu_and_the_palette_know_them(bench, window) -> None:
+    bench.open_another("inspector")
+    menus = window.commands.menus
+    menus._refresh("View")
+    entries = {entry.text(): entry for entry in menus._panels.actions()}
+    assert entries["Inspector 2"].isChecked()
+    entries["Inspector 2"].trigger()
+    assert "inspector#2" not in bench.docks
+    found = {entry.words: entry for entry in window.commands.view._entries.all()}
+    window.commands.view.do(found["One more: Inspector"])
+    assert "inspector#2" in bench.docks
