@@ -1,0 +1,542 @@
+"""The graph measured and painted: the same on the screen and in a saved picture.
+
+Lengths are those of the layout; who paints scales the painter. What a figure changes is told as areas, so
+that nothing else is painted anew.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF
+
+from app.core.graph.layout import GraphLayout, LayoutSizes, Place
+from app.core.graph.node_graph import GraphGroup, GraphLine, GraphNode, NodeGraph
+from app.core.graph.walk import GraphChoice
+from app.ui.panels.graph.words import (
+    LineFigures,
+    group_name,
+    node_icon,
+    node_line,
+    node_name,
+    percent_words,
+    quiet_words,
+)
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+CORNER = 10.0
+ARROW_LONG, ARROW_WIDE = 9.0, 8.0
+CHOSEN_WIDTH = 2.25
+DIM = 0.3
+CELL = (160.0, 48.0)
+LABEL_ROOM = 9
+"""Letters that a label keeps for its figure."""
+LEAST_TEXT_PX, LEAST_SMALL_PX = 6.0, 7.0
+"""Smaller letters are not painted: nobody could read them."""
+REACH = 6.0
+"""How near to a line a press of the mouse means it, in px of the screen."""
+JOIN = 48.0
+"""Width of the part of a bridge that names the other network."""
+
+
+@dataclass(slots=True)
+class NodeItem:
+    """A box that is painted: its place, and its words as they were painted last."""
+
+    node: GraphNode
+    rect: QRectF
+    name: str
+    line: str = ""
+    is_dim: bool = False
+
+
+@dataclass(slots=True)
+class LineItem:
+    """A line that is painted: its ways, their arrows, and where its words stand, if there is room."""
+
+    line: GraphLine
+    ways: dict[tuple[str, str], Sequence[Place]]
+    path: QPainterPath
+    arrows: list[QPolygonF]
+    bounds: QRectF
+    label: QRectF | None = None
+    figures: LineFigures = field(default_factory=lambda: LineFigures("", 1.25))
+    is_dim: bool = False
+
+
+@dataclass(slots=True)
+class GroupItem:
+    """A group that is painted; ``quiet`` is where the number of its hidden nodes stands."""
+
+    group: GraphGroup
+    rect: QRectF
+    name: str
+    quiet: QRectF | None
+
+
+class GraphScene:
+    """What is painted of one graph, measured once; `renew` takes over its figures."""
+
+    def __init__(
+        self, theme: Theme, graph: NodeGraph, layout: GraphLayout, sizes: LayoutSizes, host: str
+    ) -> None:
+        """``host`` is this computer's name."""
+        self.theme = theme
+        self.graph, self.layout, self.sizes, self._host = graph, layout, sizes, host
+        self._fonts()
+        wide, high = sizes.node
+        self.nodes = {
+            node.key: NodeItem(
+                node,
+                QRectF(x - wide / 2, y - high / 2, wide, high),
+                self._elided(self.name_font, node_name(node, host), self._words_width(node)),
+            )
+            for node in graph.nodes
+            if (place := layout.places.get(node.key)) is not None
+            for x, y in (place,)
+        }
+        self.groups = [self._group_item(group) for group in graph.groups if group.key in layout.groups]
+        ways: dict[object, dict[tuple[str, str], Sequence[Place]]] = {}
+        for (key, source, target), points in layout.routes.items():
+            ways.setdefault(key, {})[source, target] = points
+        self.lines = [_line_item(line, ways[line.key]) for line in graph.lines if line.key in ways]
+        left, top, width, height = layout.bounds(sizes)
+        self.bounds = QRectF(left, top, width, height)
+
+    def _fonts(self) -> None:
+        theme = self.theme
+        self.name_font, self.small_font = theme.font("body"), theme.font("caption")
+        self.small_font.setWeight(QFont.Weight.Normal)
+        self.name_font.setWeight(QFont.Weight.Medium)
+        self.label_font, self.title_font = theme.font("code"), theme.font("title")
+        self.letter = QFontMetricsF(self.label_font).horizontalAdvance("0")
+
+    def _words_width(self, node: GraphNode) -> float:
+        return self.sizes.node[0] - 46 - (JOIN if node.joins else 0)
+
+    @staticmethod
+    def _elided(font: QFont, text: str, width: float) -> str:
+        return QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideMiddle, width)
+
+    def _group_item(self, group: GraphGroup) -> GroupItem:
+        rect = QRectF(*self.layout.groups[group.key])
+        chip = None
+        if group.quiet:
+            words = paint.width_of(self.small_font, quiet_words(group)) + 24
+            high = self.sizes.foot * 0.7
+            width = min(words, rect.width() - 16)
+            chip = QRectF(rect.right() - 10 - width, rect.bottom() - 8 - high, width, high)
+        room = rect.width() - 48
+        return GroupItem(
+            group, rect, self._elided(self.title_font, group_name(group.key, self._host), room), chip
+        )
+
+    # -- figures ---------------------------------------------------------------------------------------------
+
+    def renew(self, figures: dict[object, LineFigures]) -> Iterator[QRectF]:
+        """Take over what stands at lines and in nodes; the areas that look otherwise than before."""
+        for item in self.lines:
+            now = figures.get(item.line.key, item.figures)
+            if now == item.figures:
+                continue
+            wider = now.width != item.figures.width or now.lost != item.figures.lost
+            item.figures = now
+            if wider:
+                yield item.bounds
+            elif item.label is not None:
+                yield item.label
+        for box in self.nodes.values():
+            said = self._elided(self.small_font, node_line(box.node), self._words_width(box.node))
+            if said != box.line:
+                box.line = said
+                yield box.rect
+
+    def place_labels(self) -> None:
+        """Find room for the words of each line: along its longest level part, and on nothing else."""
+        taken = _TakenRoom(item.rect for item in self.nodes.values())
+        high = QFontMetricsF(self.label_font).height()
+        for item in sorted(self.lines, key=lambda each: each.line.topics):
+            letters = max(len(item.figures.words), len(item.figures.words.rpartition(" ")[0]) + LABEL_ROOM)
+            item.label = None
+            for rect in _rooms(item, letters * self.letter + 4, high):
+                if taken.take(rect):
+                    item.label = rect
+                    break
+
+    def dim(self, words: Sequence[str]) -> None:
+        """Let what has not all of these words fade; who talks with what has them does not."""
+        bright = {
+            key for key, item in self.nodes.items() if all(word in _haystack(item.node) for word in words)
+        }
+        named = [
+            item
+            for item in self.lines
+            if all(word in " ".join(item.line.topics).casefold() for word in words)
+        ]
+        ends = {key for item in named for key in (*item.line.sources, *item.line.targets)}
+        found = {id(item) for item in named}
+        for item in self.lines:
+            at = {*item.line.sources, *item.line.targets}
+            item.is_dim = bool(words) and id(item) not in found and not (at & bright)
+        for key, box in self.nodes.items():
+            box.is_dim = bool(words) and key not in bright and key not in ends
+
+    @property
+    def dimmed(self) -> int:
+        """How many nodes the filter lets fade."""
+        return sum(item.is_dim for item in self.nodes.values())
+
+    # -- what is under the mouse -----------------------------------------------------------------------------
+
+    def node_at(self, at: QPointF) -> GraphNode | None:
+        """The node there."""
+        return next((item.node for item in self.nodes.values() if item.rect.contains(at)), None)
+
+    def group_at(self, at: QPointF) -> tuple[GraphGroup, bool] | None:
+        """The group whose head is there (True), or whose number of quiet nodes (False)."""
+        for item in self.groups:
+            if item.quiet is not None and item.quiet.contains(at):
+                return item.group, False
+            head = QRectF(item.rect.left(), item.rect.top(), item.rect.width(), self.sizes.head - 4)
+            if head.contains(at):
+                return item.group, True
+        return None
+
+    def line_at(self, at: QPointF, scale: float) -> LineItem | None:
+        """The line nearest to there, if it is near enough on the screen, or whose words are there."""
+        labelled = (item for item in self.lines if item.label is not None and item.label.contains(at))
+        found = next(labelled, None)
+        if found is not None:
+            return found
+        reach = REACH / scale
+        near = [
+            (_distance(at, points), number)
+            for number, item in enumerate(self.lines)
+            if item.bounds.adjusted(-reach, -reach, reach, reach).contains(at)
+            for points in item.ways.values()
+        ]
+        distance, number = min(near, default=(math.inf, 0))
+        return self.lines[number] if distance <= reach else None
+
+    # -- painting --------------------------------------------------------------------------------------------
+
+    def paint(
+        self,
+        painter: QPainter,
+        clip: QRectF,
+        scale: float,
+        chosen: GraphChoice | None = None,
+        *,
+        rings: bool = False,
+    ) -> None:
+        """Paint what is in ``clip``, as large as ``scale`` says; ``rings`` show what the keys chose."""
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        _Painting(self, painter, clip, scale, chosen, rings=rings).paint()
+
+
+def _line_item(line: GraphLine, ways: dict[tuple[str, str], Sequence[Place]]) -> LineItem:
+    path, arrows = QPainterPath(), []
+    for points in ways.values():
+        _add_rounded(path, points)
+        arrows.append(_arrow(points))
+    bounds = path.boundingRect()
+    for arrow in arrows:
+        bounds = bounds.united(arrow.boundingRect())
+    return LineItem(line, ways, path, arrows, bounds.adjusted(-12, -12, 12, 12))
+
+
+def _add_rounded(path: QPainterPath, points: Sequence[Place]) -> None:
+    """A way with round corners."""
+    path.moveTo(*points[0])
+    for before, at, after in zip(points, points[1:], points[2:], strict=False):
+        radius = min(CORNER, math.dist(before, at) / 2, math.dist(at, after) / 2)
+        into, out = _towards(at, before, radius), _towards(at, after, radius)
+        path.lineTo(*into)
+        path.quadTo(*at, *out)
+    path.lineTo(*points[-1])
+
+
+def _towards(at: Place, other: Place, length: float) -> Place:
+    whole = math.dist(at, other) or 1.0
+    return at[0] + (other[0] - at[0]) * length / whole, at[1] + (other[1] - at[1]) * length / whole
+
+
+def _arrow(points: Sequence[Place]) -> QPolygonF:
+    tip = points[-1]
+    before = next((each for each in reversed(points[:-1]) if each != tip), (tip[0] - 1, tip[1]))
+    base = _towards(tip, before, ARROW_LONG)
+    across = (
+        (tip[1] - base[1]) * ARROW_WIDE / ARROW_LONG / 2,
+        (base[0] - tip[0]) * ARROW_WIDE / ARROW_LONG / 2,
+    )
+    return QPolygonF(
+        [
+            QPointF(*tip),
+            QPointF(base[0] + across[0], base[1] + across[1]),
+            QPointF(base[0] - across[0], base[1] - across[1]),
+        ]
+    )
+
+
+def _rooms(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
+    """Where words of this width could stand, the best place first: above level parts, the longest first."""
+    level = [
+        (abs(end[0] - begin[0]), begin, end)
+        for points in item.ways.values()
+        for begin, end in itertools.pairwise(points)
+        if abs(end[1] - begin[1]) < 1 and abs(end[0] - begin[0]) >= wide
+    ]
+    for length, begin, end in sorted(level, reverse=True)[:6]:
+        left = min(begin[0], end[0])
+        for share in (0.5, 0.25, 0.75):
+            at = left + (length - wide) * share
+            yield QRectF(at, begin[1] - high - 2, wide, high)
+            yield QRectF(at, begin[1] + 3, wide, high)
+
+
+def _distance(at: QPointF, points: Sequence[Place]) -> float:
+    """How far a point is from a way."""
+    return min(_distance_to_part((at.x(), at.y()), begin, end) for begin, end in itertools.pairwise(points))
+
+
+def _distance_to_part(at: Place, begin: Place, end: Place) -> float:
+    wide, high = end[0] - begin[0], end[1] - begin[1]
+    square = wide * wide + high * high
+    share = ((at[0] - begin[0]) * wide + (at[1] - begin[1]) * high) / square if square else 0.0
+    share = min(1.0, max(0.0, share))
+    return math.dist(at, (begin[0] + wide * share, begin[1] + high * share))
+
+
+def _haystack(node: GraphNode) -> str:
+    entry = node.entry
+    if entry is None:
+        return node.name.casefold()
+    topics = " ".join((*entry.publishes, *entry.subscribes))
+    return f"{node.name} {entry.host} {entry.language} {entry.generation} {topics}".casefold()
+
+
+class _TakenRoom:
+    """Which room is taken, by cells: thousands of words are placed at once."""
+
+    def __init__(self, rects: Iterable[QRectF]) -> None:
+        self._cells: dict[tuple[int, int], list[QRectF]] = {}
+        for rect in rects:
+            self._add(rect)
+
+    def take(self, rect: QRectF) -> bool:
+        """Take this room, if all of it is free."""
+        if any(other.intersects(rect) for cell in _cells(rect) for other in self._cells.get(cell, ())):
+            return False
+        self._add(rect)
+        return True
+
+    def _add(self, rect: QRectF) -> None:
+        for cell in _cells(rect):
+            self._cells.setdefault(cell, []).append(rect)
+
+
+def _cells(rect: QRectF) -> Iterator[tuple[int, int]]:
+    wide, high = CELL
+    for column in range(math.floor(rect.left() / wide), math.floor(rect.right() / wide) + 1):
+        for row in range(math.floor(rect.top() / high), math.floor(rect.bottom() / high) + 1):
+            yield column, row
+
+
+class _Painting:
+    """One painting of a scene: the colours of the moment, and who is at the chosen line."""
+
+    def __init__(
+        self,
+        scene: GraphScene,
+        painter: QPainter,
+        clip: QRectF,
+        scale: float,
+        chosen: GraphChoice | None,
+        *,
+        rings: bool,
+    ) -> None:
+        self.scene, self.theme, self.painter = scene, scene.theme, painter
+        self.clip, self.scale, self.rings = clip, scale, rings
+        self.has_text = scale * scene.name_font.pixelSize() >= LEAST_TEXT_PX
+        self.has_small = scale * scene.small_font.pixelSize() >= LEAST_SMALL_PX
+        line = scene.graph.line_of(chosen.key) if chosen is not None and chosen.kind == "topic" else None
+        self.line = line
+        self.chosen = chosen.key if chosen is not None and chosen.kind == "node" else ""
+        self.ends = {*line.sources, *line.targets} if line is not None else set[str]()
+
+    def paint(self) -> None:
+        """Groups, lines, their words, then nodes: each may lie on what is before it."""
+        painter, clip = self.painter, self.clip
+        for group in self.scene.groups:
+            if group.rect.intersects(clip):
+                self._group(group)
+        shown = [item for item in self.scene.lines if item.bounds.intersects(clip)]
+        above = [item for item in shown if item.line is self.line]
+        for item in [*(each for each in shown if each.line is not self.line), *above]:
+            painter.setOpacity(DIM if item.is_dim else 1.0)
+            self._line(item)
+        if self.has_small:
+            for item in self.scene.lines:
+                if item.label is not None and item.label.intersects(clip):
+                    painter.setOpacity(DIM if item.is_dim else 1.0)
+                    self._label(item, item.label)
+        for box in self.scene.nodes.values():
+            if box.rect.adjusted(-6, -6, 6, 6).intersects(clip):
+                painter.setOpacity(DIM if box.is_dim else 1.0)
+                self._node(box)
+        painter.setOpacity(1.0)
+        for item in above:
+            self._losses(item)
+
+    def _group(self, item: GroupItem) -> None:
+        theme, painter, group = self.theme, self.painter, item.group
+        paint.box(painter, item.rect, theme.radius("card"), theme.colour("window"), theme.colour("border"))
+        if not self.has_text:
+            return
+        head = self.scene.sizes.head
+        side = theme.scaled(16)
+        left = item.rect.left() + 14
+        middle = item.rect.top() + head / 2
+        paint_icon(
+            painter, QRectF(left, middle - side / 2, side, side), group.icon, theme.colour("textSecondary")
+        )
+        left += side + 8
+        area = QRectF(left, item.rect.top(), item.rect.right() - 10 - left, head)
+        _text(painter, area, item.name, self.scene.title_font, theme.colour("text"))
+        used = paint.width_of(self.scene.title_font, item.name) + 8
+        if area.width() - used > 40:
+            area.setLeft(left + used)
+            paint.words(painter, area, group.address, self.scene.small_font, theme.colour("textTertiary"))
+        if item.quiet is not None:
+            pen = QPen(theme.colour("controlBorder"), 1, Qt.PenStyle.DashLine)
+            painter.setPen(pen)
+            painter.setBrush(theme.colour("panel"))
+            round_end = item.quiet.height() / 2
+            painter.drawRoundedRect(item.quiet, round_end, round_end)
+            paint.words(
+                painter,
+                item.quiet,
+                quiet_words(group),
+                self.scene.small_font,
+                theme.colour("textSecondary"),
+                paint.CENTRE,
+            )
+
+    def _line(self, item: LineItem) -> None:
+        is_chosen = item.line is self.line
+        colour = self.theme.colour("accent" if is_chosen else "controlBorder")
+        width = CHOSEN_WIDTH if is_chosen else item.figures.width
+        pen = QPen(colour, width)
+        if item.line.kind == "service":
+            pen.setDashPattern([5 / width, 4 / width])
+        self.painter.setPen(pen)
+        self.painter.setBrush(Qt.BrushStyle.NoBrush)
+        self.painter.drawPath(item.path)
+        self.painter.setPen(Qt.PenStyle.NoPen)
+        self.painter.setBrush(colour)
+        for arrow in item.arrows:
+            self.painter.drawPolygon(arrow)
+
+    def _label(self, item: LineItem, rect: QRectF) -> None:
+        """The names in the colour of text, the figure behind them quieter; on a chip when chosen."""
+        theme, painter = self.theme, self.painter
+        names, _space, figure = item.figures.words.rpartition(" ")
+        if not names or not figure.endswith(("/s", "/min")):
+            names, figure = item.figures.words, ""
+        is_chosen = item.line is self.line
+        if is_chosen:
+            paint.box(
+                painter,
+                rect.adjusted(-5, -1, 5, 1),
+                theme.radius("chip"),
+                theme.colour("accentTint"),
+                theme.colour("accent"),
+            )
+        ink = theme.colour("accentText" if is_chosen else "text")
+        _text(painter, rect, names, self.scene.label_font, ink)
+        if figure:
+            used = (len(names) + 1) * self.scene.letter
+            area = rect.adjusted(used, 0, 20, 0)
+            quiet = theme.colour("accentText" if is_chosen else "textSecondary")
+            _text(painter, area, figure, self.scene.label_font, quiet)
+
+    def _losses(self, item: LineItem) -> None:
+        """What is lost, at the end of the chosen line."""
+        lost = item.figures.lost
+        if lost is None or not self.has_small:
+            return
+        theme, painter, font = self.theme, self.painter, self.scene.small_font
+        words = percent_words(lost)
+        side = theme.scaled(12)
+        wide, high = paint.width_of(font, words) + side + 18, theme.scaled(20)
+        tip = next(iter(item.ways.values()))[-1]
+        chip = QRectF(tip[0] - wide - 12, tip[1] + 6, wide, high)
+        paint.box(painter, chip, high / 2, theme.colour("warnTint"), theme.colour("warnBorder"))
+        square = QRectF(chip.left() + 7, chip.center().y() - side / 2, side, side)
+        paint_icon(painter, square, "triangle-alert", theme.colour("warn"))
+        _text(painter, chip.adjusted(side + 11, 0, 0, 0), words, font, theme.colour("warn"))
+
+    def _node(self, item: NodeItem) -> None:
+        theme, painter, node = self.theme, self.painter, item.node
+        is_chosen = node.key == self.chosen
+        at_line = node.key in self.ends
+        is_source = self.line is not None and node.key in self.line.sources
+        fill = theme.colour("selected" if is_chosen or is_source else "panel")
+        edge = theme.colour("accent" if is_chosen or at_line else "controlBorder")
+        radius = theme.radius("panel")
+        faint = node.is_gone or node.is_quiet
+        if faint:
+            painter.setPen(QPen(edge, 1, Qt.PenStyle.DashLine))
+            painter.setBrush(fill)
+            painter.drawRoundedRect(item.rect.adjusted(0.5, 0.5, -0.5, -0.5), radius, radius)
+        else:
+            paint.box(painter, item.rect, radius, fill, edge, 1.5 if is_chosen or at_line else 1.0)
+        if node.joins:
+            self._other_side(item.rect, node.joins, edge)
+        if is_chosen and self.rings:
+            ring = item.rect.adjusted(-3, -3, 3, 3)
+            paint.box(painter, ring, radius + 3, None, theme.colour("focus"), 2.0)
+        if self.has_text:
+            self._words(item, "textDisabled" if node.is_gone else "textSecondary" if faint else "text")
+
+    def _other_side(self, rect: QRectF, joins: str, edge: QColor) -> None:
+        """The part of a bridge that belongs to the other network."""
+        theme, painter = self.theme, self.painter
+        part = QRectF(rect.right() - JOIN, rect.top() + 1, JOIN - 1, rect.height() - 2)
+        paint.box(painter, part, theme.radius("small"), theme.colour("sunken"))
+        painter.setPen(QPen(edge, 1))
+        painter.drawLine(part.topLeft(), part.bottomLeft())
+        if self.has_small:
+            font = QFont(self.scene.small_font)
+            font.setWeight(QFont.Weight.DemiBold)
+            paint.words(painter, part, joins, font, theme.colour("textSecondary"), paint.CENTRE)
+
+    def _words(self, item: NodeItem, role: str) -> None:
+        theme, painter, rect = self.theme, self.painter, item.rect
+        side = theme.scaled(16)
+        square = QRectF(rect.left() + 12, rect.center().y() - side / 2, side, side)
+        quiet = theme.colour("textDisabled" if item.node.is_gone else "textSecondary")
+        paint_icon(painter, square, node_icon(item.node), quiet)
+        left = rect.left() + 12 + side + 10
+        area = QRectF(left, rect.top() + 5, rect.right() - 4 - left, rect.height() / 2 - 4)
+        font = self.scene.name_font
+        if item.node.is_gone:
+            font = QFont(font)
+            font.setStrikeOut(True)
+        _text(painter, area, item.name, font, theme.colour(role))
+        if self.has_small and item.line:
+            area.translate(0, rect.height() / 2 - 4)
+            _text(painter, area, item.line, self.scene.small_font, theme.colour("textTertiary"))
+
+
+def _text(painter: QPainter, rect: QRectF, text: str, font: QFont, colour: QColor) -> None:
+    """One line of text that fits: `paint.words` without measuring it again."""
+    painter.setFont(font)
+    painter.setPen(colour)
+    painter.drawText(rect, int(paint.LEFT), text)
