@@ -1,8 +1,8 @@
 """Where everything stands: layered by a library at first, and what is there keeps its place when others come.
 
-The library (graphlay) puts nodes into layers so that few lines cross, and leads lines round nodes. It is asked
-for places once; after that only for the ways of lines. All lengths are pixels at 100 % zoom, x to the right and
-y downwards, places are middles.
+The library (graphlay) puts nodes into layers so that few lines cross, and leads lines round nodes. It is
+asked for places once; after that only for the ways of lines. All lengths are pixels at 100 % zoom, x to the
+right and y downwards, places are middles.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MOST_ROUTES = 6000
 """Ways that are found and drawn; of more, those of the lines with the most ends are left out, and counted."""
 MOST_PLACES = 4000
 """Places that are kept of those who left, so that they find theirs again."""
-LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 96.0, 36.0, 40.0, 10.0
+LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 130.0, 36.0, 40.0, 10.0
 ALONE_COLUMNS = 4
 """Nodes that talk with nobody of their group stand in so many columns."""
 MANY = 60

@@ -170,7 +170,7 @@ class GraphCard(QWidget):
             grid.setHorizontalSpacing(12)
             grid.setVerticalSpacing(8)
             for place, box in enumerate(self._figures):
-                grid.addWidget(box, place // 2, place % 2)
+                grid.addWidget(box, place // 2, place % 2, Qt.AlignmentFlag.AlignTop)
             grid.setColumnStretch(0, 1)
             grid.setColumnStretch(1, 1)
             self._column.addWidget(card)
@@ -247,7 +247,7 @@ class _Table(QWidget):
         self.rows: list[_TableRow] = []
         for number_, (key, name, figures) in enumerate(table.rows, 2):
             button = LinkButton(theme, name)
-            button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+            button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             button.setEnabled(bool(key))
             button.clicked.connect(lambda _on=False, key=key, kind=table.chooses: chose(kind, key))
             grid.addWidget(button, number_, 0)
@@ -272,7 +272,8 @@ class _Table(QWidget):
 class CardFacts:
     """Where a card's facts come from: topics and services by name, the graph, names and boxes of nodes.
 
-    ``box_of`` gives the box of a node's entry, "" where it is not drawn; ``calls`` are calls a second.
+    ``box_of`` gives the box of a node's entry, "" where it is not drawn; ``calls`` are calls a second;
+    ``shows`` says of a topic's name whether it is told of at all.
     """
 
     topic_of: Callable[[str], Topic | None]
@@ -280,6 +281,7 @@ class CardFacts:
     name_of: Callable[[str], str]
     box_of: Callable[[str], str]
     calls: dict[str, float]
+    shows: Callable[[str], bool] = lambda _name: True
     now_ns: Callable[[], int] = time.time_ns
 
 
@@ -422,6 +424,7 @@ def node_card(node: GraphNode, services: Sequence[tuple[str, bool]], facts: Card
 
 def _topics_of(title: str, network: str, names: Sequence[str], facts: CardFacts) -> CardTable:
     rows: list[Row] = []
+    names = [name for name in names if facts.shows(name)]
     for name in names[:MOST_ROWS]:
         key = key_of(network, name)
         topic = facts.topic_of(key)

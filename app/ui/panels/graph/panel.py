@@ -25,6 +25,7 @@ from app.core.graph.node_graph import (
     GraphLine,
     GroupBy,
     NodeGraph,
+    is_shown,
     node_graph,
 )
 from app.core.graph.walk import GraphChoice
@@ -232,7 +233,13 @@ class GraphPanel(PanelWidget):
 
     def _figures(self, graph: NodeGraph) -> dict[object, LineFigures]:
         calls = self._calls.rates_hz()
-        return {line.key: line_figures(line, self.session.topic, calls) for line in graph.lines}
+        boxes = {node.entry_key: node.key for node in graph.nodes if node.entry_key}
+        find = self.session.topic
+
+        def box_of(entry: str) -> str:
+            return boxes.get(entry, "")
+
+        return {line.key: line_figures(line, find, calls, box_of) for line in graph.lines}
 
     def _has_gone(self) -> bool:
         graph = self._asked
@@ -348,12 +355,14 @@ class GraphPanel(PanelWidget):
         nodes = scene.graph.nodes if scene is not None else ()
         boxes = {node.entry_key: node.key for node in nodes if node.entry_key}
         names = {entry.key: entry.name for entry in (*self.session.nodes, *self.session.networks.nodes)}
+        names |= {node.entry_key: node_name(node, self._host) for node in nodes if node.entry_key}
         return CardFacts(
             self.session.topic,
             self.session.graph,
             lambda entry: names.get(entry, split_key(entry)[1]),
             lambda entry: boxes.get(entry, ""),
             self._calls.rates_hz(),
+            lambda name: is_shown(name, self._choices),
         )
 
     def _say_card(self) -> None:
@@ -373,7 +382,7 @@ class GraphPanel(PanelWidget):
         view = self.session.graph
         found: list[tuple[str, bool]] = []
         for name, service in view.services.items() if view is not None else ():
-            if self._choices.shows_own or not name.startswith("/nep/"):
+            if is_shown(name, self._choices):
                 found += [(name, True)] if any(each.node_id == entry for each in service.servers) else []
                 found += [(name, False)] if any(each.node_id == entry for each in service.clients) else []
         return found

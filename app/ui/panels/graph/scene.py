@@ -285,19 +285,24 @@ def _arrow(points: Sequence[Place]) -> QPolygonF:
 
 
 def _rooms(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
-    """Where words of this width could stand, the best place first: above level parts, the longest first."""
-    level = [
-        (abs(end[0] - begin[0]), begin, end)
-        for points in item.ways.values()
-        for begin, end in itertools.pairwise(points)
-        if abs(end[1] - begin[1]) < 1 and abs(end[0] - begin[0]) >= wide
-    ]
-    for length, begin, end in sorted(level, reverse=True)[:6]:
-        left = min(begin[0], end[0])
-        for share in (0.5, 0.25, 0.75):
-            at = left + (length - wide) * share
-            yield QRectF(at, begin[1] - high - 2, wide, high)
-            yield QRectF(at, begin[1] + 3, wide, high)
+    """Where words of this width could stand, the best place first: at level parts, then at upright ones."""
+    parts = [(begin, end) for points in item.ways.values() for begin, end in itertools.pairwise(points)]
+    level = [each for each in parts if abs(each[1][1] - each[0][1]) < 1]
+    for begin, end in sorted(level, key=_length, reverse=True)[:6]:
+        left, room = min(begin[0], end[0]), abs(end[0] - begin[0]) - wide
+        for share in (0.5, 0.25, 0.75) if room >= 0 else ():
+            yield QRectF(left + room * share, begin[1] - high - 2, wide, high)
+            yield QRectF(left + room * share, begin[1] + 3, wide, high)
+    upright = [each for each in parts if abs(each[1][0] - each[0][0]) < 1]
+    for begin, end in sorted(upright, key=_length, reverse=True)[:4]:
+        top, room = min(begin[1], end[1]), abs(end[1] - begin[1]) - high
+        for share in (0.5, 0.2, 0.8) if room >= 0 else ():
+            yield QRectF(begin[0] + 5, top + room * share, wide, high)
+            yield QRectF(begin[0] - 5 - wide, top + room * share, wide, high)
+
+
+def _length(part: tuple[Place, Place]) -> float:
+    return math.dist(*part)
 
 
 def _distance(at: QPointF, points: Sequence[Place]) -> float:
@@ -467,20 +472,22 @@ class _Painting:
             _text(painter, area, figure, self.scene.label_font, quiet)
 
     def _losses(self, item: LineItem) -> None:
-        """What is lost, at the end of the chosen line."""
-        lost = item.figures.lost
-        if lost is None or not self.has_small:
+        """What is lost, at the ends of the chosen line where it is."""
+        if not self.has_small:
             return
         theme, painter, font = self.theme, self.painter, self.scene.small_font
-        words = percent_words(lost)
-        side = theme.scaled(12)
-        wide, high = paint.width_of(font, words) + side + 18, theme.scaled(20)
-        tip = next(iter(item.ways.values()))[-1]
-        chip = QRectF(tip[0] - wide - 12, tip[1] + 6, wide, high)
-        paint.box(painter, chip, high / 2, theme.colour("warnTint"), theme.colour("warnBorder"))
-        square = QRectF(chip.left() + 7, chip.center().y() - side / 2, side, side)
-        paint_icon(painter, square, "triangle-alert", theme.colour("warn"))
-        _text(painter, chip.adjusted(side + 11, 0, 0, 0), words, font, theme.colour("warn"))
+        for box, share in item.figures.lost:
+            tip = next((points[-1] for ends, points in item.ways.items() if ends[1] == box), None)
+            if tip is None:
+                continue
+            words = percent_words(share)
+            side = theme.scaled(12)
+            wide, high = paint.width_of(font, words) + side + 18, theme.scaled(20)
+            chip = QRectF(tip[0] - wide - 12, tip[1] + 6, wide, high)
+            paint.box(painter, chip, high / 2, theme.colour("warnTint"), theme.colour("warnBorder"))
+            square = QRectF(chip.left() + 7, chip.center().y() - side / 2, side, side)
+            paint_icon(painter, square, "triangle-alert", theme.colour("warn"))
+            _text(painter, chip.adjusted(side + 11, 0, 0, 0), words, font, theme.colour("warn"))
 
     def _node(self, item: NodeItem) -> None:
         theme, painter, node = self.theme, self.painter, item.node

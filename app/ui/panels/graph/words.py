@@ -6,13 +6,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.graph.node_graph import GraphGroup, GraphLine, GraphNode
-from app.core.network.topics import Topic, split_key
+from app.core.graph.node_graph import BRIDGE_TO, GraphGroup, GraphLine, GraphNode
+from app.core.network.topics import Topic, key_of, split_key
 from app.core.networks.kinds import kind_named
 from app.ui.text.nodes import cpu_words, generation_words
 from app.ui.text.numbers import grouped
-from nep.i18n import _, ngettext, number
+from nep.i18n import _, ngettext, number, pgettext
 
+BRIDGE = "bridge-"
 NAMED = 2
 """Topics whose names stand at a line; of more the number follows."""
 THIN, THICK, STEPS = 1.25, 3.0, 7
@@ -33,11 +34,11 @@ FindTopic = Callable[[str], "Topic | None"]
 
 @dataclass(frozen=True, slots=True)
 class LineFigures:
-    """What stands at a line, and how thick it is in px; ``lost`` is the share that is lost, None for none."""
+    """What stands at a line, and how thick it is in px; ``lost`` is who loses which share, by box."""
 
     words: str
     width: float
-    lost: float | None = None
+    lost: tuple[tuple[str, float], ...] = ()
 
 
 def node_icon(node: GraphNode) -> str:
@@ -47,7 +48,11 @@ def node_icon(node: GraphNode) -> str:
 
 def node_name(node: GraphNode, host: str) -> str:
     """Its name; of a closed group what it is called."""
-    return node.name if node.kind != "group" else group_name(node.key, host)
+    if node.kind == "group":
+        return group_name(node.key, host)
+    if node.joins:  # what else its name says stands beside it
+        return node.name.removeprefix(BRIDGE).rpartition(BRIDGE_TO)[0] or node.name
+    return node.name
 
 
 def node_line(node: GraphNode) -> str:
@@ -62,6 +67,8 @@ def node_line(node: GraphNode) -> str:
     cpu = cpu_words(entry.cpu_ratio)
     if node.kind == "studio":
         return _("this window")
+    if node.kind == "bridge":
+        return pgettext("node", "bridge")
     language = _("behaviour") if node.kind == "behaviour" else entry.language or _of_network(node)
     return ", ".join(filter(None, (language, cpu)))
 
@@ -96,8 +103,13 @@ def group_name(key: str, host: str) -> str:
     return _("This computer") if name == host else name or _("Unknown computer")
 
 
-def line_figures(line: GraphLine, topic_of: FindTopic, hertz: Mapping[str, float]) -> LineFigures:
-    """What stands at a line now; ``hertz`` are the calls a second of services, where they are known."""
+def line_figures(
+    line: GraphLine, topic_of: FindTopic, hertz: Mapping[str, float], box_of: Callable[[str], str]
+) -> LineFigures:
+    """What stands at a line now; ``hertz`` are the calls a second of services, where they are known.
+
+    ``box_of`` gives the box of a node's entry, "" where it is not drawn.
+    """
     names = line_name(line.topics)
     if line.kind == "service":
         known = [hertz[name] for name in line.topics if name in hertz]
@@ -106,8 +118,19 @@ def line_figures(line: GraphLine, topic_of: FindTopic, hertz: Mapping[str, float
     rates = [topic.rate_hz for topic in topics if _is_figure(topic.rate_hz)]
     rate = short_rate(sum(filter(None, rates))) if rates else ""
     sent = sum(topic.bandwidth_Bps for topic in topics if _is_figure(topic.bandwidth_Bps))  # type: ignore[misc]
-    shares = [topic.loss_ratio for topic in topics if topic.lost and _is_figure(topic.loss_ratio)]
-    return LineFigures(f"{names} {rate}".rstrip(), line_width(sent), max(filter(None, shares), default=None))
+    return LineFigures(f"{names} {rate}".rstrip(), line_width(sent), _losses(topics, box_of))
+
+
+def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tuple[str, float], ...]:
+    """The share that is lost at each subscriber that loses anything, the worst of its topics."""
+    found: dict[str, float] = {}
+    for topic in topics:
+        for each in topic.info.subscribers if topic.info is not None else ():
+            box = box_of(key_of(topic.network, each.node_id)) if each.lost else ""
+            if box and each.lost:
+                share = each.lost / (each.lost + max(0, each.received or 0))
+                found[box] = max(found.get(box, 0.0), share)
+    return tuple(sorted(found.items()))
 
 
 def _is_figure(value: float | None) -> bool:
