@@ -29,7 +29,7 @@ MOST_ROUTES = 6000
 """Ways that are found and drawn; of more, those of the lines with the most ends are left out, and counted."""
 MOST_PLACES = 4000
 """Places that are kept of those who left, so that they find theirs again."""
-LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 130.0, 36.0, 40.0, 10.0
+LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 150.0, 36.0, 40.0, 10.0
 ALONE_COLUMNS = 4
 """Nodes that talk with nobody of their group stand in so many columns."""
 MANY = 60
@@ -156,7 +156,7 @@ def _options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
             "isolated_gap": gap,
             "isolated_max_columns": ALONE_COLUMNS,
         },
-        "routing": {"style": "orthogonal", "merge_edges": "both"},
+        "routing": {"style": "orthogonal"},
         "cycles": {"strategy": "follow_flow"},
         "effort": effort,
     }
@@ -287,16 +287,8 @@ def _request_box(key: str, size: Place) -> dict[str, Any]:
 
 
 def _request_edges(ways: Sequence[RouteKey], index: Mapping[str, int]) -> list[dict[str, Any]]:
-    """Ways of one line have one ``group``: they may share a part of their way."""
-    numbers: dict[object, int] = {}
     return [
-        {
-            "source": index[source],
-            "target": index[target],
-            "weight": 1.0,
-            "group": numbers.setdefault(line, len(numbers)),
-        }
-        for line, source, target in ways
+        {"source": index[source], "target": index[target], "weight": 1.0} for _line, source, target in ways
     ]
 
 

@@ -199,6 +199,7 @@ class GraphPanel(PanelWidget):
             self._choose(starts_closed=len(facts.nodes) > MOST_OPEN)
         graph = node_graph(facts, self._choices)
         self.pages.setCurrentIndex(0 if facts.nodes else 1)
+        self.export.setVisible(bool(facts.nodes))
         if not facts.nodes:
             self._decided = False
             self._say_empty()
@@ -249,8 +250,15 @@ class GraphPanel(PanelWidget):
         return LayoutSizes().scaled(self.theme.scaled(1.0))
 
     def _say_empty(self) -> None:
+        if self.session.master.kind == "none":
+            self.empty.say(
+                _("No master is running"), _("A master lets programs find each other."), "radio-tower"
+            )
+            start = self.session.launcher.ensure_master
+            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
+            return
         said = _("Programs appear here as soon as they join the master.")
-        self.empty.say(_("Nobody is here yet."), said, "workflow")
+        self.empty.say(_("Nobody is here yet"), said, "workflow")
         doctor = EmptyAction(
             _("Open the connection doctor"),
             lambda: self.context.run("help.doctor"),

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF
 
 from app.core.graph.layout import GraphLayout, LayoutSizes, Place
@@ -35,7 +35,7 @@ ARROW_LONG, ARROW_WIDE = 9.0, 8.0
 CHOSEN_WIDTH = 2.25
 DIM = 0.3
 CELL = (160.0, 48.0)
-LABEL_ROOM = 9
+LABEL_ROOM = 7
 """Letters that a label keeps for its figure."""
 LEAST_TEXT_PX, LEAST_SMALL_PX = 6.0, 7.0
 """Smaller letters are not painted: nobody could read them."""
@@ -159,7 +159,11 @@ class GraphScene:
 
     def place_labels(self) -> None:
         """Find room for the words of each line: along its longest level part, and on nothing else."""
-        taken = _TakenRoom(item.rect for item in self.nodes.values())
+        heads = (
+            QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), self.sizes.head - 8))
+            for item in self.groups
+        )
+        taken = _TakenRoom([*(item.rect for item in self.nodes.values()), *heads])
         high = QFontMetricsF(self.label_font).height()
         for item in sorted(self.lines, key=lambda each: each.line.topics):
             letters = max(len(item.figures.words), len(item.figures.words.rpartition(" ")[0]) + LABEL_ROOM)
