@@ -400,7 +400,7 @@ def node_card(node: GraphNode, services: Sequence[tuple[str, bool]], facts: Card
         lines.append(_("pid {number}").format(number=entry.pid))
     if entry.since_ns and entry.gone_s is None:
         since = max(0.0, (facts.now_ns() - entry.since_ns) / 1e9)
-        lines.append(_("here since {age}").format(age=age_words(since - since % 10)))
+        lines.append(_("here for {age}").format(age=age_words(since - since % 10)))
     if entry.gone_s is not None:
         lines.append(_("gone"))
     figures = (CardFigure(_("Processor"), cpu_words(entry.cpu_ratio), _("of one core")),)
