@@ -96,6 +96,8 @@ class GraphCanvas(QWidget):
         self.scene = scene
         if self.choice is not None and not self._is_there(self.choice):
             self.choose(None)
+        elif self.choice is not None:
+            self.setAccessibleDescription(self._describe(self.choice))
         if self._shows_all:
             self.show_all()
         self.update()
