@@ -360,10 +360,12 @@ def _patterns(facts: GraphFacts) -> list[tuple[str, str, str]]:
 
 def _ends(sources: Iterable[str], targets: Iterable[str], place: Mapping[str, str]) -> _Ends:
     """Where a line begins and ends: boxes that are drawn, each once."""
-    return (
-        tuple(sorted({place[each] for each in sources if each in place})),
-        tuple(sorted({place[each] for each in targets if each in place})),
-    )
+    return _places(sources, place), _places(targets, place)
+
+
+def _places(entries: Iterable[str], place: Mapping[str, str]) -> tuple[str, ...]:
+    found = {place[each] for each in entries if each in place}
+    return tuple(found) if len(found) < 2 else tuple(sorted(found))
 
 
 def _bundle(bundles: dict[_Ends, list[str]], ends: _Ends, name: str) -> None:

@@ -111,7 +111,8 @@ def settle(qtbot, panel: GraphPanel) -> None:
     def is_there() -> bool:
         panel.refresh()
         scene = panel.canvas.scene
-        return not panel._thread.is_busy and (scene is None or scene.graph == panel._asked)
+        is_shown = scene is None or scene.graph == panel._asked
+        return not panel._thread.is_busy and is_shown and not panel.canvas._waiting
 
     qtbot.waitUntil(is_there, timeout=20_000)
 
@@ -162,19 +163,35 @@ def test_nodes_lines_and_figures(panel: GraphPanel) -> None:
 
 
 def test_only_what_changed_is_painted(panel: GraphPanel, window: Window, qtbot) -> None:
+    def renewed() -> int:
+        panel.canvas.renew_soon()
+        return panel.canvas.renew(panel._figures_of)
+
     qtbot.wait(1)
     painted = panel.canvas.painted
     show(window, graph())  # the same once more
+    assert renewed() == 0
     panel.refresh()
     qtbot.wait(1)
     assert panel.canvas.painted == painted
-    assert panel.canvas.renew(panel._figures(panel.canvas.scene.graph)) == 0  # type: ignore[union-attr]
     more = graph()
     touch = replace(more.topics["/touch"], rate_hz=31.0)
     show(window, replace(more, topics={**more.topics, "/touch": touch}))
-    assert panel.canvas.renew(panel._figures(panel.canvas.scene.graph)) == 1  # type: ignore[union-attr]
-    panel.refresh()
+    assert renewed() == 1
     qtbot.waitUntil(lambda: panel.canvas.painted > painted)
+    assert "/touch 31/s" in words_at(panel)
+
+
+def test_what_is_out_of_sight_is_renewed_when_it_comes_into_sight(panel: GraphPanel, window: Window) -> None:
+    panel.canvas.zoom_to(3.0)
+    panel.canvas.move_by(20_000, 0)
+    more = graph()
+    touch = replace(more.topics["/touch"], rate_hz=31.0)
+    show(window, replace(more, topics={**more.topics, "/touch": touch}))
+    panel.refresh()
+    assert "/touch 20/s" in words_at(panel)
+    panel.canvas.show_all()
+    panel.refresh()
     assert "/touch 31/s" in words_at(panel)
 
 

@@ -19,8 +19,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from app.core.graph.walk import Arrow, GraphChoice, step
-from app.ui.panels.graph.scene import GraphScene
-from app.ui.panels.graph.words import LineFigures
+from app.ui.panels.graph.scene import FiguresOf, GraphScene, LineItem, NodeItem
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -33,7 +32,9 @@ MARGIN = 20.0
 PAN = 60.0
 CLICK = 4.0
 """How far the mouse may move in a press that chooses, in px."""
-MOST_AREAS = 200
+AT_ONCE = 250
+"""Nodes and lines whose figures are renewed in one tick."""
+MOST_AREAS = 60
 """More areas than these are painted as one."""
 _ARROWS: dict[int, Arrow] = {
     Qt.Key.Key_Left: "left",
@@ -72,6 +73,7 @@ class GraphCanvas(QWidget):
         self.scale = 1.0
         self._offset = QPointF()
         self._shows_all = True
+        self._waiting: list[NodeItem | LineItem] = []
         self._pressed: QPointF | None = None
         self._dragged = False
         self.painted = 0
@@ -82,6 +84,7 @@ class GraphCanvas(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName(_("Graph of nodes"))
         theme.changed.connect(self.update)
+        self.moved.connect(self.renew_soon)
 
     def sizeHint(self) -> QSize:
         return QSize(640, 420)
@@ -109,12 +112,24 @@ class GraphCanvas(QWidget):
         graph = self.scene.graph
         return (graph.node(choice.key) if choice.kind == "node" else graph.line_of(choice.key)) is not None
 
-    def renew(self, figures: dict[object, LineFigures]) -> int:
-        """Take over other figures and paint only what they change, if it is in sight; how many areas."""
-        if self.scene is None:
+    def renew_soon(self) -> None:
+        """Figures have changed, or others are in sight: `renew` takes them over."""
+        if self.scene is not None:
+            self._waiting = self.scene.seen(self.visible())
+
+    def renew(self, figures: FiguresOf) -> int:
+        """Take over the figures of the next `AT_ONCE` in sight, and paint only what they change.
+
+        Returns how many areas that are. Called with every tick, so that none takes long.
+        """
+        scene = self.scene
+        if scene is None or not self._waiting:
             return 0
+        now, self._waiting = self._waiting[:AT_ONCE], self._waiting[AT_ONCE:]
+        has_words = scene.has_words(self.scale)
+        changed = [scene.renew(item, figures, with_words=has_words) for item in now]
         seen = self.visible()
-        areas = [area for area in self.scene.renew(figures) if area.intersects(seen)]
+        areas = [area for area in changed if area is not None and area.intersects(seen)]
         if len(areas) > MOST_AREAS:
             self.update()
         else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -280,7 +280,7 @@ class CardFacts:
     view: GraphView | None
     name_of: Callable[[str], str]
     box_of: Callable[[str], str]
-    calls: dict[str, float]
+    calls: Mapping[str, float]
     shows: Callable[[str], bool] = lambda _name: True
     now_ns: Callable[[], int] = time.time_ns
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -78,6 +78,8 @@ class GraphPanel(PanelWidget):
         self._seen: tuple[object, ...] = ()
         self._values: tuple[object, ...] = ()
         self._ticks = 0
+        self._hertz: Mapping[str, float] = {}
+        self._box_of: Callable[[str], str] = lambda _entry: ""
         self._decided = False
         self.count = label("", "small", role="textSecondary")
         self.export = Button(theme, _("Export"), "download", size="small")
@@ -167,7 +169,9 @@ class GraphPanel(PanelWidget):
         values = (self.session.topics.values_revision, self.session.networks.values_revision)
         if values != self._values or (self._has_gone() and self._ticks % QUIET_EVERY == 0):
             self._values = values
-            self._renew()
+            self.canvas.renew_soon()
+            self._say_card()
+        self.canvas.renew(self._figures_of)
 
     def _facts(self) -> tuple[object, ...]:
         session = self.session
@@ -190,6 +194,7 @@ class GraphPanel(PanelWidget):
         facts, now = self._graph_facts(), time.monotonic()
         self._quiet.update(facts, now)
         self._calls.update(facts, now)
+        self._hertz = self._calls.rates_hz()
         self._choose(quiet=self._quiet.quiet(now))
 
     def _rebuild(self) -> None:
@@ -218,29 +223,15 @@ class GraphPanel(PanelWidget):
 
     def _show(self, graph: NodeGraph, layout: GraphLayout) -> None:
         scene = GraphScene(self.theme, graph, layout, self._sizes(), self._host)
-        for _area in scene.renew(self._figures(graph)):
-            pass  # all of it is painted anew
-        scene.place_labels()
         scene.dim(self.tools.words())
+        boxes = {node.entry_key: node.key for node in graph.nodes if node.entry_key}
+        self._box_of = lambda entry: boxes.get(entry, "")
         self.canvas.show_scene(scene)
         self._say_note(layout)
         self._say_card()
 
-    def _renew(self) -> None:
-        scene = self.canvas.scene
-        if scene is not None:
-            self.canvas.renew(self._figures(scene.graph))
-        self._say_card()
-
-    def _figures(self, graph: NodeGraph) -> dict[object, LineFigures]:
-        calls = self._calls.rates_hz()
-        boxes = {node.entry_key: node.key for node in graph.nodes if node.entry_key}
-        find = self.session.topic
-
-        def box_of(entry: str) -> str:
-            return boxes.get(entry, "")
-
-        return {line.key: line_figures(line, find, calls, box_of) for line in graph.lines}
+    def _figures_of(self, line: GraphLine) -> LineFigures:
+        return line_figures(line, self.session.topic, self._hertz, self._box_of)
 
     def _has_gone(self) -> bool:
         graph = self._asked
@@ -361,15 +352,14 @@ class GraphPanel(PanelWidget):
     def _card_facts(self) -> CardFacts:
         scene = self.canvas.scene
         nodes = scene.graph.nodes if scene is not None else ()
-        boxes = {node.entry_key: node.key for node in nodes if node.entry_key}
         names = {entry.key: entry.name for entry in (*self.session.nodes, *self.session.networks.nodes)}
         names |= {node.entry_key: node_name(node, self._host) for node in nodes if node.entry_key}
         return CardFacts(
             self.session.topic,
             self.session.graph,
             lambda entry: names.get(entry, split_key(entry)[1]),
-            lambda entry: boxes.get(entry, ""),
-            self._calls.rates_hz(),
+            self._box_of,
+            self._hertz,
             lambda name: is_shown(name, self._choices),
         )
 
@@ -461,6 +451,7 @@ class GraphPanel(PanelWidget):
         scene = self.canvas.scene
         if scene is None:
             return b""
+        scene.complete(self._figures_of)
         area = scene.bounds.adjusted(-20, -20, 20, 20)
         buffer = QBuffer()
         buffer.open(QIODevice.OpenModeFlag.WriteOnly)
@@ -479,13 +470,8 @@ class GraphPanel(PanelWidget):
     def dot(self) -> str:
         """The graph in the language of Graphviz."""
         graph = self.canvas.scene.graph if self.canvas.scene is not None else NodeGraph()
-        figures = self._figures(graph)
         names = {group.key: group_name(group.key, self._host) for group in graph.groups}
-
-        def said(line: GraphLine) -> str:
-            return figures[line.key].words
-
-        return dot_of(graph, names, said)
+        return dot_of(graph, names, lambda line: self._figures_of(line).words)
 
     # -- the window ------------------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
@@ -32,6 +32,8 @@ from app.ui.widgets import paint
 
 CORNER = 10.0
 ARROW_LONG, ARROW_WIDE = 9.0, 8.0
+ROUND = 14.0
+"""How far arrows and thick lines reach beyond their ways."""
 CHOSEN_WIDTH = 2.25
 DIM = 0.3
 CELL = (160.0, 48.0)
@@ -45,6 +47,9 @@ JOIN = 48.0
 """Width of the part of a bridge that names the other network."""
 
 
+FiguresOf = Callable[[GraphLine], LineFigures]
+
+
 @dataclass(slots=True)
 class NodeItem:
     """A box that is painted: its place, and its words as they were painted last."""
@@ -52,22 +57,33 @@ class NodeItem:
     node: GraphNode
     rect: QRectF
     name: str
+    said: str = ""
     line: str = ""
+    """The same, as much of it as there is room for."""
     is_dim: bool = False
 
 
 @dataclass(slots=True)
 class LineItem:
-    """A line that is painted: its ways, their arrows, and where its words stand, if there is room."""
+    """A line that is painted: its ways, and where its words stand once they are placed, if there is room."""
 
     line: GraphLine
     ways: dict[tuple[str, str], Sequence[Place]]
-    path: QPainterPath
-    arrows: list[QPolygonF]
     bounds: QRectF
     label: QRectF | None = None
+    is_placed: bool = False
     figures: LineFigures = field(default_factory=lambda: LineFigures("", 1.25))
     is_dim: bool = False
+    _drawn: tuple[QPainterPath, list[QPolygonF]] | None = None
+
+    def drawn(self) -> tuple[QPainterPath, list[QPolygonF]]:
+        """The ways with round corners, and their arrows; made when they are first painted."""
+        if self._drawn is None:
+            path = QPainterPath()
+            for points in self.ways.values():
+                _add_rounded(path, points)
+            self._drawn = path, [_arrow(points) for points in self.ways.values()]
+        return self._drawn
 
 
 @dataclass(slots=True)
@@ -108,6 +124,10 @@ class GraphScene:
         self.lines = [_line_item(line, ways[line.key]) for line in graph.lines if line.key in ways]
         left, top, width, height = layout.bounds(sizes)
         self.bounds = QRectF(left, top, width, height)
+        heads = (
+            QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), sizes.head - 8)) for item in self.groups
+        )
+        self._taken = _TakenRoom([*(item.rect for item in self.nodes.values()), *heads])
 
     def _fonts(self) -> None:
         theme = self.theme
@@ -139,39 +159,47 @@ class GraphScene:
 
     # -- figures ---------------------------------------------------------------------------------------------
 
-    def renew(self, figures: dict[object, LineFigures]) -> Iterator[QRectF]:
-        """Take over what stands at lines and in nodes; the areas that look otherwise than before."""
-        for item in self.lines:
-            now = figures.get(item.line.key, item.figures)
-            if now == item.figures:
-                continue
-            wider = now.width != item.figures.width or now.lost != item.figures.lost
-            item.figures = now
-            if wider:
-                yield item.bounds
-            elif item.label is not None:
-                yield item.label
-        for box in self.nodes.values():
-            said = self._elided(self.small_font, node_line(box.node), self._words_width(box.node))
-            if said != box.line:
-                box.line = said
-                yield box.rect
+    def seen(self, area: QRectF) -> list[NodeItem | LineItem]:
+        """The nodes and lines in an area."""
+        nodes = [item for item in self.nodes.values() if item.rect.intersects(area)]
+        return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
 
-    def place_labels(self) -> None:
-        """Find room for the words of each line: along its longest level part, and on nothing else."""
-        heads = (
-            QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), self.sizes.head - 8))
-            for item in self.groups
-        )
-        taken = _TakenRoom([*(item.rect for item in self.nodes.values()), *heads])
-        high = QFontMetricsF(self.label_font).height()
-        for item in sorted(self.lines, key=lambda each: each.line.topics):
-            letters = max(len(item.figures.words), len(item.figures.words.rpartition(" ")[0]) + LABEL_ROOM)
-            item.label = None
-            for rect in _rooms(item, letters * self.letter + 4, high):
-                if taken.take(rect):
-                    item.label = rect
-                    break
+    def renew(self, item: NodeItem | LineItem, figures: FiguresOf, *, with_words: bool) -> QRectF | None:
+        """Take over the figures of one node or line; the area that looks otherwise than before, or None.
+
+        The words of a line find their room when they are first asked for (``with_words``).
+        """
+        if isinstance(item, NodeItem):
+            said = node_line(item.node) if with_words else item.said
+            if said == item.said:
+                return None
+            item.said = said
+            item.line = self._elided(self.small_font, said, self._words_width(item.node))
+            return item.rect
+        now, before = figures(item.line), item.figures
+        item.figures = now
+        if now.width != before.width or now.lost != before.lost:
+            area: QRectF | None = item.bounds
+        else:
+            area = item.label if now.words != before.words else None
+        if with_words and not item.is_placed:
+            item.is_placed = True
+            item.label = self._room_for(item)
+            area = area or item.label
+        return area
+
+    def complete(self, figures: FiguresOf) -> None:
+        """Take over everything at once, as a saved picture needs it."""
+        every: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
+        for item in every:
+            self.renew(item, figures, with_words=True)
+
+    def _room_for(self, item: LineItem) -> QRectF | None:
+        """Room for the words of a line that nothing else has: along its longest level part, or beside it."""
+        words = item.figures.words
+        letters = max(len(words), len(words.rpartition(" ")[0]) + LABEL_ROOM)
+        wide, high = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
+        return next((rect for rect in _rooms(item, wide, high) if self._taken.take(rect)), None)
 
     def dim(self, words: Sequence[str]) -> None:
         """Let what has not all of these words fade; who talks with what has them does not."""
@@ -195,6 +223,10 @@ class GraphScene:
     def dimmed(self) -> int:
         """How many nodes the filter lets fade."""
         return sum(item.is_dim for item in self.nodes.values())
+
+    def has_words(self, scale: float) -> bool:
+        """Whether the smaller words can be read in this size, and are painted."""
+        return scale * self.small_font.pixelSize() >= LEAST_SMALL_PX
 
     # -- what is under the mouse -----------------------------------------------------------------------------
 
@@ -245,14 +277,10 @@ class GraphScene:
 
 
 def _line_item(line: GraphLine, ways: dict[tuple[str, str], Sequence[Place]]) -> LineItem:
-    path, arrows = QPainterPath(), []
-    for points in ways.values():
-        _add_rounded(path, points)
-        arrows.append(_arrow(points))
-    bounds = path.boundingRect()
-    for arrow in arrows:
-        bounds = bounds.united(arrow.boundingRect())
-    return LineItem(line, ways, path, arrows, bounds.adjusted(-12, -12, 12, 12))
+    xs = [x for points in ways.values() for x, _y in points]
+    ys = [y for points in ways.values() for _x, y in points]
+    left, top = min(xs) - ROUND, min(ys) - ROUND
+    return LineItem(line, ways, QRectF(left, top, max(xs) + ROUND - left, max(ys) + ROUND - top))
 
 
 def _add_rounded(path: QPainterPath, points: Sequence[Place]) -> None:
@@ -373,7 +401,7 @@ class _Painting:
         self.scene, self.theme, self.painter = scene, scene.theme, painter
         self.clip, self.scale, self.rings = clip, scale, rings
         self.has_text = scale * scene.name_font.pixelSize() >= LEAST_TEXT_PX
-        self.has_small = scale * scene.small_font.pixelSize() >= LEAST_SMALL_PX
+        self.has_small = scene.has_words(scale)
         line = scene.graph.line_of(chosen.key) if chosen is not None and chosen.kind == "topic" else None
         self.line = line
         self.chosen = chosen.key if chosen is not None and chosen.kind == "node" else ""
@@ -446,10 +474,11 @@ class _Painting:
             pen.setDashPattern([5 / width, 4 / width])
         self.painter.setPen(pen)
         self.painter.setBrush(Qt.BrushStyle.NoBrush)
-        self.painter.drawPath(item.path)
+        path, arrows = item.drawn()
+        self.painter.drawPath(path)
         self.painter.setPen(Qt.PenStyle.NoPen)
         self.painter.setBrush(colour)
-        for arrow in item.arrows:
+        for arrow in arrows:
             self.painter.drawPolygon(arrow)
 
     def _label(self, item: LineItem, rect: QRectF) -> None:
