@@ -65,7 +65,7 @@ class GraphChoices:
 
 
 @dataclass(frozen=True, slots=True)
-class GraphNode:
+class DrawnNode:
     """One box. ``key`` is the same for a program that is started again; ``entry`` is what is known of it now.
 
     A closed group is a box, too, with no entry and the number of its ``members``. ``joins`` is what a bridge
@@ -125,7 +125,7 @@ class GraphGroup:
 class NodeGraph:
     """What is drawn, each in a settled order; ``nodes_there`` are all that are known, also those hidden."""
 
-    nodes: tuple[GraphNode, ...] = ()
+    nodes: tuple[DrawnNode, ...] = ()
     lines: tuple[GraphLine, ...] = ()
     groups: tuple[GraphGroup, ...] = ()
     nodes_there: int = 0
@@ -133,7 +133,7 @@ class NodeGraph:
     services_there: int = 0
     quiet_hidden: int = 0
 
-    def node(self, key: str) -> GraphNode | None:
+    def node(self, key: str) -> DrawnNode | None:
         """The box of that key, or None."""
         return next((node for node in self.nodes if node.key == key), None)
 
@@ -170,22 +170,22 @@ def node_graph(facts: GraphFacts, choices: GraphChoices) -> NodeGraph:
     )
 
 
-def _is_hidden(node: GraphNode, choices: GraphChoices) -> bool:
+def _is_hidden(node: DrawnNode, choices: GraphChoices) -> bool:
     return node.is_quiet and choices.hides_quiet and node.group not in choices.quiet_shown
 
 
 # -- nodes and their groups ----------------------------------------------------------------------------------
 
 
-def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, GraphNode]:
+def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
     """The box of each entry, by the entry's key; groups are not closed yet."""
     pictures = {topic.key for topic in facts.topics if topic.codec == "image"}
-    made: dict[str, GraphNode] = {}
+    made: dict[str, DrawnNode] = {}
     taken: Counter[str] = Counter()
     for entry in sorted(facts.nodes, key=lambda each: (each.since_ns, each.id)):
         key = f"{entry.network}|{entry.host}|{entry.name}"
         taken[key] += 1
-        made[entry.key] = GraphNode(
+        made[entry.key] = DrawnNode(
             key if taken[key] == 1 else f"{key}|{taken[key]}",
             _name_of(entry),
             _group_of(entry, facts, choices.group_by),
@@ -243,10 +243,10 @@ def _belongs(entry: NodeEntry, robot: str) -> bool:
 
 
 def _groups(
-    facts: GraphFacts, choices: GraphChoices, boxes: Mapping[str, GraphNode]
+    facts: GraphFacts, choices: GraphChoices, boxes: Mapping[str, DrawnNode]
 ) -> tuple[GraphGroup, ...]:
     """The groups in the order of their keys. One of which all are hidden is closed: it stays in sight."""
-    members: dict[str, list[GraphNode]] = {}
+    members: dict[str, list[DrawnNode]] = {}
     for node in boxes.values():
         members.setdefault(node.group, []).append(node)
     addresses = _addresses(facts)
@@ -270,7 +270,7 @@ def _host_of(group: str) -> str:
     return group.partition(":")[2]
 
 
-def _icon_of(group: str, nodes: Iterable[GraphNode], facts: GraphFacts) -> str:
+def _icon_of(group: str, nodes: Iterable[DrawnNode], facts: GraphFacts) -> str:
     kind, _colon, name = group.partition(":")
     if kind == "network":
         return "waypoints"
@@ -305,8 +305,8 @@ def _address_in(endpoint: str) -> str:
     return "" if host.startswith(("127.", "0.")) or host in {"localhost", "::1", "*", "::"} else host
 
 
-def _box_of(group: GraphGroup) -> GraphNode:
-    return GraphNode(group.key, group.name, group.key, "group", members=group.members, quiet=group.quiet)
+def _box_of(group: GraphGroup) -> DrawnNode:
+    return DrawnNode(group.key, group.name, group.key, "group", members=group.members, quiet=group.quiet)
 
 
 # -- lines ---------------------------------------------------------------------------------------------------

@@ -3,13 +3,13 @@ from __future__ import annotations
 import pytest
 
 from app.core.graph.dot import dot_of, quoted
-from app.core.graph.node_graph import GraphGroup, GraphLine, GraphNode, NodeGraph
+from app.core.graph.node_graph import GraphGroup, GraphLine, DrawnNode, NodeGraph
 
 GRAPH = NodeGraph(
     (
-        GraphNode("k1", 'say "hi"', "host:a", "program"),
-        GraphNode("k2", "gone", "host:a", "program", is_gone=True),
-        GraphNode("host:b", "b", "host:b", "group", members=3),
+        DrawnNode("k1", 'say "hi"', "host:a", "program"),
+        DrawnNode("k2", "gone", "host:a", "program", is_gone=True),
+        DrawnNode("host:b", "b", "host:b", "group", members=3),
     ),
     (
         GraphLine("topic", ("k1",), ("k2", "host:b"), ("/t",)),

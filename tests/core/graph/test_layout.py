@@ -9,13 +9,13 @@ import pytest
 from app.core.graph import layout as layout_module
 from app.core.graph.layout import MOST_ROUTES, GraphLayout, LayoutSizes, arrange
 from app.core.graph.layout_thread import LayoutThread
-from app.core.graph.node_graph import GraphGroup, GraphLine, GraphNode, NodeGraph
+from app.core.graph.node_graph import GraphGroup, GraphLine, DrawnNode, NodeGraph
 from tests.nep.programs import eventually
 
 
 def graph(groups: dict[str, str], pairs: str = "", *, quiet: int = 0) -> NodeGraph:
     """``groups``: letters by group; ``pairs``: "ab cd", who tells whom."""
-    nodes = [GraphNode(key, key, group, "program") for group, keys in groups.items() for key in keys]
+    nodes = [DrawnNode(key, key, group, "program") for group, keys in groups.items() for key in keys]
     made = [
         GraphGroup(group, group, "", "monitor", len(keys), quiet, False)
         for group, keys in groups.items()
@@ -114,7 +114,7 @@ def test_nothing_and_one() -> None:
 
 def test_too_many_lines_are_left_out_and_counted() -> None:
     keys = [f"n{number}" for number in range(120)]
-    nodes = tuple(GraphNode(key, key, "", "program") for key in keys)
+    nodes = tuple(DrawnNode(key, key, "", "program") for key in keys)
     all_to_all = GraphLine("topic", tuple(keys), tuple(keys), ("/clock",))
     one = GraphLine("topic", ("n0",), ("n1",), ("/one",))
     found = arrange(NodeGraph(nodes, (all_to_all, one), (), 120))

@@ -3,11 +3,11 @@ from __future__ import annotations
 import pytest
 
 from app.core.graph.layout import GraphLayout
-from app.core.graph.node_graph import GraphLine, GraphNode, NodeGraph
+from app.core.graph.node_graph import GraphLine, DrawnNode, NodeGraph
 from app.core.graph.walk import Arrow, GraphChoice, step
 
 GRAPH = NodeGraph(
-    tuple(GraphNode(key, key, "", "program") for key in "abcd"),
+    tuple(DrawnNode(key, key, "", "program") for key in "abcd"),
     (
         GraphLine("topic", ("a",), ("b", "c"), ("/two", "/with")),
         GraphLine("topic", ("a",), ("d",), ("/three",)),

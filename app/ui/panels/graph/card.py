@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.graph.node_graph import GraphNode
+from app.core.graph.node_graph import DrawnNode
 from app.core.network.topics import Topic, key_of, split_key
 from app.ui.panels.graph.words import percent_words, short_rate
 from app.ui.text.nodes import cpu_words, generation_words
@@ -390,7 +390,7 @@ def _row(facts: CardFacts, entry: str, figures: tuple[str, ...]) -> Row:
     return facts.box_of(entry), facts.name_of(entry), figures
 
 
-def node_card(node: GraphNode, services: Sequence[tuple[str, bool]], facts: CardFacts) -> CardContent | None:
+def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: CardFacts) -> CardContent | None:
     """What is known of a node; ``services`` are those that it serves (True) or calls."""
     entry = node.entry
     if entry is None:

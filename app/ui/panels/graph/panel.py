@@ -35,7 +35,7 @@ from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.graph.canvas import GraphCanvas, GraphOverview
 from app.ui.panels.graph.card import WIDTH, CardFacts, GraphCard, node_card, topic_card
 from app.ui.panels.graph.scene import GraphScene
-from app.ui.panels.graph.tools import GraphTools, Legend
+from app.ui.panels.graph.tools import GraphTools, GraphLegend
 from app.ui.panels.graph.words import (
     LineFigures,
     group_name,
@@ -94,7 +94,7 @@ class GraphPanel(PanelWidget):
         self.tools = GraphTools(theme)
         self.canvas = GraphCanvas(theme, self._described, self._topic_words)
         self.overview = GraphOverview(theme, self.canvas)
-        self.legend = Legend(theme)
+        self.legend = GraphLegend(theme)
         self.card = GraphCard(theme)
         self.empty = EmptyState(theme, "workflow", "", "")
         self.note = label("", "small", role="textSecondary", wrap=True)

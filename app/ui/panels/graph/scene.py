@@ -15,7 +15,7 @@ from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF
 
 from app.core.graph.layout import GraphLayout, LayoutSizes, Place
-from app.core.graph.node_graph import GraphGroup, GraphLine, GraphNode, NodeGraph
+from app.core.graph.node_graph import GraphGroup, GraphLine, DrawnNode, NodeGraph
 from app.core.graph.walk import GraphChoice
 from app.ui.panels.graph.words import (
     LineFigures,
@@ -54,7 +54,7 @@ FiguresOf = Callable[[GraphLine], LineFigures]
 class NodeItem:
     """A box that is painted: its place, and its words as they were painted last."""
 
-    node: GraphNode
+    node: DrawnNode
     rect: QRectF
     name: str
     said: str = ""
@@ -137,7 +137,7 @@ class GraphScene:
         self.label_font, self.title_font = theme.font("code"), theme.font("title")
         self.letter = QFontMetricsF(self.label_font).horizontalAdvance("0")
 
-    def _words_width(self, node: GraphNode) -> float:
+    def _words_width(self, node: DrawnNode) -> float:
         return self.sizes.node[0] - 46 - (JOIN if node.joins else 0)
 
     @staticmethod
@@ -230,7 +230,7 @@ class GraphScene:
 
     # -- what is under the mouse -----------------------------------------------------------------------------
 
-    def node_at(self, at: QPointF) -> GraphNode | None:
+    def node_at(self, at: QPointF) -> DrawnNode | None:
         """The node there."""
         return next((item.node for item in self.nodes.values() if item.rect.contains(at)), None)
 
@@ -350,7 +350,7 @@ def _distance_to_part(at: Place, begin: Place, end: Place) -> float:
     return math.dist(at, (begin[0] + wide * share, begin[1] + high * share))
 
 
-def _haystack(node: GraphNode) -> str:
+def _haystack(node: DrawnNode) -> str:
     entry = node.entry
     if entry is None:
         return node.name.casefold()

@@ -14,7 +14,7 @@ from app.ui.widgets.inputs.fields import FilterField
 from nep.i18n import _, ngettext, number
 
 
-class ToggleButton(Button):
+class FilledToggle(Button):
     """A button that is on or off: on it is filled as what is chosen, with an edge of the accent."""
 
     def __init__(self, theme: Theme, text: str, icon: str) -> None:
@@ -40,8 +40,8 @@ class GraphTools(QWidget):
             size="small",
             name=_("Group by"),
         )
-        self.quiet = ToggleButton(theme, _("Hide quiet nodes"), "eye-off")
-        self.services = ToggleButton(theme, _("Services"), "spline")
+        self.quiet = FilledToggle(theme, _("Hide quiet nodes"), "eye-off")
+        self.services = FilledToggle(theme, _("Services"), "spline")
         self.smaller = IconButton(theme, "zoom-out", _("Smaller"), "-", size=26)
         self.larger = IconButton(theme, "zoom-in", _("Larger"), "+", size=26)
         self.scale = label("100 %", "body", role="textSecondary")
@@ -85,7 +85,7 @@ class GraphTools(QWidget):
         self.scale.setText(f"{number(scale * 100, '.0f')} %")
 
 
-class Legend(QWidget):
+class GraphLegend(QWidget):
     """What lines and edges mean, in one row."""
 
     def __init__(self, theme: Theme) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.graph.node_graph import BRIDGE_TO, GraphGroup, GraphLine, GraphNode
+from app.core.graph.node_graph import BRIDGE_TO, GraphGroup, GraphLine, DrawnNode
 from app.core.network.topics import Topic, key_of, split_key
 from app.core.networks.kinds import kind_named
 from app.ui.text.nodes import cpu_words, generation_words
@@ -41,12 +41,12 @@ class LineFigures:
     lost: tuple[tuple[str, float], ...] = ()
 
 
-def node_icon(node: GraphNode) -> str:
+def node_icon(node: DrawnNode) -> str:
     """The icon of a node's kind."""
     return "camera" if node.has_pictures and node.kind == "program" else ICONS[node.kind]
 
 
-def node_name(node: GraphNode, host: str) -> str:
+def node_name(node: DrawnNode, host: str) -> str:
     """Its name; of a closed group what it is called."""
     if node.kind == "group":
         return group_name(node.key, host)
@@ -55,7 +55,7 @@ def node_name(node: GraphNode, host: str) -> str:
     return node.name
 
 
-def node_line(node: GraphNode) -> str:
+def node_line(node: DrawnNode) -> str:
     """The second line of a node: "Python, 4.1 %", "this window", "gone 4 s", "41 nodes"."""
     entry = node.entry
     if entry is None:
@@ -73,7 +73,7 @@ def node_line(node: GraphNode) -> str:
     return ", ".join(filter(None, (language, cpu)))
 
 
-def _of_network(node: GraphNode) -> str:
+def _of_network(node: DrawnNode) -> str:
     entry = node.entry
     return generation_words(entry) if entry is not None and entry.network else ""
 
