@@ -247,6 +247,20 @@ class Button(PaintedButton):
         )
 
 
+class ToggleButton(Button):
+    """A button that stays on: in the colours of what is chosen."""
+
+    def __init__(self, theme: Theme, text: str, icon: str) -> None:
+        super().__init__(theme, text, icon, size="small")
+        self.setCheckable(True)
+
+    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+        colour = self._theme.colour
+        if self.isChecked() and self.isEnabled():
+            return colour("selected"), colour("accent"), colour("selectedText")
+        return super()._look()
+
+
 class IconButton(PaintedButton):
     """A button with only an icon; its name and shortcut are its tooltip and what a screen reader says."""
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from app.core.graph.dot import dot_of, quoted
-from app.core.graph.node_graph import GraphGroup, GraphLine, DrawnNode, NodeGraph
+from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
 
 GRAPH = NodeGraph(
     (

@@ -9,7 +9,7 @@ import pytest
 from app.core.graph import layout as layout_module
 from app.core.graph.layout import MOST_ROUTES, GraphLayout, LayoutSizes, arrange
 from app.core.graph.layout_thread import LayoutThread
-from app.core.graph.node_graph import GraphGroup, GraphLine, DrawnNode, NodeGraph
+from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
 from tests.nep.programs import eventually
 
 

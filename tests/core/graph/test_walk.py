@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from app.core.graph.layout import GraphLayout
-from app.core.graph.node_graph import GraphLine, DrawnNode, NodeGraph
+from app.core.graph.node_graph import DrawnNode, GraphLine, NodeGraph
 from app.core.graph.walk import Arrow, GraphChoice, step
 
 GRAPH = NodeGraph(

@@ -35,7 +35,7 @@ from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.graph.canvas import GraphCanvas, GraphOverview
 from app.ui.panels.graph.card import WIDTH, CardFacts, GraphCard, node_card, topic_card
 from app.ui.panels.graph.scene import GraphScene
-from app.ui.panels.graph.tools import GraphTools, GraphLegend
+from app.ui.panels.graph.tools import GraphLegend, GraphTools
 from app.ui.panels.graph.words import (
     LineFigures,
     group_name,

@@ -15,7 +15,7 @@ from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF
 
 from app.core.graph.layout import GraphLayout, LayoutSizes, Place
-from app.core.graph.node_graph import GraphGroup, GraphLine, DrawnNode, NodeGraph
+from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
 from app.core.graph.walk import GraphChoice
 from app.ui.panels.graph.words import (
     LineFigures,

@@ -3,29 +3,16 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.core.graph.node_graph import GraphChoices
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Segments, label, paint
+from app.ui.widgets.buttons import ToggleButton
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.fields import FilterField
 from nep.i18n import _, ngettext, number
-
-
-class FilledToggle(Button):
-    """A button that is on or off: on it is filled as what is chosen, with an edge of the accent."""
-
-    def __init__(self, theme: Theme, text: str, icon: str) -> None:
-        super().__init__(theme, text, icon, size="small")
-        self.setCheckable(True)
-
-    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
-        if not self.isChecked():
-            return super()._look()
-        theme = self._theme
-        return theme.colour("selected"), theme.colour("accent"), theme.colour("selectedText")
 
 
 class GraphTools(QWidget):
@@ -40,8 +27,8 @@ class GraphTools(QWidget):
             size="small",
             name=_("Group by"),
         )
-        self.quiet = FilledToggle(theme, _("Hide quiet nodes"), "eye-off")
-        self.services = FilledToggle(theme, _("Services"), "spline")
+        self.quiet = ToggleButton(theme, _("Hide quiet nodes"), "eye-off")
+        self.services = ToggleButton(theme, _("Services"), "spline")
         self.smaller = IconButton(theme, "zoom-out", _("Smaller"), "-", size=26)
         self.larger = IconButton(theme, "zoom-in", _("Larger"), "+", size=26)
         self.scale = label("100 %", "body", role="textSecondary")

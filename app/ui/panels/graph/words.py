@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.graph.node_graph import BRIDGE_TO, GraphGroup, GraphLine, DrawnNode
+from app.core.graph.node_graph import BRIDGE_TO, DrawnNode, GraphGroup, GraphLine
 from app.core.network.topics import Topic, key_of, split_key
 from app.core.networks.kinds import kind_named
 from app.ui.text.nodes import cpu_words, generation_words

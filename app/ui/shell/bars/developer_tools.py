@@ -11,8 +11,8 @@ from app.ui.shell.commands.freeze import all_frozen, freezable
 from app.ui.shell.commands.shell import Shell
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
-from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Separator, paint
+from app.ui.widgets.buttons import ToggleButton
 from nep.i18n import _
 
 FREEZE = "view.freeze"
@@ -39,20 +39,6 @@ class MenuButton(Button):
         painter.translate(-(side + GAP) / 2, 0)
         super().paint_content(painter, ink)
         painter.restore()
-
-
-class ToggleButton(Button):
-    """A button that stays on: in the colours of what is chosen."""
-
-    def __init__(self, theme: Theme, text: str, icon: str) -> None:
-        super().__init__(theme, text, icon, size="small")
-        self.setCheckable(True)
-
-    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
-        colour = self._theme.colour
-        if self.isChecked() and self.isEnabled():
-            return colour("selected"), colour("accent"), colour("selectedText")
-        return super()._look()
 
 
 class DeveloperTools(QObject):
