@@ -9,6 +9,7 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import replace
 
 from app.core.graph.layout import GraphLayout, LayoutSizes, arrange
@@ -41,12 +42,21 @@ class LayoutProcess:
             told, _nothing = self._process.communicate(pickle.dumps((bare, before, sizes)), TIMEOUT_S)
         except (subprocess.TimeoutExpired, OSError, ValueError):
             self.kill()
-            self._process.communicate()
             return None
+        finally:
+            self._leave()
         if self._process.returncode or not told:
             return None
         made = pickle.loads(told)  # noqa: S301 - what our own child wrote
         return made if isinstance(made, GraphLayout) else None
+
+    def _leave(self) -> None:
+        """It has ended, or was: nothing of it stays open."""
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with suppress(OSError):  # what it did not read any more
+                    pipe.close()
+        self._process.wait()
 
     def kill(self) -> None:
         """End it at once, whatever it does."""
