@@ -117,7 +117,10 @@ class Runs:
         """Open every group, and wait until all have their places; how late the window was, in ms."""
         panel, began, late = self.panel, time.monotonic(), [0.0]
         panel._layout = None  # noqa: SLF001
-        panel._choices = replace(panel._choices, starts_closed=False)  # noqa: SLF001
+        scene = panel.canvas.scene
+        assert scene is not None
+        every = frozenset(group.key for group in scene.graph.groups)
+        panel._choices = replace(panel._choices, toggled=every)  # noqa: SLF001
         while len(late) < 2 or not placed(panel):
             late.append(self.meter.measure(0.25).late_max)
         print(
@@ -160,7 +163,6 @@ def main() -> int:
         for name in ("plain", "plain again"):
             runs.measure(name, figures, seconds / 2)
         figures = Figures(opened, many)
-        panel._decided = False  # noqa: SLF001 - as at the first look at so many
         bare.tell(str(seconds))
         figures.tell()
         run_for(0.5)

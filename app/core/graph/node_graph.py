@@ -123,7 +123,7 @@ class GraphGroup:
 
 @dataclass(frozen=True, slots=True)
 class NodeGraph:
-    """What is drawn, each in a settled order; ``nodes_there`` are all that are known, also those hidden."""
+    """What is drawn, each in a settled order; ``nodes_there`` counts all that are there, also hidden ones."""
 
     nodes: tuple[DrawnNode, ...] = ()
     lines: tuple[GraphLine, ...] = ()
@@ -163,7 +163,7 @@ def node_graph(facts: GraphFacts, choices: GraphChoices) -> NodeGraph:
         tuple(drawn),
         tuple(sorted([*lines, *services], key=lambda line: (line.kind, line.topics))),
         groups,
-        len(facts.nodes),
+        sum(entry.gone_s is None for entry in facts.nodes),
         sum(len(line.topics) for line in lines),
         sum(len(line.topics) for line in services),
         sum(_is_hidden(node, choices) for node in boxes.values()),

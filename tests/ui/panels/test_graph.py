@@ -254,6 +254,35 @@ def test_the_card_of_a_service(panel: GraphPanel) -> None:
     panel.canvas.opened.emit("remember")  # Enter: there is nothing to inspect
 
 
+@pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, 2.0**64, -1.0])
+def test_impossible_figures_break_nothing(panel: GraphPanel, window: Window, rate: float) -> None:
+    more = graph()
+    odd = replace(more.topics["/touch"], rate_hz=rate, bandwidth_Bps=rate, loss_ratio=rate, lost=2**64 - 1)
+    odd = replace(
+        odd, publishers=tuple(replace(each, rate_hz=rate, last_seq=2**64 - 1) for each in odd.publishers)
+    )
+    show(window, replace(more, topics={**more.topics, "/touch": odd}))
+    panel.canvas.choose(GraphChoice("topic", "/touch"))
+    panel.refresh()
+    panel.canvas.grab()
+    assert panel.card.content is not None
+    assert any(words.startswith("/touch") for words in words_at(panel))
+
+
+def test_another_theme_moves_nobody_and_larger_text_arranges_anew(
+    panel: GraphPanel, window: Window, qtbot
+) -> None:
+    scene = panel.canvas.scene
+    window.theme.set_mode("dark")
+    panel.refresh()
+    assert panel.canvas.scene is scene
+    window.theme.set_text_percent(150)
+    settle(qtbot, panel)
+    assert panel.canvas.scene is not scene
+    node = panel.canvas.scene.nodes[key_of(panel, "RIZE")]  # type: ignore[union-attr]
+    assert node.rect.width() == 228
+
+
 def test_keys_walk_along_lines_and_say_what_is_chosen(panel: GraphPanel, window: Window) -> None:
     canvas = panel.canvas
     canvas.choose(GraphChoice("node", key_of(panel, "pepper_driver")))

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout
 
 from app.core.graph.node_graph import DrawnNode
 from app.core.network.topics import Topic, key_of, split_key
-from app.ui.panels.graph.words import percent_words, short_rate
+from app.ui.panels.graph.words import known_figure, percent_words, short_rate
 from app.ui.text.nodes import cpu_words, generation_words
 from app.ui.text.numbers import age_words, bandwidth_words, grouped, latency_words, rate_words, size_words
 from app.ui.theme.theme import Theme
@@ -295,16 +295,15 @@ def topic_card(key: str, facts: CardFacts) -> CardContent | None:
 
 
 def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
-    size = topic.bandwidth_Bps / topic.rate_hz if topic.bandwidth_Bps and topic.rate_hz else None
+    rate, sent = known_figure(topic.rate_hz), known_figure(topic.bandwidth_Bps)
+    size = sent / rate if sent and rate else None
     rates = tuple(topic.rates)
     least = _("least {rate} lately").format(rate=rate_words(min(rates))) if len(rates) > 1 else ""
     figures = (
-        CardFigure(
-            _("Rate"), f"{rate_words(topic.rate_hz)} /s" if topic.rate_hz is not None else "", least, rates
-        ),
+        CardFigure(_("Rate"), f"{rate_words(rate)} /s" if rate is not None else "", least, rates),
         CardFigure(
             _("Bandwidth"),
-            bandwidth_words(topic.bandwidth_Bps),
+            bandwidth_words(sent),
             _("{size} a message").format(size=size_words(size)) if size else "",
         ),
         _lost(topic),
@@ -312,7 +311,11 @@ def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
     )
     info = topic.info
     publishers = tuple(
-        _row(facts, key_of(topic.network, each.node_id), (rate_words(each.rate_hz), grouped(each.last_seq)))
+        _row(
+            facts,
+            key_of(topic.network, each.node_id),
+            (rate_words(known_figure(each.rate_hz)), grouped(each.last_seq)),
+        )
         for each in (info.publishers if info is not None else ())[:MOST_ROWS]
     )
     subscribers = tuple(
@@ -428,7 +431,7 @@ def _topics_of(title: str, network: str, names: Sequence[str], facts: CardFacts)
     for name in names[:MOST_ROWS]:
         key = key_of(network, name)
         topic = facts.topic_of(key)
-        rate = "" if topic is None else rate_words(topic.rate_hz)
+        rate = "" if topic is None else rate_words(known_figure(topic.rate_hz))
         rows.append((key if topic is not None else "", split_key(key)[1], (rate,)))
     if len(names) > MOST_ROWS:
         rows.append(("", _more(len(names) - MOST_ROWS), ("",)))

@@ -39,6 +39,7 @@ from app.ui.panels.graph.tools import GraphLegend, GraphTools
 from app.ui.panels.graph.words import (
     LineFigures,
     group_name,
+    known_figure,
     line_figures,
     line_name,
     node_line,
@@ -75,12 +76,12 @@ class GraphPanel(PanelWidget):
         self._quiet, self._calls = QuietNodes(), CallRates()
         self._layout: GraphLayout | None = None
         self._asked: NodeGraph | None = None
+        self._sizes_asked = LayoutSizes()
         self._seen: tuple[object, ...] = ()
         self._values: tuple[object, ...] = ()
         self._ticks = 0
         self._hertz: Mapping[str, float] = {}
         self._box_of: Callable[[str], str] = lambda _entry: ""
-        self._decided = False
         self.count = label("", "small", role="textSecondary")
         self.export = Button(theme, _("Export"), "download", size="small")
         self._menu = Menu(theme, self.export)
@@ -199,19 +200,20 @@ class GraphPanel(PanelWidget):
 
     def _rebuild(self) -> None:
         facts = self._graph_facts()
-        if facts.nodes and not self._decided:
-            self._decided = True
-            self._choose(starts_closed=len(facts.nodes) > MOST_OPEN)
+        choices = self._choices
+        if len(facts.nodes) > MOST_OPEN and not (choices.starts_closed or choices.toggled):
+            self._layout = None
+            self._choose(starts_closed=True)
         graph = node_graph(facts, self._choices)
         self.pages.setCurrentIndex(0 if facts.nodes else 1)
         self.export.setVisible(bool(facts.nodes))
         if not facts.nodes:
-            self._decided = False
+            self._choose(starts_closed=False)
             self._say_empty()
         self._say_counts(graph)
         if graph != self._asked:
-            self._asked = graph
-            self._thread.ask(graph, self._layout, self._sizes())
+            self._asked, self._sizes_asked = graph, self._sizes()
+            self._thread.ask(graph, self._layout, self._sizes_asked)
 
     def _take_layout(self) -> None:
         made = self._thread.take()
@@ -222,7 +224,7 @@ class GraphPanel(PanelWidget):
         self._show(graph, layout)
 
     def _show(self, graph: NodeGraph, layout: GraphLayout) -> None:
-        scene = GraphScene(self.theme, graph, layout, self._sizes(), self._host)
+        scene = GraphScene(self.theme, graph, layout, self._sizes_asked, self._host)
         scene.dim(self.tools.words())
         boxes = {node.entry_key: node.key for node in graph.nodes if node.entry_key}
         self._box_of = lambda entry: boxes.get(entry, "")
@@ -411,8 +413,9 @@ class GraphPanel(PanelWidget):
             said = _("from {sources} to {targets}")
             ends = said.format(sources=self._names(line.sources), targets=self._names(line.targets))
         figures = [split_key(key)[1]]
-        if topic is not None and topic.rate_hz is not None:
-            figures += [short_rate(topic.rate_hz), bandwidth_words(topic.bandwidth_Bps)]
+        rate = known_figure(topic.rate_hz) if topic is not None else None
+        if topic is not None and rate is not None:
+            figures += [short_rate(rate), bandwidth_words(known_figure(topic.bandwidth_Bps))]
         return ", ".join(filter(None, (*figures, ends)))
 
     def _names(self, keys: tuple[str, ...]) -> str:
@@ -506,7 +509,7 @@ class GraphPanel(PanelWidget):
     def theme_changed(self) -> None:
         super().theme_changed()
         self._fit()
-        if self._asked is not None:
+        if self._asked is not None and self._sizes() != self._sizes_asked:
             self._arrange_anew()
 
     def save_state(self) -> dict[str, object]:

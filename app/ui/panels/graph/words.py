@@ -115,9 +115,9 @@ def line_figures(
         known = [hertz[name] for name in line.topics if name in hertz]
         return LineFigures(f"{names} {short_rate(sum(known))}" if known else names, THIN)
     topics = [topic for name in line.topics if (topic := topic_of(name)) is not None]
-    rates = [topic.rate_hz for topic in topics if _is_figure(topic.rate_hz)]
-    rate = short_rate(sum(filter(None, rates))) if rates else ""
-    sent = sum(topic.bandwidth_Bps for topic in topics if _is_figure(topic.bandwidth_Bps))  # type: ignore[misc]
+    rates = [hz for topic in topics if (hz := known_figure(topic.rate_hz)) is not None]
+    rate = short_rate(sum(rates)) if rates else ""
+    sent = sum(known_figure(topic.bandwidth_Bps) or 0.0 for topic in topics)
     return LineFigures(f"{names} {rate}".rstrip(), line_width(sent), _losses(topics, box_of))
 
 
@@ -133,8 +133,9 @@ def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tupl
     return tuple(sorted(found.items()))
 
 
-def _is_figure(value: float | None) -> bool:
-    return value is not None and math.isfinite(value)
+def known_figure(value: float | None) -> float | None:
+    """The same; None for what is no number that a person could read."""
+    return value if value is not None and math.isfinite(value) else None
 
 
 def line_name(topics: Sequence[str]) -> str:
