@@ -125,6 +125,9 @@ class GraphCanvas(QWidget):
         scene = self.scene
         if scene is None or not self._waiting:
             return 0
+        if not scene.has_figures(self.scale):
+            self._waiting = []  # they are renewed when it is enlarged
+            return 0
         now, self._waiting = self._waiting[:AT_ONCE], self._waiting[AT_ONCE:]
         has_words = scene.has_words(self.scale)
         changed = [scene.renew(item, figures, with_words=has_words) for item in now]

@@ -41,6 +41,8 @@ LABEL_ROOM = 7
 """Letters that a label keeps for its figure."""
 LEAST_TEXT_PX, LEAST_SMALL_PX = 6.0, 7.0
 """Smaller letters are not painted: nobody could read them."""
+TINY = 0.2
+"""In smaller sizes thousands of lines are in sight, of which no figure can be read or thickness be seen."""
 REACH = 6.0
 """How near to a line a press of the mouse means it, in px of the screen."""
 JOIN = 48.0
@@ -224,6 +226,11 @@ class GraphScene:
         """How many nodes the filter lets fade."""
         return sum(item.is_dim for item in self.nodes.values())
 
+    @staticmethod
+    def has_figures(scale: float) -> bool:
+        """Whether figures change anything in this size; else lines are of one pixel, without arrows."""
+        return scale >= TINY
+
     def has_words(self, scale: float) -> bool:
         """Whether the smaller words can be read in this size, and are painted."""
         return scale * self.small_font.pixelSize() >= LEAST_SMALL_PX
@@ -402,6 +409,8 @@ class _Painting:
         self.clip, self.scale, self.rings = clip, scale, rings
         self.has_text = scale * scene.name_font.pixelSize() >= LEAST_TEXT_PX
         self.has_small = scene.has_words(scale)
+        self.is_tiny = not scene.has_figures(scale)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, not self.is_tiny)
         line = scene.graph.line_of(chosen.key) if chosen is not None and chosen.kind == "topic" else None
         self.line = line
         self.chosen = chosen.key if chosen is not None and chosen.kind == "node" else ""
@@ -468,14 +477,17 @@ class _Painting:
     def _line(self, item: LineItem) -> None:
         is_chosen = item.line is self.line
         colour = self.theme.colour("accent" if is_chosen else "controlBorder")
-        width = CHOSEN_WIDTH if is_chosen else item.figures.width
+        width = 1.0 if self.is_tiny else CHOSEN_WIDTH if is_chosen else item.figures.width
         pen = QPen(colour, width)
+        pen.setCosmetic(self.is_tiny)
         if item.line.kind == "service":
             pen.setDashPattern([5 / width, 4 / width])
         self.painter.setPen(pen)
         self.painter.setBrush(Qt.BrushStyle.NoBrush)
         path, arrows = item.drawn()
         self.painter.drawPath(path)
+        if self.is_tiny:
+            return
         self.painter.setPen(Qt.PenStyle.NoPen)
         self.painter.setBrush(colour)
         for arrow in arrows:
