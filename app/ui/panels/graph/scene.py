@@ -14,12 +14,13 @@ from dataclasses import dataclass, field
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF
 
-from app.core.graph.layout import GraphLayout, LayoutSizes, Place
+from app.core.graph.layout import MOST_LED, GraphLayout, LayoutSizes, Place
 from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
 from app.core.graph.walk import GraphChoice
 from app.ui.panels.graph.words import (
     LineFigures,
     group_name,
+    line_name,
     node_icon,
     node_line,
     node_name,
@@ -129,6 +130,8 @@ class GraphScene:
         heads = (
             QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), sizes.head - 8)) for item in self.groups
         )
+        led = self.lines if len(layout.routes) <= MOST_LED else []
+        self._crossed = _TakenRoom(_thin(*part) for item in led for part in _parts(item))
         self._taken = _TakenRoom([*(item.rect for item in self.nodes.values()), *heads])
 
     def _fonts(self) -> None:
@@ -198,10 +201,13 @@ class GraphScene:
 
     def _room_for(self, item: LineItem) -> QRectF | None:
         """Room for the words of a line that nothing else has: along its longest level part, or beside it."""
-        words = item.figures.words
-        letters = max(len(words), len(words.rpartition(" ")[0]) + LABEL_ROOM)
+        letters = len(line_name(item.line.topics)) + LABEL_ROOM
         wide, high = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
-        return next((rect for rect in _rooms(item, wide, high) if self._taken.take(rect)), None)
+        rooms = [rect for rect in _rooms(item, wide, high) if self._taken.is_free(rect)]
+        found = next((rect for rect in rooms if self._crossed.is_free(rect)), rooms[0] if rooms else None)
+        if found is not None:
+            self._taken.add(found)
+        return found
 
     def dim(self, words: Sequence[str]) -> None:
         """Let what has not all of these words fade; who talks with what has them does not."""
@@ -325,7 +331,7 @@ def _arrow(points: Sequence[Place]) -> QPolygonF:
 
 def _rooms(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
     """Where words of this width could stand, the best place first: at level parts, then at upright ones."""
-    parts = [(begin, end) for points in item.ways.values() for begin, end in itertools.pairwise(points)]
+    parts = _parts(item)
     level = [each for each in parts if abs(each[1][1] - each[0][1]) < 1]
     for begin, end in sorted(level, key=_length, reverse=True)[:6]:
         left, room = min(begin[0], end[0]), abs(end[0] - begin[0]) - wide
@@ -338,6 +344,17 @@ def _rooms(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
         for share in (0.5, 0.2, 0.8) if room >= 0 else ():
             yield QRectF(begin[0] + 5, top + room * share, wide, high)
             yield QRectF(begin[0] - 5 - wide, top + room * share, wide, high)
+
+
+def _parts(item: LineItem) -> list[tuple[Place, Place]]:
+    """The straight parts of all its ways."""
+    return [part for points in item.ways.values() for part in itertools.pairwise(points)]
+
+
+def _thin(begin: Place, end: Place) -> QRectF:
+    """The room that a straight part takes, if it is level or upright."""
+    left, top = min(begin[0], end[0]), min(begin[1], end[1])
+    return QRectF(left, top, abs(end[0] - begin[0]) + 0.5, abs(end[1] - begin[1]) + 0.5)
 
 
 def _length(part: tuple[Place, Place]) -> float:
@@ -371,16 +388,14 @@ class _TakenRoom:
     def __init__(self, rects: Iterable[QRectF]) -> None:
         self._cells: dict[tuple[int, int], list[QRectF]] = {}
         for rect in rects:
-            self._add(rect)
+            self.add(rect)
 
-    def take(self, rect: QRectF) -> bool:
-        """Take this room, if all of it is free."""
-        if any(other.intersects(rect) for cell in _cells(rect) for other in self._cells.get(cell, ())):
-            return False
-        self._add(rect)
-        return True
+    def is_free(self, rect: QRectF) -> bool:
+        """Whether nobody has taken any of this room."""
+        return not any(other.intersects(rect) for cell in _cells(rect) for other in self._cells.get(cell, ()))
 
-    def _add(self, rect: QRectF) -> None:
+    def add(self, rect: QRectF) -> None:
+        """Take this room."""
         for cell in _cells(rect):
             self._cells.setdefault(cell, []).append(rect)
 
