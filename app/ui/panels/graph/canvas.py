@@ -19,6 +19,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from app.core.graph.walk import Arrow, GraphChoice, step
+from app.ui.panels.graph.painting import paint_scene
 from app.ui.panels.graph.scene import FiguresOf, GraphScene, LineItem, NodeItem
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
@@ -238,7 +239,7 @@ class GraphCanvas(QWidget):
             corner = self._to_scene(clip.topLeft())
             seen = QRectF(corner, clip.size() / self.scale)
             rings = self.hasFocus() and keyboard_leads()
-            self.scene.paint(painter, seen, self.scale, self.choice, rings=rings)
+            paint_scene(self.scene, painter, seen, self.scale, self.choice, rings=rings)
             painter.resetTransform()
         if self.hasFocus() and keyboard_leads() and self.choice is None:
             whole = QRectF(self.rect()).adjusted(2, 2, -2, -2)

@@ -34,6 +34,7 @@ from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.graph.canvas import GraphCanvas, GraphOverview
 from app.ui.panels.graph.card import WIDTH, CardFacts, GraphCard, node_card, topic_card
+from app.ui.panels.graph.painting import paint_scene
 from app.ui.panels.graph.scene import GraphScene
 from app.ui.panels.graph.tools import GraphLegend, GraphTools
 from app.ui.panels.graph.words import (
@@ -466,7 +467,7 @@ class GraphPanel(PanelWidget):
         painter = QPainter(generator)
         painter.fillRect(QRectF(0, 0, area.width(), area.height()), QColor(self.theme.colour("panel")))
         painter.translate(-area.topLeft())
-        scene.paint(painter, area, 1.0)
+        paint_scene(scene, painter, area, 1.0)
         painter.end()
         return bytes(buffer.data().data())
 
