@@ -111,7 +111,7 @@ def settle(qtbot, panel: GraphPanel) -> None:
     def is_there() -> bool:
         panel.refresh()
         scene = panel.canvas.scene
-        is_shown = scene is None or scene.graph == panel._asked
+        is_shown = scene is not None and scene.graph == panel._asked
         return not panel._thread.is_busy and is_shown and not panel.canvas._waiting
 
     qtbot.waitUntil(is_there, timeout=20_000)
