@@ -28,6 +28,7 @@ from nep.version import __version__
 
 PROCESSES = (
     "app.blocks.runtime.child",
+    "app.core.graph.layout_process",
     "app.robots.simulated",
     "app.robots.turtle",
     "app.ui.speaker",

@@ -38,6 +38,7 @@ QT = {"PySide6", "shiboken6", "PyQt6", "PyQt5"}
 SMALL_LINES = 60
 # Small modules that one other module alone imports, and what each earns its file by (docs/adr/0020-rooms.md).
 EARNED = {
+    "app.core.graph.dot": "pure, and tested alone",
     "app.core.robots.awaited": "pure, and tested alone",
     "nep.programs.blackboard.ages": "pure, and tested alone",
     "nep.programs.blackboard.perception": "pure, and tested alone",

@@ -19,6 +19,7 @@ from app.ui.panels import alerts, camera, doctor, health, plot, problems, robot,
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.behaviour import panel as behaviour
 from app.ui.panels.console import panel as console
+from app.ui.panels.graph import panel as graph
 from app.ui.panels.image import panel as image
 from app.ui.panels.inspector import panel as inspector
 from app.ui.panels.nodes import panel as nodes
@@ -38,6 +39,7 @@ SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "plot": (plot.PANEL, 760, 520, "compact"),
     "console": (console.PANEL, 446, 222, "compact"),
     "nodes": (nodes.PANEL, 446, 260, "compact"),
+    "graph": (graph.PANEL, 1428, 780, "compact"),
     "alerts": (alerts.PANEL, 446, 222, "compact"),
     "doctor": (doctor.PANEL, 446, 400, "compact"),
     "robot": (robot.PANEL, 384, 327, "comfortable"),

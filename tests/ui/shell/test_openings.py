@@ -31,7 +31,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 TIMES = 50
 PANELS = [
-    "alerts", "behaviour", "camera", "console", "doctor", "health", "image", "inspector", "nodes", "plot",
+    "alerts", "behaviour", "camera", "console", "doctor", "graph", "health", "image", "inspector", "nodes", "plot",
     "problems", "robot", "robots", "sensors", "topics",
 ]  # fmt: skip
 COMMANDS = [

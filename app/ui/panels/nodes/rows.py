@@ -10,19 +10,15 @@ from dataclasses import dataclass, replace
 from app.core.network.nodes import NodeEntry
 from app.core.network.topics import key_of
 from app.core.networks.kinds import kind_named
+from app.ui.text.nodes import cpu_words, generation_words
 from app.ui.text.numbers import age_words
 from app.ui.widgets.table.model import Cell, Column, Order
-from nep.i18n import _, lazy, number, pgettext, plazy
+from nep.i18n import _, lazy, pgettext, plazy
 from nep.protocol.graph_view import BRIDGES_TOPIC
 from nep.protocol.topic_pattern import is_pattern
 
 PUBLISHES, SUBSCRIBES = lazy("publishes"), lazy("subscribes")
 INDENT = 19
-GENERATIONS = {
-    "native": lazy("native"),
-    "A": lazy("NEP to 0.5.4.5"),
-    "B": "NEP 0.5.4.8",
-}
 UNSERVED = frozenset({"0.5.4.6", "0.5.4.7"})
 NOT_SERVED = lazy("NEP {version} is not served: nobody understands its messages. Install 0.5.4.8 or 0.5.4.5.")
 LIMITS = lazy(
@@ -84,14 +80,6 @@ def rows_of(
     return rows
 
 
-def generation_words(node: NodeEntry) -> str:
-    """Native, which versions of the original NEP, or which other network."""
-    kind = kind_named(node.network)
-    if kind is not None:
-        return kind.words
-    return _(GENERATIONS.get(node.generation, f"NEP {node.generation}"))
-
-
 def limits_of(node: NodeEntry) -> str:
     """What an original program can't do, what a bridge does, or what can't be known on its network.
 
@@ -135,14 +123,6 @@ def facts_of(node: NodeEntry) -> str:
         clock = time.strftime("%H:%M:%S", time.localtime(node.since_ns / 1e9))
         parts.append(_("here since {clock}").format(clock=clock))
     return ", ".join(parts)
-
-
-def cpu_words(ratio: float | None) -> str:
-    """The share of a core: 0.4 %, 12 %, 130 %; blank when not known."""
-    if ratio is None:
-        return ""
-    percent = ratio * 100
-    return f"{number(percent, '.1f')} %" if percent < 9.95 else f"{round(percent)} %"
 
 
 def _ink(row: NodeRow, role: str) -> str:

@@ -93,6 +93,7 @@ BEHAVIOUR = Layout(
         "robots": "behaviour",
         "doctor": "behaviour",
         "plot": "behaviour",
+        "graph": "behaviour",
         "console": "problems",
         "alerts": "problems",
         "nodes": "problems",
@@ -120,6 +121,7 @@ DEVELOPER = Layout(
     {
         "robots": "topics",
         "doctor": "topics",
+        "graph": "topics",
         "robot": "image",
         "camera": "image",
         "health": "console",

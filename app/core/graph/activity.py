@@ -1,0 +1,100 @@
+"""What moves: who has been quiet for a minute, and how often services are called."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+
+from app.core.graph.node_graph import OWN, GraphFacts
+from app.core.network.topics import key_of
+from app.core.networks.kinds import kind_named
+
+QUIET_S = 60.0
+CALLS_OVER_S = 60.0
+LOOKS = 61
+"""Looks at services that are kept: one a second."""
+
+
+class QuietNodes:
+    """Follows the counters of every node. One thread uses it (the window's).
+
+    What nobody counts is not quiet: a network that tells no figures, an original program that only hears.
+    """
+
+    def __init__(self) -> None:
+        """Know nobody yet."""
+        self._counted: dict[str, tuple[int, float]] = {}
+
+    def update(self, facts: GraphFacts, now: float) -> None:
+        """Take over new figures; ``now`` is a monotonic clock in s. Who is new has just moved."""
+        sums = {entry.key: 0 for entry in facts.nodes if entry.gone_s is None}
+        unknown = {
+            entry.key
+            for entry in facts.nodes
+            if (kind := kind_named(entry.network)) is not None and not kind.tells_figures
+        }
+        originals = {entry.key for entry in facts.nodes if entry.is_original}
+        for entry, count in _counts(facts):
+            if count is None and entry in originals:
+                unknown.add(entry)
+            elif entry in sums:
+                sums[entry] += count or 0
+        before = self._counted
+        self._counted = {}
+        for entry, total in sums.items():
+            if entry not in unknown:
+                had = before.get(entry)
+                moved = had is None or had[0] != total
+                self._counted[entry] = total, now if moved or had is None else had[1]
+
+    def quiet(self, now: float) -> frozenset[str]:
+        """The keys of those without a message or a call for `QUIET_S` at this time."""
+        return frozenset(entry for entry, (_total, since) in self._counted.items() if now - since >= QUIET_S)
+
+
+class CallRates:
+    """How often services are called, over a minute. One thread uses it (the window's)."""
+
+    def __init__(self) -> None:
+        """Know no service yet."""
+        self._looks: deque[tuple[float, Mapping[str, int]]] = deque(maxlen=LOOKS)
+
+    def update(self, facts: GraphFacts, now: float) -> None:
+        """Take over the counts of calls; a look within a second of the last one adds nothing."""
+        if not self._looks or now - self._looks[-1][0] >= 1.0:
+            self._looks.append((now, {name: info.calls for name, info in facts.services.items()}))
+
+    def rates_hz(self) -> dict[str, float]:
+        """Calls a second by service; a service that has not been known for two looks is not in it."""
+        if len(self._looks) < 2:
+            return {}
+        last_at, last = self._looks[-1]
+        first: dict[str, tuple[float, int]] = {}
+        for at, counts in self._looks:
+            if last_at - at <= CALLS_OVER_S:
+                for name in counts.keys() - first.keys():
+                    first[name] = at, counts[name]
+        return {
+            name: (calls - first[name][1]) / (last_at - first[name][0])
+            for name, calls in last.items()
+            if name in first and first[name][0] < last_at and calls >= first[name][1]
+        }
+
+
+def _counts(facts: GraphFacts) -> Iterator[tuple[str, int | None]]:
+    """(key of an entry, messages or calls so far); None where nobody counts them. nep's own say nothing."""
+    for topic in facts.topics:
+        if topic.info is None or topic.name.startswith(OWN):
+            continue
+        for publisher in topic.info.publishers:
+            yield key_of(topic.network, publisher.node_id), publisher.count
+        for subscriber in topic.info.subscribers:
+            yield key_of(topic.network, subscriber.node_id), subscriber.received
+    for name, service in facts.services.items():
+        if name.startswith(OWN):
+            continue
+        for server in service.servers:
+            yield server.node_id, server.calls
+        for client in service.clients:
+            told = None if client.answered is None else client.answered + (client.failed or 0)
+            yield client.node_id, told

@@ -1,0 +1,40 @@
+"""The graph in DOT, the language of Graphviz, for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from app.core.graph.node_graph import GraphLine, NodeGraph
+
+
+def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[GraphLine], str]) -> str:
+    """The graph as a text. ``group_names`` by key; ``label`` says what stands at a line."""
+    names = {node.key: f"n{number}" for number, node in enumerate(graph.nodes)}
+    lines = ["digraph nodes {", "  rankdir=LR;", "  node [shape=box, style=rounded];"]
+    inside: dict[str, list[str]] = {}
+    for node in graph.nodes:
+        style = ', style="rounded,dashed"' if node.is_gone or node.is_quiet else ""
+        name = group_names.get(node.key, node.name) if node.kind == "group" else node.name
+        inside.setdefault(node.group, []).append(f"{names[node.key]} [label={quoted(name)}{style}];")
+    clusters = [group for group in graph.groups if not group.is_closed and group.key in inside]
+    for number, group in enumerate(clusters):
+        lines += [
+            f"  subgraph cluster_{number} {{",
+            f"    label={quoted(group_names.get(group.key, group.name))};",
+            *(f"    {each}" for each in inside.pop(group.key)),
+            "  }",
+        ]
+    lines += [f"  {each}" for others in inside.values() for each in others]
+    for line in graph.lines:
+        style = ", style=dashed" if line.kind == "service" else ""
+        said = quoted(label(line))
+        lines += [
+            f"  {names[source]} -> {names[target]} [label={said}{style}];" for source, target in line.pairs()
+        ]
+    return "\n".join([*lines, "}", ""])
+
+
+def quoted(text: str) -> str:
+    r"""A text in DOT's quotation marks: its own marks and backslashes stay, its lines end by ``\n``."""
+    kept = text.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "")
+    return '"' + "\\n".join(kept.splitlines() or [""]) + '"'

@@ -1,0 +1,443 @@
+"""Where everything stands: layered by a library at first, and what is there keeps its place when others come.
+
+The library (graphlay) puts nodes into layers so that few lines cross, and leads lines round nodes. It is
+asked for places once; after that only for the ways of lines. All lengths are pixels at 100 % zoom, x to the
+right and y downwards, places are middles.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import graphlay
+
+from app.core.graph.node_graph import GraphLine, NodeGraph
+
+_log = logging.getLogger(__name__)
+
+Place = tuple[float, float]
+Box = tuple[float, float, float, float]
+"""Left, top, width, height."""
+RouteKey = tuple[tuple[str, tuple[str, ...], tuple[str, ...]], str, str]
+"""A line's key, and from whom to whom."""
+
+MOST_ROUTES = 6000
+"""Ways that are found and drawn; of more, those of the lines with the most ends are left out, and counted."""
+MOST_PLACES = 4000
+"""Places that are kept of those who left, so that they find theirs again."""
+LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 150.0, 36.0, 40.0, 10.0
+ALONE_COLUMNS = 4
+"""Nodes that talk with nobody of their group stand in so many columns."""
+MANY = 60
+"""From so many boxes on the library takes less trouble."""
+MOST_LED = 400
+"""Of more ways none is led round nodes, which would take many seconds: they run straight."""
+WIDEST, ASPECT = 3.0, 1.6
+"""A row of groups that is wider than so many times its height is broken into rows of about this shape."""
+
+
+@dataclass(frozen=True, slots=True)
+class LayoutSizes:
+    """How large things are: a node, a group's head, the room around its nodes, the line about quiet ones."""
+
+    node: Place = (152.0, 48.0)
+    head: float = 36.0
+    side: float = 18.0
+    foot: float = 30.0
+    letter: float = 8.0
+
+    def scaled(self, share: float) -> LayoutSizes:
+        """The same for text of another size."""
+        wide, high = self.node
+        return LayoutSizes(
+            (wide * share, high * share),
+            self.head * share,
+            self.side * share,
+            self.foot * share,
+            self.letter * share,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class GraphLayout:
+    """Where boxes and groups stand and how lines run.
+
+    ``kept`` are places of those who are gone, by key, the oldest first. ``routes`` begin and end at the edges
+    of boxes. ``left_out`` ways were too many. ``is_plain``: the library failed, and boxes stand in rows.
+    """
+
+    places: Mapping[str, Place] = field(default_factory=dict)
+    groups: Mapping[str, Box] = field(default_factory=dict)
+    routes: Mapping[RouteKey, tuple[Place, ...]] = field(default_factory=dict)
+    kept: Mapping[str, Place] = field(default_factory=dict)
+    left_out: int = 0
+    is_plain: bool = False
+
+    def bounds(self, sizes: LayoutSizes) -> Box:
+        """The box around everything; of size 0 when there is nothing."""
+        boxes = [*self.groups.values(), *(_box_at(place, sizes.node) for place in self.places.values())]
+        boxes += [(x, y, 0.0, 0.0) for way in self.routes.values() for x, y in way]
+        return _around(boxes)
+
+
+def arrange(
+    graph: NodeGraph, before: GraphLayout | None = None, sizes: LayoutSizes | None = None
+) -> GraphLayout:
+    """Give everything in ``graph`` a place; what has one in ``before`` keeps it.
+
+    Everything is placed anew without ``before``, or when more came than stayed. May take seconds for hundreds
+    of nodes: `LayoutThread` calls it.
+    """
+    sizes = sizes if sizes is not None else LayoutSizes()
+    ways, left_out = _ways(graph)
+    known = {} if before is None else {**before.kept, **before.places}
+    here = {node.key for node in graph.nodes}
+    stay = len(here & known.keys())
+    is_plain = False
+    if not stay or stay < len(here) - stay:
+        places, is_plain = _placed(graph, ways, sizes)
+        known = {}
+    else:
+        places = _grown(graph, {key: known[key] for key in here & known.keys()}, sizes)
+    routes = {} if is_plain else _routed(places, ways, sizes)
+    kept = {key: place for key, place in known.items() if key not in here}
+    for key in [*kept][: max(0, len(kept) - MOST_PLACES)]:
+        del kept[key]
+    straight = {way: _straight(places[way[1]], places[way[2]], sizes) for way in ways}
+    groups = _group_boxes(graph, places, sizes)
+    return GraphLayout(places, groups, {**straight, **routes}, kept, left_out, is_plain)
+
+
+def arrange_plainly(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
+    """Everything in rows, without the library: when that failed, or took too long."""
+    places = _in_rows(graph, sizes)
+    ways, left_out = _ways(graph)
+    return GraphLayout(
+        places,
+        _group_boxes(graph, places, sizes),
+        {way: _straight(places[way[1]], places[way[2]], sizes) for way in ways},
+        {},
+        left_out,
+        is_plain=True,
+    )
+
+
+def _ways(graph: NodeGraph) -> tuple[list[RouteKey], int]:
+    """Every way of every line, lines with few ends first; and how many are left out."""
+    found: list[RouteKey] = []
+    left_out = 0
+    for line in sorted(graph.lines, key=_ends_of):
+        ways = [(line.key, source, target) for source, target in line.pairs()]
+        if len(found) + len(ways) <= MOST_ROUTES:
+            found += ways
+        else:
+            left_out += len(ways)
+    return found, left_out
+
+
+def _ends_of(line: GraphLine) -> tuple[int, tuple[str, ...]]:
+    return len(line.sources) * len(line.targets), line.topics
+
+
+# -- with the library ----------------------------------------------------------------------------------------
+
+
+def _options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
+    return {
+        "direction": "leftright",
+        "spacing": {
+            "layer_gap": LAYER_GAP,
+            "node_gap": gap,
+            "dummy_gap": DUMMY_GAP,
+            "isolated_gap": gap,
+            "isolated_max_columns": ALONE_COLUMNS,
+        },
+        "routing": {"style": "orthogonal"},
+        "cycles": {"strategy": "follow_flow"},
+        "effort": effort,
+    }
+
+
+def _placed(graph: NodeGraph, ways: Sequence[RouteKey], sizes: LayoutSizes) -> tuple[dict[str, Place], bool]:
+    """Everything placed anew; and whether that was done without the library, which failed.
+
+    First the nodes within each group, then the groups among each other.
+    """
+    inside: dict[str, list[str]] = {}
+    for node in graph.nodes:
+        inside.setdefault(node.group, []).append(node.key)
+    home = {key: block for block, keys in inside.items() for key in keys}
+    within: dict[str, list[RouteKey]] = {}
+    between: dict[tuple[str, str], int] = {}
+    effort = "balanced" if len(home) < MANY else "fast"
+    for way in ways:
+        begin, end = home[way[1]], home[way[2]]
+        if begin == end:
+            within.setdefault(begin, []).append(way)
+        else:
+            between[begin, end] = between.get((begin, end), 0) + 1
+    try:
+        blocks = {
+            block: _place_block(keys, within.get(block, ()), sizes, effort) for block, keys in inside.items()
+        }
+        boxes = {block: _block_box(graph, block, places, sizes) for block, places in blocks.items()}
+        middles = _place_boxes(boxes, between)
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt | SystemExit):
+            raise
+        _log.exception("nodes could not be placed; they stand in rows")
+        return _in_rows(graph, sizes), True
+    places = {}
+    for block, (left, top, wide, high) in boxes.items():
+        across, down = middles[block][0] - left - wide / 2, middles[block][1] - top - high / 2
+        for key, (x, y) in blocks[block].items():
+            places[key] = x + across, y + down
+    return places, False
+
+
+def _place_block(
+    keys: Sequence[str], ways: Sequence[RouteKey], sizes: LayoutSizes, effort: str
+) -> dict[str, Place]:
+    """The nodes of one group among each other."""
+    if len(keys) == 1:
+        return {keys[0]: (0.0, 0.0)}
+    index = {key: number for number, key in enumerate(keys)}
+    made = graphlay.layout(
+        {"nodes": [_request_box(key, sizes.node) for key in keys], "edges": _request_edges(ways, index)},
+        options=_options(effort),
+    )
+    return {key: _point(node["center"]) for key, node in zip(keys, made.nodes, strict=True)}
+
+
+def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Place], sizes: LayoutSizes) -> Box:
+    """What a group takes of the drawing; of a node without a group the node itself."""
+    group = next((each for each in graph.groups if each.key == block and not each.is_closed), None)
+    box = _around(_box_at(place, sizes.node) for place in places.values())
+    if group is None:
+        return box
+    left, top, wide, high = _room(box, block, sizes)
+    return left, top, wide, high + (sizes.foot if group.quiet else 0.0)
+
+
+def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int]) -> dict[str, Place]:
+    """The middles of boxes of any size among each other."""
+    if len(boxes) == 1:
+        return dict.fromkeys(boxes, (0.0, 0.0))
+    index = {block: number for number, block in enumerate(boxes)}
+    edges = [
+        {"source": index[begin], "target": index[end], "weight": float(count)}
+        for (begin, end), count in between.items()
+    ]
+    nodes = [_request_box(block, (box[2], box[3])) for block, box in boxes.items()]
+    made = graphlay.layout({"nodes": nodes, "edges": edges}, options=_options("balanced", GROUP_GAP))
+    middles = {block: _point(node["center"]) for block, node in zip(boxes, made.nodes, strict=True)}
+    wide = made.bounds["max"]["x"] - made.bounds["min"]["x"]
+    high = made.bounds["max"]["y"] - made.bounds["min"]["y"]
+    return middles if wide <= WIDEST * high or len(boxes) < 4 else _in_shelves(boxes, middles)
+
+
+def _in_shelves(boxes: Mapping[str, Box], middles: Mapping[str, Place]) -> dict[str, Place]:
+    """Many groups that would stand in one long row, in several rows, in the same order."""
+    area = sum((box[2] + LAYER_GAP) * (box[3] + GROUP_GAP) for box in boxes.values())
+    room = max(math.sqrt(area * ASPECT), *(box[2] for box in boxes.values()))
+    found: dict[str, Place] = {}
+    left = top = high = 0.0
+    for block in sorted(boxes, key=lambda each: (middles[each], each)):
+        _left, _top, wide, tall = boxes[block]
+        if left and left + wide > room:
+            left, top, high = 0.0, top + high + GROUP_GAP, 0.0
+        found[block] = left + wide / 2, top + tall / 2
+        left, high = left + wide + LAYER_GAP, max(high, tall)
+    return found
+
+
+def _routed(
+    places: Mapping[str, Place], ways: Sequence[RouteKey], sizes: LayoutSizes
+) -> dict[RouteKey, tuple[Place, ...]]:
+    """How lines run round the boxes; {} when the library can't tell: then they run straight."""
+    if not ways or len(ways) > MOST_LED:
+        return {}
+    index = {key: number for number, key in enumerate(places)}
+    request = [
+        {**_request_box(key, sizes.node), "position": {"x": x, "y": y}} for key, (x, y) in places.items()
+    ]
+    try:
+        made = graphlay.reroute(
+            {"nodes": request, "edges": _request_edges(ways, index)}, options=_options("fast")
+        )
+        return {
+            way: tuple(_point(each) for each in edge["points"])
+            for way, edge in zip(ways, made.edges, strict=True)
+            if len(edge["points"]) > 1
+        }
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt | SystemExit):
+            raise
+        _log.exception("lines could not be led round nodes; they run straight")
+        return {}
+
+
+def _request_box(key: str, size: Place) -> dict[str, Any]:
+    wide, high = size
+    return {"size": {"width": wide, "height": high}, "shape": "box", "key": key}
+
+
+def _request_edges(ways: Sequence[RouteKey], index: Mapping[str, int]) -> list[dict[str, Any]]:
+    return [
+        {"source": index[source], "target": index[target], "weight": 1.0} for _line, source, target in ways
+    ]
+
+
+def _point(told: Mapping[str, float]) -> Place:
+    return float(told["x"]), float(told["y"])
+
+
+# -- without it ----------------------------------------------------------------------------------------------
+
+
+def _in_rows(graph: NodeGraph, sizes: LayoutSizes) -> dict[str, Place]:
+    """Each group a column of its own, side by side."""
+    wide, high = sizes.node
+    columns: dict[str, list[str]] = {}
+    for node in graph.nodes:
+        columns.setdefault(node.group, []).append(node.key)
+    step = wide + 2 * sizes.side + LAYER_GAP
+    return {
+        key: (column * step, row * (high + NODE_GAP))
+        for column, keys in enumerate(columns.values())
+        for row, key in enumerate(keys)
+    }
+
+
+def _grown(graph: NodeGraph, places: dict[str, Place], sizes: LayoutSizes) -> dict[str, Place]:
+    """The places of those who stay, and beside them one for each who came."""
+    neighbours = _neighbours(graph)
+    for node in graph.nodes:
+        if node.key in places:
+            continue
+        mates = [each.key for each in graph.nodes if each.group == node.group and each.key in places]
+        near = [places[key] for key in neighbours.get(node.key, ()) if key in places]
+        if mates:
+            places[node.key] = _free_place([places[key] for key in mates], near, places.values(), sizes)
+        else:
+            left, top, wide, _high = _around(_box_at(place, sizes.node) for place in places.values())
+            step = sizes.node[0] + 2 * sizes.side + LAYER_GAP
+            places[node.key] = (left + wide + step - sizes.node[0] / 2, top + sizes.node[1] / 2)
+        _push_apart(graph, places, node.group, sizes)
+    return places
+
+
+def _free_place(
+    mates: Sequence[Place], near: Sequence[Place], taken: Iterable[Place], sizes: LayoutSizes
+) -> Place:
+    """A free place in the columns of the group, nearest to those it talks with."""
+    high = sizes.node[1] + NODE_GAP
+    wide = sizes.node[0]
+    there = list(taken)
+    x_near = sum(x for x, _y in near) / len(near) if near else mates[0][0]
+    y_near = sum(y for _x, y in near) / len(near) if near else max(y for _x, y in mates)
+    tops = [y for _x, y in mates]
+    rows = [min(tops) + high * step for step in range(int((max(tops) - min(tops)) / high) + 2)]
+    columns = sorted({x for x, _y in mates})
+    free = [
+        (x, y)
+        for x in columns
+        for y in rows
+        if all(abs(x - other) >= wide or abs(y - level) >= high - 1 for other, level in there)
+    ]
+    if not free:
+        return columns[0], max(tops) + high
+    return min(free, key=lambda at: (abs(at[0] - x_near) + abs(at[1] - y_near), at))
+
+
+def _push_apart(graph: NodeGraph, places: dict[str, Place], grown: str, sizes: LayoutSizes) -> None:
+    """Move whole groups down until none lies on one that has grown."""
+    members: dict[str, list[str]] = {}
+    for node in graph.nodes:
+        if node.key in places:
+            members.setdefault(node.group or node.key, []).append(node.key)
+    boxes = {
+        key: _around(_room(_box_at(places[each], sizes.node), key, sizes) for each in keys)
+        for key, keys in members.items()
+    }
+    moving = [grown] if grown in boxes else []
+    for _turn in range(len(boxes) ** 2):
+        if not moving:
+            return
+        upper = moving.pop()
+        for key, box in boxes.items():
+            if key == upper or not _overlap(boxes[upper], box):
+                continue
+            down = boxes[upper][1] + boxes[upper][3] + GROUP_GAP - box[1]
+            boxes[key] = (box[0], box[1] + down, box[2], box[3])
+            for each in members[key]:
+                places[each] = (places[each][0], places[each][1] + down)
+            moving.append(key)
+
+
+def _neighbours(graph: NodeGraph) -> dict[str, set[str]]:
+    found: dict[str, set[str]] = {}
+    for line in graph.lines:
+        if len(line.sources) * len(line.targets) > MOST_ROUTES:
+            continue
+        for source, target in line.pairs():
+            found.setdefault(source, set()).add(target)
+            found.setdefault(target, set()).add(source)
+    return found
+
+
+def _group_boxes(graph: NodeGraph, places: Mapping[str, Place], sizes: LayoutSizes) -> dict[str, Box]:
+    """The box of each group that is open: around its nodes, as wide as its name."""
+    inside: dict[str, list[Box]] = {}
+    for node in graph.nodes:
+        inside.setdefault(node.group, []).append(_box_at(places[node.key], sizes.node))
+    made = {}
+    for group in graph.groups:
+        if group.is_closed or group.key not in inside:
+            continue
+        left, top, wide, high = _around(_room(box, group.key, sizes) for box in inside[group.key])
+        if group.quiet:
+            high += sizes.foot
+        made[group.key] = (left, top, wide, high)
+    return made
+
+
+def _room(box: Box, group: str, sizes: LayoutSizes) -> Box:
+    """The box of a node with the room around it that its group takes; as it is without a group."""
+    if not group:
+        return box
+    left, top, wide, high = box
+    return (left - sizes.side, top - sizes.head, wide + 2 * sizes.side, high + sizes.head + sizes.side)
+
+
+def _box_at(place: Place, size: Place) -> Box:
+    return place[0] - size[0] / 2, place[1] - size[1] / 2, size[0], size[1]
+
+
+def _around(boxes: Iterable[Box]) -> Box:
+    made = list(boxes)
+    if not made:
+        return 0.0, 0.0, 0.0, 0.0
+    left, top = min(box[0] for box in made), min(box[1] for box in made)
+    right, bottom = max(box[0] + box[2] for box in made), max(box[1] + box[3] for box in made)
+    return left, top, right - left, bottom - top
+
+
+def _overlap(one: Box, other: Box) -> bool:
+    return (
+        one[0] < other[0] + other[2]
+        and other[0] < one[0] + one[2]
+        and one[1] < other[1] + other[3]
+        and other[1] < one[1] + one[3]
+    )
+
+
+def _straight(source: Place, target: Place, sizes: LayoutSizes) -> tuple[Place, ...]:
+    """From the right edge of one to the left edge of the other; the reverse when that lies to the left."""
+    half = sizes.node[0] / 2
+    way = half if source[0] <= target[0] else -half
+    return (source[0] + way, source[1]), (target[0] - way, target[1])

@@ -1,0 +1,97 @@
+"""LayoutThread: gives a graph its places outside the window's thread, the newest graph only."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from app.core.faults import log_errors
+from app.core.graph.layout import GraphLayout, LayoutSizes, arrange, arrange_plainly
+from app.core.graph.layout_process import LayoutProcess, is_large
+from app.core.graph.node_graph import NodeGraph
+
+END_S = 5.0
+
+Arrange = Callable[[NodeGraph, "GraphLayout | None", LayoutSizes], GraphLayout]
+
+
+class LayoutThread:
+    """One thread, which begins with the first graph; a graph that waits is replaced by a newer one.
+
+    A large graph is given to a process: see `layout_process`.
+    """
+
+    def __init__(self, arranged: Arrange | None = None) -> None:
+        """Does nothing yet. ``arranged`` may arrange graphs instead, of any size."""
+        self._arrange = arranged if arranged is not None else self._arrange_anywhere
+        self._process: LayoutProcess | None = None
+        self._news = threading.Condition()
+        self._waiting: tuple[NodeGraph, GraphLayout | None, LayoutSizes] | None = None
+        self._made: tuple[NodeGraph, GraphLayout] | None = None
+        self._is_busy = self._is_closing = False
+        self._thread: threading.Thread | None = None
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a graph waits for its places."""
+        with self._news:
+            return self._is_busy or self._waiting is not None
+
+    def ask(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> None:
+        """Give this graph its places; one that waits is forgotten. After `close` nothing happens."""
+        with self._news:
+            if self._is_closing:
+                return
+            self._waiting = graph, before, sizes
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._run, name="graph-layout", daemon=True)
+                self._thread.start()
+            self._news.notify()
+
+    def take(self) -> tuple[NodeGraph, GraphLayout] | None:
+        """The newest graph that has its places, and those; None when there is none since the last time."""
+        with self._news:
+            made, self._made = self._made, None
+            return made
+
+    def close(self) -> None:
+        """End; returns when its thread has ended, or after `END_S` when the library does not come back."""
+        with self._news:
+            self._is_closing, self._waiting = True, None
+            self._news.notify()
+            if self._process is not None:
+                self._process.kill()
+        if self._thread is not None:
+            self._thread.join(END_S)
+
+    def _run(self) -> None:
+        while True:
+            with self._news:
+                self._news.wait_for(lambda: self._waiting is not None or self._is_closing)
+                if self._is_closing or self._waiting is None:
+                    return
+                graph, before, sizes = self._waiting
+                self._waiting, self._is_busy = None, True
+            made: GraphLayout | None = None
+            with log_errors("give nodes their places"):
+                made = self._arrange(graph, before, sizes)
+            with self._news:
+                self._is_busy = False
+                if made is not None:
+                    self._made = graph, made
+
+    def _arrange_anywhere(
+        self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes
+    ) -> GraphLayout:
+        if not is_large(graph):
+            return arrange(graph, before, sizes)
+        with self._news:
+            if self._is_closing:
+                return GraphLayout()
+            self._process = process = LayoutProcess()
+        try:
+            made = process.arrange(graph, before, sizes)
+        finally:
+            with self._news:
+                self._process = None
+        return made if made is not None else arrange_plainly(graph, sizes)

@@ -1,0 +1,379 @@
+"""The graph as it is drawn: nodes in groups, and lines, each of which stands for one topic or several."""
+
+from __future__ import annotations
+
+import platform
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+from urllib.parse import urlsplit
+
+from app.core.network.graph_changes import PROGRAM
+from app.core.network.nodes import NodeEntry
+from app.core.network.source import NODE_NAME
+from app.core.network.topics import Topic, key_of
+from app.core.networks.kinds import kind_named
+from nep.protocol.graph_view import ServiceInfo
+from nep.protocol.topic_pattern import is_pattern, matches
+
+GroupBy = Literal["computer", "robot", "nothing"]
+NodeKind = Literal["program", "studio", "behaviour", "robot", "bridge", "original", "group"]
+LineKind = Literal["topic", "service"]
+
+OWN = "/nep/"
+"""Topics and services that nep itself makes, such as the log's: every node has them."""
+MOST_OPEN = 200
+"""With more nodes all groups are closed at first."""
+BRIDGE_TO = "-to-"
+"""A bridge's nodes are called "bridge-NAME-to-BACKEND"."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphFacts:
+    """What is known of all networks; ``services`` are the native one's, ``robots`` the names of robots."""
+
+    nodes: Sequence[NodeEntry] = ()
+    topics: Sequence[Topic] = ()
+    services: Mapping[str, ServiceInfo] = field(default_factory=dict)
+    robots: Sequence[str] = ()
+    host: str = field(default_factory=platform.node)
+    """This computer's name."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphChoices:
+    """What a person wants to see of them.
+
+    ``quiet`` are the keys of entries that have been quiet; they are left out while ``hides_quiet``, but for
+    the groups ``quiet_shown``. ``starts_closed``: groups are closed, but for those ``toggled``; else the
+    reverse.
+    """
+
+    group_by: GroupBy = "computer"
+    shows_services: bool = True
+    shows_own: bool = False
+    hides_quiet: bool = True
+    quiet: frozenset[str] = frozenset()
+    quiet_shown: frozenset[str] = frozenset()
+    starts_closed: bool = False
+    toggled: frozenset[str] = frozenset()
+
+    def is_closed(self, group: str) -> bool:
+        """Whether a group is drawn as one box."""
+        return bool(group) and self.starts_closed is not (group in self.toggled)
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnNode:
+    """One box. ``key`` is the same for a program that is started again; ``entry`` is what is known of it now.
+
+    A closed group is a box, too, with no entry and the number of its ``members``. ``joins`` is what a bridge
+    joins this network with, in words; ``has_pictures`` whether it publishes pictures.
+    """
+
+    key: str
+    name: str
+    group: str
+    kind: NodeKind
+    entry: NodeEntry | None = field(default=None, compare=False)
+    entry_key: str = ""
+    joins: str = ""
+    has_pictures: bool = False
+    is_gone: bool = False
+    is_quiet: bool = False
+    members: int = 1
+    quiet: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class GraphLine:
+    """Who tells whom: every one of ``sources`` every one of ``targets``, on the same ``topics``.
+
+    ``topics`` are named as among all networks (`key_of`); of a service its clients are the sources.
+    """
+
+    kind: LineKind
+    sources: tuple[str, ...]
+    targets: tuple[str, ...]
+    topics: tuple[str, ...]
+
+    @property
+    def key(self) -> tuple[LineKind, tuple[str, ...], tuple[str, ...]]:
+        """Names the line while the same nodes are at its ends."""
+        return self.kind, self.sources, self.targets
+
+    def pairs(self) -> Iterator[tuple[str, str]]:
+        """From whom to whom; nobody to itself."""
+        return ((source, target) for source in self.sources for target in self.targets if source != target)
+
+
+@dataclass(frozen=True, slots=True)
+class GraphGroup:
+    """Nodes of one computer, robot or network. ``quiet`` of its ``members`` are hidden."""
+
+    key: str
+    name: str
+    address: str
+    icon: str
+    members: int
+    quiet: int
+    is_closed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class NodeGraph:
+    """What is drawn, each in a settled order; ``nodes_there`` counts all that are there, also hidden ones."""
+
+    nodes: tuple[DrawnNode, ...] = ()
+    lines: tuple[GraphLine, ...] = ()
+    groups: tuple[GraphGroup, ...] = ()
+    nodes_there: int = 0
+    topics_there: int = 0
+    services_there: int = 0
+    quiet_hidden: int = 0
+
+    def node(self, key: str) -> DrawnNode | None:
+        """The box of that key, or None."""
+        return next((node for node in self.nodes if node.key == key), None)
+
+    def line_of(self, topic: str) -> GraphLine | None:
+        """The line that carries a topic or service, or None."""
+        return next((line for line in self.lines if topic in line.topics), None)
+
+
+def node_graph(facts: GraphFacts, choices: GraphChoices) -> NodeGraph:
+    """What is drawn of these facts by these choices. Takes no longer than nodes and their topics are many."""
+    boxes = _boxes(facts, choices)
+    groups = _groups(facts, choices, boxes)
+    closed = {group.key for group in groups if group.is_closed}
+    drawn = [node for node in boxes.values() if node.group not in closed and not _is_hidden(node, choices)]
+    drawn += [_box_of(group) for group in groups if group.is_closed]
+    shown = {node.key for node in drawn}
+    place = {
+        entry: (node.group if node.group in closed else node.key)
+        for entry, node in boxes.items()
+        if node.group in closed or node.key in shown
+    }
+    lines = [*_topic_lines(facts, choices, place)]
+    services: list[GraphLine] = []
+    if choices.shows_services:
+        services = [*_service_lines(facts, choices, place)]
+    return NodeGraph(
+        tuple(drawn),
+        tuple(sorted([*lines, *services], key=lambda line: (line.kind, line.topics))),
+        groups,
+        sum(entry.gone_s is None for entry in facts.nodes),
+        sum(len(line.topics) for line in lines),
+        sum(len(line.topics) for line in services),
+        sum(_is_hidden(node, choices) for node in boxes.values()),
+    )
+
+
+def _is_hidden(node: DrawnNode, choices: GraphChoices) -> bool:
+    return node.is_quiet and choices.hides_quiet and node.group not in choices.quiet_shown
+
+
+# -- nodes and their groups ----------------------------------------------------------------------------------
+
+
+def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
+    """The box of each entry, by the entry's key; groups are not closed yet."""
+    pictures = {topic.key for topic in facts.topics if topic.codec == "image"}
+    made: dict[str, DrawnNode] = {}
+    taken: Counter[str] = Counter()
+    for entry in sorted(facts.nodes, key=lambda each: (each.since_ns, each.id)):
+        key = f"{entry.network}|{entry.host}|{entry.name}"
+        taken[key] += 1
+        made[entry.key] = DrawnNode(
+            key if taken[key] == 1 else f"{key}|{taken[key]}",
+            _name_of(entry),
+            _group_of(entry, facts, choices.group_by),
+            _kind_of(entry, facts),
+            entry,
+            entry.key,
+            _joined_by(entry),
+            any(key_of(entry.network, topic) in pictures for topic in entry.publishes),
+            entry.gone_s is not None,
+            entry.key in choices.quiet and entry.gone_s is None,
+        )
+    return dict(sorted(made.items(), key=lambda item: item[1].key))
+
+
+def _kind_of(entry: NodeEntry, facts: GraphFacts) -> NodeKind:
+    if entry.is_bridge:
+        return "bridge"
+    if entry.is_original:
+        return "original"
+    if entry.network:
+        return "program"
+    if entry.name == NODE_NAME:
+        return "studio"
+    if entry.name.startswith(PROGRAM):
+        return "behaviour"
+    return "robot" if entry.name in facts.robots else "program"
+
+
+def _name_of(entry: NodeEntry) -> str:
+    """Its name; of a behaviour's program that of the behaviour."""
+    return entry.name.removeprefix(PROGRAM) or entry.name
+
+
+def _joined_by(entry: NodeEntry) -> str:
+    """What a bridge joins this network with; "" when its name does not tell."""
+    _before, found, back_end = entry.name.rpartition(BRIDGE_TO)
+    if not entry.is_bridge or not found:
+        return ""
+    kind = kind_named(back_end)
+    return kind.words if kind is not None else back_end
+
+
+def _group_of(entry: NodeEntry, facts: GraphFacts, group_by: GroupBy) -> str:
+    """The key of its group: "host:lab-pc", "network:ros2", "robot:Pepper"; "" where there is none."""
+    if group_by == "nothing":
+        return ""
+    if group_by == "robot":
+        mine = [name for name in facts.robots if _belongs(entry, name)]
+        return f"robot:{max(mine, key=len)}" if mine else "robot:"
+    return f"host:{entry.host}" if entry.host or not entry.network else f"network:{entry.network}"
+
+
+def _belongs(entry: NodeEntry, robot: str) -> bool:
+    return entry.name == robot or any(topic.startswith(f"/{robot}/") for topic in entry.publishes)
+
+
+def _groups(
+    facts: GraphFacts, choices: GraphChoices, boxes: Mapping[str, DrawnNode]
+) -> tuple[GraphGroup, ...]:
+    """The groups in the order of their keys. One of which all are hidden is closed: it stays in sight."""
+    members: dict[str, list[DrawnNode]] = {}
+    for node in boxes.values():
+        members.setdefault(node.group, []).append(node)
+    addresses = _addresses(facts)
+    made = []
+    for key in sorted(members):
+        if not key:
+            continue
+        nodes = members[key]
+        hidden = sum(_is_hidden(node, choices) for node in nodes)
+        told = Counter(addresses[node.entry_key] for node in nodes if node.entry_key in addresses)
+        address = min(told, key=lambda each: (-told[each], each)) if told else ""
+        closed = choices.is_closed(key) or hidden == len(nodes)
+        made.append(
+            GraphGroup(key, _host_of(key), address, _icon_of(key, nodes, facts), len(nodes), hidden, closed)
+        )
+    return tuple(made)
+
+
+def _host_of(group: str) -> str:
+    """The name in a group's key; "" for what has none."""
+    return group.partition(":")[2]
+
+
+def _icon_of(group: str, nodes: Iterable[DrawnNode], facts: GraphFacts) -> str:
+    kind, _colon, name = group.partition(":")
+    if kind == "network":
+        return "waypoints"
+    if kind == "robot":
+        return "bot" if name else "box"
+    return "bot" if name != facts.host and any(node.kind == "robot" for node in nodes) else "monitor"
+
+
+def _addresses(facts: GraphFacts) -> dict[str, str]:
+    """By the key of an entry the address of its computer, where its publishers can be reached from others."""
+    found: dict[str, str] = {}
+    for topic in facts.topics:
+        if topic.info is None:
+            continue
+        for publisher in topic.info.publishers:
+            entry = key_of(topic.network, publisher.node_id)
+            if entry not in found:
+                reached = next(filter(None, map(_address_in, publisher.endpoints)), "")
+                if reached:
+                    found[entry] = reached
+    return found
+
+
+def _address_in(endpoint: str) -> str:
+    """The address in "tcp://192.168.1.20:40001"; "" for one that only this computer has, or none."""
+    try:
+        host = urlsplit(endpoint).hostname or ""
+    except ValueError:
+        return ""
+    if "://" not in endpoint or endpoint.startswith(("ipc:", "inproc:")):
+        return ""
+    return "" if host.startswith(("127.", "0.")) or host in {"localhost", "::1", "*", "::"} else host
+
+
+def _box_of(group: GraphGroup) -> DrawnNode:
+    return DrawnNode(group.key, group.name, group.key, "group", members=group.members, quiet=group.quiet)
+
+
+# -- lines ---------------------------------------------------------------------------------------------------
+
+_Ends = tuple[tuple[str, ...], tuple[str, ...]]
+
+
+def is_shown(topic: str, choices: GraphChoices) -> bool:
+    """Whether topics of this name are drawn at all: nep's own only when they are asked for."""
+    return choices.shows_own or not topic.startswith(OWN)
+
+
+def _topic_lines(facts: GraphFacts, choices: GraphChoices, place: Mapping[str, str]) -> Iterator[GraphLine]:
+    patterns = _patterns(facts)
+    bundles: dict[_Ends, list[str]] = {}
+    for topic in facts.topics:
+        info = topic.info
+        if info is None or topic.gone_s is not None or not is_shown(topic.name, choices):
+            continue
+        hearers = [key_of(topic.network, each.node_id) for each in info.subscribers]
+        hearers += [
+            entry
+            for network, pattern, entry in patterns
+            if network == topic.network and matches(pattern, topic.name)
+        ]
+        speakers = (key_of(topic.network, each.node_id) for each in info.publishers)
+        _bundle(bundles, _ends(speakers, hearers, place), topic.key)
+    yield from _as_lines("topic", bundles)
+
+
+def _service_lines(facts: GraphFacts, choices: GraphChoices, place: Mapping[str, str]) -> Iterator[GraphLine]:
+    bundles: dict[_Ends, list[str]] = {}
+    for name, info in facts.services.items():
+        if is_shown(name, choices):
+            clients = (each.node_id for each in info.clients)
+            servers = (each.node_id for each in info.servers)
+            _bundle(bundles, _ends(clients, servers, place), name)
+    yield from _as_lines("service", bundles)
+
+
+def _patterns(facts: GraphFacts) -> list[tuple[str, str, str]]:
+    """(network, pattern, entry) of everybody who hears all topics that match a pattern."""
+    return [
+        (entry.network, topic, entry.key)
+        for entry in facts.nodes
+        if entry.gone_s is None
+        for topic in entry.subscribes
+        if is_pattern(topic)
+    ]
+
+
+def _ends(sources: Iterable[str], targets: Iterable[str], place: Mapping[str, str]) -> _Ends:
+    """Where a line begins and ends: boxes that are drawn, each once."""
+    return _places(sources, place), _places(targets, place)
+
+
+def _places(entries: Iterable[str], place: Mapping[str, str]) -> tuple[str, ...]:
+    found = {place[each] for each in entries if each in place}
+    return tuple(found) if len(found) < 2 else tuple(sorted(found))
+
+
+def _bundle(bundles: dict[_Ends, list[str]], ends: _Ends, name: str) -> None:
+    sources, targets = ends
+    if sources and targets and not (len(sources) == 1 and sources == targets):
+        bundles.setdefault(ends, []).append(name)
+
+
+def _as_lines(kind: LineKind, bundles: Mapping[_Ends, Collection[str]]) -> Iterator[GraphLine]:
+    for (sources, targets), names in bundles.items():
+        yield GraphLine(kind, sources, targets, tuple(sorted(names)))

@@ -1,0 +1,469 @@
+"""GraphCanvas: the graph on the screen, to be moved, enlarged and walked through by mouse and keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, QSizeF, Qt, Signal
+from PySide6.QtGui import (
+    QFocusEvent,
+    QHelpEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QNativeGestureEvent,
+    QPainter,
+    QPaintEvent,
+    QResizeEvent,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
+
+from app.core.graph.walk import Arrow, GraphChoice, step
+from app.ui.panels.graph.painting import paint_scene
+from app.ui.panels.graph.scene import FiguresOf, GraphScene, LineItem, NodeItem
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.keyboard import is_plain, keyboard_leads
+from nep.i18n import _
+
+LEAST_SCALE, MOST_SCALE = 0.05, 3.0
+STEP = 1.2
+MARGIN = 20.0
+PAN = 60.0
+CLICK = 4.0
+"""How far the mouse may move in a press that chooses, in px."""
+AT_ONCE = 250
+"""Nodes and lines whose figures are renewed in one tick."""
+MOST_AREAS = 60
+"""More areas than these are painted as one."""
+_ARROWS: dict[int, Arrow] = {
+    Qt.Key.Key_Left: "left",
+    Qt.Key.Key_Right: "right",
+    Qt.Key.Key_Up: "up",
+    Qt.Key.Key_Down: "down",
+}
+_WAYS = {"left": (1, 0), "right": (-1, 0), "up": (0, 1), "down": (0, -1)}
+LETTERS = {Qt.Key.Key_G: "g", Qt.Key.Key_H: "h", Qt.Key.Key_S: "s", Qt.Key.Key_Slash: "/"}
+
+
+class GraphCanvas(QWidget):
+    """Shows one scene. It stays where it is when the scene is another one, until a person wants all of it.
+
+    `chosen` tells what a person chose (None: nothing), `opened` a topic that is to be looked at, `entered` a
+    node whose card is wanted, `toggled` a group to be opened or closed, `quiet_wanted` one whose quiet nodes
+    are wanted, `letter` a key that is the panel's, `moved` that the part that shows is another.
+    """
+
+    chosen = Signal(object)
+    opened = Signal(str)
+    entered = Signal()
+    toggled = Signal(str)
+    quiet_wanted = Signal(str)
+    letter = Signal(str)
+    moved = Signal()
+
+    def __init__(
+        self, theme: Theme, describe: Callable[[GraphChoice | None], str], tip: Callable[[str], str]
+    ) -> None:
+        """``describe`` says in words what is chosen, ``tip`` what is known of a topic under the mouse."""
+        super().__init__()
+        self._theme, self._describe, self._tip = theme, describe, tip
+        self.scene: GraphScene | None = None
+        self.choice: GraphChoice | None = None
+        self.scale = 1.0
+        self._offset = QPointF()
+        self._shows_all = True
+        self._waiting: list[NodeItem | LineItem] = []
+        self._pressed: QPointF | None = None
+        self._dragged = False
+        self.painted = 0
+        """How often it was painted; tests and benchmarks ask."""
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setProperty("ownFocus", "true")
+        self.setMouseTracking(True)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAccessibleName(_("Graph of nodes"))
+        theme.changed.connect(self.update)
+        self.moved.connect(self.renew_soon)
+
+    def sizeHint(self) -> QSize:
+        return QSize(640, 420)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(120, 80)
+
+    # -- what it shows ---------------------------------------------------------------------------------------
+
+    def show_scene(self, scene: GraphScene | None) -> None:
+        """Show another graph, or the same with other places."""
+        self.scene = scene
+        if self.choice is not None and not self._is_there(self.choice):
+            self.choose(None)
+        elif self.choice is not None:
+            self.setAccessibleDescription(self._describe(self.choice))
+        if self._shows_all:
+            self.show_all()
+        self.update()
+        self.moved.emit()
+
+    def _is_there(self, choice: GraphChoice) -> bool:
+        if self.scene is None:
+            return False
+        graph = self.scene.graph
+        return (graph.node(choice.key) if choice.kind == "node" else graph.line_of(choice.key)) is not None
+
+    def renew_soon(self) -> None:
+        """Figures have changed, or others are in sight: `renew` takes them over."""
+        if self.scene is not None:
+            self._waiting = self.scene.seen(self.visible())
+
+    def renew(self, figures: FiguresOf) -> int:
+        """Take over the figures of the next `AT_ONCE` in sight, and paint only what they change.
+
+        Returns how many areas that are. Called with every tick, so that none takes long.
+        """
+        scene = self.scene
+        if scene is None or not self._waiting:
+            return 0
+        if not scene.has_figures(self.scale):
+            self._waiting = []  # they are renewed when it is enlarged
+            return 0
+        now, self._waiting = self._waiting[:AT_ONCE], self._waiting[AT_ONCE:]
+        has_words = scene.has_words(self.scale)
+        changed = [scene.renew(item, figures, with_words=has_words) for item in now]
+        seen = self.visible()
+        areas = [area for area in changed if area is not None and area.intersects(seen)]
+        if len(areas) > MOST_AREAS:
+            self.update()
+        else:
+            for area in areas:
+                self.update(self._to_screen(area).adjusted(-2, -2, 2, 2).toAlignedRect())
+        return len(areas)
+
+    def choose(self, choice: GraphChoice | None, *, by_key: bool = False) -> None:
+        """Choose something, or nothing; what keys choose comes into sight and is said."""
+        if choice == self.choice:
+            return
+        self.choice = choice
+        said = self._describe(choice)
+        self.setAccessibleDescription(said)
+        if by_key:
+            self._bring_into_sight()
+            paint.announce(self, said)
+        self.update()
+        self.chosen.emit(choice)
+
+    # -- the part that shows ---------------------------------------------------------------------------------
+
+    def visible(self) -> QRectF:
+        """The part of the scene that is in sight."""
+        left_top = -self._offset / self.scale
+        return QRectF(left_top.x(), left_top.y(), self.width() / self.scale, self.height() / self.scale)
+
+    def show_all(self) -> None:
+        """Show everything, not larger than 100 %; so it stays until a person moves or enlarges it."""
+        self._shows_all = True
+        if self.scene is None or self.scene.bounds.isEmpty():
+            return
+        whole = self.scene.bounds.adjusted(-MARGIN, -MARGIN, MARGIN, MARGIN)
+        fits = min(self.width() / whole.width(), self.height() / whole.height(), 1.0)
+        self.scale = max(LEAST_SCALE, fits)
+        self._offset = QPointF(self.width() / 2, self.height() / 2) - whole.center() * self.scale
+        self.update()
+        self.moved.emit()
+
+    def zoom_by(self, factor: float, at: QPointF | None = None) -> None:
+        """Enlarge around a point of the screen, or the middle."""
+        self.zoom_to(self.scale * factor, at)
+
+    def zoom_to(self, scale: float, at: QPointF | None = None) -> None:
+        """Show it in this size (1.0 is 100 %) around a point of the screen, or the middle."""
+        at = at if at is not None else QPointF(self.width() / 2, self.height() / 2)
+        scale = min(MOST_SCALE, max(LEAST_SCALE, scale))
+        self._offset = at - (at - self._offset) * (scale / self.scale)
+        self.scale = scale
+        self._shows_all = False
+        self.update()
+        self.moved.emit()
+
+    def move_by(self, dx: float, dy: float) -> None:
+        """Move it by so many px of the screen."""
+        self._offset += QPointF(dx, dy)
+        self._shows_all = False
+        self.update()
+        self.moved.emit()
+
+    def show_place(self, at: QPointF) -> None:
+        """Bring a place of the scene into the middle."""
+        middle = self.visible().center()
+        self.move_by((middle.x() - at.x()) * self.scale, (middle.y() - at.y()) * self.scale)
+
+    def _bring_into_sight(self) -> None:
+        scene, choice = self.scene, self.choice
+        if scene is None or choice is None:
+            return
+        rect = QRectF()
+        if choice.kind == "node" and choice.key in scene.nodes:
+            rect = scene.nodes[choice.key].rect
+        else:
+            item = next((each for each in scene.lines if choice.key in each.line.topics), None)
+            if item is not None:
+                rect = item.label if item.label is not None else QRectF(item.bounds.center(), QSizeF(1, 1))
+        if not rect.isNull() and not self.visible().contains(rect):
+            self.show_place(rect.center())
+
+    def _to_screen(self, area: QRectF) -> QRectF:
+        return QRectF(
+            area.left() * self.scale + self._offset.x(),
+            area.top() * self.scale + self._offset.y(),
+            area.width() * self.scale,
+            area.height() * self.scale,
+        )
+
+    def _to_scene(self, at: QPointF) -> QPointF:
+        return (at - self._offset) / self.scale
+
+    # -- Qt --------------------------------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        self.painted += 1
+        painter = QPainter(self)
+        theme = self._theme
+        painter.fillRect(event.rect(), theme.colour("panel"))
+        if self.scene is not None:
+            painter.setClipRegion(event.region())
+            painter.translate(self._offset)
+            painter.scale(self.scale, self.scale)
+            clip = QRectF(event.rect())
+            corner = self._to_scene(clip.topLeft())
+            seen = QRectF(corner, clip.size() / self.scale)
+            rings = self.hasFocus() and keyboard_leads()
+            paint_scene(self.scene, painter, seen, self.scale, self.choice, rings=rings)
+            painter.resetTransform()
+        if self.hasFocus() and keyboard_leads() and self.choice is None:
+            whole = QRectF(self.rect()).adjusted(2, 2, -2, -2)
+            paint.box(painter, whole, theme.radius("small"), None, theme.colour("focus"), 2.0)
+        painter.end()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self._shows_all:
+            self.show_all()
+        else:
+            self.moved.emit()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.update()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self.update()
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
+            self._show_tip(event)
+            return True
+        if isinstance(event, QNativeGestureEvent):
+            if event.gestureType() == Qt.NativeGestureType.ZoomNativeGesture:
+                self.zoom_by(1 + event.value(), event.position())
+            return True
+        return super().event(event)
+
+    def _show_tip(self, event: QHelpEvent) -> None:
+        said = ""
+        at = self._to_scene(QPointF(event.pos()))
+        if self.scene is not None:
+            node = self.scene.node_at(at)
+            item = self.scene.line_at(at, self.scale) if node is None else None
+            if node is not None:
+                said = self._describe(GraphChoice("node", node.key))
+            elif item is not None:
+                said = "\n".join(self._tip(topic) for topic in item.line.topics[:12])
+        QToolTip.showText(event.globalPos(), plain.tip(said), self)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if event.modifiers() & Qt.KeyboardModifier.ShiftModifier or not event.pixelDelta().isNull():
+            by = event.pixelDelta() if not event.pixelDelta().isNull() else event.angleDelta()
+            if not event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+                sideways = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier) and not by.x()
+                self.move_by(by.y() if sideways else by.x(), 0 if sideways else by.y())
+                event.accept()
+                return
+        self.zoom_by(STEP ** (event.angleDelta().y() / 120), event.position())
+        event.accept()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() in {Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton}:
+            self._pressed, self._dragged = event.position(), False
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._pressed is not None:
+            by = event.position() - self._pressed
+            if self._dragged or by.manhattanLength() > CLICK:
+                self._dragged = True
+                self.move_by(by.x(), by.y())
+                self._pressed = event.position()
+                self.setCursor(Qt.CursorShape.ClosedHandCursor)
+            return
+        self.setCursor(
+            Qt.CursorShape.PointingHandCursor
+            if self._means(event.position()) is not None
+            else Qt.CursorShape.ArrowCursor
+        )
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        clicked = self._pressed is not None and not self._dragged
+        self._pressed, self._dragged = None, False
+        if clicked and event.button() == Qt.MouseButton.LeftButton:
+            self._press(event.position())
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        meant = self._means(event.position())
+        if isinstance(meant, GraphChoice) and meant.kind == "topic":
+            self.opened.emit(meant.key)
+
+    def _press(self, at: QPointF) -> None:
+        meant = self._means(at)
+        if isinstance(meant, tuple):
+            group, is_head = meant
+            (self.toggled if is_head else self.quiet_wanted).emit(group)
+            return
+        if meant is not None and meant.kind == "node" and self._open_group(meant.key):
+            return
+        self.choose(meant)
+
+    def _means(self, at: QPointF) -> GraphChoice | tuple[str, bool] | None:
+        """What a press there would choose: a node, a topic, or (a group, whether by its head)."""
+        scene = self.scene
+        if scene is None:
+            return None
+        here = self._to_scene(at)
+        node = scene.node_at(here)
+        if node is not None:
+            return GraphChoice("node", node.key)
+        item = scene.line_at(here, self.scale)
+        if item is not None:
+            return GraphChoice("topic", item.line.topics[0], item.line.sources[0])
+        group = scene.group_at(here)
+        return (group[0].key, group[1]) if group is not None else None
+
+    def _open_group(self, key: str) -> bool:
+        """Open a group that is drawn as one box."""
+        node = self.scene.graph.node(key) if self.scene is not None else None
+        if node is None or node.kind != "group":
+            return False
+        (self.quiet_wanted if node.quiet == node.members else self.toggled).emit(node.group)
+        return True
+
+    # -- keys ------------------------------------------------------------------------------------------------
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        key = event.key()
+        arrow = _ARROWS.get(key)
+        if arrow is not None and event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
+            across, down = _WAYS[arrow]
+            self.move_by(across * PAN, down * PAN)
+        elif arrow is not None and is_plain(event):
+            self._walk(arrow)
+        elif key in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
+            self._enter()
+        elif key == Qt.Key.Key_Escape and self.choice is not None:
+            self.choose(None)
+        elif not self._zoom_key(event):
+            super().keyPressEvent(event)
+
+    def _zoom_key(self, event: QKeyEvent) -> bool:
+        """Letters of the panel, and what enlarges; False for other keys."""
+        held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier)
+        key = event.key()
+        if held:
+            return False
+        if key in LETTERS:
+            self.letter.emit(LETTERS[Qt.Key(key)])
+        elif event.text() in {"+", "="}:
+            self.zoom_by(STEP)
+        elif event.text() == "-":
+            self.zoom_by(1 / STEP)
+        elif event.text() == "0":
+            self.show_all()
+        else:
+            return False
+        return True
+
+    def _walk(self, arrow: Arrow) -> None:
+        if self.scene is not None:
+            found = step(self.scene.graph, self.scene.layout, self.choice, arrow)
+            if found is not None:
+                self.choose(found, by_key=True)
+
+    def _enter(self) -> None:
+        choice = self.choice
+        if choice is None:
+            return
+        if choice.kind == "topic":
+            self.opened.emit(choice.key)
+        elif not self._open_group(choice.key):
+            self.entered.emit()
+
+
+class GraphOverview(QWidget):
+    """The whole graph small, with a frame around the part that shows; a press goes there."""
+
+    def __init__(self, theme: Theme, canvas: GraphCanvas) -> None:
+        super().__init__(canvas)
+        self._theme, self._canvas = theme, canvas
+        self.resize(168, 104)
+        self.setAccessibleName(_("Overview"))
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        canvas.moved.connect(self._follow)
+        self.hide()
+
+    def _follow(self) -> None:
+        """Stand in the corner while not everything is in sight, and there is room."""
+        canvas, scene = self._canvas, self._canvas.scene
+        wanted = (
+            scene is not None
+            and not canvas.visible().contains(scene.bounds)
+            and canvas.width() > 3 * self.width()
+            and canvas.height() > 3 * self.height()
+        )
+        self.move(canvas.width() - self.width() - 12, canvas.height() - self.height() - 12)
+        self.setVisible(wanted)
+        self.update()
+
+    def _fit(self, scene: GraphScene) -> tuple[float, QPointF]:
+        bounds = scene.bounds.adjusted(-MARGIN, -MARGIN, MARGIN, MARGIN)
+        scale = min((self.width() - 8) / bounds.width(), (self.height() - 8) / bounds.height())
+        return scale, QPointF(self.width() / 2, self.height() / 2) - bounds.center() * scale
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        scene, theme = self._canvas.scene, self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        paint.box(painter, rect, theme.radius("panel"), theme.colour("panel"), theme.colour("borderStrong"))
+        if scene is not None:
+            scale, offset = self._fit(scene)
+            painter.save()
+            painter.translate(offset)
+            painter.scale(scale, scale)
+            for group in scene.groups:
+                painter.fillRect(group.rect, theme.colour("sunken"))
+            choice = self._canvas.choice
+            for key, item in scene.nodes.items():
+                is_chosen = choice is not None and choice.key == key
+                painter.fillRect(item.rect, theme.colour("accent" if is_chosen else "controlBorder"))
+            painter.restore()
+            seen = self._canvas.visible()
+            frame = QRectF(seen.topLeft() * scale + offset, seen.size() * scale)
+            paint.box(
+                painter, frame.intersected(rect.adjusted(2, 2, -2, -2)), 3, None, theme.colour("accent"), 1.5
+            )
+        painter.end()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        scene = self._canvas.scene
+        if scene is not None and event.button() == Qt.MouseButton.LeftButton:
+            scale, offset = self._fit(scene)
+            self._canvas.show_place((event.position() - offset) / scale)

@@ -1,0 +1,448 @@
+"""The card of what is chosen in the graph: a topic, a service or a node, with its figures and next steps."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from app.core.graph.node_graph import DrawnNode
+from app.core.network.topics import Topic, key_of, split_key
+from app.ui.panels.graph.words import known_figure, percent_words, short_rate
+from app.ui.text.nodes import cpu_words, generation_words
+from app.ui.text.numbers import age_words, bandwidth_words, grouped, latency_words, rate_words, size_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Card, ElidedLabel, IconButton, Scrolled, Separator, Sparkline, label
+from app.ui.widgets.buttons import LinkButton
+from nep.i18n import _, ngettext, number
+
+if TYPE_CHECKING:
+    from nep.protocol.graph_view import GraphView, ServiceInfo
+
+WIDTH = 316
+MOST_ROWS = 40
+"""Publishers, subscribers or topics that are listed; how many more there are is said."""
+
+Row = tuple[str, str, tuple[str, ...]]
+"""What a press on a row chooses ("" for nothing), its name, and its figures."""
+
+
+@dataclass(frozen=True, slots=True)
+class CardTable:
+    """Rows under a head. ``columns`` are the words above the figures."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+    chooses: str = "node"
+
+
+@dataclass(frozen=True, slots=True)
+class CardFigure:
+    """One large figure: what it is, its value, a line below, and perhaps a curve."""
+
+    title: str
+    value: str
+    note: str = ""
+    curve: tuple[float, ...] = ()
+    is_bad: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CardContent:
+    """Everything that a card says of one thing."""
+
+    title: str
+    kind: str
+    figures: tuple[CardFigure, ...] = ()
+    facts: tuple[str, ...] = ()
+    tables: tuple[CardTable, ...] = ()
+    foot: str = ""
+    topic: str = ""
+    """What *Inspect* opens; "" where there is nothing to inspect."""
+
+
+class GraphCard(QWidget):
+    """Shows a `CardContent`; what did not change is left alone.
+
+    `closed` when a person closes it, `inspected` tells a topic, `chose` a node's or topic's key.
+
+    More next steps of a topic (plot its rate, record it, make an alarm of it) stand beside `inspect` in
+    `steps` as soon as Studio can do them.
+    """
+
+    closed = Signal()
+    inspected = Signal(str)
+    chose = Signal(str, str)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.content: CardContent | None = None
+        self.title = ElidedLabel("code", "text", least=60)
+        self.kind = label("", "small", role="textTertiary")
+        self.close_button = IconButton(theme, "x", _("Close the card"), size=24)
+        self.close_button.clicked.connect(self.closed)
+        self._inside = QWidget()
+        self._column = QVBoxLayout(self._inside)
+        self._column.setContentsMargins(14, 4, 14, 10)
+        self._column.setSpacing(8)
+        scroll = Scrolled(self._inside)
+        scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.inspect = Button(theme, _("Inspect"), "list-tree", size="form")
+        self.inspect.clicked.connect(self._inspect)
+        self.steps = QHBoxLayout()
+        self.steps.setContentsMargins(14, 6, 14, 8)
+        self.steps.setSpacing(8)
+        self.steps.addWidget(self.inspect)
+        self.steps.addStretch(1)
+        self.foot = label("", "small", role="textTertiary", wrap=True)
+        self.foot.setContentsMargins(14, 5, 14, 7)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(self._head())
+        column.addWidget(scroll, 1)
+        column.addLayout(self.steps)
+        self._line = Separator(theme)
+        column.addWidget(self._line)
+        column.addWidget(self.foot)
+        self._figures: list[_FigureBox] = []
+        self._tables: list[_Table] = []
+        self.setAccessibleName(_("What is chosen"))
+        self.hide()
+
+    def _head(self) -> QHBoxLayout:
+        head = QHBoxLayout()
+        head.setContentsMargins(14, 8, 8, 4)
+        head.setSpacing(8)
+        head.addWidget(self.title)
+        head.addWidget(self.kind, 1)
+        head.addWidget(self.close_button)
+        return head
+
+    def first_stop(self) -> QWidget:
+        """What gets the keyboard when a person goes into the card: the first row, else *Inspect*."""
+        rows = [row.button for table in self._tables for row in table.rows]
+        first = next((button for button in rows if button.isVisibleTo(self)), None)
+        return first or (self.inspect if self.inspect.isVisibleTo(self) else self.close_button)
+
+    def _inspect(self) -> None:
+        if self.content is not None and self.content.topic:
+            self.inspected.emit(self.content.topic)
+
+    def show_content(self, content: CardContent | None) -> None:
+        """Say this, or nothing: then the card is not there."""
+        if content == self.content:
+            return
+        before, self.content = self.content, content
+        if content is None:
+            self.hide()
+            return
+        self.title.setText(content.title)
+        self.kind.setText(content.kind)
+        self.inspect.setVisible(bool(content.topic))
+        self.foot.setText(content.foot)
+        self.foot.setVisible(bool(content.foot))
+        self._line.setVisible(bool(content.foot))
+        if before is None or _shape(before) != _shape(content):
+            self._rebuild(content)
+        for box, figure in zip(self._figures, content.figures, strict=True):
+            box.say(figure)
+        for made, table in zip(self._tables, content.tables, strict=True):
+            made.say(table)
+        self.show()
+
+    def _rebuild(self, content: CardContent) -> None:
+        while (item := self._column.takeAt(0)) is not None:
+            if (old := item.widget()) is not None:
+                old.hide()
+                old.deleteLater()
+        self._figures = [_FigureBox(self._theme) for _figure in content.figures]
+        if self._figures:
+            card = Card(self._theme)
+            grid = QGridLayout(card)
+            grid.setContentsMargins(12, 8, 12, 8)
+            grid.setHorizontalSpacing(12)
+            grid.setVerticalSpacing(8)
+            for place, box in enumerate(self._figures):
+                grid.addWidget(box, place // 2, place % 2, Qt.AlignmentFlag.AlignTop)
+            grid.setColumnStretch(0, 1)
+            grid.setColumnStretch(1, 1)
+            self._column.addWidget(card)
+        for fact in content.facts:
+            self._column.addWidget(label(fact, "body", role="textSecondary", wrap=True))
+        self._tables = [_Table(self._theme, table, self.chose.emit) for table in content.tables]
+        for made in self._tables:
+            self._column.addWidget(made)
+        self._column.addStretch(1)
+
+
+def _shape(content: CardContent) -> object:
+    """What decides which widgets there are."""
+    tables = [(table.title, table.columns, [row[:2] for row in table.rows]) for table in content.tables]
+    return content.title, len(content.figures), content.facts, tables
+
+
+class _FigureBox(QWidget):
+    """One of the large figures."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._title = label("", "small", role="textTertiary")
+        self._value = label("", "heading")
+        self._note = label("", "small", role="textSecondary", wrap=True)
+        self._curve = Sparkline(theme)
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        row.addWidget(self._value, 1)
+        row.addWidget(self._curve, 0, Qt.AlignmentFlag.AlignBottom)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(1)
+        column.addWidget(self._title)
+        column.addLayout(row)
+        column.addWidget(self._note)
+
+    def say(self, figure: CardFigure) -> None:
+        """Show this figure."""
+        self._title.setText(figure.title)
+        if self._value.text() != figure.value:
+            self._value.setText(figure.value)
+        self._note.setText(figure.note)
+        self._curve.set_values(figure.curve)
+        self._curve.setVisible(len(figure.curve) > 1)
+        role = "warn" if figure.is_bad else "text"
+        if self._value.property("role") != role:
+            self._value.setProperty("role", role)
+            self._value.style().unpolish(self._value)
+            self._value.style().polish(self._value)
+        self.setAccessibleName(f"{figure.title}: {figure.value}")
+
+
+@dataclass(slots=True)
+class _TableRow:
+    button: LinkButton
+    figures: list[QWidget]
+
+
+class _Table(QWidget):
+    """Names, each of which chooses what it names, with figures at their right."""
+
+    def __init__(self, theme: Theme, table: CardTable, chose: Callable[[str, str], object]) -> None:
+        super().__init__()
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 4, 0, 0)
+        grid.setHorizontalSpacing(10)
+        grid.setVerticalSpacing(2)
+        grid.setColumnStretch(0, 1)
+        grid.addWidget(label(table.title, "title"), 0, 0)
+        for place, words in enumerate(table.columns, 1):
+            grid.addWidget(label(words, "small", role="textTertiary"), 0, place, Qt.AlignmentFlag.AlignRight)
+        grid.addWidget(Separator(theme), 1, 0, 1, len(table.columns) + 1)
+        self.rows: list[_TableRow] = []
+        for number_, (key, name, figures) in enumerate(table.rows, 2):
+            button = LinkButton(theme, name)
+            button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+            button.setEnabled(bool(key))
+            button.clicked.connect(lambda _on=False, key=key, kind=table.chooses: chose(kind, key))
+            grid.addWidget(button, number_, 0)
+            shown: list[QWidget] = []
+            for place, _words in enumerate(figures, 1):
+                shown.append(label("", "body"))
+                grid.addWidget(shown[-1], number_, place, Qt.AlignmentFlag.AlignRight)
+            self.rows.append(_TableRow(button, shown))
+
+    def say(self, table: CardTable) -> None:
+        """Show the figures of the moment."""
+        for row, (_key, _name, figures) in zip(self.rows, table.rows, strict=True):
+            for shown, words in zip(row.figures, figures, strict=True):
+                if shown.text() != words:  # type: ignore[attr-defined]
+                    shown.setText(words)  # type: ignore[attr-defined]
+
+
+# -- what is said --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class CardFacts:
+    """Where a card's facts come from: topics and services by name, the graph, names and boxes of nodes.
+
+    ``box_of`` gives the box of a node's entry, "" where it is not drawn; ``calls`` are calls a second;
+    ``shows`` says of a topic's name whether it is told of at all.
+    """
+
+    topic_of: Callable[[str], Topic | None]
+    view: GraphView | None
+    name_of: Callable[[str], str]
+    box_of: Callable[[str], str]
+    calls: Mapping[str, float]
+    shows: Callable[[str], bool] = lambda _name: True
+    now_ns: Callable[[], int] = time.time_ns
+
+
+def topic_card(key: str, facts: CardFacts) -> CardContent | None:
+    """What is known of a topic or service; None when it is not known."""
+    topic = facts.topic_of(key)
+    if topic is not None:
+        return _of_topic(topic, facts)
+    service = facts.view.services.get(key) if facts.view is not None else None
+    return _of_service(service, facts) if service is not None else None
+
+
+def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
+    rate, sent = known_figure(topic.rate_hz), known_figure(topic.bandwidth_Bps)
+    size = sent / rate if sent and rate else None
+    rates = tuple(topic.rates)
+    least = _("least {rate} lately").format(rate=rate_words(min(rates))) if len(rates) > 1 else ""
+    figures = (
+        CardFigure(_("Rate"), f"{rate_words(rate)} /s" if rate is not None else "", least, rates),
+        CardFigure(
+            _("Bandwidth"),
+            bandwidth_words(sent),
+            _("{size} a message").format(size=size_words(size)) if size else "",
+        ),
+        _lost(topic),
+        _latency(topic),
+    )
+    info = topic.info
+    publishers = tuple(
+        _row(
+            facts,
+            key_of(topic.network, each.node_id),
+            (rate_words(known_figure(each.rate_hz)), grouped(each.last_seq)),
+        )
+        for each in (info.publishers if info is not None else ())[:MOST_ROWS]
+    )
+    subscribers = tuple(
+        _row(facts, key_of(topic.network, each.node_id), _received(each.received, each.lost))
+        for each in (info.subscribers if info is not None else ())[:MOST_ROWS]
+    )
+    more = max(0, topic.publishers - MOST_ROWS) + max(0, topic.subscribers - MOST_ROWS)
+    tables = (
+        CardTable(_("Publisher"), (_("Rate /s"), _("Seq")), publishers),
+        CardTable(_("Subscribers"), (_("Received"), _("Lost")), subscribers),
+    )
+    return CardContent(
+        topic.name,
+        topic.msg_type,
+        figures,
+        (_more(more),) if more else (),
+        tuple(table for table in tables if table.rows),
+        clock_words(facts.view) if not topic.network else "",
+        topic.key,
+    )
+
+
+def _received(received: int | None, lost: int | None) -> tuple[str, str]:
+    return "" if received is None else grouped(received), "" if lost is None else grouped(lost)
+
+
+def _more(count: int) -> str:
+    return ngettext("{count} more is not listed", "{count} more are not listed", count).format(
+        count=grouped(count)
+    )
+
+
+def _lost(topic: Topic) -> CardFigure:
+    if topic.lost is None:
+        return CardFigure(_("Lost"), "")
+    share = topic.loss_ratio
+    value = "0" if not topic.lost else percent_words(share) if share is not None else grouped(topic.lost)
+    note = ngettext("{count} message", "{count} messages", topic.lost).format(count=grouped(topic.lost))
+    return CardFigure(_("Lost"), value, note if topic.lost else "", is_bad=bool(topic.lost))
+
+
+def _latency(topic: Topic) -> CardFigure:
+    """Of the newest message, where somebody looks at the topic; nobody measures it otherwise."""
+    newest = topic.newest
+    latency = newest.latency_s if newest is not None else None
+    if latency is None:
+        return CardFigure(_("Latency"), "", _("known while you look at it"))
+    return CardFigure(_("Latency"), latency_words(latency), _("of the newest message"))
+
+
+def _of_service(service: ServiceInfo, facts: CardFacts) -> CardContent:
+    rate = facts.calls.get(service.name)
+    figures = (
+        CardFigure(_("Calls"), grouped(service.calls), short_rate(rate) if rate is not None else ""),
+        CardFigure(_("Errors"), grouped(service.errors), is_bad=service.errors > 0),
+    )
+    servers = tuple(
+        _row(facts, each.node_id, (grouped(each.calls), grouped(each.errors)))
+        for each in service.servers[:MOST_ROWS]
+    )
+    clients = tuple(
+        _row(facts, each.node_id, _received(each.answered, each.failed))
+        for each in service.clients[:MOST_ROWS]
+    )
+    tables = (
+        CardTable(_("Servers"), (_("Answered"), _("Errors")), servers),
+        CardTable(_("Clients"), (_("Answered"), _("Failed")), clients),
+    )
+    return CardContent(
+        service.name, _("service"), figures, (), tuple(table for table in tables if table.rows)
+    )
+
+
+def _row(facts: CardFacts, entry: str, figures: tuple[str, ...]) -> Row:
+    return facts.box_of(entry), facts.name_of(entry), figures
+
+
+def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: CardFacts) -> CardContent | None:
+    """What is known of a node; ``services`` are those that it serves (True) or calls."""
+    entry = node.entry
+    if entry is None:
+        return None
+    lines = [_("on {host}").format(host=entry.host)] if entry.host else []
+    if entry.pid is not None:
+        lines.append(_("pid {number}").format(number=entry.pid))
+    if entry.since_ns and entry.gone_s is None:
+        since = max(0.0, (facts.now_ns() - entry.since_ns) / 1e9)
+        lines.append(_("here for {age}").format(age=age_words(since - since % 10)))
+    if entry.gone_s is not None:
+        lines.append(_("gone"))
+    figures = (CardFigure(_("Processor"), cpu_words(entry.cpu_ratio), _("of one core")),)
+    tables = (
+        _topics_of(_("Publishes"), entry.network, entry.publishes, facts),
+        _topics_of(_("Subscribes"), entry.network, entry.subscribes, facts),
+        CardTable(_("Serves"), (), tuple((name, name, ()) for name, serves in services if serves), "topic"),
+        CardTable(
+            _("Calls"), (), tuple((name, name, ()) for name, serves in services if not serves), "topic"
+        ),
+    )
+    kind = ", ".join(filter(None, (entry.language, generation_words(entry))))
+    return CardContent(
+        node.name,
+        kind,
+        figures if entry.cpu_ratio is not None else (),
+        (", ".join(lines),) if lines else (),
+        tuple(table for table in tables if table.rows),
+    )
+
+
+def _topics_of(title: str, network: str, names: Sequence[str], facts: CardFacts) -> CardTable:
+    rows: list[Row] = []
+    names = [name for name in names if facts.shows(name)]
+    for name in names[:MOST_ROWS]:
+        key = key_of(network, name)
+        topic = facts.topic_of(key)
+        rate = "" if topic is None else rate_words(known_figure(topic.rate_hz))
+        rows.append((key if topic is not None else "", split_key(key)[1], (rate,)))
+    if len(names) > MOST_ROWS:
+        rows.append(("", _more(len(names) - MOST_ROWS), ("",)))
+    return CardTable(title, (_("Rate /s"),), tuple(rows), "topic")
+
+
+def clock_words(view: GraphView | None) -> str:
+    """How surely the clocks of computers are known; "" when nobody has measured it."""
+    if view is None:
+        return ""
+    known = [node.clock_uncertainty_ns for node in view.nodes.values() if node.clock_uncertainty_ns]
+    if not known:
+        return ""
+    return _("Clocks are known within {time} ms").format(time=number(max(known) / 1e6, ".1f"))

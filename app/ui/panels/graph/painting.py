@@ -1,0 +1,233 @@
+"""A scene painted: on the screen, and in a saved picture."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QPainter, QPen
+
+from app.core.graph.walk import GraphChoice
+from app.ui.panels.graph.scene import JOIN, GraphScene, GroupItem, LineItem, NodeItem
+from app.ui.panels.graph.words import node_icon, percent_words, quiet_words
+from app.ui.theme.icons import paint_icon
+from app.ui.widgets import paint
+
+CHOSEN_WIDTH = 2.25
+DIM = 0.3
+LEAST_TEXT_PX = 6.0
+"""Smaller names are not painted: nobody could read them."""
+
+
+def paint_scene(
+    scene: GraphScene,
+    painter: QPainter,
+    clip: QRectF,
+    scale: float,
+    chosen: GraphChoice | None = None,
+    *,
+    rings: bool = False,
+) -> None:
+    """Paint what is in ``clip``, as large as ``scale`` says; ``rings`` show what the keys chose."""
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    _Painting(scene, painter, clip, scale, chosen, rings=rings).paint()
+
+
+class _Painting:
+    """One painting of a scene: the colours of the moment, and who is at the chosen line."""
+
+    def __init__(
+        self,
+        scene: GraphScene,
+        painter: QPainter,
+        clip: QRectF,
+        scale: float,
+        chosen: GraphChoice | None,
+        *,
+        rings: bool,
+    ) -> None:
+        self.scene, self.theme, self.painter = scene, scene.theme, painter
+        self.clip, self.scale, self.rings = clip, scale, rings
+        self.has_text = scale * scene.name_font.pixelSize() >= LEAST_TEXT_PX
+        self.has_small = scene.has_words(scale)
+        self.is_tiny = not scene.has_figures(scale)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, not self.is_tiny)
+        line = scene.graph.line_of(chosen.key) if chosen is not None and chosen.kind == "topic" else None
+        self.line = line
+        self.chosen = chosen.key if chosen is not None and chosen.kind == "node" else ""
+        self.ends = {*line.sources, *line.targets} if line is not None else set[str]()
+
+    def paint(self) -> None:
+        """Groups, lines, their words, then nodes: each may lie on what is before it."""
+        painter, clip = self.painter, self.clip
+        for group in self.scene.groups:
+            if group.rect.intersects(clip):
+                self._group(group)
+        shown = [item for item in self.scene.lines if item.bounds.intersects(clip)]
+        above = [item for item in shown if item.line is self.line]
+        for item in [*(each for each in shown if each.line is not self.line), *above]:
+            painter.setOpacity(DIM if item.is_dim else 1.0)
+            self._line(item)
+        if self.has_small:
+            for item in self.scene.lines:
+                if item.label is not None and item.label.intersects(clip):
+                    painter.setOpacity(DIM if item.is_dim else 1.0)
+                    self._label(item, item.label)
+        for box in self.scene.nodes.values():
+            if box.rect.adjusted(-6, -6, 6, 6).intersects(clip):
+                painter.setOpacity(DIM if box.is_dim else 1.0)
+                self._node(box)
+        painter.setOpacity(1.0)
+        for item in above:
+            self._losses(item)
+
+    def _group(self, item: GroupItem) -> None:
+        theme, painter, group = self.theme, self.painter, item.group
+        paint.box(painter, item.rect, theme.radius("card"), theme.colour("window"), theme.colour("border"))
+        if not self.has_text:
+            return
+        head = self.scene.sizes.head
+        side = theme.scaled(16)
+        left = item.rect.left() + 14
+        middle = item.rect.top() + head / 2
+        paint_icon(
+            painter, QRectF(left, middle - side / 2, side, side), group.icon, theme.colour("textSecondary")
+        )
+        left += side + 8
+        area = QRectF(left, item.rect.top(), item.rect.right() - 10 - left, head)
+        _text(painter, area, item.name, self.scene.title_font, theme.colour("text"))
+        used = paint.width_of(self.scene.title_font, item.name) + 8
+        if area.width() - used > 40:
+            area.setLeft(left + used)
+            paint.words(painter, area, group.address, self.scene.small_font, theme.colour("textTertiary"))
+        if item.quiet is not None:
+            pen = QPen(theme.colour("controlBorder"), 1, Qt.PenStyle.DashLine)
+            painter.setPen(pen)
+            painter.setBrush(theme.colour("panel"))
+            round_end = item.quiet.height() / 2
+            painter.drawRoundedRect(item.quiet, round_end, round_end)
+            paint.words(
+                painter,
+                item.quiet,
+                quiet_words(group),
+                self.scene.small_font,
+                theme.colour("textSecondary"),
+                paint.CENTRE,
+            )
+
+    def _line(self, item: LineItem) -> None:
+        is_chosen = item.line is self.line
+        colour = self.theme.colour("accent" if is_chosen else "controlBorder")
+        width = 1.0 if self.is_tiny else CHOSEN_WIDTH if is_chosen else item.figures.width
+        pen = QPen(colour, width)
+        pen.setCosmetic(self.is_tiny)
+        if item.line.kind == "service":
+            pen.setDashPattern([5 / width, 4 / width])
+        self.painter.setPen(pen)
+        self.painter.setBrush(Qt.BrushStyle.NoBrush)
+        path, arrows = item.drawn()
+        self.painter.drawPath(path)
+        if self.is_tiny:
+            return
+        self.painter.setPen(Qt.PenStyle.NoPen)
+        self.painter.setBrush(colour)
+        for arrow in arrows:
+            self.painter.drawPolygon(arrow)
+
+    def _label(self, item: LineItem, rect: QRectF) -> None:
+        """The names in the colour of text, the figure behind them quieter; on a chip when chosen."""
+        theme, painter = self.theme, self.painter
+        names, _space, figure = item.figures.words.rpartition(" ")
+        if not names or not figure.endswith(("/s", "/min")):
+            names, figure = item.figures.words, ""
+        is_chosen = item.line is self.line
+        if is_chosen:
+            paint.box(
+                painter,
+                rect.adjusted(-5, -1, 5, 1),
+                theme.radius("chip"),
+                theme.colour("accentTint"),
+                theme.colour("accent"),
+            )
+        ink = theme.colour("accentText" if is_chosen else "text")
+        _text(painter, rect, names, self.scene.label_font, ink)
+        if figure:
+            used = (len(names) + 1) * self.scene.letter
+            area = rect.adjusted(used, 0, 20, 0)
+            quiet = theme.colour("accentText" if is_chosen else "textSecondary")
+            _text(painter, area, figure, self.scene.label_font, quiet)
+
+    def _losses(self, item: LineItem) -> None:
+        """What is lost, at the ends of the chosen line where it is."""
+        if not self.has_small:
+            return
+        theme, painter, font = self.theme, self.painter, self.scene.small_font
+        for box, share in item.figures.lost:
+            tip = next((points[-1] for ends, points in item.ways.items() if ends[1] == box), None)
+            if tip is None:
+                continue
+            words = percent_words(share)
+            side = theme.scaled(12)
+            wide, high = paint.width_of(font, words) + side + 18, theme.scaled(20)
+            chip = QRectF(tip[0] - wide - 12, tip[1] + 6, wide, high)
+            paint.box(painter, chip, high / 2, theme.colour("warnTint"), theme.colour("warnBorder"))
+            square = QRectF(chip.left() + 7, chip.center().y() - side / 2, side, side)
+            paint_icon(painter, square, "triangle-alert", theme.colour("warn"))
+            _text(painter, chip.adjusted(side + 11, 0, 0, 0), words, font, theme.colour("warn"))
+
+    def _node(self, item: NodeItem) -> None:
+        theme, painter, node = self.theme, self.painter, item.node
+        is_chosen = node.key == self.chosen
+        at_line = node.key in self.ends
+        is_source = self.line is not None and node.key in self.line.sources
+        fill = theme.colour("selected" if is_chosen or is_source else "panel")
+        edge = theme.colour("accent" if is_chosen or at_line else "controlBorder")
+        radius = theme.radius("panel")
+        faint = node.is_gone or node.is_quiet
+        if faint:
+            painter.setPen(QPen(edge, 1, Qt.PenStyle.DashLine))
+            painter.setBrush(fill)
+            painter.drawRoundedRect(item.rect.adjusted(0.5, 0.5, -0.5, -0.5), radius, radius)
+        else:
+            paint.box(painter, item.rect, radius, fill, edge, 1.5 if is_chosen or at_line else 1.0)
+        if node.joins:
+            self._other_side(item.rect, node.joins, edge)
+        if is_chosen and self.rings:
+            ring = item.rect.adjusted(-3, -3, 3, 3)
+            paint.box(painter, ring, radius + 3, None, theme.colour("focus"), 2.0)
+        if self.has_text:
+            self._words(item, "textDisabled" if node.is_gone else "textSecondary" if faint else "text")
+
+    def _other_side(self, rect: QRectF, joins: str, edge: QColor) -> None:
+        """The part of a bridge that belongs to the other network."""
+        theme, painter = self.theme, self.painter
+        part = QRectF(rect.right() - JOIN, rect.top() + 1, JOIN - 1, rect.height() - 2)
+        paint.box(painter, part, theme.radius("small"), theme.colour("sunken"))
+        painter.setPen(QPen(edge, 1))
+        painter.drawLine(part.topLeft(), part.bottomLeft())
+        if self.has_small:
+            font = QFont(self.scene.small_font)
+            font.setWeight(QFont.Weight.DemiBold)
+            paint.words(painter, part, joins, font, theme.colour("textSecondary"), paint.CENTRE)
+
+    def _words(self, item: NodeItem, role: str) -> None:
+        theme, painter, rect = self.theme, self.painter, item.rect
+        side = theme.scaled(16)
+        square = QRectF(rect.left() + 12, rect.center().y() - side / 2, side, side)
+        quiet = theme.colour("textDisabled" if item.node.is_gone else "textSecondary")
+        paint_icon(painter, square, node_icon(item.node), quiet)
+        left = rect.left() + 12 + side + 10
+        area = QRectF(left, rect.top() + 5, rect.right() - 4 - left, rect.height() / 2 - 4)
+        font = self.scene.name_font
+        if item.node.is_gone:
+            font = QFont(font)
+            font.setStrikeOut(True)
+        _text(painter, area, item.name, font, theme.colour(role))
+        if self.has_small and item.line:
+            area.translate(0, rect.height() / 2 - 4)
+            _text(painter, area, item.line, self.scene.small_font, theme.colour("textTertiary"))
+
+
+def _text(painter: QPainter, rect: QRectF, text: str, font: QFont, colour: QColor) -> None:
+    """One line of text that fits: `paint.words` without measuring it again."""
+    painter.setFont(font)
+    painter.setPen(colour)
+    painter.drawText(rect, int(paint.LEFT), text)

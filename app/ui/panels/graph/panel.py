@@ -1,0 +1,540 @@
+"""Graph: who talks to whom. Nodes in groups, topics and services as lines with their rates."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QBuffer, QIODevice, QRectF, Qt
+from PySide6.QtGui import QAction, QColor, QPainter, QResizeEvent
+from PySide6.QtSvg import QSvgGenerator
+from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
+
+from app.core.graph.activity import CallRates, QuietNodes
+from app.core.graph.dot import dot_of
+from app.core.graph.layout import GraphLayout, LayoutSizes
+from app.core.graph.layout_thread import LayoutThread
+from app.core.graph.node_graph import (
+    MOST_OPEN,
+    GraphChoices,
+    GraphFacts,
+    GraphLine,
+    GroupBy,
+    NodeGraph,
+    is_shown,
+    node_graph,
+)
+from app.core.graph.walk import GraphChoice
+from app.core.network.topics import split_key
+from app.core.storage.atomic_file import write_atomically
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.graph.canvas import GraphCanvas, GraphOverview
+from app.ui.panels.graph.card import WIDTH, CardFacts, GraphCard, node_card, topic_card
+from app.ui.panels.graph.painting import paint_scene
+from app.ui.panels.graph.scene import GraphScene
+from app.ui.panels.graph.tools import GraphLegend, GraphTools
+from app.ui.panels.graph.words import (
+    LineFigures,
+    group_name,
+    known_figure,
+    line_figures,
+    line_name,
+    node_line,
+    node_name,
+    short_rate,
+)
+from app.ui.text.numbers import bandwidth_words, grouped
+from app.ui.widgets import Button, EmptyAction, EmptyState, Separator, label
+from app.ui.widgets.file_dialogs import FileKind
+from app.ui.widgets.menus import Menu
+from nep.i18n import _, lazy, ngettext
+
+if TYPE_CHECKING:
+    pass
+
+SVG = FileKind(lazy("Picture that stays sharp at any size"), ".svg")
+DOT = FileKind(lazy("Graph for other programs"), ".dot")
+BESIDE_FROM = 700
+"""From this width on, in px at 100 % text, the card stands beside the graph, else below it."""
+QUIET_EVERY = 30
+"""Refreshes of 30 a second: who is quiet is looked at once a second."""
+GROUPS: tuple[GroupBy, ...] = ("computer", "robot", "nothing")
+
+
+class GraphPanel(PanelWidget):
+    """The graph with its tools above, and the card of what is chosen beside it."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, _("Graph"))
+        theme = self.theme
+        self._host = platform.node()
+        self._choices = GraphChoices()
+        self._thread = LayoutThread()
+        self._quiet, self._calls = QuietNodes(), CallRates()
+        self._layout: GraphLayout | None = None
+        self._asked: NodeGraph | None = None
+        self._sizes_asked = LayoutSizes()
+        self._seen: tuple[object, ...] = ()
+        self._values: tuple[object, ...] = ()
+        self._ticks = 0
+        self._hertz: Mapping[str, float] = {}
+        self._box_of: Callable[[str], str] = lambda _entry: ""
+        self.count = label("", "small", role="textSecondary")
+        self.export = Button(theme, _("Export"), "download", size="small")
+        self._menu = Menu(theme, self.export)
+        for words, kind in ((_("Picture (SVG)"), SVG), (_("Graph (DOT)"), DOT)):
+            self._menu.addAction(words).triggered.connect(lambda _on=False, kind=kind: self._ask_file(kind))
+        self.export.clicked.connect(
+            lambda: self._menu.popup(self.export.mapToGlobal(self.export.rect().bottomLeft()))
+        )
+        self.count.setProperty("place", "start")
+        self.header = [self.count, self.export]
+        self.tools = GraphTools(theme)
+        self.canvas = GraphCanvas(theme, self._described, self._topic_words)
+        self.overview = GraphOverview(theme, self.canvas)
+        self.legend = GraphLegend(theme)
+        self.card = GraphCard(theme)
+        self.empty = EmptyState(theme, "workflow", "", "")
+        self.note = label("", "small", role="textSecondary", wrap=True)
+        self.note.setContentsMargins(12, 2, 12, 4)
+        self.note.hide()
+        self._make_actions()
+        self._connect()
+        self.pages = self.show_one_of(self._make_page(), self.empty)
+        self.setFocusProxy(self.canvas)
+        self.theme_changed()
+
+    def _make_actions(self) -> None:
+        theme = self.theme
+        self._own = QAction(_("Show NEP's own topics"), self)
+        self._own.setCheckable(True)
+        self._own.toggled.connect(lambda on: self._choose(shows_own=on))
+        self._anew = QAction(theme.icon("refresh-cw"), _("Arrange anew"), self)
+        self._anew.triggered.connect(lambda _on=False: self._arrange_anew())
+
+    def _connect(self) -> None:
+        tools, canvas = self.tools, self.canvas
+        tools.filter.textChanged.connect(self._filter)
+        tools.filter.leave.connect(lambda: canvas.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        tools.group.changed.connect(self._group_by)
+        tools.quiet.clicked.connect(
+            lambda: self._choose(hides_quiet=tools.quiet.isChecked(), quiet_shown=frozenset())
+        )
+        tools.services.clicked.connect(lambda: self._choose(shows_services=tools.services.isChecked()))
+        tools.whole.clicked.connect(canvas.show_all)
+        tools.larger.clicked.connect(lambda: canvas.zoom_by(1.2))
+        tools.smaller.clicked.connect(lambda: canvas.zoom_by(1 / 1.2))
+        canvas.moved.connect(lambda: tools.say_scale(canvas.scale))
+        canvas.chosen.connect(self._chosen)
+        canvas.opened.connect(self._open)
+        canvas.entered.connect(lambda: self.card.first_stop().setFocus(Qt.FocusReason.TabFocusReason))
+        canvas.toggled.connect(self._toggle)
+        canvas.quiet_wanted.connect(self._show_quiet)
+        canvas.letter.connect(self._letter)
+        self.card.closed.connect(lambda: canvas.choose(None))
+        self.card.inspected.connect(self._open)
+        self.card.chose.connect(self._choose_key)
+
+    def _make_page(self) -> QWidget:
+        left = QWidget()
+        column = QVBoxLayout(left)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget, stretch in ((self.tools, 0), (self.canvas, 1), (self.note, 0), (self.legend, 0)):
+            column.addWidget(widget, stretch)
+        page = QWidget()
+        self._beside = QBoxLayout(QBoxLayout.Direction.LeftToRight, page)
+        self._beside.setContentsMargins(0, 0, 0, 0)
+        self._beside.setSpacing(0)
+        self._beside.addWidget(left, 1)
+        self._line = Separator(self.theme, upright=True)
+        self._line.hide()
+        self._beside.addWidget(self._line)
+        self._beside.addWidget(self.card)
+        return page
+
+    # -- what it shows ---------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        self._ticks += 1
+        if self._ticks % QUIET_EVERY == 1:
+            self._look_who_is_quiet()
+        facts = self._facts()
+        if facts != self._seen:
+            self._seen = facts
+            self._rebuild()
+        self._take_layout()
+        values = (self.session.topics.values_revision, self.session.networks.values_revision)
+        if values != self._values or (self._has_gone() and self._ticks % QUIET_EVERY == 0):
+            self._values = values
+            self.canvas.renew_soon()
+            self._say_card()
+        self.canvas.renew(self._figures_of)
+
+    def _facts(self) -> tuple[object, ...]:
+        session = self.session
+        view = session.graph
+        graph = (view.epoch, view.revision) if view is not None else None
+        counts = (session.nodes.revision, session.topics.revision, session.networks.revision)
+        return (graph, counts, session.fleet.revision, session.master.kind, self._choices)
+
+    def _graph_facts(self) -> GraphFacts:
+        session = self.session
+        return GraphFacts(
+            [*session.nodes, *session.networks.nodes],
+            [*session.topics, *session.networks.topics],
+            session.graph.services if session.graph is not None else {},
+            [link.name for link in session.fleet.links],
+            self._host,
+        )
+
+    def _look_who_is_quiet(self) -> None:
+        facts, now = self._graph_facts(), time.monotonic()
+        self._quiet.update(facts, now)
+        self._calls.update(facts, now)
+        self._hertz = self._calls.rates_hz()
+        self._choose(quiet=self._quiet.quiet(now))
+
+    def _rebuild(self) -> None:
+        facts = self._graph_facts()
+        choices = self._choices
+        if len(facts.nodes) > MOST_OPEN and not (choices.starts_closed or choices.toggled):
+            self._layout = None
+            self._choose(starts_closed=True)
+        graph = node_graph(facts, self._choices)
+        self.pages.setCurrentIndex(0 if facts.nodes else 1)
+        self.export.setVisible(bool(facts.nodes))
+        if not facts.nodes:
+            self._choose(starts_closed=False)
+            self._say_empty()
+        self._say_counts(graph)
+        if graph != self._asked:
+            self._asked, self._sizes_asked = graph, self._sizes()
+            self._thread.ask(graph, self._layout, self._sizes_asked)
+
+    def _take_layout(self) -> None:
+        made = self._thread.take()
+        if made is None:
+            return
+        graph, layout = made
+        self._layout = layout
+        self._show(graph, layout)
+
+    def _show(self, graph: NodeGraph, layout: GraphLayout) -> None:
+        scene = GraphScene(self.theme, graph, layout, self._sizes_asked, self._host)
+        scene.dim(self.tools.words())
+        boxes = {node.entry_key: node.key for node in graph.nodes if node.entry_key}
+        self._box_of = lambda entry: boxes.get(entry, "")
+        self.canvas.show_scene(scene)
+        self._say_note(layout)
+        self._say_card()
+
+    def _figures_of(self, line: GraphLine) -> LineFigures:
+        return line_figures(line, self.session.topic, self._hertz, self._box_of)
+
+    def _has_gone(self) -> bool:
+        graph = self._asked
+        return graph is not None and any(node.is_gone for node in graph.nodes)
+
+    def _sizes(self) -> LayoutSizes:
+        return LayoutSizes().scaled(self.theme.scaled(1.0))
+
+    def _say_empty(self) -> None:
+        if self.session.master.kind == "none":
+            self.empty.say(
+                _("No master is running"), _("A master lets programs find each other."), "radio-tower"
+            )
+            start = self.session.launcher.ensure_master
+            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
+            return
+        said = _("Programs appear here as soon as they join the master.")
+        self.empty.say(_("Nobody is here yet"), said, "workflow")
+        doctor = EmptyAction(
+            _("Open the connection doctor"),
+            lambda: self.context.run("help.doctor"),
+            "stethoscope",
+            primary=True,
+        )
+        self.empty.set_actions([doctor])
+
+    def _say_counts(self, graph: NodeGraph) -> None:
+        there = graph.nodes_there
+        if not there:
+            self.count.setText("")
+            return
+        shown = there - graph.quiet_hidden
+        nodes = ngettext("{shown} of {count} node", "{shown} of {count} nodes", there)
+        if shown == there:
+            nodes = ngettext("{count} node", "{count} nodes", there)
+        parts = [nodes.format(shown=grouped(shown), count=grouped(there))]
+        topics = ngettext("{count} topic", "{count} topics", graph.topics_there)
+        parts.append(topics.format(count=grouped(graph.topics_there)))
+        if graph.services_there:
+            services = ngettext("{count} service", "{count} services", graph.services_there)
+            parts.append(services.format(count=grouped(graph.services_there)))
+        self.count.setText(", ".join(parts))
+        self.tools.say_quiet(graph.quiet_hidden, self._choices.hides_quiet)
+
+    def _say_note(self, layout: GraphLayout) -> None:
+        """What is not drawn as it should be; the line is not there when all is well."""
+        words = []
+        if layout.left_out:
+            left = ngettext(
+                "{count} line is not drawn: there are too many",
+                "{count} lines are not drawn: there are too many",
+                layout.left_out,
+            )
+            words.append(left.format(count=grouped(layout.left_out)))
+        if layout.is_plain:
+            words.append(_("The nodes stand in rows: they could not be arranged"))
+        self.note.setText(". ".join(words))
+        self.note.setVisible(bool(words))
+
+    # -- what a person chooses -------------------------------------------------------------------------------
+
+    def _choose(self, **changes: object) -> None:
+        self._choices = replace(self._choices, **changes)  # type: ignore[arg-type]
+        self.tools.show_choices(self._choices)
+
+    def _group_by(self, name: str) -> None:
+        for group_by in GROUPS:
+            if group_by == name:
+                self._layout = None
+                self._choose(group_by=group_by, toggled=frozenset(), quiet_shown=frozenset())
+
+    def _toggle(self, group: str) -> None:
+        self._layout = None
+        self._choose(toggled=self._choices.toggled ^ {group})
+
+    def _show_quiet(self, group: str) -> None:
+        self._choose(quiet_shown=self._choices.quiet_shown | {group})
+
+    def _arrange_anew(self) -> None:
+        self._layout = self._asked = None
+        self._seen = ()
+        self.canvas.show_all()
+
+    def _filter(self) -> None:
+        if self.canvas.scene is not None:
+            self.canvas.scene.dim(self.tools.words())
+            self.canvas.update()
+
+    def _letter(self, letter: str) -> None:
+        if letter == "/":
+            self.focus_filter()
+        elif letter == "g":
+            now = GROUPS.index(self._choices.group_by)
+            self._group_by(GROUPS[(now + 1) % len(GROUPS)])
+        elif letter == "h":
+            self._choose(hides_quiet=not self._choices.hides_quiet, quiet_shown=frozenset())
+        elif letter == "s":
+            self._choose(shows_services=not self._choices.shows_services)
+
+    def _open(self, key: str) -> None:
+        if self.session.topic(key) is not None:
+            self.session.mark_seen(key)
+            self.context.open_topic(key)
+
+    def _chosen(self, _choice: object) -> None:
+        self._say_card()
+
+    def _choose_key(self, kind: str, key: str) -> None:
+        if kind == "node":
+            self.canvas.choose(GraphChoice("node", key), by_key=True)
+        elif self._asked is not None and self._asked.line_of(key) is not None:
+            self.canvas.choose(GraphChoice("topic", key), by_key=True)
+        else:
+            self._open(key)  # nobody hears it: there is no line
+
+    # -- the card and other words ----------------------------------------------------------------------------
+
+    def _card_facts(self) -> CardFacts:
+        scene = self.canvas.scene
+        nodes = scene.graph.nodes if scene is not None else ()
+        names = {entry.key: entry.name for entry in (*self.session.nodes, *self.session.networks.nodes)}
+        names |= {node.entry_key: node_name(node, self._host) for node in nodes if node.entry_key}
+        return CardFacts(
+            self.session.topic,
+            self.session.graph,
+            lambda entry: names.get(entry, split_key(entry)[1]),
+            self._box_of,
+            self._hertz,
+            lambda name: is_shown(name, self._choices),
+        )
+
+    def _say_card(self) -> None:
+        choice, scene = self.canvas.choice, self.canvas.scene
+        content = None
+        if choice is not None and scene is not None:
+            if choice.kind == "topic":
+                content = topic_card(choice.key, self._card_facts())
+            else:
+                node = scene.graph.node(choice.key)
+                if node is not None:
+                    content = node_card(node, self._services_of(node.entry_key), self._card_facts())
+        self.card.show_content(content)
+        self._line.setVisible(content is not None)
+
+    def _services_of(self, entry: str) -> list[tuple[str, bool]]:
+        view = self.session.graph
+        found: list[tuple[str, bool]] = []
+        for name, service in view.services.items() if view is not None else ():
+            if is_shown(name, self._choices):
+                found += [(name, True)] if any(each.node_id == entry for each in service.servers) else []
+                found += [(name, False)] if any(each.node_id == entry for each in service.clients) else []
+        return found
+
+    def _described(self, choice: GraphChoice | None) -> str:
+        """What is chosen, as a screen reader says it."""
+        scene = self.canvas.scene
+        if choice is None or scene is None:
+            return ""
+        if choice.kind == "topic":
+            return self._topic_words(choice.key)
+        node = scene.graph.node(choice.key)
+        if node is None:
+            return ""
+        outgoing = [line for line in scene.graph.lines if node.key in line.sources]
+        incoming = [line for line in scene.graph.lines if node.key in line.targets]
+        said = _("{node}, {facts}. Lines to others: {out}. Lines from others: {into}.")
+        return said.format(
+            node=node_name(node, self._host), facts=node_line(node), out=len(outgoing), into=len(incoming)
+        )
+
+    def _topic_words(self, key: str) -> str:
+        topic = self.session.topic(key)
+        scene = self.canvas.scene
+        line = scene.graph.line_of(key) if scene is not None else None
+        ends = ""
+        if line is not None:
+            said = _("from {sources} to {targets}")
+            ends = said.format(sources=self._names(line.sources), targets=self._names(line.targets))
+        figures = [split_key(key)[1]]
+        rate = known_figure(topic.rate_hz) if topic is not None else None
+        if topic is not None and rate is not None:
+            figures += [short_rate(rate), bandwidth_words(known_figure(topic.bandwidth_Bps))]
+        return ", ".join(filter(None, (*figures, ends)))
+
+    def _names(self, keys: tuple[str, ...]) -> str:
+        scene = self.canvas.scene
+        nodes = [scene.graph.node(key) for key in keys[:5]] if scene is not None else []
+        names = [node_name(node, self._host) for node in nodes if node is not None]
+        more = len(keys) - len(names)
+        return (
+            line_name(names)
+            if not more
+            else _("{names} and {count} more").format(names=", ".join(names), count=more)
+        )
+
+    # -- files -----------------------------------------------------------------------------------------------
+
+    def _ask_file(self, kind: FileKind) -> None:
+        suggestion = Path.home() / _("graph")
+        self.context.files.save_as(_("Export the graph"), suggestion, (kind,), self.save)
+
+    def save(self, path: Path, kind: FileKind) -> None:
+        """Write the graph there; the window says whether that went well."""
+        scene = self.canvas.scene
+        if scene is None:
+            return
+        data = self.picture() if kind is SVG else self.dot().encode("utf-8")
+        try:
+            write_atomically(path, data)
+        except OSError as error:
+            said = _("The graph can't be saved: {why}")
+            self.context.toast(said.format(why=error.strerror or str(error)))
+        else:
+            self.context.toast(_("Saved {name}").format(name=path.name))
+
+    def picture(self) -> bytes:
+        """The whole graph as SVG, in the colours of the moment; b"" when there is none."""
+        scene = self.canvas.scene
+        if scene is None:
+            return b""
+        scene.complete(self._figures_of)
+        area = scene.bounds.adjusted(-20, -20, 20, 20)
+        buffer = QBuffer()
+        buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+        generator = QSvgGenerator()
+        generator.setOutputDevice(buffer)
+        generator.setTitle(_("Graph of nodes"))
+        generator.setSize(area.size().toSize())
+        generator.setViewBox(QRectF(0, 0, area.width(), area.height()))
+        painter = QPainter(generator)
+        painter.fillRect(QRectF(0, 0, area.width(), area.height()), QColor(self.theme.colour("panel")))
+        painter.translate(-area.topLeft())
+        paint_scene(scene, painter, area, 1.0)
+        painter.end()
+        return bytes(buffer.data().data())
+
+    def dot(self) -> str:
+        """The graph in the language of Graphviz."""
+        graph = self.canvas.scene.graph if self.canvas.scene is not None else NodeGraph()
+        names = {group.key: group_name(group.key, self._host) for group in graph.groups}
+        return dot_of(graph, names, lambda line: self._figures_of(line).words)
+
+    # -- the window ------------------------------------------------------------------------------------------
+
+    def focus_filter(self) -> bool:
+        self.tools.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.tools.filter.selectAll()
+        return True
+
+    def show_topic(self, name: str) -> None:
+        if self._asked is not None and self._asked.line_of(name) is not None:
+            self.canvas.choose(GraphChoice("topic", name), by_key=True)
+
+    def more_actions(self) -> list[QAction]:
+        return [self._anew, self._own]
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """The card beside the graph, or below it where there is too little room."""
+        is_wide = self.width() >= self.theme.scaled(BESIDE_FROM)
+        ways = QBoxLayout.Direction
+        self._beside.setDirection(ways.LeftToRight if is_wide else ways.TopToBottom)
+        wide = round(self.theme.scaled(WIDTH))
+        self.card.setMinimumWidth(wide if is_wide else 0)
+        self.card.setMaximumWidth(wide if is_wide else 16_777_215)
+        self.card.setMaximumHeight(16_777_215 if is_wide else max(120, self.height() // 2))
+        self._line.setFixedSize(*((1, 16_777_215) if is_wide else (16_777_215, 1)))
+        self.legend.setVisible(is_wide and self.height() >= self.theme.scaled(420))
+
+    def theme_changed(self) -> None:
+        super().theme_changed()
+        self._fit()
+        if self._asked is not None and self._sizes() != self._sizes_asked:
+            self._arrange_anew()
+
+    def save_state(self) -> dict[str, object]:
+        choices = self._choices
+        return {
+            "group_by": choices.group_by,
+            "services": choices.shows_services,
+            "hides_quiet": choices.hides_quiet,
+            "own": choices.shows_own,
+        }
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        for group_by in GROUPS:
+            if state.get("group_by") == group_by:
+                self._choose(group_by=group_by)
+        if isinstance(services := state.get("services"), bool):
+            self._choose(shows_services=services)
+        if isinstance(hides := state.get("hides_quiet"), bool):
+            self._choose(hides_quiet=hides)
+        if isinstance(own := state.get("own"), bool):
+            self._own.setChecked(own)
+
+    def shut(self) -> None:
+        self._thread.close()
+
+
+PANEL = Panel("graph", lazy("Graph"), "workflow", (), GraphPanel)

@@ -1,0 +1,386 @@
+"""The graph measured: where everything is, what stands there, and what is under the mouse.
+
+Lengths are those of the layout; who paints scales the painter. What a figure changes is told as areas, so
+that nothing else is painted anew.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
+from PySide6.QtGui import QFont, QFontMetricsF, QPainterPath, QPolygonF
+
+from app.core.graph.layout import MOST_LED, GraphLayout, LayoutSizes, Place
+from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
+from app.ui.panels.graph.words import (
+    LineFigures,
+    group_name,
+    line_name,
+    node_line,
+    node_name,
+    quiet_words,
+)
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+CORNER = 10.0
+ARROW_LONG, ARROW_WIDE = 9.0, 8.0
+ROUND = 14.0
+"""How far arrows and thick lines reach beyond their ways."""
+CELL = (160.0, 48.0)
+LABEL_ROOM = 7
+"""Letters that a label keeps for its figure."""
+LEAST_SMALL_PX = 7.0
+"""Smaller letters are not painted: nobody could read them."""
+TINY = 0.2
+"""In smaller sizes thousands of lines are in sight, of which no figure can be read or thickness be seen."""
+REACH = 6.0
+"""How near to a line a press of the mouse means it, in px of the screen."""
+JOIN = 48.0
+"""Width of the part of a bridge that names the other network."""
+
+
+FiguresOf = Callable[[GraphLine], LineFigures]
+
+
+@dataclass(slots=True)
+class NodeItem:
+    """A box that is painted: its place, and its words as they were painted last."""
+
+    node: DrawnNode
+    rect: QRectF
+    name: str
+    said: str = ""
+    line: str = ""
+    """The same, as much of it as there is room for."""
+    is_dim: bool = False
+
+
+@dataclass(slots=True)
+class LineItem:
+    """A line that is painted: its ways, and where its words stand once they are placed, if there is room."""
+
+    line: GraphLine
+    ways: dict[tuple[str, str], Sequence[Place]]
+    bounds: QRectF
+    label: QRectF | None = None
+    is_placed: bool = False
+    figures: LineFigures = field(default_factory=lambda: LineFigures("", 1.25))
+    is_dim: bool = False
+    _drawn: tuple[QPainterPath, list[QPolygonF]] | None = None
+
+    def drawn(self) -> tuple[QPainterPath, list[QPolygonF]]:
+        """The ways with round corners, and their arrows; made when they are first painted."""
+        if self._drawn is None:
+            path = QPainterPath()
+            for points in self.ways.values():
+                _add_rounded(path, points)
+            self._drawn = path, [_arrow(points) for points in self.ways.values()]
+        return self._drawn
+
+
+@dataclass(slots=True)
+class GroupItem:
+    """A group that is painted; ``quiet`` is where the number of its hidden nodes stands."""
+
+    group: GraphGroup
+    rect: QRectF
+    name: str
+    quiet: QRectF | None
+
+
+class GraphScene:
+    """What is painted of one graph, measured once; `renew` takes over its figures."""
+
+    def __init__(
+        self, theme: Theme, graph: NodeGraph, layout: GraphLayout, sizes: LayoutSizes, host: str
+    ) -> None:
+        """``host`` is this computer's name."""
+        self.theme = theme
+        self.graph, self.layout, self.sizes, self._host = graph, layout, sizes, host
+        self._fonts()
+        wide, high = sizes.node
+        self.nodes = {
+            node.key: NodeItem(
+                node,
+                QRectF(x - wide / 2, y - high / 2, wide, high),
+                self._elided(self.name_font, node_name(node, host), self._words_width(node)),
+            )
+            for node in graph.nodes
+            if (place := layout.places.get(node.key)) is not None
+            for x, y in (place,)
+        }
+        self.groups = [self._group_item(group) for group in graph.groups if group.key in layout.groups]
+        ways: dict[object, dict[tuple[str, str], Sequence[Place]]] = {}
+        for (key, source, target), points in layout.routes.items():
+            ways.setdefault(key, {})[source, target] = points
+        self.lines = [_line_item(line, ways[line.key]) for line in graph.lines if line.key in ways]
+        left, top, width, height = layout.bounds(sizes)
+        self.bounds = QRectF(left, top, width, height)
+        heads = (
+            QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), sizes.head - 8)) for item in self.groups
+        )
+        led = self.lines if len(layout.routes) <= MOST_LED else []
+        self._crossed = _TakenRoom(_thin(*part) for item in led for part in _parts(item))
+        self._taken = _TakenRoom([*(item.rect for item in self.nodes.values()), *heads])
+
+    def _fonts(self) -> None:
+        theme = self.theme
+        self.name_font, self.small_font = theme.font("body"), theme.font("caption")
+        self.small_font.setWeight(QFont.Weight.Normal)
+        self.name_font.setWeight(QFont.Weight.Medium)
+        self.label_font, self.title_font = theme.font("code"), theme.font("title")
+        self.letter = QFontMetricsF(self.label_font).horizontalAdvance("0")
+
+    def _words_width(self, node: DrawnNode) -> float:
+        return self.sizes.node[0] - 46 - (JOIN if node.joins else 0)
+
+    @staticmethod
+    def _elided(font: QFont, text: str, width: float) -> str:
+        return QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideMiddle, width)
+
+    def _group_item(self, group: GraphGroup) -> GroupItem:
+        rect = QRectF(*self.layout.groups[group.key])
+        chip = None
+        if group.quiet:
+            words = paint.width_of(self.small_font, quiet_words(group)) + 24
+            high = self.sizes.foot * 0.7
+            width = min(words, rect.width() - 16)
+            chip = QRectF(rect.right() - 10 - width, rect.bottom() - 8 - high, width, high)
+        room = rect.width() - 48
+        return GroupItem(
+            group, rect, self._elided(self.title_font, group_name(group.key, self._host), room), chip
+        )
+
+    # -- figures ---------------------------------------------------------------------------------------------
+
+    def seen(self, area: QRectF) -> list[NodeItem | LineItem]:
+        """The nodes and lines in an area."""
+        nodes = [item for item in self.nodes.values() if item.rect.intersects(area)]
+        return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
+
+    def renew(self, item: NodeItem | LineItem, figures: FiguresOf, *, with_words: bool) -> QRectF | None:
+        """Take over the figures of one node or line; the area that looks otherwise than before, or None.
+
+        The words of a line find their room when they are first asked for (``with_words``).
+        """
+        if isinstance(item, NodeItem):
+            said = node_line(item.node) if with_words else item.said
+            if said == item.said:
+                return None
+            item.said = said
+            item.line = self._elided(self.small_font, said, self._words_width(item.node))
+            return item.rect
+        now, before = figures(item.line), item.figures
+        item.figures = now
+        if now.width != before.width or now.lost != before.lost:
+            area: QRectF | None = item.bounds
+        else:
+            area = item.label if now.words != before.words else None
+        if with_words and not item.is_placed:
+            item.is_placed = True
+            item.label = self._room_for(item)
+            area = area or item.label
+        return area
+
+    def complete(self, figures: FiguresOf) -> None:
+        """Take over everything at once, as a saved picture needs it."""
+        every: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
+        for item in every:
+            self.renew(item, figures, with_words=True)
+
+    def _room_for(self, item: LineItem) -> QRectF | None:
+        """Room for the words of a line that nothing else has: along its longest level part, or beside it."""
+        letters = len(line_name(item.line.topics)) + LABEL_ROOM
+        wide, high = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
+        rooms = [rect for rect in _rooms(item, wide, high) if self._taken.is_free(rect)]
+        found = next((rect for rect in rooms if self._crossed.is_free(rect)), rooms[0] if rooms else None)
+        if found is not None:
+            self._taken.add(found)
+        return found
+
+    def dim(self, words: Sequence[str]) -> None:
+        """Let what has not all of these words fade; who talks with what has them does not."""
+        bright = {
+            key for key, item in self.nodes.items() if all(word in _haystack(item.node) for word in words)
+        }
+        named = [
+            item
+            for item in self.lines
+            if all(word in " ".join(item.line.topics).casefold() for word in words)
+        ]
+        ends = {key for item in named for key in (*item.line.sources, *item.line.targets)}
+        found = {id(item) for item in named}
+        for item in self.lines:
+            at = {*item.line.sources, *item.line.targets}
+            item.is_dim = bool(words) and id(item) not in found and not (at & bright)
+        for key, box in self.nodes.items():
+            box.is_dim = bool(words) and key not in bright and key not in ends
+
+    @property
+    def dimmed(self) -> int:
+        """How many nodes the filter lets fade."""
+        return sum(item.is_dim for item in self.nodes.values())
+
+    @staticmethod
+    def has_figures(scale: float) -> bool:
+        """Whether figures change anything in this size; else lines are of one pixel, without arrows."""
+        return scale >= TINY
+
+    def has_words(self, scale: float) -> bool:
+        """Whether the smaller words can be read in this size, and are painted."""
+        return scale * self.small_font.pixelSize() >= LEAST_SMALL_PX
+
+    # -- what is under the mouse -----------------------------------------------------------------------------
+
+    def node_at(self, at: QPointF) -> DrawnNode | None:
+        """The node there."""
+        return next((item.node for item in self.nodes.values() if item.rect.contains(at)), None)
+
+    def group_at(self, at: QPointF) -> tuple[GraphGroup, bool] | None:
+        """The group whose head is there (True), or whose number of quiet nodes (False)."""
+        for item in self.groups:
+            if item.quiet is not None and item.quiet.contains(at):
+                return item.group, False
+            head = QRectF(item.rect.left(), item.rect.top(), item.rect.width(), self.sizes.head - 4)
+            if head.contains(at):
+                return item.group, True
+        return None
+
+    def line_at(self, at: QPointF, scale: float) -> LineItem | None:
+        """The line nearest to there, if it is near enough on the screen, or whose words are there."""
+        labelled = (item for item in self.lines if item.label is not None and item.label.contains(at))
+        found = next(labelled, None)
+        if found is not None:
+            return found
+        reach = REACH / scale
+        near = [
+            (_distance(at, points), number)
+            for number, item in enumerate(self.lines)
+            if item.bounds.adjusted(-reach, -reach, reach, reach).contains(at)
+            for points in item.ways.values()
+        ]
+        distance, number = min(near, default=(math.inf, 0))
+        return self.lines[number] if distance <= reach else None
+
+
+def _line_item(line: GraphLine, ways: dict[tuple[str, str], Sequence[Place]]) -> LineItem:
+    xs = [x for points in ways.values() for x, _y in points]
+    ys = [y for points in ways.values() for _x, y in points]
+    left, top = min(xs) - ROUND, min(ys) - ROUND
+    return LineItem(line, ways, QRectF(left, top, max(xs) + ROUND - left, max(ys) + ROUND - top))
+
+
+def _add_rounded(path: QPainterPath, points: Sequence[Place]) -> None:
+    """A way with round corners."""
+    path.moveTo(*points[0])
+    for before, at, after in zip(points, points[1:], points[2:], strict=False):
+        radius = min(CORNER, math.dist(before, at) / 2, math.dist(at, after) / 2)
+        into, out = _towards(at, before, radius), _towards(at, after, radius)
+        path.lineTo(*into)
+        path.quadTo(*at, *out)
+    path.lineTo(*points[-1])
+
+
+def _towards(at: Place, other: Place, length: float) -> Place:
+    whole = math.dist(at, other) or 1.0
+    return at[0] + (other[0] - at[0]) * length / whole, at[1] + (other[1] - at[1]) * length / whole
+
+
+def _arrow(points: Sequence[Place]) -> QPolygonF:
+    tip = points[-1]
+    before = next((each for each in reversed(points[:-1]) if each != tip), (tip[0] - 1, tip[1]))
+    base = _towards(tip, before, ARROW_LONG)
+    across = (
+        (tip[1] - base[1]) * ARROW_WIDE / ARROW_LONG / 2,
+        (base[0] - tip[0]) * ARROW_WIDE / ARROW_LONG / 2,
+    )
+    return QPolygonF(
+        [
+            QPointF(*tip),
+            QPointF(base[0] + across[0], base[1] + across[1]),
+            QPointF(base[0] - across[0], base[1] - across[1]),
+        ]
+    )
+
+
+def _rooms(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
+    """Where words of this width could stand, the best place first: at level parts, then at upright ones."""
+    parts = _parts(item)
+    level = [each for each in parts if abs(each[1][1] - each[0][1]) < 1]
+    for begin, end in sorted(level, key=_length, reverse=True)[:6]:
+        left, room = min(begin[0], end[0]), abs(end[0] - begin[0]) - wide
+        for share in (0.5, 0.25, 0.75) if room >= 0 else ():
+            yield QRectF(left + room * share, begin[1] - high - 2, wide, high)
+            yield QRectF(left + room * share, begin[1] + 3, wide, high)
+    upright = [each for each in parts if abs(each[1][0] - each[0][0]) < 1]
+    for begin, end in sorted(upright, key=_length, reverse=True)[:4]:
+        top, room = min(begin[1], end[1]), abs(end[1] - begin[1]) - high
+        for share in (0.5, 0.2, 0.8) if room >= 0 else ():
+            yield QRectF(begin[0] + 5, top + room * share, wide, high)
+            yield QRectF(begin[0] - 5 - wide, top + room * share, wide, high)
+
+
+def _parts(item: LineItem) -> list[tuple[Place, Place]]:
+    """The straight parts of all its ways."""
+    return [part for points in item.ways.values() for part in itertools.pairwise(points)]
+
+
+def _thin(begin: Place, end: Place) -> QRectF:
+    """The room that a straight part takes, if it is level or upright."""
+    left, top = min(begin[0], end[0]), min(begin[1], end[1])
+    return QRectF(left, top, abs(end[0] - begin[0]) + 0.5, abs(end[1] - begin[1]) + 0.5)
+
+
+def _length(part: tuple[Place, Place]) -> float:
+    return math.dist(*part)
+
+
+def _distance(at: QPointF, points: Sequence[Place]) -> float:
+    """How far a point is from a way."""
+    return min(_distance_to_part((at.x(), at.y()), begin, end) for begin, end in itertools.pairwise(points))
+
+
+def _distance_to_part(at: Place, begin: Place, end: Place) -> float:
+    wide, high = end[0] - begin[0], end[1] - begin[1]
+    square = wide * wide + high * high
+    share = ((at[0] - begin[0]) * wide + (at[1] - begin[1]) * high) / square if square else 0.0
+    share = min(1.0, max(0.0, share))
+    return math.dist(at, (begin[0] + wide * share, begin[1] + high * share))
+
+
+def _haystack(node: DrawnNode) -> str:
+    entry = node.entry
+    if entry is None:
+        return node.name.casefold()
+    topics = " ".join((*entry.publishes, *entry.subscribes))
+    return f"{node.name} {entry.host} {entry.language} {entry.generation} {topics}".casefold()
+
+
+class _TakenRoom:
+    """Which room is taken, by cells: thousands of words are placed at once."""
+
+    def __init__(self, rects: Iterable[QRectF]) -> None:
+        self._cells: dict[tuple[int, int], list[QRectF]] = {}
+        for rect in rects:
+            self.add(rect)
+
+    def is_free(self, rect: QRectF) -> bool:
+        """Whether nobody has taken any of this room."""
+        return not any(other.intersects(rect) for cell in _cells(rect) for other in self._cells.get(cell, ()))
+
+    def add(self, rect: QRectF) -> None:
+        """Take this room."""
+        for cell in _cells(rect):
+            self._cells.setdefault(cell, []).append(rect)
+
+
+def _cells(rect: QRectF) -> Iterator[tuple[int, int]]:
+    wide, high = CELL
+    for column in range(math.floor(rect.left() / wide), math.floor(rect.right() / wide) + 1):
+        for row in range(math.floor(rect.top() / high), math.floor(rect.bottom() / high) + 1):
+            yield column, row

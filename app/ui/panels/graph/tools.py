@@ -1,0 +1,135 @@
+"""What stands above and below the graph: filter, grouping, what is hidden, the size; and what lines mean."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.core.graph.node_graph import GraphChoices
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, IconButton, Segments, label, paint
+from app.ui.widgets.buttons import ToggleButton
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.fields import FilterField
+from nep.i18n import _, ngettext, number
+
+
+class GraphTools(QWidget):
+    """The row above the graph; in a narrow panel it becomes several rows."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.filter = FilterField(theme, _("Filter the graph"))
+        self.group = Segments(
+            theme,
+            [("computer", _("Computer"), None), ("robot", _("Robot"), None), ("nothing", _("Nothing"), None)],
+            size="small",
+            name=_("Group by"),
+        )
+        self.quiet = ToggleButton(theme, _("Hide quiet nodes"), "eye-off")
+        self.services = ToggleButton(theme, _("Services"), "spline")
+        self.smaller = IconButton(theme, "zoom-out", _("Smaller"), "-", size=26)
+        self.larger = IconButton(theme, "zoom-in", _("Larger"), "+", size=26)
+        self.scale = label("100 %", "body", role="textSecondary")
+        self.scale.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.scale.setMinimumWidth(round(theme.scaled(44)))
+        self.whole = Button(theme, _("Show all"), "scan", size="small")
+        flow = Flow(self, gap=10, row_gap=6)
+        flow.setContentsMargins(10, 8, 10, 8)
+        flow.addWidget(self.filter)
+        flow.addWidget(label(_("Group by"), "body", role="textSecondary"))
+        for widget in (self.group, self.quiet, self.services):
+            flow.addWidget(widget)
+        flow.push()
+        for size in (self.smaller, self.scale, self.larger, self.whole):
+            flow.addWidget(size)
+        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+        self.show_choices(GraphChoices())
+
+    def words(self) -> list[str]:
+        """What must be in what does not fade, each of them."""
+        return self.filter.text().casefold().split()
+
+    def show_choices(self, choices: GraphChoices) -> None:
+        """Show what is chosen."""
+        self.group.set_value(choices.group_by)
+        self.quiet.setChecked(choices.hides_quiet)
+        self.services.setChecked(choices.shows_services)
+
+    def say_quiet(self, hidden: int, hides: bool) -> None:
+        """How many quiet nodes are hidden."""
+        if hides and hidden:
+            words = ngettext("{count} quiet node hidden", "{count} quiet nodes hidden", hidden)
+            self.quiet.set_word(words.format(count=hidden))
+        else:
+            self.quiet.set_word(_("Hide quiet nodes"))
+
+    def say_scale(self, scale: float) -> None:
+        """In which size the graph is shown."""
+        self.scale.setText(f"{number(scale * 100, '.0f')} %")
+
+
+class GraphLegend(QWidget):
+    """What lines and edges mean, in one row."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        flow = Flow(self, gap=18, row_gap=2)
+        flow.setContentsMargins(12, 4, 12, 8)
+        for kind, words in (
+            ("topic", _("topic; thicker carries more")),
+            ("service", _("service")),
+            ("chosen", _("chosen topic")),
+            ("gone", _("gone, or quiet")),
+        ):
+            flow.addWidget(_Entry(theme, kind, words))
+        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+
+
+class _Entry(QWidget):
+    """A line or an edge, and its words."""
+
+    SIGN = 36.0
+
+    def __init__(self, theme: Theme, kind: str, words: str) -> None:
+        super().__init__()
+        self._theme, self._kind, self._words = theme, kind, words
+        self.setAccessibleName(words)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        theme.changed.connect(self.updateGeometry)
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("small")
+        wide = self.SIGN + 8 + paint.width_of(font, self._words)
+        return QSize(round(wide) + 1, round(max(18.0, paint.height_of(font))))
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        middle = self.height() / 2
+        colour = theme.colour("accent" if self._kind == "chosen" else "controlBorder")
+        pen = QPen(colour, 2.25 if self._kind == "chosen" else 1.5)
+        if self._kind in {"service", "gone"}:
+            pen.setDashPattern([3, 2.5])
+        painter.setPen(pen)
+        if self._kind == "gone":
+            painter.drawRoundedRect(QRectF(5, middle - 7, 26, 14), 4, 4)
+        else:
+            painter.drawLine(QPointF(0, middle), QPointF(self.SIGN - 8, middle))
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(colour)
+            tip = self.SIGN
+            painter.drawPolygon(
+                [QPointF(tip, middle), QPointF(tip - 9, middle - 4), QPointF(tip - 9, middle + 4)]
+            )
+        area = QRectF(self.SIGN + 8, 0, self.width(), self.height())
+        paint.words(painter, area, self._words, theme.font("small"), theme.colour("textSecondary"))
+        painter.end()

@@ -1,0 +1,167 @@
+"""What stands in the graph: the words of nodes, groups and lines, and how thick a line is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from app.core.graph.node_graph import BRIDGE_TO, DrawnNode, GraphGroup, GraphLine
+from app.core.network.topics import Topic, key_of, split_key
+from app.core.networks.kinds import kind_named
+from app.ui.text.nodes import cpu_words, generation_words
+from app.ui.text.numbers import grouped
+from nep.i18n import _, ngettext, number, pgettext
+
+BRIDGE = "bridge-"
+NAMED = 2
+"""Topics whose names stand at a line; of more the number follows."""
+THIN, THICK, STEPS = 1.25, 3.0, 7
+LEAST_BPS, DECADES = 100.0, 5.0
+"""A line is thin up to 100 B/s, and thick from 10 MB/s on."""
+ICONS = {
+    "studio": "app-window",
+    "behaviour": "blocks",
+    "robot": "bot",
+    "bridge": "arrow-left-right",
+    "original": "plug",
+    "group": "boxes",
+    "program": "box",
+}
+
+FindTopic = Callable[[str], "Topic | None"]
+
+
+@dataclass(frozen=True, slots=True)
+class LineFigures:
+    """What stands at a line, and how thick it is in px; ``lost`` is who loses which share, by box."""
+
+    words: str
+    width: float
+    lost: tuple[tuple[str, float], ...] = ()
+
+
+def node_icon(node: DrawnNode) -> str:
+    """The icon of a node's kind."""
+    return "camera" if node.has_pictures and node.kind == "program" else ICONS[node.kind]
+
+
+def node_name(node: DrawnNode, host: str) -> str:
+    """Its name; of a closed group what it is called."""
+    if node.kind == "group":
+        return group_name(node.key, host)
+    if node.joins:  # what else its name says stands beside it
+        return node.name.removeprefix(BRIDGE).rpartition(BRIDGE_TO)[0] or node.name
+    return node.name
+
+
+def node_line(node: DrawnNode) -> str:
+    """The second line of a node: "Python, 4.1 %", "this window", "gone 4 s", "41 nodes"."""
+    entry = node.entry
+    if entry is None:
+        return _members(node.members, node.quiet)
+    if entry.gone_s is not None:
+        return _("gone {seconds} s").format(seconds=int(entry.gone_s))
+    if node.kind == "original":
+        return generation_words(entry)
+    cpu = cpu_words(entry.cpu_ratio)
+    if node.kind == "studio":
+        return _("this window")
+    if node.kind == "bridge":
+        return pgettext("node", "bridge")
+    language = _("behaviour") if node.kind == "behaviour" else entry.language or _of_network(node)
+    return ", ".join(filter(None, (language, cpu)))
+
+
+def _of_network(node: DrawnNode) -> str:
+    entry = node.entry
+    return generation_words(entry) if entry is not None and entry.network else ""
+
+
+def _members(members: int, quiet: int) -> str:
+    words = ngettext("{count} node", "{count} nodes", members).format(count=grouped(members))
+    if quiet < members:
+        return words
+    return ngettext("{count} quiet node", "{count} quiet nodes", quiet).format(count=grouped(quiet))
+
+
+def quiet_words(group: GraphGroup) -> str:
+    """How many of a group are hidden because they are quiet."""
+    return ngettext("{count} quiet node", "{count} quiet nodes", group.quiet).format(
+        count=grouped(group.quiet)
+    )
+
+
+def group_name(key: str, host: str) -> str:
+    """What a group is called by its key; ``host`` is this computer."""
+    kind, _colon, name = key.partition(":")
+    if kind == "network":
+        known = kind_named(name)
+        return known.words if known is not None else name
+    if kind == "robot":
+        return name or _("No robot")
+    return _("This computer") if name == host else name or _("Unknown computer")
+
+
+def line_figures(
+    line: GraphLine, topic_of: FindTopic, hertz: Mapping[str, float], box_of: Callable[[str], str]
+) -> LineFigures:
+    """What stands at a line now; ``hertz`` are the calls a second of services, where they are known.
+
+    ``box_of`` gives the box of a node's entry, "" where it is not drawn.
+    """
+    names = line_name(line.topics)
+    if line.kind == "service":
+        known = [hertz[name] for name in line.topics if name in hertz]
+        return LineFigures(f"{names} {short_rate(sum(known))}" if known else names, THIN)
+    topics = [topic for name in line.topics if (topic := topic_of(name)) is not None]
+    rates = [hz for topic in topics if (hz := known_figure(topic.rate_hz)) is not None]
+    rate = short_rate(sum(rates)) if rates else ""
+    sent = sum(known_figure(topic.bandwidth_Bps) or 0.0 for topic in topics)
+    return LineFigures(f"{names} {rate}".rstrip(), line_width(sent), _losses(topics, box_of))
+
+
+def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tuple[str, float], ...]:
+    """The share that is lost at each subscriber that loses anything, the worst of its topics."""
+    found: dict[str, float] = {}
+    for topic in topics:
+        for each in topic.info.subscribers if topic.info is not None else ():
+            box = box_of(key_of(topic.network, each.node_id)) if each.lost else ""
+            if box and each.lost:
+                share = each.lost / (each.lost + max(0, each.received or 0))
+                found[box] = max(found.get(box, 0.0), share)
+    return tuple(sorted(found.items()))
+
+
+def known_figure(value: float | None) -> float | None:
+    """The same; None for what is no number that a person could read."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def line_name(topics: Sequence[str]) -> str:
+    """The names of a line's topics: two of them, and how many more there are."""
+    named = " ".join(split_key(topic)[1] for topic in topics[:NAMED])
+    more = len(topics) - NAMED
+    return _("{names} and {count} more").format(names=named, count=more) if more > 0 else named
+
+
+def short_rate(rate_hz: float) -> str:
+    """52/s, 0.5/s, 2/min; what is rarer is 0/s."""
+    if rate_hz >= 9.95:
+        return f"{grouped(round(rate_hz))}/s"
+    if rate_hz >= 0.095:
+        return f"{number(rate_hz, '.1f')}/s"
+    return f"{round(rate_hz * 60)}/min" if rate_hz * 60 >= 0.5 else "0/s"
+
+
+def line_width(bytes_per_s: float) -> float:
+    """How thick a line is, in px; in a few steps, so that it is painted anew seldom."""
+    if not bytes_per_s > LEAST_BPS:
+        return THIN
+    share = min(1.0, math.log10(bytes_per_s / LEAST_BPS) / DECADES)
+    return THIN + (THICK - THIN) * round(share * STEPS) / STEPS
+
+
+def percent_words(share: float) -> str:
+    """0.7 %, 12 %."""
+    return number(share, ".1%").replace("%", " %")

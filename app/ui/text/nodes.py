@@ -1,0 +1,29 @@
+"""Programs as people read them: of which NEP they are, and what they take of a processor."""
+
+from __future__ import annotations
+
+from app.core.network.nodes import NodeEntry
+from app.core.networks.kinds import kind_named
+from nep.i18n import _, lazy, number
+
+GENERATIONS = {
+    "native": lazy("native"),
+    "A": lazy("NEP to 0.5.4.5"),
+    "B": "NEP 0.5.4.8",
+}
+
+
+def generation_words(node: NodeEntry) -> str:
+    """Native, which versions of the original NEP, or which other network."""
+    kind = kind_named(node.network)
+    if kind is not None:
+        return kind.words
+    return _(GENERATIONS.get(node.generation, f"NEP {node.generation}"))
+
+
+def cpu_words(ratio: float | None) -> str:
+    """The share of a core: 0.4 %, 12 %, 130 %; blank when not known."""
+    if ratio is None:
+        return ""
+    percent = ratio * 100
+    return f"{number(percent, '.1f')} %" if percent < 9.95 else f"{round(percent)} %"

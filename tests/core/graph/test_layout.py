@@ -1,0 +1,201 @@
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import graphlay
+import pytest
+
+from app.core.graph import layout as layout_module
+from app.core.graph.layout import MOST_ROUTES, GraphLayout, LayoutSizes, arrange
+from app.core.graph.layout_thread import LayoutThread
+from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
+from tests.nep.programs import eventually
+
+
+def graph(groups: dict[str, str], pairs: str = "", *, quiet: int = 0) -> NodeGraph:
+    """``groups``: letters by group; ``pairs``: "ab cd", who tells whom."""
+    nodes = [DrawnNode(key, key, group, "program") for group, keys in groups.items() for key in keys]
+    made = [
+        GraphGroup(group, group, "", "monitor", len(keys), quiet, False)
+        for group, keys in groups.items()
+        if group
+    ]
+    lines = [GraphLine("topic", (a,), (b,), (f"/{a}{b}",)) for a, b in pairs.split()]
+    return NodeGraph(tuple(nodes), tuple(lines), tuple(made), len(nodes))
+
+
+def overlapping(found: GraphLayout) -> list[tuple[str, str]]:
+    boxes = [*found.groups.items()]
+    return [
+        (one, other)
+        for number, (one, a) in enumerate(boxes)
+        for other, b in boxes[number + 1 :]
+        if a[0] < b[0] + b[2] and b[0] < a[0] + a[2] and a[1] < b[1] + b[3] and b[1] < a[1] + a[3]
+    ]
+
+
+LAB = graph({"g": "abcd", "h": "ef", "i": "x"}, "ab bc cd de ef fa xa ax")
+
+
+def test_everything_has_a_place_groups_hold_their_nodes_and_do_not_overlap() -> None:
+    found = arrange(LAB)
+    assert found.places.keys() == set("abcdefx")
+    assert overlapping(found) == []
+    for node in LAB.nodes:
+        x, y = found.places[node.key]
+        left, top, wide, high = found.groups[node.group]
+        assert left + 76 < x < left + wide - 76
+        assert top + 24 + 30 < y < top + high - 24
+    assert not found.is_plain
+    assert len({*found.places.values()}) == 7
+
+
+def test_lines_begin_and_end_at_the_edges_of_their_nodes() -> None:
+    found = arrange(LAB)
+    assert found.routes.keys() == {(line.key, *line.key[1], *line.key[2]) for line in LAB.lines}
+    for (_line, source, target), points in found.routes.items():
+        for (x, y), key in ((points[0], source), (points[-1], target)):
+            across, down = abs(x - found.places[key][0]), abs(y - found.places[key][1])
+            assert across == pytest.approx(76, abs=1) or down == pytest.approx(24, abs=1)
+
+
+def test_the_same_graph_has_the_same_places() -> None:
+    assert arrange(LAB) == arrange(LAB)
+
+
+def test_places_stay_when_nodes_come_and_go_and_come_back() -> None:
+    first = arrange(LAB)
+    more = graph({"g": "abcdkm", "h": "ef", "i": "x", "j": "n"}, "ab bc cd de ef fa xa ax ak km na")
+    second = arrange(more, first)
+    untouched = [key for key in "ef" if "h" in second.groups]
+    assert all(second.places[key] == first.places[key] for key in "abcd")
+    assert overlapping(second) == []
+    assert untouched
+    fewer = arrange(graph({"g": "abkm", "h": "e", "j": "n"}, "ab ak"), second)
+    assert all(fewer.places[key] == second.places[key] for key in "abkmen")
+    back = arrange(more, fewer)
+    assert all(back.places[key] == second.places[key] for key in "abcdefx")
+
+
+def test_no_two_nodes_of_a_crowd_that_comes_one_by_one_lie_on_each_other() -> None:
+    names = "abcdefghijklmnop"
+    found = None
+    for count in range(1, len(names) + 1):
+        found = arrange(graph({"g": names[:count], "h": names[:count].upper()}, ""), found)
+        assert overlapping(found) == []
+    assert found is not None
+    places = [*found.places.values()]
+    assert all(
+        abs(a[0] - b[0]) >= 152 or abs(a[1] - b[1]) >= 48
+        for number, a in enumerate(places)
+        for b in places[number + 1 :]
+    )
+
+
+def test_most_of_it_new_is_arranged_anew() -> None:
+    first = arrange(graph({"g": "a"}))
+    second = arrange(graph({"g": "abcdef"}, "ab bc cd de ef"), first)
+    xs = [second.places[key][0] for key in "abcdef"]
+    assert xs == sorted(xs)
+    assert len({*xs}) == 6
+
+
+def test_a_group_with_quiet_nodes_has_room_to_say_so() -> None:
+    plain, told = arrange(graph({"g": "a"})), arrange(graph({"g": "a"}, quiet=2))
+    assert told.groups["g"][3] == plain.groups["g"][3] + LayoutSizes().foot
+
+
+def test_nothing_and_one() -> None:
+    assert arrange(NodeGraph()) == GraphLayout()
+    assert arrange(NodeGraph()).bounds(LayoutSizes()) == (0.0, 0.0, 0.0, 0.0)
+    assert arrange(graph({"": "a"})).places.keys() == {"a"}
+
+
+def test_too_many_lines_are_left_out_and_counted() -> None:
+    keys = [f"n{number}" for number in range(120)]
+    nodes = tuple(DrawnNode(key, key, "", "program") for key in keys)
+    all_to_all = GraphLine("topic", tuple(keys), tuple(keys), ("/clock",))
+    one = GraphLine("topic", ("n0",), ("n1",), ("/one",))
+    found = arrange(NodeGraph(nodes, (all_to_all, one), (), 120))
+    assert found.left_out == 120 * 119
+    assert found.left_out > MOST_ROUTES
+    assert [key[1:] for key in found.routes] == [("n0", "n1")]
+
+
+@pytest.mark.parametrize("error", [graphlay.GraphlayError("no"), BaseException("a panic")])
+def test_when_the_library_fails_nodes_stand_in_rows_and_lines_run_straight(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, error: BaseException
+) -> None:
+    def fails(*_arguments: object, **_options: object) -> None:
+        raise error
+
+    monkeypatch.setattr(layout_module.graphlay, "layout", fails)
+    found = arrange(LAB)
+    assert found.is_plain
+    assert found.places.keys() == set("abcdefx")
+    assert overlapping(found) == []
+    assert all(len(points) == 2 for points in found.routes.values())
+    assert "could not be placed" in caplog.text
+    monkeypatch.undo()
+    placed = arrange(LAB)
+    monkeypatch.setattr(layout_module.graphlay, "reroute", fails)
+    straight = arrange(LAB, placed)
+    assert straight.places == placed.places
+    assert straight.routes.keys() == placed.routes.keys()
+
+
+def test_larger_text_takes_larger_room() -> None:
+    large = arrange(LAB, None, LayoutSizes().scaled(2.0))
+    assert large.groups["i"][2] == pytest.approx(2 * arrange(LAB).groups["i"][2])
+    assert overlapping(large) == []
+
+
+# -- the thread ----------------------------------------------------------------------------------------------
+
+
+def test_the_thread_arranges_the_newest_graph_only() -> None:
+    began, go_on = threading.Event(), threading.Event()
+    asked: list[int] = []
+
+    def slow(wanted: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> GraphLayout:
+        asked.append(wanted.nodes_there)
+        began.set()
+        assert go_on.wait(20)
+        return arrange(wanted, before, sizes)
+
+    thread = LayoutThread(slow)
+    try:
+        thread.ask(LAB, None, LayoutSizes())
+        assert began.wait(20)
+        for count in (8, 9):
+            thread.ask(replace(LAB, nodes_there=count), None, LayoutSizes())
+        assert thread.is_busy
+        assert thread.take() is None
+        go_on.set()
+        eventually(lambda: not thread.is_busy)
+        made = thread.take()
+        assert made is not None
+        assert made[0].nodes_there == 9
+        assert asked == [7, 9]
+        assert thread.take() is None
+    finally:
+        thread.close()
+
+
+def test_the_thread_goes_on_after_an_error_and_ends_at_once(caplog: pytest.LogCaptureFixture) -> None:
+    def fails(wanted: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> GraphLayout:
+        if not wanted.nodes:
+            raise ValueError("nothing")
+        return arrange(wanted, before, sizes)
+
+    thread = LayoutThread(fails)
+    thread.ask(NodeGraph(), None, LayoutSizes())
+    eventually(lambda: not thread.is_busy)
+    thread.ask(LAB, None, LayoutSizes())
+    eventually(lambda: thread.take() is not None)
+    thread.close()
+    thread.ask(LAB, None, LayoutSizes())
+    assert not thread.is_busy
+    LayoutThread().close()
+    assert "nothing" in caplog.text

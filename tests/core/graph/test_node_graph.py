@@ -1,0 +1,205 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from app.core.graph.node_graph import GraphChoices, GraphFacts, NodeGraph, node_graph
+from app.core.network.nodes import Nodes
+from app.core.network.topics import Topics
+from nep.protocol.graph_view import (
+    BRIDGES_TOPIC,
+    ClientInfo,
+    GraphView,
+    NodeInfo,
+    PatternInfo,
+    PublisherInfo,
+    ServerInfo,
+    ServiceInfo,
+    SubscriberInfo,
+    TopicInfo,
+)
+
+HERE, THERE = "lab-pc", "pepper"
+
+
+def node(id: str, name: str, host: str = HERE, generation: str = "native") -> NodeInfo:
+    return NodeInfo(id, name, host, 1, "Python", generation, int(id, 16))
+
+
+def topic(name: str, by: str, to: str = "", codec: str = "json", endpoint: str = "") -> TopicInfo:
+    ends = (endpoint,) if endpoint else ()
+    return TopicInfo(
+        name,
+        codec,
+        codec,
+        tuple(PublisherInfo(n, id, ends, False, 5, 50, 5, None, 2.0, 40.0) for n, id in enumerate(by)),
+        tuple(SubscriberInfo(n, id, 5, 0) for n, id in enumerate(to)),
+        rate_hz=2.0,
+        bandwidth_Bps=40.0,
+    )
+
+
+NODES = (
+    node("1", "pepper_driver", THERE),
+    node("2", "blackboard"),
+    node("3", "program greeting"),
+    node("4", "studio"),
+    node("5", "RIZE", HERE, "B"),
+    node("6", "bridge-lab-to-ros2"),
+)
+TOPICS = (
+    topic("/Pepper/touch", "1", "2", endpoint="tcp://192.168.1.24:40001"),
+    topic("/Pepper/odom", "1", "2"),
+    topic("/blackboard", "2", "346"),
+    topic("robot_action", "35", "1"),
+    topic("/nep/log", "123456", "4"),
+    topic(BRIDGES_TOPIC, "6"),
+    topic("/alone", "2"),
+    topic("/echo", "2", "2"),
+)
+SERVICES = (
+    ServiceInfo("remember_face", "", (ServerInfo(1, "2", (), 3, 0, 9),), (ClientInfo(1, "4", 3, 0),), 3, 0),
+    ServiceInfo("/nep/parameters/1", "", (ServerInfo(2, "1", (), 3, 0, 9),), (ClientInfo(2, "4", 3, 0),)),
+)
+
+
+def facts(
+    nodes: tuple[NodeInfo, ...] = NODES,
+    topics: tuple[TopicInfo, ...] = TOPICS,
+    patterns: tuple[PatternInfo, ...] = (),
+) -> GraphFacts:
+    view = GraphView(
+        1,
+        1,
+        {each.id: each for each in nodes},
+        {each.name: each for each in topics},
+        services={each.name: each for each in SERVICES},
+        patterns={each.name: each for each in patterns},
+    )
+    known, heard = Nodes(), Topics(own=("nobody", 0))
+    known.update(view, 0.0)
+    heard.update(view, 0.0)
+    return GraphFacts([*known], [*heard], view.services, ["Pepper"], HERE)
+
+
+def lines(graph: NodeGraph) -> dict[tuple[str, ...], tuple[str, str]]:
+    names = {each.key: each.name for each in graph.nodes}
+    return {
+        line.topics: (
+            "+".join(names[key] for key in line.sources),
+            "+".join(names[key] for key in line.targets),
+        )
+        for line in graph.lines
+    }
+
+
+def test_who_tells_whom() -> None:
+    graph = node_graph(facts(), GraphChoices())
+    assert lines(graph) == {
+        ("/Pepper/odom", "/Pepper/touch"): ("pepper_driver", "blackboard"),
+        ("/blackboard",): ("blackboard", "bridge-lab-to-ros2+greeting+studio"),
+        ("robot_action",): ("RIZE+greeting", "pepper_driver"),
+        ("remember_face",): ("studio", "blackboard"),
+    }
+    assert (graph.nodes_there, graph.topics_there, graph.services_there) == (6, 4, 1)
+
+
+def test_kinds_and_names() -> None:
+    graph = node_graph(facts(), GraphChoices())
+    assert {each.name: (each.kind, each.joins) for each in graph.nodes} == {
+        "pepper_driver": ("program", ""),
+        "blackboard": ("program", ""),
+        "greeting": ("behaviour", ""),
+        "studio": ("studio", ""),
+        "RIZE": ("original", ""),
+        "bridge-lab-to-ros2": ("bridge", "ROS 2"),
+    }
+
+
+def test_groups_by_computer_with_its_address_by_robot_or_none() -> None:
+    found = facts()
+    by_computer = node_graph(found, GraphChoices()).groups
+    assert [(each.key, each.address, each.members) for each in by_computer] == [
+        ("host:lab-pc", "", 5),
+        ("host:pepper", "192.168.1.24", 1),
+    ]
+    by_robot = node_graph(found, GraphChoices(group_by="robot"))
+    assert [(each.key, each.icon, each.members) for each in by_robot.groups] == [
+        ("robot:", "box", 5),
+        ("robot:Pepper", "bot", 1),
+    ]
+    assert node_graph(found, GraphChoices(group_by="nothing")).groups == ()
+
+
+@pytest.mark.parametrize(
+    "endpoint",
+    ["", "tcp://127.0.0.1:4", "ipc:///tmp/x", "tcp://[::1", "rubbish", "tcp://0.0.0.0:1", "tcp://:1"],
+)
+def test_what_is_no_address_for_others_is_none(endpoint: str) -> None:
+    graph = node_graph(facts(topics=(topic("/a", "1", "2", endpoint=endpoint),)), GraphChoices())
+    assert {each.address for each in graph.groups} == {""}
+
+
+def test_neps_own_topics_and_services_are_drawn_when_wanted() -> None:
+    choices = GraphChoices(shows_own=True)
+    found = lines(node_graph(facts(), choices))
+    assert ("/nep/log",) in found
+    assert ("/nep/parameters/1",) in found
+    assert ("remember_face",) not in lines(node_graph(facts(), replace(choices, shows_services=False)))
+
+
+def test_a_closed_group_is_one_box_with_the_lines_of_all_in_it() -> None:
+    graph = node_graph(facts(), GraphChoices(toggled=frozenset({"host:lab-pc"})))
+    assert {(each.kind, each.key, each.members) for each in graph.nodes} == {
+        ("group", "host:lab-pc", 5),
+        ("program", "|pepper|pepper_driver", 1),
+    }
+    assert {line.topics for line in graph.lines} == {("/Pepper/odom", "/Pepper/touch"), ("robot_action",)}
+    again = node_graph(facts(), GraphChoices(starts_closed=True, toggled=frozenset({"host:pepper"})))
+    assert again == graph
+
+
+def test_quiet_nodes_are_hidden_and_counted_until_their_group_shows_them() -> None:
+    choices = GraphChoices(quiet=frozenset({"4", "5"}))
+    graph = node_graph(facts(), choices)
+    assert {each.name for each in graph.nodes} == {
+        "pepper_driver", "blackboard", "greeting", "bridge-lab-to-ros2",
+    }  # fmt: skip
+    assert graph.quiet_hidden == 2
+    assert [each.quiet for each in graph.groups] == [2, 0]
+    shown = node_graph(facts(), replace(choices, quiet_shown=frozenset({"host:lab-pc"})))
+    assert {each.name for each in shown.nodes if each.is_quiet} == {"studio", "RIZE"}
+    assert node_graph(facts(), replace(choices, hides_quiet=False)).quiet_hidden == 0
+
+
+def test_a_group_of_which_everybody_is_quiet_stays_in_sight() -> None:
+    graph = node_graph(facts(), GraphChoices(quiet=frozenset({"1"})))
+    box = graph.node("host:pepper")
+    assert box is not None
+    assert (box.kind, box.members, box.quiet) == ("group", 1, 1)
+
+
+def test_a_program_that_is_started_again_keeps_its_key_and_a_twin_has_another() -> None:
+    first = node_graph(facts(), GraphChoices())
+    restarted = tuple(replace(each, id="99") if each.name == "blackboard" else each for each in NODES)
+    second = node_graph(facts(restarted, ()), GraphChoices())
+    assert {each.key for each in first.nodes} == {each.key for each in second.nodes}
+    twins = node_graph(facts((*NODES, node("77", "blackboard")), ()), GraphChoices())
+    keys = [each.key for each in twins.nodes if each.name == "blackboard"]
+    assert sorted(keys) == ["|lab-pc|blackboard", "|lab-pc|blackboard|2"]
+
+
+def test_who_hears_all_topics_that_match_is_at_their_lines() -> None:
+    wide = PatternInfo("/Pepper/*", "json", (SubscriberInfo(9, "5", 1, 0),))
+    found = lines(node_graph(facts(patterns=(wide,)), GraphChoices()))
+    assert found["/Pepper/odom", "/Pepper/touch"] == ("pepper_driver", "RIZE+blackboard")
+
+
+def test_nothing_is_nothing() -> None:
+    assert node_graph(GraphFacts(), GraphChoices()) == NodeGraph()
+
+
+def test_a_topic_of_nodes_that_nobody_knows_has_no_line() -> None:
+    graph = node_graph(facts(topics=(topic("/ghost", "89", "2"),)), GraphChoices())
+    assert graph.topics_there == 0

@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import pytest
+
+from app.core.graph.layout import GraphLayout
+from app.core.graph.node_graph import DrawnNode, GraphLine, NodeGraph
+from app.core.graph.walk import Arrow, GraphChoice, step
+
+GRAPH = NodeGraph(
+    tuple(DrawnNode(key, key, "", "program") for key in "abcd"),
+    (
+        GraphLine("topic", ("a",), ("b", "c"), ("/two", "/with")),
+        GraphLine("topic", ("a",), ("d",), ("/three",)),
+        GraphLine("topic", ("a", "d"), ("a", "d"), ("/both",)),
+        GraphLine("service", ("c",), ("a",), ("ask",)),
+    ),
+)
+PLACES = GraphLayout({"a": (0, 0), "b": (200, -100), "c": (200, 0), "d": (200, 100)})
+
+
+def walked(begin: GraphChoice | None, *arrows: Arrow) -> list[str]:
+    found = []
+    for arrow in arrows:
+        begin = step(GRAPH, PLACES, begin, arrow)
+        assert begin is not None
+        found.append(begin.key)
+    return found
+
+
+def test_the_first_arrow_goes_to_the_node_at_the_left() -> None:
+    assert walked(None, "down") == ["a"]
+    assert walked(GraphChoice("node", "gone"), "right") == ["a"]
+    assert walked(GraphChoice("topic", "/gone", "a"), "right") == ["a"]
+    assert step(NodeGraph(), GraphLayout(), None, "right") is None
+
+
+def test_right_goes_along_a_line_and_left_back() -> None:
+    assert walked(GraphChoice("node", "a"), "right", "right") == ["/two", "c"]
+    assert walked(GraphChoice("node", "a"), "right", "left") == ["/two", "a"]
+    assert walked(GraphChoice("node", "b"), "left", "left") == ["/two", "a"]
+    assert walked(GraphChoice("node", "b"), "left", "right") == ["/two", "b"]
+    assert walked(GraphChoice("node", "c"), "right", "right") == ["ask", "a"]
+
+
+def test_up_and_down_go_from_line_to_line_of_a_node_each_of_its_topics_once() -> None:
+    at = GraphChoice("topic", "/two", "a")
+    assert walked(at, "down", "down", "down", "down") == ["/with", "/both", "/three", "/three"]
+    assert walked(at, "up") == ["/two"]
+
+
+def test_up_and_down_go_from_node_to_node() -> None:
+    assert walked(GraphChoice("node", "b"), "down", "down", "down", "up") == ["c", "d", "d", "c"]
+
+
+def test_a_node_without_lines_stays_chosen() -> None:
+    assert walked(GraphChoice("node", "b"), "right") == ["b"]
+
+
+def test_a_line_of_those_who_hear_each_other_leads_to_the_other() -> None:
+    at = GraphChoice("topic", "/both", "a")
+    assert walked(at, "right") == ["d"]
+    assert walked(at, "left") == ["a"]
+
+
+@pytest.mark.parametrize("arrow", ["left", "right", "up", "down"])
+def test_every_arrow_leads_to_something_that_is_there(arrow: Arrow) -> None:
+    choices = [GraphChoice("node", key) for key in "abcd"]
+    choices += [
+        GraphChoice("topic", topic, origin, outward)
+        for topic in ("/two", "/with", "/three", "/both", "ask")
+        for origin in ("", "a", "b", "gone")
+        for outward in (True, False)
+    ]
+    for choice in choices:
+        found = step(GRAPH, PLACES, choice, arrow)
+        assert found is not None
+        assert found.key in PLACES.places or GRAPH.line_of(found.key) is not None

@@ -1,0 +1,71 @@
+"""The graph of the real window: who talks to whom is seen, walked along by keys, and led to by the mouse."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.fingers import Fingers
+from tests.e2e.programs import Program
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(240)
+TALK = """
+import sys, threading
+import nep
+talker, listener = nep.node("talker"), nep.node("listener")
+heard = listener.new_sub("/chatter", "json", sink=lambda messages: None)
+told = talker.new_pub("/chatter", "json")
+ended = threading.Event()
+def talk():
+    while not ended.wait(0.1):
+        told.publish({"say": "hello"})
+threading.Thread(target=talk).start()
+print("talks", flush=True)
+sys.stdin.read()
+ended.set()
+"""
+
+
+def said(studio: Studio) -> str:
+    """What a screen reader says of what is chosen in the graph."""
+    return str(studio.find("Graph of nodes")["description"])
+
+
+def test_a_person_follows_a_topic_from_who_tells_it_to_who_hears_it(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
+    studio = start()
+    fingers = Fingers(studio)
+    studio.click("Open the Developer layout")
+    studio.find("Topics", kind="Dock")
+    script = tmp_path / "talk.py"
+    script.write_text(TALK, "utf-8")
+    with Program(str(script)) as program:
+        program.says("talks", 60)
+        fingers.do("Graph", "Graph")
+        canvas = studio.find("Graph of nodes")
+        studio.says("nodes, 1 topic")
+        left, top, wide, high = canvas["rect"]
+        studio.screen.click(left + wide / 2, top + high - 10)  # beside everything
+        studio.find("Graph of nodes", focus=True)
+
+        def walked() -> bool:
+            """To the first node, and along its line as soon as that is drawn."""
+            if not said(studio).startswith("/chatter"):
+                fingers.press("Right")
+            return "from talker to listener" in said(studio)
+
+        until(walked, lambda: said(studio))
+        studio.find("/chatter", kind="ElidedLabel")
+        fingers.press("Right")
+        until(lambda: said(studio).startswith("listener, Python"), lambda: said(studio))
+        fingers.press("Left")
+        until(lambda: said(studio).startswith("/chatter"), lambda: said(studio))
+        studio.click("Inspect")
+        until(lambda: studio.values("Newest message").get("say"), "the Inspector shows what is said")
+        until(lambda: "studio" in said(studio), lambda: f"who inspects it hears it, too: {said(studio)}")
+    assert studio.quit() == 0

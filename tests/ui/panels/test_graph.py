@@ -1,0 +1,522 @@
+from __future__ import annotations
+
+import platform
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+
+from app.core.graph.activity import QUIET_S
+from app.core.graph.walk import GraphChoice
+from app.core.network.master import MasterState
+from app.ui.panels.graph.panel import DOT, PANEL, SVG, GraphPanel
+from app.ui.panels.graph.words import line_width, short_rate
+from nep.protocol.graph_view import (
+    ClientInfo,
+    GraphView,
+    NodeInfo,
+    PublisherInfo,
+    ServerInfo,
+    ServiceInfo,
+    SubscriberInfo,
+    TopicInfo,
+)
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, button, press
+
+HERE = platform.node()
+NODES = tuple(
+    NodeInfo(id, name, host, 100, "Python", generation, number, 0.012)
+    for number, (id, name, host, generation) in enumerate(
+        (
+            ("1", "pepper_driver", "pepper", "native"),
+            ("2", "blackboard", HERE, "native"),
+            ("3", "program greeting", HERE, "native"),
+            ("4", "studio", HERE, "native"),
+            ("5", "RIZE", HERE, "B"),
+        )
+    )
+)
+
+
+def topic(name: str, by: str, to: str, rate: float, count: int, lost: int = 0) -> TopicInfo:
+    return TopicInfo(
+        name, "json", "json",
+        tuple(PublisherInfo(9, id, (), False, count, 10 * count, count, 1, rate, rate * 500) for id in by),
+        tuple(SubscriberInfo(8, id, count, lost) for id in to),
+        rate, rate * 500, 1, lost, lost / count,
+    )  # fmt: skip
+
+
+def graph(revision: int = 1, count: int = 100, nodes: tuple[NodeInfo, ...] = NODES) -> GraphView:
+    topics = (
+        topic("/touch", "1", "2", 20.0, count),
+        topic("/blackboard", "2", "34", 10.0, count, lost=2),
+        topic("robot_action", "35", "1", 0.5, count),
+        topic("/nep/log", "1235", "4", 1.0, count),
+    )
+    service = ServiceInfo(
+        "remember", "", (ServerInfo(1, "2", (), 7, 1, 9),), (ClientInfo(1, "4", 6, 1),), 7, 1
+    )
+    there = {node.id for node in nodes}
+    kept = [
+        replace(
+            each,
+            publishers=tuple(one for one in each.publishers if one.node_id in there),
+            subscribers=tuple(one for one in each.subscribers if one.node_id in there),
+        )
+        for each in topics
+    ]
+    return GraphView(
+        1,
+        revision,
+        {node.id: node for node in nodes},
+        {each.name: each for each in kept if each.publishers},
+        services={"remember": service},
+    )
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    made = Window(Session())
+    made.session.master = MasterState("connected", "127.0.0.1:7780")
+    show(made, graph())
+    return made
+
+
+@pytest.fixture
+def panel(qtbot, window: Window) -> Iterator[GraphPanel]:
+    made = window.make(PANEL, (1376, 748))
+    qtbot.addWidget(made)
+    assert isinstance(made, GraphPanel)
+    settle(qtbot, made)
+    yield made
+    made.shut()
+
+
+def show(window: Window, view: GraphView) -> None:
+    window.session._on_graph(view, window.session.clock())
+
+
+def settle(qtbot, panel: GraphPanel) -> None:
+    """Until everything that was asked for has its place, and is shown."""
+    panel.refresh()
+
+    def is_there() -> bool:
+        panel.refresh()
+        scene = panel.canvas.scene
+        is_shown = scene is not None and scene.graph == panel._asked
+        return not panel._thread.is_busy and is_shown and not panel.canvas._waiting
+
+    qtbot.waitUntil(is_there, timeout=20_000)
+
+
+def key_of(panel: GraphPanel, name: str) -> str:
+    assert panel.canvas.scene is not None
+    return next(node.key for node in panel.canvas.scene.graph.nodes if node.name == name)
+
+
+def names(panel: GraphPanel) -> set[str]:
+    assert panel.canvas.scene is not None
+    return {node.name for node in panel.canvas.scene.graph.nodes}
+
+
+def at(panel: GraphPanel, place: QPointF) -> QPoint:
+    """Where a place of the drawing is on the canvas."""
+    canvas = panel.canvas
+    return ((place - canvas.visible().topLeft()) * canvas.scale).toPoint()
+
+
+def middle(panel: GraphPanel, name: str) -> QPoint:
+    assert panel.canvas.scene is not None
+    return at(panel, panel.canvas.scene.nodes[key_of(panel, name)].rect.center())
+
+
+def click(widget: QWidget, place: QPoint) -> None:
+    QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=place)
+
+
+def words_at(panel: GraphPanel) -> set[str]:
+    assert panel.canvas.scene is not None
+    return {item.figures.words for item in panel.canvas.scene.lines}
+
+
+def test_nodes_lines_and_figures(panel: GraphPanel) -> None:
+    assert panel.count.text() == "5 nodes, 3 topics, 1 service"
+    assert names(panel) == {"pepper_driver", "blackboard", "greeting", "studio", "RIZE"}
+    assert words_at(panel) == {"/touch 20/s", "/blackboard 10/s", "robot_action 0.5/s", "remember"}
+    scene = panel.canvas.scene
+    assert scene is not None
+    lines = {item.node.name: item.line for item in scene.nodes.values()}
+    assert lines == {
+        "pepper_driver": "Python, 1.2 %", "blackboard": "Python, 1.2 %", "greeting": "behaviour, 1.2 %",
+        "studio": "this window", "RIZE": "NEP 0.5.4.8",
+    }  # fmt: skip
+    assert {item.name for item in scene.groups} == {"This computer", "pepper"}
+    assert all(item.label is not None for item in scene.lines if item.line.kind == "topic")
+
+
+def test_only_what_changed_is_painted(panel: GraphPanel, window: Window, qtbot) -> None:
+    def renewed() -> int:
+        panel.canvas.renew_soon()
+        return panel.canvas.renew(panel._figures_of)
+
+    qtbot.wait(1)
+    painted = panel.canvas.painted
+    show(window, graph())  # the same once more
+    assert renewed() == 0
+    panel.refresh()
+    qtbot.wait(1)
+    assert panel.canvas.painted == painted
+    more = graph()
+    touch = replace(more.topics["/touch"], rate_hz=31.0)
+    show(window, replace(more, topics={**more.topics, "/touch": touch}))
+    assert renewed() == 1
+    qtbot.waitUntil(lambda: panel.canvas.painted > painted)
+    assert "/touch 31/s" in words_at(panel)
+
+
+def test_what_is_out_of_sight_is_renewed_when_it_comes_into_sight(panel: GraphPanel, window: Window) -> None:
+    panel.canvas.zoom_to(3.0)
+    panel.canvas.move_by(20_000, 0)
+    more = graph()
+    touch = replace(more.topics["/touch"], rate_hz=31.0)
+    show(window, replace(more, topics={**more.topics, "/touch": touch}))
+    panel.refresh()
+    assert "/touch 20/s" in words_at(panel)
+    panel.canvas.show_all()
+    panel.refresh()
+    assert "/touch 31/s" in words_at(panel)
+
+
+def test_a_click_on_a_line_shows_its_topic_and_inspect_opens_it(panel: GraphPanel, window: Window) -> None:
+    scene = panel.canvas.scene
+    assert scene is not None
+    item = next(each for each in scene.lines if each.line.topics == ("/blackboard",))
+    assert item.label is not None
+    click(panel.canvas, at(panel, item.label.center()))
+    assert panel.canvas.choice == GraphChoice("topic", "/blackboard", key_of(panel, "blackboard"))
+    content = panel.card.content
+    assert content is not None
+    assert (content.title, content.kind) == ("/blackboard", "json")
+    assert [figure.value for figure in content.figures] == ["10.0 /s", "5.0 kB/s", "2.0 %", ""]
+    assert [[row[1:] for row in table.rows] for table in content.tables] == [
+        [("blackboard", ("10.0", "100"))],
+        [("greeting", ("100", "2")), ("studio", ("100", "2"))],
+    ]
+    assert panel.card.isVisible()
+    press(panel.card.inspect)
+    assert window.opened == ["/blackboard"]
+    press(panel.card.close_button)
+    assert panel.canvas.choice is None
+    assert not panel.card.isVisible()
+
+
+def test_a_double_click_on_a_line_opens_its_topic(panel: GraphPanel, window: Window) -> None:
+    scene = panel.canvas.scene
+    assert scene is not None
+    item = next(each for each in scene.lines if each.line.topics == ("/touch",))
+    points = next(iter(item.ways.values()))
+    half = QPointF((points[0][0] + points[1][0]) / 2, (points[0][1] + points[1][1]) / 2)
+    QTest.mouseDClick(panel.canvas, Qt.MouseButton.LeftButton, pos=at(panel, half))
+    assert window.opened == ["/touch"]
+
+
+def test_the_card_of_a_node_leads_to_its_topics(panel: GraphPanel, window: Window) -> None:
+    click(panel.canvas, middle(panel, "blackboard"))
+    content = panel.card.content
+    assert content is not None
+    assert [(table.title, [row[1] for row in table.rows]) for table in content.tables] == [
+        ("Publishes", ["/blackboard"]),
+        ("Subscribes", ["/touch"]),
+        ("Serves", ["remember"]),
+    ]
+    assert not panel.card.inspect.isVisible()
+    press(button(panel.card, "/touch"))
+    assert panel.canvas.choice == GraphChoice("topic", "/touch")
+    press(button(panel.card, "pepper_driver"))
+    assert panel.canvas.choice == GraphChoice("node", key_of(panel, "pepper_driver"))
+    assert window.opened == []
+
+
+def test_the_card_of_a_service(panel: GraphPanel) -> None:
+    panel.canvas.choose(GraphChoice("topic", "remember"))
+    content = panel.card.content
+    assert content is not None
+    assert [(figure.title, figure.value) for figure in content.figures] == [("Calls", "7"), ("Errors", "1")]
+    assert not panel.card.inspect.isVisible()
+    panel.canvas.opened.emit("remember")  # Enter: there is nothing to inspect
+
+
+@pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, 2.0**64, -1.0])
+def test_impossible_figures_break_nothing(panel: GraphPanel, window: Window, rate: float) -> None:
+    more = graph()
+    odd = replace(more.topics["/touch"], rate_hz=rate, bandwidth_Bps=rate, loss_ratio=rate, lost=2**64 - 1)
+    odd = replace(
+        odd, publishers=tuple(replace(each, rate_hz=rate, last_seq=2**64 - 1) for each in odd.publishers)
+    )
+    show(window, replace(more, topics={**more.topics, "/touch": odd}))
+    panel.canvas.choose(GraphChoice("topic", "/touch"))
+    panel.refresh()
+    panel.canvas.grab()
+    assert panel.card.content is not None
+    assert any(words.startswith("/touch") for words in words_at(panel))
+
+
+def test_another_theme_moves_nobody_and_larger_text_arranges_anew(
+    panel: GraphPanel, window: Window, qtbot
+) -> None:
+    scene = panel.canvas.scene
+    window.theme.set_mode("dark")
+    panel.refresh()
+    assert panel.canvas.scene is scene
+    window.theme.set_text_percent(150)
+    settle(qtbot, panel)
+    assert panel.canvas.scene is not scene
+    node = panel.canvas.scene.nodes[key_of(panel, "RIZE")]  # type: ignore[union-attr]
+    assert node.rect.width() == 228
+
+
+def test_keys_walk_along_lines_and_say_what_is_chosen(panel: GraphPanel, window: Window) -> None:
+    canvas = panel.canvas
+    canvas.choose(GraphChoice("node", key_of(panel, "pepper_driver")))
+    QTest.keyClick(canvas, Qt.Key.Key_Right)
+    assert canvas.choice is not None
+    assert canvas.choice.key == "/touch"
+    assert canvas.accessibleDescription() == "/touch, 20/s, 10 kB/s, from pepper_driver to blackboard"
+    QTest.keyClick(canvas, Qt.Key.Key_Right)
+    assert canvas.choice.key == key_of(panel, "blackboard")
+    assert canvas.accessibleDescription().startswith("blackboard, Python, 1.2 %. Lines to others: 1.")
+    QTest.keyClick(canvas, Qt.Key.Key_Right)
+    QTest.keyClick(canvas, Qt.Key.Key_Return)
+    assert window.opened == ["/blackboard"]
+    QTest.keyClick(canvas, Qt.Key.Key_Escape)
+    assert canvas.choice is None
+
+
+def test_enter_on_a_node_goes_into_its_card(panel: GraphPanel) -> None:
+    panel.canvas.choose(GraphChoice("node", key_of(panel, "studio")))
+    panel.activateWindow()
+    panel.canvas.setFocus()
+    QTest.keyClick(panel.canvas, Qt.Key.Key_Return)
+    assert panel.card.first_stop().accessibleName() == "/blackboard"
+
+
+def test_the_filter_lets_others_fade(panel: GraphPanel) -> None:
+    panel.canvas.setFocus()
+    QTest.keyClick(panel.canvas, Qt.Key.Key_Slash)
+    panel.tools.filter.setText("TOUCH")
+    scene = panel.canvas.scene
+    assert scene is not None
+    faded = {item.node.name for item in scene.nodes.values() if item.is_dim}
+    assert faded == {"greeting", "studio", "RIZE"}
+    assert {item.line.topics[0] for item in scene.lines if not item.is_dim} >= {"/touch"}
+    panel.tools.filter.clear()
+    assert scene.dimmed == 0
+
+
+def test_quiet_nodes_are_hidden_after_a_minute_and_shown_by_a_press(
+    panel: GraphPanel, window: Window, qtbot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [time.monotonic()]
+    monkeypatch.setattr("app.ui.panels.graph.panel.time.monotonic", lambda: now[0])
+    panel._look_who_is_quiet()
+    now[0] += QUIET_S + 1
+    more = graph(count=200)
+    show(window, replace(more, topics={**more.topics, "robot_action": graph().topics["robot_action"]}))
+    panel._look_who_is_quiet()
+    settle(qtbot, panel)
+    assert panel.tools.quiet.text() == "1 quiet node hidden"
+    assert names(panel) == {"pepper_driver", "blackboard", "greeting", "studio"}
+    assert panel.count.text() == "4 of 5 nodes, 3 topics, 1 service"
+    scene = panel.canvas.scene
+    assert scene is not None
+    chip = next(item.quiet for item in scene.groups if item.quiet is not None)
+    click(panel.canvas, at(panel, chip.center()))
+    settle(qtbot, panel)
+    assert "RIZE" in names(panel)
+    QTest.keyClick(panel.canvas, Qt.Key.Key_H)
+    QTest.keyClick(panel.canvas, Qt.Key.Key_H)
+    settle(qtbot, panel)
+    assert "RIZE" not in names(panel)
+    press(panel.tools.quiet)
+    settle(qtbot, panel)
+    assert "RIZE" in names(panel)
+
+
+def test_groups_open_and_close_and_g_and_s_are_keys(panel: GraphPanel, qtbot) -> None:
+    scene = panel.canvas.scene
+    assert scene is not None
+    head = next(item.rect for item in scene.groups if item.name == "This computer")
+    click(panel.canvas, at(panel, head.topLeft() + QPointF(30, 14)))
+    settle(qtbot, panel)
+    assert names(panel) == {"pepper_driver", HERE}
+    box = panel.canvas.scene.nodes[f"host:{HERE}"]  # type: ignore[union-attr]
+    assert (box.name, box.line) == ("This computer", "4 nodes")
+    click(panel.canvas, at(panel, box.rect.center()))
+    settle(qtbot, panel)
+    assert len(names(panel)) == 5
+    QTest.keyClick(panel.canvas, Qt.Key.Key_G)
+    settle(qtbot, panel)
+    assert panel.tools.group.value == "robot"
+    QTest.keyClick(panel.canvas, Qt.Key.Key_S)
+    settle(qtbot, panel)
+    assert panel.count.text() == "5 nodes, 3 topics"
+    assert panel.save_state() == {"group_by": "robot", "services": False, "hides_quiet": True, "own": False}
+
+
+def test_what_was_chosen_comes_back_and_rubbish_is_left_out(panel: GraphPanel) -> None:
+    panel.restore_state({"group_by": "nothing", "services": False, "hides_quiet": False, "own": True})
+    assert panel.save_state() == {"group_by": "nothing", "services": False, "hides_quiet": False, "own": True}
+    panel.restore_state({"group_by": 7, "services": "no", "hides_quiet": None, "own": 1})
+    assert panel.save_state() == {"group_by": "nothing", "services": False, "hides_quiet": False, "own": True}
+
+
+def test_places_stay_when_somebody_leaves_and_comes(panel: GraphPanel, window: Window, qtbot) -> None:
+    def places() -> dict[str, tuple[float, float]]:
+        assert panel.canvas.scene is not None
+        return {key: item.rect.center().toTuple() for key, item in panel.canvas.scene.nodes.items()}
+
+    before = places()
+    show(window, graph(2, nodes=NODES[:-1]))
+    settle(qtbot, panel)
+    scene = panel.canvas.scene
+    assert scene is not None
+    gone = scene.nodes[key_of(panel, "RIZE")]
+    assert gone.node.is_gone
+    assert gone.line == "gone 0 s"
+    show(
+        window,
+        graph(3, nodes=(*NODES[:-1], replace(NODES[-1], id="55"), replace(NODES[1], id="66", name="new"))),
+    )
+    settle(qtbot, panel)
+    assert {key: place for key, place in places().items() if key in before} == before
+    assert len(places()) == 6
+
+
+def test_many_nodes_begin_with_closed_groups(qtbot, window: Window) -> None:
+    many = tuple(NodeInfo(f"{n:x}", f"n{n}", f"host{n % 3}", 1, "", "native", n) for n in range(1, 202))
+    show(window, GraphView(1, 2, {node.id: node for node in many}))
+    window.session.nodes.age(window.session.clock() + 100)
+    window.session.topics.age(window.session.clock() + 100, 0)
+    made = window.make(PANEL, (900, 600))
+    qtbot.addWidget(made)
+    assert isinstance(made, GraphPanel)
+    settle(qtbot, made)
+    scene = made.canvas.scene
+    assert scene is not None
+    assert {item.line for item in scene.nodes.values()} == {"67 nodes"}
+    made.shut()
+
+
+def test_moving_and_enlarging(panel: GraphPanel) -> None:
+    canvas = panel.canvas
+    fits = canvas.scale
+    assert canvas.visible().contains(canvas.scene.bounds)  # type: ignore[union-attr]
+    QTest.keyClick(canvas, Qt.Key.Key_Plus)
+    assert canvas.scale == pytest.approx(fits * 1.2)
+    for _ in range(40):
+        canvas.zoom_by(1.2)
+    assert canvas.scale == 3.0
+    assert panel.tools.scale.text() == "300 %"
+    assert panel.overview.isVisible()
+    left = canvas.visible().left()
+    QTest.keyClick(canvas, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
+    assert canvas.visible().left() == pytest.approx(left + 20)
+    QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=QPoint(100, 100))
+    QTest.mouseMove(canvas, QPoint(160, 130))
+    QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=QPoint(160, 130))
+    assert canvas.choice is None
+    for _ in range(80):
+        canvas.zoom_by(1 / 1.2)
+    assert canvas.scale == 0.05
+    press(panel.tools.whole)
+    assert canvas.scale == fits
+    assert not panel.overview.isVisible()
+
+
+def test_the_overview_leads_to_a_place(panel: GraphPanel) -> None:
+    panel.canvas.zoom_to(3.0)
+    scene = panel.canvas.scene
+    assert scene is not None
+    scale, offset = panel.overview._fit(scene)
+    wanted = scene.nodes[key_of(panel, "pepper_driver")].rect.center()
+    click(panel.overview, (wanted * scale + offset).toPoint())
+    assert panel.canvas.visible().contains(wanted)
+
+
+def test_the_card_stands_below_where_there_is_little_room(panel: GraphPanel, qtbot) -> None:
+    panel.show_topic("/blackboard")
+    panel.resize(460, 700)
+    qtbot.waitUntil(lambda: panel.card.y() > panel.canvas.y())
+    panel.resize(1376, 748)
+    qtbot.waitUntil(lambda: panel.card.x() > panel.canvas.width() - 4)
+
+
+def test_svg_and_dot_are_written(panel: GraphPanel, window: Window, tmp_path: Path) -> None:
+    panel.save(tmp_path / "graph.svg", SVG)
+    panel.save(tmp_path / "graph.dot", DOT)
+    assert window.toasts == ["Saved graph.svg", "Saved graph.dot"]
+    root = ET.parse(tmp_path / "graph.svg").getroot()
+    said = {"".join(each.itertext()).strip() for each in root.iter("{http://www.w3.org/2000/svg}text")}
+    assert {"blackboard", "greeting", "This computer", "/touch", "20/s"} <= said
+    dot = (tmp_path / "graph.dot").read_text("utf-8")
+    assert 'label="/blackboard 10/s"' in dot
+    assert dot.count("subgraph cluster_") == 2
+    panel.save(tmp_path / "graph.svg" / "graph.svg", SVG)
+    assert window.toasts[-1].startswith("The graph can't be saved: ")
+
+
+def test_the_export_menu_asks_for_a_file(panel: GraphPanel, window: Window, tmp_path: Path) -> None:
+    actions = {action.text(): action for action in panel._menu.actions()}
+    window.answers.path = tmp_path / "mine.dot"
+    actions["Graph (DOT)"].trigger()
+    assert window.answers.asked == [f"Export the graph: {Path.home() / 'graph'}"]
+    assert window.toasts == ["Saved mine.dot"]
+    assert set(actions) == {"Picture (SVG)", "Graph (DOT)"}
+
+
+def test_nobody_is_here_says_what_to_do(qtbot, qapp) -> None:
+    window = Window(Session())
+    window.session.master = MasterState("connected", "127.0.0.1:7780")
+    made = window.make(PANEL)
+    qtbot.addWidget(made)
+    assert isinstance(made, GraphPanel)
+    press(button(made, "Open the connection doctor"))
+    assert window.commands == ["help.doctor"]
+    assert made.picture() == b""
+    made.save(Path("nowhere.svg"), SVG)
+    assert window.toasts == []
+    window.session.master = MasterState("none", "127.0.0.1:7780")
+    made.refresh()
+    button(made, "Start a master here")
+    made.shut()
+
+
+@pytest.mark.parametrize(
+    ("rate", "words"),
+    [
+        (0.0, "0/s"),
+        (0.001, "0/s"),
+        (0.0334, "2/min"),
+        (0.1, "0.1/s"),
+        (9.96, "10/s"),
+        (1e6, "1\u2009000\u2009000/s"),
+    ],
+)
+def test_short_rates(rate: float, words: str) -> None:
+    assert short_rate(rate) == words
+
+
+@pytest.mark.parametrize(
+    ("sent", "width"),
+    [(0.0, 1.25), (-1.0, 1.25), (float("nan"), 1.25), (100.0, 1.25), (1e7, 3.0), (float("inf"), 3.0)],
+)
+def test_widths(sent: float, width: float) -> None:
+    assert line_width(sent) == pytest.approx(width)
