@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from typer.models import CommandInfo
 
-from nep.cli import blackboard, bridge, doctor, log, masters, nodes, parameters, services, topics
+from nep.cli import blackboard, bridge, doctor, log, masters, nodes, parameters, services, topics, watch
 from nep.cli.screen import say_error, write
 from nep.cli.typer_words import TranslatedCommand, TranslatedGroup
 from nep.errors import NepError
@@ -39,6 +39,7 @@ app.command("master")(masters.master)
 app.command("bridge")(bridge.bridge)
 app.command("log")(log.log)
 app.command("doctor")(doctor.doctor)
+app.command("watch")(watch.watch)
 app.add_typer(nodes.app, name="node")
 app.add_typer(topics.app, name="topic")
 app.add_typer(services.app, name="service")
