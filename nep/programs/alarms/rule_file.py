@@ -37,7 +37,7 @@ from nep.programs.alarms.rule import (
 )
 from nep.text import escaped, quotable, shortened
 
-__all__ = ["EXAMPLE", "AlarmFile", "alarms_text", "read_alarms", "read_text"]
+__all__ = ["EXAMPLE", "AlarmFile", "NewerAlarmsError", "alarms_text", "read_alarms", "read_text"]
 
 FORMAT = 1
 MOST_ALARMS = 200
@@ -185,6 +185,10 @@ def _action_plain(action: AlarmAction) -> object:
             return action.kind
 
 
+class NewerAlarmsError(NepError):
+    """A file of alarms is of a newer version, and well, as far as anybody knows here."""
+
+
 class _Wrong(Exception):  # noqa: N818 - never leaves this module
     """An alarm that is wrong; the sentence is whole."""
 
@@ -221,13 +225,13 @@ class _Reader:
     def _root(self, value: object) -> list[object]:
         if not isinstance(value, dict):
             self._fail("", _('it is no file of alarms; it begins with {"format": 1, "alarms": ['))
-        self._check_keys(value, _ROOT_KEYS, None)
         version = value.get("format", FORMAT)
         if not isinstance(version, int) or isinstance(version, bool) or version < 1:
             self._fail("format", _("it must be {format}").format(format=FORMAT))
         if version > FORMAT:
-            said = _("it is of a newer version of nep (format {found}, known is {format}); update nep")
-            self._fail("format", said.format(found=version, format=FORMAT))
+            said = _("'{path}' is of a newer version of nep (format {found}, known is {format}); update nep")
+            raise NewerAlarmsError(said.format(path=self._path, found=version, format=FORMAT))
+        self._check_keys(value, _ROOT_KEYS, None)
         told = value.get("alarms")
         if not isinstance(told, list):
             self._fail("alarms", _('no alarms are in it; write "alarms": [...]'))
