@@ -315,7 +315,9 @@ class AlarmEvaluator:
                 return AlarmState("off")
             condition = track.rule.condition
             heard = self._heard.get(condition.name) if condition.hears else None
-            was_seen = track.was_seen if heard is None else heard.there_since is not None
+            was_seen = track.was_seen or (heard is not None and heard.there_since is not None)
+            if condition.is_about_value:
+                was_seen = heard is not None and heard.last is not None
             trouble = track.trouble or ("unreadable" if heard is not None and heard.unreadable else "")
             if track.on_since is not None:
                 return AlarmState("on", track.seen, now - track.on_since, track.count, trouble)

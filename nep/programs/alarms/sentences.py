@@ -74,9 +74,9 @@ _ACTIONS: Mapping[str, str] = {
 
 
 def time_words(seconds: float) -> str:
-    """A time as a person would say it: 0.5 s, 2 s, 10 min, 3 h."""
+    """A time as a person would say it: 0.5 s, 60 s, 10 min, 3 h."""
     for unit, size in ((_("{count} h"), 3600.0), (_("{count} min"), 60.0)):
-        if seconds >= size and math.isclose(seconds % size, 0.0, abs_tol=1e-9):
+        if seconds > size and math.isclose(seconds % size, 0.0, abs_tol=1e-9):
             return unit.format(count=number(seconds / size))
     return _("{count} s").format(count=number(round(seconds, 3)))
 

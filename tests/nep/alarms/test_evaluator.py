@@ -226,7 +226,7 @@ def test_rules_that_stay_keep_what_is_known_and_one_that_goes_ends_its_alarm() -
     assert scene.state() == "on"
     scene.alarms.put(rule("below", "/d", path="other", limit=1))
     assert [kind for kind, _ in scene.happened()] == ["off"]
-    assert scene.state() == "well"  # the topic is there
+    assert scene.state() == "well"  # it was heard
 
 
 def test_who_is_off_or_has_a_problem_is_not_watched() -> None:

@@ -92,6 +92,7 @@ BEHAVIOUR = Layout(
     {
         "robots": "behaviour",
         "doctor": "behaviour",
+        "alarms": "behaviour",
         "console": "problems",
         "alerts": "problems",
         "nodes": "problems",
@@ -119,6 +120,7 @@ DEVELOPER = Layout(
     {
         "robots": "topics",
         "doctor": "topics",
+        "alarms": "topics",
         "robot": "image",
         "camera": "image",
         "health": "console",
