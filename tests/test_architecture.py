@@ -39,6 +39,7 @@ SMALL_LINES = 60
 # Small modules that one other module alone imports, and what each earns its file by (docs/adr/0020-rooms.md).
 EARNED = {
     "app.core.robots.awaited": "pure, and tested alone",
+    "nep.programs.alarms.losses": "pure, and tested alone",
     "nep.programs.blackboard.ages": "pure, and tested alone",
     "nep.programs.blackboard.perception": "pure, and tested alone",
     "nep.cli.doctor": "one of a list: the commands of nep",

@@ -7,12 +7,17 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Protocol
 
+from app.core.alerts import Alerts
+from app.core.console import Console
 from app.core.documents.background_worker import BackgroundWorker
+from app.core.network.source import Source
 from app.core.network.watches import Watch
-from app.core.robots.voices import Notes
+from app.core.robots.voices import Notes, RobotVoices
+from app.core.run.control import Runs
 from app.core.storage.atomic_file import read_whole, write_atomically
+from app.core.storage.settings import Settings
 from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.messages.message import Message
@@ -26,9 +31,6 @@ from nep.programs.alarms.rule_file import NewerAlarmsError, alarms_text, read_te
 from nep.programs.alarms.sentences import subject_words, time_words, what_words
 from nep.protocol.graph_view import GraphView
 from nep.system.replace_file import replace_file
-
-if TYPE_CHECKING:
-    from app.core.session import Session
 
 FILE = "alarms.json"
 SHOW = "panel:alarms"
@@ -48,6 +50,20 @@ def severity_of(condition: AlarmCondition) -> str:
     return "warn" if condition.kind in MILD else "error"
 
 
+class AlarmSession(Protocol):
+    """What alarms use of the session that they belong to."""
+
+    settings: Settings
+    alerts: Alerts
+    console: Console
+    source: Source
+    voices: RobotVoices
+    runs: Runs
+
+    def watch(self, topic: str) -> Watch:
+        """Look at a topic until the watch is closed."""
+
+
 class SessionAlarms:
     """The alarms of a session. One thread uses it (the window's), but for `take`.
 
@@ -57,7 +73,7 @@ class SessionAlarms:
 
     def __init__(
         self,
-        session: Session,
+        session: AlarmSession,
         *,
         clock: Callable[[], float] = time.monotonic,
         clock_s: Callable[[], float] = time.time,

@@ -61,7 +61,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         self.header: list[QWidget] = [self.filter]
         self.table.setAccessibleName(self.title())
         self.table.opened.connect(self.open_row)
-        self.table.menu_wanted.connect(self._show_menu)
+        self.table.menu_wanted.connect(self._show_row_menu)
         self.table.filter_wanted.connect(self.focus_filter)
         self.table.order_changed.connect(self.rebuild)
         self.foot = label("", "small", role="textTertiary", wrap=True)
@@ -97,7 +97,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         """What the menu of the row of this key offers; no menu where that is nothing."""
         return (RowAction(_("Show"), "eye", lambda: self.open_row(key)),)
 
-    def _show_menu(self, key: str, at: QPoint) -> None:
+    def _show_row_menu(self, key: str, at: QPoint) -> None:
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for action in self.row_actions(key):

@@ -135,7 +135,7 @@ class AlarmsPanel(PanelWidget):
         foot.setSpacing(6)
         hint = ElidedLabel("small", "textTertiary")
         hint.setText(_("A right click on any value, topic or node makes an alarm"))
-        self.line = LinkButton(self.theme, "nep watch")
+        self.line = LinkButton(self.theme, _("nep watch"))
         self.line.setToolTip(_("Copies the line that watches over them without a window"))
         self.line.setAccessibleName(_("Copy the line for a terminal: nep watch"))
         self.line.clicked.connect(self._copy_line)
@@ -293,6 +293,7 @@ class AlarmsPanel(PanelWidget):
             self._peek = self.session.watch(condition.name)  # its newest message says which values there are
         self.field = SlotField(
             self.theme,
+            row,
             row.slots[part.key],
             typed_now(rule, part),
             example_of(part, rule),

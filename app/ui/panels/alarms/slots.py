@@ -97,9 +97,16 @@ class SlotField(QLineEdit):
     ended = Signal()
 
     def __init__(
-        self, theme: Theme, slot: AlarmSlot, text: str, example: str, take: Callable[[str], bool]
+        self,
+        theme: Theme,
+        row: QWidget,
+        slot: AlarmSlot,
+        text: str,
+        example: str,
+        take: Callable[[str], bool],
     ) -> None:
-        super().__init__(text, _row_of(slot))
+        """``row`` is what the sentence of the ``slot`` lies in: the field is higher than a line of it."""
+        super().__init__(text, row)
         self.slot, self._take, self._is_over = slot, take, False
         self.setAccessibleName(slot.accessibleName())
         self.setPlaceholderText(example)
@@ -112,17 +119,16 @@ class SlotField(QLineEdit):
         completer.setMaxVisibleItems(10)
         self.setCompleter(completer)
         self.textEdited.connect(lambda _text: self._mark(wrong=False))
-        self._place(theme)
+        self._place(theme, row)
         self.selectAll()
         self.show()
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _place(self, theme: Theme) -> None:
-        parent = self.parentWidget()
-        rect = QRect(self.slot.mapTo(parent, QPoint()), self.slot.size())
+    def _place(self, theme: Theme, row: QWidget) -> None:
+        rect = QRect(self.slot.mapTo(row, QPoint()), self.slot.size())
         rect.setWidth(max(rect.width() + 24, round(theme.scaled(FIELD_WIDTH))))
-        if rect.right() > parent.width() - 4:
-            rect.moveRight(max(rect.width(), parent.width() - 4))
+        if rect.right() > row.width() - 4:
+            rect.moveRight(max(rect.width(), row.width() - 4))
         middle, high = rect.center().y(), max(rect.height() + 4, self.sizeHint().height())
         rect.setHeight(high)
         rect.moveTop(middle - high // 2)
@@ -188,9 +194,3 @@ class SlotField(QLineEdit):
         self.hide()
         self.ended.emit()
         self.deleteLater()
-
-
-def _row_of(slot: QWidget) -> QWidget:
-    """What the sentence lies in: the field is higher than a line of it."""
-    sentence = slot.parentWidget()
-    return sentence.parentWidget() or sentence
