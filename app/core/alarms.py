@@ -237,7 +237,7 @@ class SessionAlarms:
 
     def _say(self, rule: AlarmRule, seen: object, count: int) -> None:
         condition, record = rule.condition, self.history.last(rule.id)
-        words = what_words(condition, seen)  # type: ignore[arg-type]
+        words = record.words if record is not None else ""  # of the value that did it, not of what is now
         if condition.kind == "silent" and isinstance(seen, int | float) and seen >= 1:
             said = _("{topic} has been silent for {time}")
             words = said.format(topic=subject_words(condition), time=time_words(round(seen)))

@@ -26,6 +26,7 @@ from nep.programs.alarms.history import AlarmDeed, AlarmRecord
 from nep.programs.alarms.rule import KINDS, problem_of
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press, ticks
+from tests.ui.test_accessible import unsaid
 
 pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
 BELOW = AlarmRule(
@@ -120,6 +121,40 @@ def test_the_values_of_a_topic_are_offered(panel, window) -> None:
     window.session.send("/blackboard", {"pose": {"x": 1.0, "y": [2]}})
     panel.field.offer(panel._existing(slot(panel, "value").part, panel.rows[0]))
     assert panel.field.completer().model().stringList() == ["pose.x", "pose.y[0]"]
+
+
+def test_everything_in_a_row_has_a_name_for_a_screen_reader(panel) -> None:
+    panel.alarms.put(replace(BELOW, actions=(AlarmAction("call", payload={"n": 1}), AlarmAction("stop"))))
+    panel.refresh()
+    assert unsaid(panel) == []
+    assert slot(panel, "add").accessibleName() == "Add an action"
+    assert slot(panel, "limit").accessibleName() == "Limit: 20"
+
+
+def test_what_exists_is_taken_as_soon_as_it_is_chosen(panel, qtbot) -> None:
+    panel.begin()
+    field = panel.field
+    assert field is not None
+    QTest.keyClicks(field, "odom")
+    popup = field.completer().popup()
+    assert popup is not None
+    QTest.keyClick(popup, Qt.Key.Key_Down)
+    QTest.keyClick(popup, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: panel.field is None)
+    assert panel.alarms.rules[0].condition.name == "/odom"
+    assert slot(panel, "subject").hasFocus() or not panel.isActiveWindow()
+
+
+def test_the_banner_tells_the_value_that_did_it(panel, window) -> None:
+    session = window.session
+    session.alarms.put(BELOW)
+    ticks(window, panel, 1)
+    for battery in (12, 84):
+        session.send("/blackboard", {"robots": {"Pepper": {"battery": battery}}})
+        ticks(window, panel, 1)
+    session.alarms.check()
+    (alert,) = [each for each in session.alerts.active if each.id == "alarm:d"]
+    assert "is 12, below 20" in alert.title
 
 
 def test_actions_are_added_named_and_removed(panel) -> None:

@@ -224,7 +224,8 @@ class AlarmsPanel(PanelWidget):
         yesterday = (midnight - dt.timedelta(days=1)).timestamp()
         today = sum(each.at_s >= midnight.timestamp() for each in history)
         before = sum(yesterday <= each.at_s < midnight.timestamp() for each in history)
-        said = _("today {today}, yesterday {yesterday}").format(today=today, yesterday=before)
+        words_today = _("today {today}, yesterday {yesterday}") if before else _("today {today}")
+        said = words_today.format(today=today, yesterday=before)
         self.history_count.setText(said if len(history) else _("nothing happened yet"))
         for widget in (self.filter, self.export):
             widget.setVisible(len(history) > 0)

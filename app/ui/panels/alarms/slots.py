@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QPoint, QRect, QRectF, QSize, QStringListModel, Qt, Signal
+from PySide6.QtCore import QPoint, QRect, QRectF, QSize, QStringListModel, Qt, QTimer, Signal
 from PySide6.QtGui import QFocusEvent, QFont, QKeyEvent, QPainter, QPen
-from PySide6.QtWidgets import QCompleter, QLineEdit, QWidget
+from PySide6.QtWidgets import QCompleter, QLineEdit, QStyledItemDelegate, QWidget
 
 from app.ui.panels.alarms.phrases import PhrasePart
 from app.ui.theme.icons import paint_icon
@@ -28,15 +28,16 @@ class AlarmSlot(PaintedButton):
 
     def __init__(self, theme: Theme, part: PhrasePart, name: str) -> None:
         super().__init__(theme)
-        self.part = part
-        self._name = name
-        self.show_part(part)
+        self.part, self._name = part, name
+        self._say(part)
 
     def show_part(self, part: PhrasePart) -> None:
         """Show another word."""
-        if part == self.part and self.text() == part.text:
-            return
-        self.part = part
+        if part != self.part:
+            self.part = part
+            self._say(part)
+
+    def _say(self, part: PhrasePart) -> None:
         self.say(part.text, f"{self._name}: {part.text}" if part.text else self._name)
         self.updateGeometry()
         self.update()
@@ -117,6 +118,11 @@ class SlotField(QLineEdit):
         completer.setFilterMode(Qt.MatchFlag.MatchContains)
         completer.setCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
         completer.setMaxVisibleItems(10)
+        completer.activated.connect(self._chosen)
+        popup = completer.popup()
+        if popup is not None:
+            popup.setProperty("offers", "true")
+            popup.setItemDelegate(QStyledItemDelegate(popup))  # which the style sheet can give room
         self.setCompleter(completer)
         self.textEdited.connect(lambda _text: self._mark(wrong=False))
         self._place(theme, row)
@@ -147,14 +153,21 @@ class SlotField(QLineEdit):
         completer.setCompletionPrefix("")
         completer.complete()
 
+    def _chosen(self, _text: str) -> None:
+        """One of those that exist was chosen: it is taken as soon as it stands in the field."""
+        QTimer.singleShot(0, self, self._take_and_leave)
+
+    def _take_and_leave(self) -> None:
+        if not self._is_over and self._taken():
+            self.leave()
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         popup = self.completer().popup()
         is_offering = popup is not None and popup.isVisible()
         if event.key() == Qt.Key.Key_Escape and not is_offering:
             self.leave()
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
-            if self._taken():
-                self.leave()
+            self._take_and_leave()
         elif event.key() == Qt.Key.Key_Down and not is_offering:
             self._show_all()
         else:
