@@ -49,6 +49,8 @@ class AlarmTrack:
         self._for_s = 0.0 if condition.kind in {"silent", "loses"} else condition.for_s
         self._calm_s = max(rule.calm_s, EVENT_SHOWN_S) if condition.kind in EVENT_KINDS else rule.calm_s
         self._value = _Value(parse_path(condition.path) if condition.is_about_value else ())
+        self._is_below = condition.kind == "below"
+        self._bound = condition.number if condition.kind in {"below", "above"} else None
         self._true_since: float | None = None
         self._false_since: float | None = None
         self.on_since: float | None = None
@@ -72,6 +74,9 @@ class AlarmTrack:
     def read(self, payload: object, now: float) -> Turn | None:
         """Take over a message of its topic; `now` is a monotonic clock in s."""
         value = pick(payload, self._value.path)
+        if self._is_well(value):
+            self.seen, self.trouble, self.was_seen = value, "", True  # type: ignore[assignment]  # a number
+            return None
         self.was_seen = True
         if value is MISSING:
             self.trouble = "missing"
@@ -92,6 +97,14 @@ class AlarmTrack:
             return None
         seen = scalar_of(value) if math.isfinite(number) else number
         return self.compare(number, now, is_below=kind == "below", seen=seen)
+
+    def _is_well(self, value: object) -> bool:
+        """Whether it is a number on the well side of the limit, and nothing was otherwise: nearly always."""
+        if self._bound is None or self.on_since is not None or self._true_since is not None:
+            return False
+        if type(value) is not float and type(value) is not int:
+            return False
+        return value >= self._bound if self._is_below else value <= self._bound
 
     def compare(self, number: float, now: float, *, is_below: bool, seen: Scalar = None) -> Turn | None:
         """Take over a number that is compared with the limit; back beyond the margin it is well.
