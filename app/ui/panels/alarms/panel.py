@@ -495,7 +495,7 @@ class AlarmsPanel(PanelWidget):
             self.list.ensureWidgetVisible(row)
 
     def _save(self) -> None:
-        suggestion = Path.home() / f"{_('alarms')}.csv"
+        suggestion = Path.home() / _("alarms.csv")
         self.context.files.save_as(_("Save the history"), suggestion, [CSV], self._write)
 
     def _write(self, path: Path, _kind: FileKind) -> None:
