@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import signal
+import sys
 import threading
 
 import pytest
 
 import nep
+from nep.cli import screen
 from nep.masters.master import Master
 from nep.programs.alarms.rule_file import EXAMPLE
-from tests.nep.programs import eventually
+from tests.nep.programs import eventually, running
 
 
 @pytest.fixture
@@ -90,24 +93,32 @@ def test_a_message_is_sent_and_a_typo_is_told(master, type_in, file) -> None:
     assert "sent to /say" in done.stdout
 
 
-def test_a_master_that_is_away_is_waited_for(type_in, file) -> None:
+def test_a_master_that_is_away_is_waited_for(type_in, file, monkeypatch) -> None:
     with Master("127.0.0.1:0") as first:
         address = first.address
     name = file({"when": {"node": "lidar", "is": "comes"}}, {"when": BELOW})
-    found: list[object] = []
+    waits, ended = threading.Event(), threading.Event()
+
+    def say(sentence: str) -> None:
+        screen.say(sentence)
+        if sentence.endswith("; waiting"):
+            waits.set()
+
+    monkeypatch.setattr("nep.cli.watch.say", say)
 
     def come_later() -> None:
-        with Master(address) as late, Talker(late.address, "/distance", {"range": 0.3}):
-            eventually(lambda: found)
+        if waits.wait(30):
+            with Master(address) as late, Talker(late.address, "/distance", {"range": 0.3}):
+                ended.wait(30)
 
-    thread = threading.Timer(0.7, come_later)
+    thread = threading.Thread(target=come_later)
     thread.start()
     try:
-        found.append(type_in("watch", name, "-n", "1", "--master", address))
+        done = type_in("watch", name, "-n", "1", "--master", address)
     finally:
-        found.append(None)
+        waits.set()
+        ended.set()
         thread.join()
-    done = found[0]
     assert "; waiting" in done.stderr
     assert "a master is there" in done.stderr
     assert "range of /distance is 0.3" in done.stdout
@@ -136,3 +147,17 @@ def test_how_it_ends_without_a_network(type_in, file, words, code: int, said: st
 
 def test_the_example_is_printed(type_in) -> None:
     assert type_in("watch", "--example").stdout == EXAMPLE
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a program of Windows cannot be sent Ctrl+C alone")
+def test_ctrl_c_ends_it_quietly(master, file) -> None:
+    begin = "import sys\nfrom nep.cli import main\nsys.argv[1:1] = ['watch']\nmain()"
+    with nep.node("talker") as node:
+        publisher = node.new_pub("/distance", "json")
+        with running(begin, file({"when": BELOW}), NEP_MASTER=master.address) as program:
+            eventually(lambda: publisher.subscribers == 1)
+            program.signal(signal.SIGINT)
+            _out, said = program.end()
+            assert program.process.returncode == 130, said
+            assert "Traceback" not in said
+        eventually(lambda: publisher.subscribers == 0)

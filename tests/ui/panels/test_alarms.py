@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu
 
@@ -21,6 +22,8 @@ from app.ui.panels.alarms.phrases import (
     typed_now,
     with_kind,
 )
+from app.ui.panels.nodes import panel as nodes
+from app.ui.panels.topics import panel as topics
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
 from nep.programs.alarms.history import AlarmDeed, AlarmRecord
 from nep.programs.alarms.rule import KINDS, problem_of
@@ -277,3 +280,23 @@ def test_limits_are_numbers_where_numbers_are_compared_and_else_what_json_says()
     assert [read_limit(text, each) for each in ("true", "null", "idle", '"5"', "5", "{}", "")] == [
         True, None, "idle", "5", 5, "{}", "",
     ]  # fmt: skip
+
+
+def test_the_menus_of_topics_and_nodes_offer_an_alarm(qtbot, window) -> None:
+    for panel, key, wanted in (
+        (topics.PANEL, "/odom", "alarm.topic:/odom"),
+        (nodes.PANEL, "", "alarm.node:"),
+    ):
+        made = window.make(panel)
+        qtbot.addWidget(made)
+        for widget in made.header_widgets():
+            qtbot.addWidget(widget)
+        made.rebuild()
+        made.table.choose(key or made.model.key_of(made.model.row_at(made.model.index(0, 0))))
+        at = made.table.visualRect(made.table.currentIndex()).center()
+        reason = QContextMenuEvent.Reason.Mouse
+        QApplication.sendEvent(
+            made.table.viewport(), QContextMenuEvent(reason, at, made.table.viewport().mapToGlobal(at))
+        )
+        choose("New alarm")
+        assert window.commands[-1].startswith(wanted)
