@@ -108,7 +108,7 @@ def history_columns(
         return Cell(seconds_words(record.lasted_s) if record.lasted_s is not None else "")
 
     return (
-        Column("when", lazy("When"), 118, when, key=lambda record: record.at_s, figures=False),
+        Column("when", lazy("When"), 136, when, key=lambda record: record.at_s, figures=False),
         Column("alarm", lazy("Alarm"), 180, alarm, stretch=True, tip=lambda record: record.words),
         Column("times", lazy("Times"), 56, lambda record: Cell(str(record.count) if record.count > 1 else ""),
                key=lambda record: record.count, figures=True, yields=2),
