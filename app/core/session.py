@@ -12,6 +12,7 @@ from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 
+from app.core.alarms import SessionAlarms
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.document import Document
@@ -102,7 +103,7 @@ class Session:
             SeriesFeed(self.watch, clock_ns, self._mailbox.set_room),
         )
         make_source = source if source is not None else partial(LiveSource, always=LOGS)
-        sinks = [self._checks.look, self._mailbox.post, self._offer]
+        sinks = [self._checks.look, self._mailbox.post, self._offer, self._warn]
         self.source: Source = make_source(self.address, sinks, self._mailbox.post_event)
         self.networks, self.parameters = (
             Networks(self.settings, sinks[1:], self._mailbox.post_event, self.alerts),
@@ -130,19 +131,22 @@ class Session:
         )
         self.runs.coming = lambda: self.coming
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
+        self.alarms = SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9)
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, self._mailbox.post_event)
         self._program, self.tick_ms = OwnProgram(), 0.0
-        self._robots_seen = -1
+        self._robots_seen = self._topics_seen = -1
         self._reachable: tuple[StopTarget, ...] = ()
         self._tries_to_reach = False
-        self._topics_seen = -1
         self._next_check = 0.0
         self._learning = MasterChange()
 
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:
         self.images.offer(messages, topic)
+
+    def _warn(self, topic: str, messages: Sequence[Message]) -> None:
+        self.alarms.take(topic, messages)
 
     # -- what the window and its panels call -----------------------------------------------------------------
 
@@ -161,6 +165,7 @@ class Session:
         """Start the threads; a master is started when none answers."""
         self.source.start()
         self.networks.start()
+        self.alarms.start()
         self.source.submit(NO_WATCH, self._make_stopper)
         if self._start_processes:
             self.launcher.ensure_master()
@@ -201,6 +206,8 @@ class Session:
             self.networks.age(now, now_ns)
         with self.guarded(lazy("follow the robots")):
             self._follow_robots()
+        with self.guarded(lazy("watch over the alarms")):
+            self.alarms.tick()
         with self.guarded(lazy("let the robots be heard")):
             self.voices.follow()
         with self.guarded(lazy("tell the program of its robots")):
@@ -227,6 +234,8 @@ class Session:
     def _check(self, now: float) -> None:
         """What is looked at once a second."""
         self._faults.check()
+        with self.guarded(lazy("keep the alarms")):
+            self.alarms.check()
         with self.guarded(lazy("keep which tabs are open")):
             self.tabs.follow()
         with self.guarded(lazy("check what was started here")):
@@ -254,6 +263,7 @@ class Session:
             ("end the program", self.runs.close),
             ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
             ("keep which robots were here", partial(self.last_robots.keep, self.launcher)),
+            ("keep the alarms", self.alarms.close),
             ("end the behaviours", self.documents.end),
             ("silence the robots", self.voices.close),
             ("end the robots", self.fleet.close),
@@ -390,6 +400,7 @@ class Session:
             for line in arrivals(before, view):
                 self.console.add("info", "master", line)
         self.graph = view
+        self.alarms.see(view)
         self.topics.update(view, now)
         self.nodes.update(view, now)
         self.fleet.update(view)
@@ -404,6 +415,7 @@ class Session:
     def _on_master_lost(self, event: MasterLost) -> None:
         was_there = self.master.kind == "connected"
         self.master = MasterState("none", event.address, event.sentence)
+        self.alarms.see(None)
         if was_there:
             self.console.add("error", "master", event.sentence)
             self.alerts.put(

@@ -23,6 +23,7 @@ from nep.cli import (
     recordings,
     services,
     topics,
+    watch,
 )
 from nep.cli.screen import say_error, write
 from nep.cli.typer_words import TranslatedCommand, TranslatedGroup
@@ -54,6 +55,7 @@ app.command("log")(log.log)
 app.command("record")(record.record)
 app.command("play")(play.play)
 app.command("doctor")(doctor.doctor)
+app.command("watch")(watch.watch)
 app.add_typer(nodes.app, name="node")
 app.add_typer(topics.app, name="topic")
 app.add_typer(services.app, name="service")

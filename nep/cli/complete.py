@@ -12,9 +12,9 @@ from collections.abc import Iterator
 
 import typer
 
-from nep.cli.fields import leaves
 from nep.errors import NepError
 from nep.masters.process import view
+from nep.messages.fields import leaves
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import host_of, master_address

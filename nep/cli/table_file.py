@@ -8,11 +8,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from nep.cli.fields import MISSING, Path, parse_path, pick
 from nep.cli.screen import say
 from nep.cli.values import json_of
 from nep.errors import DecodeError
 from nep.i18n import _, ngettext
+from nep.messages.fields import MISSING, Path, parse_path, pick
 from nep.messages.message import Message
 from nep.text import escaped
 

@@ -7,11 +7,11 @@ import json
 import orjson
 
 from nep.cli import topic_patterns
-from nep.cli.fields import MISSING, leaves, parse_path, pick
 from nep.cli.publish import value_of as payload_of
 from nep.cli.values import json_of, presented
 from nep.errors import EncodeError, NepError, WrongTypeError
 from nep.messages.codecs import CODECS
+from nep.messages.fields import MISSING, leaves, parse_path, pick
 from nep.system.arguments import at_least, limit, one_of, period, seconds, text, within
 from nep.text import control_in, escaped, harmless, shortened
 from tests.fuzz.target import SEPARATOR, Targets, joined, parts_of, text_of, value_of

@@ -16,6 +16,7 @@ from pytestqt.qtbot import QtBot
 
 from app.ui.blockly.scheme import register_scheme
 from app.ui.panels import alerts, camera, doctor, health, plot, problems, robot, sensors
+from app.ui.panels.alarms import panel as alarms
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.behaviour import panel as behaviour
 from app.ui.panels.console import panel as console
@@ -41,6 +42,7 @@ SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "nodes": (nodes.PANEL, 446, 260, "compact"),
     "graph": (graph.PANEL, 1428, 780, "compact"),
     "alerts": (alerts.PANEL, 446, 222, "compact"),
+    "alarms": (alarms.PANEL, 752, 700, "compact"),
     "doctor": (doctor.PANEL, 446, 400, "compact"),
     "robot": (robot.PANEL, 384, 327, "comfortable"),
     "camera": (camera.PANEL, 384, 275, "comfortable"),

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
@@ -33,6 +33,14 @@ class TableWords:
     clear_the_filter: str
 
 
+class RowAction(NamedTuple):
+    """An entry in the menu of a row: its words, its icon, what it does."""
+
+    words: str
+    icon: str
+    run: Callable[[], object]
+
+
 class TablePanel(PanelWidget, Generic[Row]):
     """Whoever derives makes the table and says what `rebuild` shows and `open_row` opens.
 
@@ -53,6 +61,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         self.header: list[QWidget] = [self.filter]
         self.table.setAccessibleName(self.title())
         self.table.opened.connect(self.open_row)
+        self.table.menu_wanted.connect(self._show_row_menu)
         self.table.filter_wanted.connect(self.focus_filter)
         self.table.order_changed.connect(self.rebuild)
         self.foot = label("", "small", role="textTertiary", wrap=True)
@@ -83,6 +92,18 @@ class TablePanel(PanelWidget, Generic[Row]):
     def open_row(self, key: str) -> None:
         """A person opened the row of this key."""
         raise NotImplementedError
+
+    def row_actions(self, key: str) -> Sequence[RowAction]:
+        """What the menu of the row of this key offers; no menu where that is nothing."""
+        return (RowAction(_("Show"), "eye", lambda: self.open_row(key)),)
+
+    def _show_row_menu(self, key: str, at: QPoint) -> None:
+        menu = Menu(self.theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        for action in self.row_actions(key):
+            menu.addAction(self.theme.icon(action.icon), action.words, action.run)
+        if menu.actions():
+            menu.popup(at)
 
     def filter_words(self) -> list[str]:
         """What a row must have, each of them, to be shown."""

@@ -96,6 +96,10 @@ QAbstractItemView {{
     selection-background-color: {selected}; selection-color: {selectedText};
 }}
 QAbstractItemView[raised="true"] {{ background: {raised}; }}
+QListView[offers="true"] {{ background: {raised}; border: 1px solid {borderStrong}; padding: 4px; }}
+QListView[offers="true"]::item {{ padding: 4px 8px; border-radius: {small}px; border: none; }}
+QListView[offers="true"]::item:hover {{ background: {hover}; }}
+QListView[offers="true"]::item:selected {{ background: {selected}; color: {selectedText}; }}
 QHeaderView {{ background: {panel}; border: none; }}
 QHeaderView::section {{
     background: {panel}; color: {textTertiary}; border: none; border-bottom: 1px solid {border};

@@ -112,6 +112,7 @@ class Session(session_module.Session):
         self.launcher = Launcher(ADDRESS, post, self.fleet.is_there, self.clock)
         self.images = Images(self.watch, self.clock)
         self.master = MasterState("none", ADDRESS)
+        self.alarms.path = None  # kept in memory alone
         self.ticks = 0
         self.runner: Runner | None = None
         """The program that runs, or ran last."""

@@ -31,8 +31,8 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 TIMES = 50
 PANELS = [
-    "alerts", "behaviour", "camera", "console", "doctor", "graph", "health", "image", "inspector", "nodes", "plot",
-    "problems", "robot", "robots", "sensors", "topics",
+    "alarms", "alerts", "behaviour", "camera", "console", "doctor", "graph", "health", "image", "inspector",
+    "nodes", "plot", "problems", "robot", "robots", "sensors", "topics",
 ]  # fmt: skip
 COMMANDS = [
     "file.earlier", "settings.open", "palette.open", "layout.keep", "help.shortcuts", "help.about",

@@ -278,6 +278,11 @@ class InspectorPanel(PanelWidget):
     def _show_menu(self, at: QPoint) -> None:
         menu = Menu(self.theme, self)
         menu.addActions(self.own.listed())
+        index = self.tree.currentIndex()
+        if index.isValid() and self._topic and not split_key(self._topic)[0]:
+            what = f"alarm.value:{self._topic} {self.model.node(index).path}"
+            menu.addSeparator()
+            menu.addAction(self.theme.icon("bell"), _("New alarm"), lambda: self.context.run(what))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.tree.viewport().mapToGlobal(at))
 

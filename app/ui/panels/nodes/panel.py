@@ -15,7 +15,7 @@ from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.network_table import NetworkTable, own_everywhere
 from app.ui.panels.nodes.parameters import ParametersPart
 from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, lack_of_parameters, limits_of, rows_of
-from app.ui.panels.table_panel import TableWords
+from app.ui.panels.table_panel import RowAction, TableWords
 from app.ui.text.numbers import rate_words
 from app.ui.widgets import Scrolled
 from app.ui.widgets.paint import show_when
@@ -24,7 +24,7 @@ from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from app.core.network.nodes import NodeEntry
     from app.core.network.watches import Suspendable
@@ -153,6 +153,17 @@ class NodesPanel(NetworkTable[NodeRow]):
             network = self.session.networks.get(row.node.network)
             (network.nodes if network is not None else self.session.nodes).mark_seen(row.node.id)
             self._fold(key, row.node.key not in self._opened)
+
+    def row_actions(self, key: str) -> Sequence[RowAction]:
+        row = self.model.row_at(self.model.index_of(key))
+        if row is None:
+            return ()
+        words = _("Show its messages") if row.topic else _("Show its topics")
+        shows = RowAction(words, "list-tree", lambda: self.open_row(key))
+        if row.node.network or row.is_pattern:
+            return (shows,)  # alarms are about Studio's own network
+        what = f"alarm.topic:{row.topic}" if row.topic else f"alarm.node:{row.node.name}"
+        return (shows, RowAction(_("New alarm"), "bell", lambda: self.context.run(what)))
 
     def _fold(self, key: str, opened: bool) -> None:
         row = self.model.row_at(self.model.index_of(key))

@@ -13,7 +13,7 @@ from app.core.network.topics import split_key
 from app.core.networks.networks import network_words
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.network_table import NetworkTable, own_everywhere
-from app.ui.panels.table_panel import TableWords
+from app.ui.panels.table_panel import RowAction, TableWords
 from app.ui.panels.topics.columns import columns
 from app.ui.text.numbers import grouped
 from app.ui.widgets import EmptyAction, label
@@ -166,6 +166,13 @@ class TopicsPanel(NetworkTable["Topic"]):
     def open_row(self, key: str) -> None:
         self.session.mark_seen(key)
         self.context.open_topic(key)
+
+    def row_actions(self, key: str) -> Sequence[RowAction]:
+        shows = RowAction(_("Show its messages"), "list-tree", lambda: self.open_row(key))
+        if split_key(key)[0]:
+            return (shows,)  # alarms are about Studio's own network
+        warns = RowAction(_("New alarm"), "bell", lambda: self.context.run(f"alarm.topic:{key}"))
+        return (shows, warns)
 
     def show_topic(self, name: str) -> None:
         self._wanted = "" if self.model.index_of(name).isValid() else name  # its row may still come

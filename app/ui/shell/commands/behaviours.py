@@ -147,6 +147,30 @@ class BehaviourCommands:
         else:
             self._files.with_newest(runs.run)
 
+    def run_named(self, name: str) -> str:
+        """Run the behaviour of this name, open or opened lately; why it can't be run, "" when it begins.
+
+        What runs is not broken off.
+        """
+        session = self._session
+        if session.runs.active:
+            return _("another behaviour runs")
+        document = next((each for each in session.documents if session.documents.title(each) == name), None)
+        if document is not None:
+            self._files.show(document)
+        else:
+            path = next((file.path for file in session.settings.recent if file.name == name), None)
+            if path is None:
+                return _("no behaviour has this name")
+            self._files.open(path)
+
+        def begin() -> None:
+            if session.documents.title(session.document) == name:
+                session.runs.run()
+
+        self._files.with_newest(begin)
+        return ""
+
     def try_stack(self, stack: Stack) -> None:
         """Run one stack alone, with the editor's newest edit."""
         self._files.with_newest(lambda: self._session.runs.try_stack(stack))

@@ -34,6 +34,7 @@ class Commands:
             session, asks, shell.say, partial(bring_into_view, shell), shell.editor
         )
         self.behaviours = BehaviourCommands(shell, session, self.files, asks)
+        session.alarms.run_behaviour = self.behaviours.run_named
         self.robots = RobotCommands(shell, session, self.files, self.behaviours.undo)
         self.view = ViewCommands(shell, session, self.files, keys)
         self.shortcuts = keys

@@ -19,10 +19,11 @@ from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
 from app.ui.shell.commands.shell import START, Shell
 from app.ui.shell.commands.variables import VariableCommands
-from app.ui.shell.commands.view import TEXT_STEP, ViewCommands
+from app.ui.shell.commands.view import TEXT_STEP, ViewCommands, read_value
 from app.ui.shell.documents import DocumentController
 from app.ui.theme.theme import TEXT_PERCENT
 from nep.i18n import _, lazy
+from nep.programs.alarms import AlarmCondition
 from nep.version import RELEASES_PAGE
 
 A = TypeVar("A")
@@ -289,6 +290,8 @@ COMMANDS: tuple[C, ...] = (
       "Robots", icon="wifi", above=True),
     C("network.look", lazy("Look at other networks"), lambda do: do.robots.choose_networks(), "Robots",
       icon="waypoints"),
+    C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell", above=True,
+      why_not=_no_panels),
     C("help.first_steps", lazy("First steps"), lambda do: do.view.first_steps(), "Help", icon="lightbulb"),
     C("help.guide", lazy("Guide"), lambda do: do.view.open_guide(), "Help", icon="book-open"),
     C("help.examples", lazy("Examples"), lambda do: do.view.examples(), "Help", icon="blocks"),
@@ -317,6 +320,11 @@ def _fix_blocks(verb: str) -> ArgumentCommand[Handlers]:
 ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("panel", str, lambda do, name: do.shell.open_panel(name) is not None),
     _about("inspect", str, lambda do, topic: do.view.inspect(topic)),
+    _about(
+        "alarm.topic", str, lambda do, topic: do.view.new_alarm(AlarmCondition("silent", topic, for_s=2.0))
+    ),
+    _about("alarm.node", str, lambda do, node: do.view.new_alarm(AlarmCondition("leaves", node))),
+    _about("alarm.value", read_value, lambda do, about: do.view.alarm_on_value(about)),
     _about("key", str, lambda do, key: do.view.press(key)),
     _about("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
     _about("try", read_stack, lambda do, stack: do.behaviours.try_stack(stack)),

@@ -6,6 +6,8 @@ Everything that opens over the window is made when it is first asked for, so tha
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
@@ -28,7 +30,11 @@ from app.ui.speaker import has_voice_engine, voice_words
 from app.ui.theme.system import Preference
 from app.ui.theme.theme import Mode
 from app.ui.widgets.lists.fuzzy import Entry
+from nep.errors import NepError
 from nep.i18n import _, language
+from nep.messages.fields import parse_path, pick
+from nep.programs.alarms import AlarmCondition
+from nep.programs.alarms.rule import NUMBER_KINDS
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -55,6 +61,23 @@ class SupportsRobotChoice(Protocol):
 
     def choose(self, name: str) -> None:
         """Show the robot of that name."""
+
+
+@runtime_checkable
+class SupportsAlarms(Protocol):
+    """The panel of alarms."""
+
+    def begin(self) -> None:
+        """Begin an alarm."""
+
+    def edit(self, rule_id: str, slot: str) -> None:
+        """Show an alarm and open one of its slots, or none."""
+
+
+def read_value(text: str) -> tuple[str, str]:
+    """The topic and the path in "/odom pose.x"; a topic has no blank in its name."""
+    topic, _blank, path = text.partition(" ")
+    return topic, path
 
 
 class ViewCommands:
@@ -138,6 +161,33 @@ class ViewCommands:
         if dock is not None:
             dock.panel.show_topic(topic)
             self._mark_topic(topic)
+
+    def new_alarm(self, about: AlarmCondition | None = None) -> None:
+        """Begin an alarm about this, and show it where its words are chosen."""
+        dock = self._shell.open_panel("alarms")
+        if dock is None or not isinstance(dock.panel, SupportsAlarms):
+            return
+        if about is None:
+            dock.panel.begin()
+            return
+        rule = self._session.alarms.new(about)
+        waits = about.kind in NUMBER_KINDS  # for its limit: the value of now is none
+        if waits:
+            self._session.alarms.put(replace(rule, is_on=False))
+        dock.panel.edit(rule.id, "limit" if waits else "")
+
+    def alarm_on_value(self, about: tuple[str, str]) -> None:
+        """Begin an alarm about a value of a topic: of a number its limit is asked for."""
+        topic, path = about
+        known = self._session.topics.get(topic)
+        newest = known.newest if known is not None else None
+        value: object = None
+        with suppress(NepError):
+            value = pick(newest.payload, parse_path(path or ".")) if newest is not None else None
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        limit = value if isinstance(value, int | float) and is_number else None
+        kind = "below" if is_number else "changes"
+        self.new_alarm(AlarmCondition(kind, topic, path or ".", limit))
 
     def _mark_topic(self, name: str) -> None:
         """Choose a topic that was opened by command in the list of topics too, where that is open."""

@@ -18,6 +18,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import (
     QAccessible,
     QAccessibleTableModelChangeEvent,
+    QContextMenuEvent,
     QFocusEvent,
     QFont,
     QKeyEvent,
@@ -54,9 +55,13 @@ KEYBOARD = frozenset(
 
 
 class TableView(QTableView, Generic[Row]):
-    """A table of `Column`s. `opened` with the key of a row that was clicked or entered."""
+    """A table of `Column`s. `opened` with the key of a row that was clicked or entered.
+
+    `menu_wanted` with the key of a row and the place on the screen where its menu is wanted.
+    """
 
     opened = Signal(str)
+    menu_wanted = Signal(str, QPoint)
     filter_wanted = Signal()
     order_changed = Signal()
 
@@ -196,6 +201,17 @@ class TableView(QTableView, Generic[Row]):
             self.filter_wanted.emit()
         else:
             super().keyPressEvent(event)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        by_keys = event.reason() == QContextMenuEvent.Reason.Keyboard
+        index = self.currentIndex() if by_keys else self.indexAt(event.pos())
+        row = self._model.row_at(index)
+        if row is None:
+            return
+        key = self._model.key_of(row)
+        self.choose(key)
+        at = self.visualRect(index).bottomLeft() if by_keys else event.pos()
+        self.menu_wanted.emit(key, self.viewport().mapToGlobal(at))
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         self.keyboard = event.reason() in KEYBOARD

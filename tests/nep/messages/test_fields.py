@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import nep
 from nep.cli.echo import echo
-from nep.cli.fields import MISSING, leaves, parse_path, pick
 from nep.cli.table_file import Fields, Table
 from nep.errors import NepError
+from nep.messages.fields import MISSING, leaves, parse_path, pick
 from nep.messages.message import Message
 
 ODOM = {"pose": {"x": 1.5, "y": None}, "joints": [0.1, 0.2, {"name": 'knee "left", bent'}], "a key": True}

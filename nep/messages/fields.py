@@ -49,7 +49,11 @@ def pick(payload: object, path: Path) -> object:
     """The value at the path, or `MISSING`."""
     value = payload
     for step in path:
-        if isinstance(step, int) and isinstance(value, Sequence) and not isinstance(value, (str, bytes)):
+        if type(value) is dict:  # nearly always: an abstract class is asked for ten times as long
+            value = value.get(step, MISSING)
+            if value is MISSING:
+                return MISSING
+        elif isinstance(step, int) and isinstance(value, Sequence) and not isinstance(value, (str, bytes)):
             if not -len(value) <= step < len(value):
                 return MISSING
             value = value[step]

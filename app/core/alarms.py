@@ -1,0 +1,365 @@
+"""The session's alarms: kept in one file, fed with what arrives, told as alerts, and carried out here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+from app.core.alerts import Alerts
+from app.core.console import Console
+from app.core.documents.background_worker import BackgroundWorker
+from app.core.network.source import Source
+from app.core.network.watches import Watch
+from app.core.robots.voices import Notes, RobotVoices
+from app.core.run.control import Runs
+from app.core.storage.atomic_file import read_whole, write_atomically
+from app.core.storage.settings import Settings
+from nep.errors import NepError
+from nep.i18n import _, lazy
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmEvent, AlarmFile, AlarmRule, Alarms
+from nep.programs.alarms.alarms import Carrier, Done
+from nep.programs.alarms.commands import AlarmCommands
+from nep.programs.alarms.history import AlarmHistory
+from nep.programs.alarms.rule import EVENT_KINDS, new_id
+from nep.programs.alarms.rule_file import NewerAlarmsError, alarms_text, read_text
+from nep.programs.alarms.sentences import subject_words, time_words, what_words
+from nep.protocol.graph_view import GraphView
+from nep.system.replace_file import replace_file
+
+FILE = "alarms.json"
+SHOW = "panel:alarms"
+"""The window's command that shows them."""
+LATE_S = 10.0
+"""What waited for a master for longer is not sent any more: who knows what is so by then."""
+SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
+VOLUME = 0.6
+NOT_CARRIED = lazy("an alarm can't do what it is to do: {error}")
+_MOST_BYTES = 4_000_000
+MILD = frozenset({*EVENT_KINDS, "loses", "rate_below", "rate_above"})
+"""What is a warning; the rest is an error."""
+
+
+def severity_of(condition: AlarmCondition) -> str:
+    """How an alarm of this kind is told: "error" or "warn"."""
+    return "warn" if condition.kind in MILD else "error"
+
+
+class AlarmSession(Protocol):
+    """What alarms use of the session that they belong to."""
+
+    settings: Settings
+    alerts: Alerts
+    console: Console
+    source: Source
+    voices: RobotVoices
+    runs: Runs
+
+    def watch(self, topic: str) -> Watch:
+        """Look at a topic until the watch is closed."""
+
+
+class SessionAlarms:
+    """The alarms of a session. One thread uses it (the window's), but for `take`.
+
+    ``keep`` keeps the last seconds of what happened, ``run_behaviour`` runs a behaviour by its name and gives
+    why it can't; each is set by who can, and until then such an action says that it can't be done.
+    """
+
+    def __init__(
+        self,
+        session: AlarmSession,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        clock_s: Callable[[], float] = time.time,
+    ) -> None:
+        """Read what was kept beside the settings; without a ``path`` they are kept in memory alone."""
+        self._session = session
+        self.path: Path | None = session.settings.path.with_name(FILE)
+        self._clock, self._clock_s = clock, clock_s
+        self._commands = AlarmCommands()
+        self.keep: Carrier | None = None
+        self.run_behaviour: Callable[[str], str] | None = None
+        self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-alarms")
+        self._watches: dict[str, Watch] = {}
+        self._removed: tuple[AlarmRule, int] | None = None
+        self._is_newer = False
+        found = self._read(self.path)
+        carriers: dict[str, Carrier] = {
+            "banner": _told,
+            "console": self._console,
+            "sound": self._sound,
+            "keep": self._keep,
+            "run": self._run,
+            "call": self._command,
+            "send": self._command,
+            "stop": self._stop,
+        }
+        self.alarms = Alarms(found.rules, found.history, carriers, clock=clock, clock_s=clock_s)
+        self._written = self._state()
+        self._view: GraphView | None = None
+        self._on: set[str] = set()
+
+    # ---- what the panel and menus do
+
+    @property
+    def rules(self) -> tuple[AlarmRule, ...]:
+        """All alarms, the newest first."""
+        return self.alarms.rules
+
+    @property
+    def history(self) -> AlarmHistory:
+        """What happened, bounded."""
+        return self.alarms.history
+
+    @property
+    def revision(self) -> int:
+        """Grows with the rules and the history, not with what is seen."""
+        return self.alarms.revision + self.history.revision
+
+    @property
+    def on(self) -> Sequence[AlarmRule]:
+        """Those that are on and not snoozed."""
+        return [rule for rule in self.rules if rule.id in self._on and not rule.is_snoozed(self._clock_s())]
+
+    def new(self, condition: AlarmCondition) -> AlarmRule:
+        """Begin an alarm, which shows a banner; it is watched as soon as nothing is missing."""
+        rule = AlarmRule(new_id(), condition, (AlarmAction("banner"),))
+        self.put(rule)
+        return rule
+
+    def put(self, rule: AlarmRule) -> None:
+        """Add an alarm, or change the one of this id."""
+        self.alarms.put(rule)
+        self._follow_rules()
+
+    def remove(self, rule_id: str) -> AlarmRule | None:
+        """Remove an alarm; `put_back` is its undo."""
+        rule = self.alarms.rule(rule_id)
+        if rule is not None:
+            self._removed = (rule, self.rules.index(rule))
+            self.alarms.remove(rule_id)
+            self._follow_rules()
+        return rule
+
+    def put_back(self) -> None:
+        """Put the alarm that was removed last in its place again."""
+        if self._removed is not None:
+            (rule, place), self._removed = self._removed, None
+            rules = [*self.rules]
+            rules.insert(place, rule)
+            self.alarms.set_rules(rules)
+            self._follow_rules()
+
+    def snooze(self, rule_id: str, until_s: float) -> None:
+        """Let nothing be done until then, in seconds since 1970; 0 ends it."""
+        self.alarms.snooze(rule_id, until_s)
+        if until_s > self._clock_s():
+            self._session.alerts.dismiss(_alert_id(rule_id))
+
+    # ---- what the session does
+
+    def take(self, topic: str, messages: Sequence[Message]) -> None:
+        """Messages arrived; called in the thread in which they do."""
+        self.alarms.evaluator.take(topic, messages)
+
+    def see(self, view: GraphView | None) -> None:
+        """A new graph; None when the master has gone."""
+        self._view = view
+        self.alarms.evaluator.see(view)
+
+    def start(self) -> None:
+        """Begin to look at what the alarms are about."""
+        self._follow_rules()
+
+    def tick(self) -> None:
+        """Let time go by."""
+        for event in self.alarms.tick():
+            self._show(event)
+        self.alarms.take_deeds()
+
+    def check(self) -> None:
+        """Once a second: what alerts say is renewed, and what changed is kept."""
+        for rule in self.rules:
+            if rule.id in self._on:
+                self._say(rule, self.alarms.evaluator.state(rule).seen, count=0)
+        self._write()
+        try:
+            if self._worker.take(FILE):
+                self._session.alerts.resolve("alarms:kept")
+        except OSError as error:
+            self._session.alerts.put(
+                "alarms:kept",
+                "warn",
+                _("Alarms can't be kept."),
+                _("They are watched until Studio ends: {reason}.").format(reason=error.strerror or error),
+                count=0,
+            )
+
+    def close(self) -> None:
+        """Keep what is not kept yet, and look at nothing any more."""
+        for watch in self._watches.values():
+            watch.close()
+        self._watches.clear()
+        self._write()
+        self._worker.finish(FILE)
+        self._worker.close()
+        self._commands.close()
+
+    def _follow_rules(self) -> None:
+        wanted = self.alarms.evaluator.topics
+        for topic in self._watches.keys() - wanted:
+            self._watches.pop(topic).close()
+        for topic in wanted - self._watches.keys():
+            self._watches[topic] = self._session.watch(topic)
+        if self._view is not None:
+            self.alarms.evaluator.see(self._view)
+
+    # ---- alerts
+
+    def _show(self, event: AlarmEvent) -> None:
+        rule, alerts = event.rule, self._session.alerts
+        if event.kind == "off":
+            self._on.discard(rule.id)
+            alerts.resolve(_alert_id(rule.id))
+            return
+        if event.kind == "still":
+            alerts.resolve(_alert_id(rule.id))  # its banner was closed with the snooze
+        self._on.add(rule.id)
+        self._say(rule, event.seen, count=1)
+        if event.is_snoozed or not any(action.kind == "banner" for action in rule.actions):
+            alerts.dismiss(_alert_id(rule.id))
+
+    def _say(self, rule: AlarmRule, seen: object, count: int) -> None:
+        condition, record = rule.condition, self.history.last(rule.id)
+        words = record.words if record is not None else ""  # of the value that did it, not of what is now
+        if condition.kind == "silent" and isinstance(seen, int | float) and seen >= 1:
+            said = _("{topic} has been silent for {time}")
+            words = said.format(topic=subject_words(condition), time=time_words(round(seen)))
+        details = [deed.words for deed in record.deeds] if record is not None else []
+        now = self.alarms.evaluator.state(rule).count
+        known = next((each.count for each in self._session.alerts.active if each.id == _alert_id(rule.id)), 0)
+        self._session.alerts.put(
+            _alert_id(rule.id),
+            severity_of(condition),
+            f"{words[:1].upper()}{words[1:]}.",
+            ". ".join([*(each[:1].upper() + each[1:] for each in details), ""]).strip(),
+            button=_("Show the alarm"),
+            action=SHOW,
+            count=max(count, now - known) if known else max(1, count),
+        )
+
+    # ---- what is done
+
+    def _console(self, event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+        words = what_words(event.rule.condition, event.seen)
+        self._session.console.add(severity_of(event.rule.condition), "alarms", words)
+        done(True, "")
+
+    def _sound(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+        speaker = self._session.voices.speaker
+        if speaker is None:
+            done(False, _("there is no sound here"))
+            return
+        speaker.play(SOUND, VOLUME)
+        done(True, _("sound"))
+
+    def _keep(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+        if self.keep is None:
+            done(False, _("nothing was kept: nothing is being recorded"))
+        else:
+            self.keep(event, action, done)
+
+    def _run(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+        why_not = _("there is no window") if self.run_behaviour is None else self.run_behaviour(action.name)
+        if why_not:
+            done(False, _("“{name}” was not run: {reason}").format(name=action.name, reason=why_not))
+        else:
+            done(True, _("ran “{name}”").format(name=action.name))
+
+    def _stop(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+        self._session.runs.stop()
+        done(True, _("all robots were told to stop"))
+
+    def _command(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+        asked = self._clock()
+
+        def job(node: Node) -> None:
+            if self._clock() - asked > LATE_S:
+                done(False, _("no master was there"))
+            else:
+                self._commands.carry(node, action, done)
+
+        self._session.source.submit(NOT_CARRIED, job)
+
+    # ---- their file
+
+    def _state(self) -> tuple[tuple[AlarmRule, ...], int]:
+        return self.rules, self.history.revision
+
+    def _write(self) -> None:
+        path, state = self.path, self._state()
+        if path is None or self._is_newer or state == self._written:
+            return
+        self._written = state
+        rules = [rule for rule in self.rules if rule.condition.name]
+        kept = AlarmHistory([replace(record) for record in self.history.records])
+
+        def write() -> bool:
+            write_atomically(path, alarms_text(rules, kept), durable=False, private=True)
+            return True
+
+        self._worker.ask(FILE, write)
+
+    def _read(self, path: Path) -> AlarmFile:
+        """What was kept; what is damaged is put aside, and said."""
+        try:
+            data = read_whole(path, _MOST_BYTES)
+        except (FileNotFoundError, NotADirectoryError):
+            return AlarmFile()
+        except OSError as error:
+            return self._damaged(path, error.strerror or str(error))
+        try:
+            found = read_text(data, path.name, lenient=True)
+        except NepError as error:
+            self._is_newer = isinstance(error, NewerAlarmsError)
+            return self._damaged(path, str(error))
+        return self._damaged(path, found.problems[0], data, found) if found.problems else found
+
+    def _damaged(
+        self, path: Path, reason: str, data: bytes | None = None, found: AlarmFile | None = None
+    ) -> AlarmFile:
+        """Keep the file beside, and say so; ``found`` is what could be read of its ``data``."""
+        beside = path.with_name("alarms.damaged.json")
+        said = _("The file is left as it is, and what you change is not kept: {reason}.")
+        if not self._is_newer:
+            said = _("The file is kept as “{file}”: {reason}.")
+            with suppress(OSError):
+                if data is None:
+                    replace_file(path, beside)
+                else:
+                    write_atomically(beside, data, durable=False, private=True)
+        title = _("Some alarms could not be read.") if found else _("The alarms could not be read.")
+        self._session.alerts.put(
+            "alarms:file",
+            "warn",
+            title,
+            said.format(file=beside.name, reason=reason),
+            button=_("Show the alarms"),
+            action=SHOW,
+        )
+        return found if found is not None else AlarmFile()
+
+
+def _alert_id(rule_id: str) -> str:
+    return f"alarm:{rule_id}"
+
+
+def _told(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+    """The alert is there already (`SessionAlarms._show`)."""
+    done(True, "")

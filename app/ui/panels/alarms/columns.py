@@ -1,0 +1,142 @@
+"""How alarms are told: the chip and the note of each, and the table of what happened."""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import io
+from collections.abc import Callable, Iterable
+
+from app.core.alarms import SessionAlarms, severity_of
+from app.ui.text.dates import clock_words, when_words
+from app.ui.text.numbers import seconds_words
+from app.ui.widgets.table.model import Cell, Column
+from nep.i18n import _, lazy, ngettext
+from nep.programs.alarms import AlarmRule, AlarmState
+from nep.programs.alarms.history import AlarmRecord
+from nep.programs.alarms.rule import problem_of
+from nep.programs.alarms.sentences import seen_words
+
+TROUBLES = {
+    "missing": lazy("the newest message has no such value"),
+    "no_number": lazy("the value is no number"),
+    "unreadable": lazy("the newest message can't be read"),
+}
+
+
+def moment(seconds: float) -> dt.datetime:
+    """A time in seconds since 1970 by this computer's clock and zone."""
+    return dt.datetime.fromtimestamp(seconds, tz=dt.timezone.utc).astimezone()
+
+
+def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, str, str | None]:
+    """The chip: its words, its status, its icon where it is not the status' own."""
+    seen = seen_words(rule.condition, state.seen)
+    match state.phase:
+        case "faulty":
+            problem = problem_of(rule)
+            if not rule.condition.name or problem is None:
+                return _("not yet finished"), "off", None
+            return problem.sentence, "warn", None
+        case "off":
+            return _("off"), "off", None
+        case "waits":
+            return _("waits for {name}").format(name=rule.condition.name), "off", None
+    if rule.is_snoozed(now_s):
+        until = clock_words(moment(rule.snoozed_until_s))
+        words = _("{seen}, snoozed until {clock}") if seen else _("snoozed until {clock}")
+        return words.format(seen=seen, clock=until), "warn", "bell-off"
+    if state.phase == "on":
+        lasts = _("on for {time}").format(time=seconds_words(state.on_for_s))
+        is_told = bool(seen) and rule.condition.kind != "silent"
+        words = _("{state}, {seen}").format(state=lasts, seen=seen) if is_told else lasts
+        return words, severity_of(rule.condition), None
+    if state.phase == "pending":
+        return seen or _("so for a moment"), "warn", None
+    return seen or _("well"), "ok", None
+
+
+def note_words(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt.datetime) -> str:
+    """What stands behind the chip: what came of its actions, how often it came, or when it came last."""
+    parts = []
+    retry_s = alarms.alarms.retry_in_s(rule.id)
+    last = alarms.history.last(rule.id)
+    if retry_s is not None and last is not None and last.deeds:
+        parts.append(
+            _("{what}; tried again in {time}").format(
+                what=last.deeds[-1].words, time=seconds_words(round(retry_s))
+            )
+        )
+    if state.trouble:
+        parts.append(_(TROUBLES[state.trouble]))
+    midnight = now.replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
+    today = alarms.history.since(rule.id, midnight)
+    if today:
+        parts.append(ngettext("once today", "{count} times today", today).format(count=today))
+    elif last is not None:
+        parts.append(_("last on {when}").format(when=_uncapital(when_words(moment(last.at_s), now))))
+    else:
+        parts.append(_("never on"))
+    return ", ".join(parts)
+
+
+def _uncapital(words: str) -> str:
+    return words[:1].lower() + words[1:]
+
+
+def history_columns(
+    condition: Callable[[AlarmRecord], str], now: Callable[[], dt.datetime]
+) -> tuple[Column[AlarmRecord], ...]:
+    """The table of what happened; ``condition`` is the severity of a record's alarm."""
+
+    def when(record: AlarmRecord) -> Cell:
+        then = moment(record.at_s)
+        today = then.date() == now().date()
+        words = then.strftime("%H:%M:%S").lstrip("0") if today else when_words(then, now())
+        return Cell(words, role="textSecondary", mono=today)
+
+    def alarm(record: AlarmRecord) -> Cell:
+        icon = "check"
+        if record.is_on:
+            icon = "circle-x" if condition(record) == "error" else "triangle-alert"
+        return Cell(record.words, icon, condition(record) if record.is_on else "text")
+
+    def lasted(record: AlarmRecord) -> Cell:
+        if record.is_on:
+            on_s = max(0.0, now().timestamp() - record.at_s)
+            return Cell(_("{time}, on").format(time=seconds_words(on_s)), role=condition(record))
+        return Cell(seconds_words(record.lasted_s) if record.lasted_s is not None else "")
+
+    return (
+        Column("when", lazy("When"), 136, when, key=lambda record: record.at_s, figures=False),
+        Column("alarm", lazy("Alarm"), 180, alarm, stretch=True, tip=lambda record: record.words),
+        Column("times", lazy("Times"), 56, lambda record: Cell(str(record.count) if record.count > 1 else ""),
+               key=lambda record: record.count, figures=True, yields=2),
+        Column("lasted", lazy("Lasted"), 84, lasted, key=lambda record: record.lasted_s, figures=True),
+        Column("did", lazy("Did"), 210, lambda record: Cell(deeds_words(record), role="textSecondary"),
+               tip=deeds_words, yields=1),
+    )  # fmt: skip
+
+
+def deeds_words(record: AlarmRecord) -> str:
+    """What was done: "restart_lidar did not answer, sound"; "nothing, snoozed"."""
+    if record.was_snoozed and not record.deeds:
+        return _("nothing, snoozed")
+    return ", ".join(deed.words for deed in record.deeds)
+
+
+def csv_text(records: Iterable[AlarmRecord]) -> str:
+    """What happened as comma-separated values (RFC 4180), oldest first; times as ISO 8601."""
+    out = io.StringIO()
+    rows = csv.writer(out)
+    rows.writerow(("at", "alarm", "lasted_s", "times", "did"))
+    for record in records:
+        lasted = "" if record.lasted_s is None else f"{record.lasted_s:.3f}"
+        words = [_harmless(text) for text in (record.words, deeds_words(record))]
+        rows.writerow((moment(record.at_s).isoformat(), words[0], lasted, record.count, words[1]))
+    return out.getvalue()
+
+
+def _harmless(text: str) -> str:
+    """A table program takes what begins so for a formula."""
+    return f"'{text}" if text[:1] in {"=", "+", "-", "@", "\t", "\r"} else text

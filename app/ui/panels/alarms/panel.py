@@ -1,0 +1,545 @@
+"""Alarms: rules in plain words, how each is now, what happened, and a new one in two keys."""
+
+from __future__ import annotations
+
+import datetime as dt
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QActionGroup, QGuiApplication
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.alarms import severity_of
+from app.core.storage.atomic_file import write_atomically
+from app.ui.panels.alarms.columns import csv_text, history_columns, moment, note_words, state_words
+from app.ui.panels.alarms.phrases import (
+    ACTION_ICONS,
+    ACTION_MENU,
+    CHOICES,
+    MENU_WORDS,
+    NEW_ACTIONS,
+    PhrasePart,
+    example_of,
+    taken,
+    typed_now,
+    with_action,
+    with_kind,
+)
+from app.ui.panels.alarms.row import AlarmRow
+from app.ui.panels.alarms.slots import SlotField
+from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.widgets import Button, Chip, ElidedLabel, EmptyAction, EmptyState, Separator, label
+from app.ui.widgets.buttons import LinkButton
+from app.ui.widgets.file_dialogs import FileKind
+from app.ui.widgets.inputs.fields import FilterField
+from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.table.model import TableModel
+from app.ui.widgets.table.view import TableView
+from nep.errors import DecodeError
+from nep.i18n import _, lazy, ngettext
+from nep.messages.fields import leaves
+from nep.programs.alarms import AlarmCondition, AlarmRule
+from nep.programs.alarms.history import AlarmRecord
+from nep.programs.alarms.rule import new_id
+from nep.programs.alarms.sentences import condition_words, time_words
+
+if TYPE_CHECKING:
+    from app.core.network.watches import Watch
+
+STATES_EVERY = 6  # refreshes of 30 a second: how alarms are is said anew five times a second
+SNOOZE_S = 600.0
+CALM_CHOICES_S = (0.5, 2.0, 10.0, 60.0)
+ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
+CSV = FileKind(lazy("Comma-separated values"), ".csv")
+MOST_OFFERED = 500
+
+
+class AlarmsPanel(PanelWidget):
+    """Rows of alarms, and their history below."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, _("Alarms"))
+        self.alarms = context.session.alarms
+        self.now_s: Callable[[], float] = time.time
+        self._seen: tuple[object, ...] = ()
+        self._history_seen: object = None
+        self._ticks = 0
+        self.rows: list[AlarmRow] = []
+        self.field: SlotField | None = None
+        self._peek: Watch | None = None
+        self._fresh = ""
+        self._make_header()
+        self._make_rows()
+        self._make_history()
+        self._arrange()
+        self.refresh()
+
+    # -- its parts ----------------------------------------------------------------------------------------
+
+    def _make_header(self) -> None:
+        self.chip = Chip(self.theme)
+        self.chips = [self.chip]
+        self.new = Button(self.theme, _("New alarm"), "plus", size="small")
+        self.new.clicked.connect(self.begin)
+        self.header = [self.new]
+
+    def _make_rows(self) -> None:
+        self.list = ScrollColumn(_("Alarms"))
+        self.column = self.list.column
+        self.empty = EmptyState(
+            self.theme,
+            "bell",
+            _("No alarms yet"),
+            _("Right click a value, topic or node."),
+            [EmptyAction(_("New alarm"), self.begin, "plus", primary=True)],
+        )
+
+    def _make_history(self) -> None:
+        self.history_title = label(_("History"), "title")
+        self.history_count = label("", "small", role="textSecondary")
+        self.filter = FilterField(self.theme, _("Filter the history"))
+        self.filter.textChanged.connect(self._show_history)
+        self.export = Button(self.theme, _("CSV"), "download", size="small")
+        self.export.setAccessibleName(_("Save the history as CSV"))
+        self.export.clicked.connect(self._save)
+        columns = history_columns(self._severity, lambda: moment(self.now_s()))
+        self.model: TableModel[AlarmRecord] = TableModel(
+            columns, lambda record: f"{record.rule_id} {record.at_s}"
+        )
+        self.table = TableView(self.theme, self.model)
+        self.table.setAccessibleName(_("History of the alarms"))
+        self.table.order_changed.connect(self._show_history)
+        self.table.filter_wanted.connect(self.focus_filter)
+        self.table.opened.connect(self._open_record)
+        self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self._clear = QAction(_("Clear the history"), self)
+        self._clear.triggered.connect(self.alarms.history.clear)
+
+    def _arrange(self) -> None:
+        head = QHBoxLayout()
+        head.setContentsMargins(12, 6, 8, 4)
+        head.setSpacing(8)
+        head.addWidget(self.history_title)
+        head.addWidget(self.history_count)
+        head.addStretch(1)
+        head.addWidget(self.filter)
+        head.addWidget(self.export)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(12, 3, 12, 4)
+        foot.setSpacing(6)
+        hint = ElidedLabel("small", "textTertiary")
+        hint.setText(_("A right click on any value, topic or node makes an alarm"))
+        self.line = LinkButton(self.theme, _("nep watch"))
+        self.line.setToolTip(_("Copies the line that watches over them without a window"))
+        self.line.setAccessibleName(_("Copy the line for a terminal: nep watch"))
+        self.line.clicked.connect(self._copy_line)
+        foot.addWidget(hint, 1)
+        foot.addWidget(label(_("also without a window:"), "small", role="textTertiary"))
+        foot.addWidget(self.line)
+        inside = QWidget()
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.list, 5)
+        column.addWidget(Separator(self.theme))
+        column.addLayout(head)
+        column.addWidget(self.table, 3)
+        column.addWidget(Separator(self.theme))
+        column.addLayout(foot)
+        self.pages: QStackedWidget = self.show_one_of(self.empty, inside)
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        self._ticks += 1
+        facts = (self.alarms.alarms.revision, self.session.topics.revision)
+        if facts != self._seen:
+            self._seen = facts
+            self._show_rules()
+            self._show_states()
+        elif self._ticks % STATES_EVERY == 0:
+            self._show_states()
+        if self._history_seen != self.alarms.history.revision:
+            self._show_history()
+        elif self._ticks % 30 == 0:
+            self.table.tell_visible_changed()
+        if self.field is not None and self._ticks % STATES_EVERY == 0:
+            self.field.offer(self._existing(self.field.slot.part, self._row_of(self.field.slot)))
+
+    def _show_rules(self) -> None:
+        known = {row.rule_id: row for row in self.rows}
+        rules = self.alarms.rules
+        self.rows = [known.pop(rule.id) if rule.id in known else self._new_row(rule.id) for rule in rules]
+        for row in known.values():
+            self.column.removeWidget(row)
+            row.hide()
+            row.deleteLater()
+        for place, (row, rule) in enumerate(zip(self.rows, rules, strict=True)):
+            if self.column.indexOf(row) != place:
+                self.column.insertWidget(place, row)
+            row.show_rule(rule, self._icon(rule), snoozed=rule.is_snoozed(self.now_s()))
+        any_history = len(self.alarms.history) > 0
+        self.pages.setCurrentIndex(1 if rules or any_history else 0)
+
+    def _new_row(self, rule_id: str) -> AlarmRow:
+        row = AlarmRow(self.theme, rule_id)
+        row.switched.connect(partial(self._switch, rule_id))
+        row.slot_pressed.connect(partial(self._pressed, row))
+        row.action_removed.connect(partial(self._remove_action, rule_id))
+        row.snooze_pressed.connect(partial(self._snooze, rule_id))
+        row.more_pressed.connect(partial(self._more, row))
+        return row
+
+    def _icon(self, rule: AlarmRule) -> str:
+        topic = self.session.topics.get(rule.condition.name)
+        return ICONS.get(topic.codec, "box") if topic is not None else "radio-tower"
+
+    def _show_states(self) -> None:
+        now_s, on = self.now_s(), 0
+        now = moment(now_s)
+        for row, rule in zip(self.rows, self.alarms.rules, strict=True):
+            state = self.alarms.alarms.evaluator.state(rule)
+            on += state.phase == "on" and not rule.is_snoozed(now_s)
+            row.show_state(*state_words(rule, state, now_s), note_words(rule, state, self.alarms, now))
+            row.snooze.setVisible(rule.is_on)
+        count = len(self.rows)
+        words = ngettext("{count} alarm", "{count} alarms", count).format(count=count)
+        self.set_title(_("Alarms"), words if count else "")
+        self.chip.set(ngettext("{count} on", "{count} on", on).format(count=on) if on else "", "error")
+
+    def _show_history(self) -> None:
+        history = self.alarms.history
+        self._history_seen = history.revision
+        words = self.filter.text().casefold().split()
+        rows = [each for each in history if all(word in each.words.casefold() for word in words)]
+        self.model.set_rows(self.table.order.sort(rows))
+        self.table.tell_visible_changed()
+        midnight = moment(self.now_s()).replace(hour=0, minute=0, second=0, microsecond=0)
+        yesterday = (midnight - dt.timedelta(days=1)).timestamp()
+        today = sum(each.at_s >= midnight.timestamp() for each in history)
+        before = sum(yesterday <= each.at_s < midnight.timestamp() for each in history)
+        words_today = _("today {today}, yesterday {yesterday}") if before else _("today {today}")
+        said = words_today.format(today=today, yesterday=before)
+        self.history_count.setText(said if len(history) else _("nothing happened yet"))
+        for widget in (self.filter, self.export):
+            widget.setVisible(len(history) > 0)
+        if len(history) and not self.rows:
+            self.pages.setCurrentIndex(1)
+
+    def _severity(self, record: AlarmRecord) -> str:
+        rule = self.alarms.alarms.rule(record.rule_id)
+        return severity_of(rule.condition) if rule is not None else "error"
+
+    def badge(self) -> tuple[str, str] | None:
+        on = len(self.alarms.on)
+        return (str(on), "error") if on else None
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """A new alarm, whose topic is asked for at once."""
+        self.edit(self.alarms.new(AlarmCondition("silent", for_s=2.0)).id, "subject")
+
+    def edit(self, rule_id: str, slot: str) -> None:
+        """Show this alarm and open one of its slots; with "" only go there."""
+        self._show_rules()
+        self._seen = ()
+        self._fresh = rule_id if slot == "limit" else ""
+        row = next((row for row in self.rows if row.rule_id == rule_id), None)
+        if row is None:
+            return
+        row.show()
+        self.list.ensureWidgetVisible(row)
+        found = row.slots.get(slot) or row.slots["kind"]
+        found.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        if slot:
+            self._pressed(row, found.part)
+
+    def _rule(self, rule_id: str) -> AlarmRule | None:
+        return self.alarms.alarms.rule(rule_id)
+
+    def _put(self, rule: AlarmRule) -> None:
+        self.alarms.put(rule)
+        self.refresh()
+
+    def _switch(self, rule_id: str, on: bool) -> None:
+        rule = self._rule(rule_id)
+        if rule is not None:
+            self._put(replace(rule, is_on=on))
+
+    def _pressed(self, row: AlarmRow, part: PhrasePart) -> None:
+        rule = self._rule(row.rule_id)
+        if rule is None:
+            return
+        if part.role in CHOICES or part.role == "action":
+            menu = Menu(self.theme, self)
+            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            (self._fill_kinds if part.role == "kind" else self._fill_actions)(menu, row, part)
+            drop_below(menu, row.slots[part.key])
+        else:
+            self._type(row, rule, part)
+
+    def _type(self, row: AlarmRow, rule: AlarmRule, part: PhrasePart) -> None:
+        """Let a person type into a slot."""
+        if self.field is not None:
+            self.field.leave(keeps_focus=False)
+        condition = rule.condition
+        if part.role in {"value", "limit"} and condition.name and self._peek is None:
+            self._peek = self.session.watch(condition.name)  # its newest message says which values there are
+        self.field = SlotField(
+            self.theme,
+            row,
+            row.slots[part.key],
+            typed_now(rule, part),
+            example_of(part, rule),
+            lambda text: self._take(row, part, text),
+        )
+        self.field.ended.connect(self._field_ended)
+        self.field.offer(self._existing(part, row))
+
+    def _take(self, row: AlarmRow, part: PhrasePart, text: str) -> bool:
+        rule = self._rule(row.rule_id)
+        if rule is None:
+            return True
+        made = taken(rule, part, text)
+        if made is None:
+            return False
+        if part.role == "limit" and self._fresh == rule.id:
+            made, self._fresh = replace(made, is_on=True), ""  # it waited for its limit
+        if made != rule:
+            self._put(made)
+        return True
+
+    def _field_ended(self) -> None:
+        self.field = None
+        if self._peek is not None:
+            self._peek.close()
+            self._peek = None
+
+    def _row_of(self, slot: QWidget) -> AlarmRow:
+        return next(row for row in self.rows if slot in row.slots.values())
+
+    def _existing(self, part: PhrasePart, row: AlarmRow) -> Sequence[str]:
+        """What exists now for a slot."""
+        rule = self._rule(row.rule_id)
+        if rule is None:
+            return ()
+        match part.role:
+            case "subject" if rule.condition.is_about_node:
+                return sorted({node.name for node in self.session.nodes})[:MOST_OFFERED]
+            case "subject":
+                return sorted(topic.name for topic in self.session.topics.live())[:MOST_OFFERED]
+            case "value":
+                return self._paths(rule.condition.name)
+            case "time":
+                return [time_words(seconds) for seconds in (0.5, 1, 2, 5, 10, 30, 60, 600)]
+            case "name":
+                return self._names(rule.actions[part.place].kind)
+            case _:
+                return ()
+
+    def _paths(self, name: str) -> list[str]:
+        topic = self.session.topics.get(name)
+        newest = topic.newest if topic is not None else None
+        if newest is None or newest.size_bytes > 256 * 1024:
+            return []
+        try:
+            return list(leaves(newest.payload))
+        except DecodeError:
+            return []
+
+    def _names(self, kind: str) -> list[str]:
+        if kind == "call":
+            return sorted(self.session.graph.services) if self.session.graph is not None else []
+        if kind == "send":
+            return sorted(topic.name for topic in self.session.topics.live())[:MOST_OFFERED]
+        titles = [self.session.documents.title(document) for document in self.session.documents]
+        return list(dict.fromkeys([*titles, *(file.name for file in self.session.settings.recent)]))
+
+    # -- menus --------------------------------------------------------------------------------------------
+
+    def _fill_kinds(self, menu: Menu, row: AlarmRow, _part: PhrasePart) -> None:
+        rule = self._rule(row.rule_id)
+        if rule is None:
+            return
+        for group in MENU_WORDS:
+            if menu.actions():
+                menu.addSeparator()
+            for kind, words in group:
+                action = menu.addAction(_(words))
+                action.setCheckable(True)
+                action.setChecked(kind == rule.condition.kind)
+                action.triggered.connect(partial(self._choose_kind, row, kind))
+
+    def _choose_kind(self, row: AlarmRow, kind: str, _on: bool = False) -> None:
+        rule = self._rule(row.rule_id)
+        if rule is None:
+            return
+        made = with_kind(rule, kind)
+        self._put(made)
+        condition = made.condition
+        missing = (
+            "subject"
+            if not condition.name
+            else "value"
+            if condition.is_about_value and not condition.path
+            else ""
+        )
+        if missing:
+            row.slots[missing].setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _fill_actions(self, menu: Menu, row: AlarmRow, part: PhrasePart) -> None:
+        rule = self._rule(row.rule_id)
+        if rule is None:
+            return
+        is_new = part.role == "add"
+        place = len(rule.actions) if is_new else part.place
+        there = {action.kind for action in rule.actions}
+        for action in NEW_ACTIONS:
+            if action.kind in there and action.kind not in {"run", "call", "send"}:
+                continue
+            entry = menu.addAction(self.theme.icon(ACTION_ICONS[action.kind]), _(ACTION_MENU[action.kind]))
+            entry.triggered.connect(partial(self._choose_action, row, place, action))
+        if not is_new:
+            menu.addSeparator()
+            entry = menu.addAction(self.theme.icon("trash-2"), _("Remove this action"))
+            entry.triggered.connect(partial(self._remove_action, row.rule_id, part))
+
+    def _choose_action(self, row: AlarmRow, place: int, action: object, _on: bool = False) -> None:
+        rule = self._rule(row.rule_id)
+        if rule is None:
+            return
+        self._put(with_action(rule, place, action))  # type: ignore[arg-type]
+        name = row.slots.get(f"name:{place}")
+        if name is not None:
+            self._pressed(row, name.part)
+
+    def _remove_action(self, rule_id: str, part: PhrasePart, _on: bool = False) -> None:
+        rule = self._rule(rule_id)
+        if rule is not None and part.place < len(rule.actions):
+            self._put(with_action(rule, part.place, None))
+
+    def _snooze(self, rule_id: str, seconds: float = SNOOZE_S, _on: bool = False) -> None:
+        rule = self._rule(rule_id)
+        if rule is not None:
+            is_snoozed = rule.is_snoozed(self.now_s())
+            self.alarms.snooze(rule_id, 0.0 if is_snoozed or not seconds else self.now_s() + seconds)
+            self.refresh()
+
+    def _until_tomorrow(self) -> float:
+        now = moment(self.now_s())
+        tomorrow = (now + dt.timedelta(days=1)).replace(hour=0, minute=0, second=0, microsecond=0)
+        return tomorrow.timestamp() - self.now_s()
+
+    def _more(self, row: AlarmRow) -> None:
+        rule = self._rule(row.rule_id)
+        if rule is None:
+            return
+        menu = Menu(self.theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        if rule.is_snoozed(self.now_s()):
+            menu.addAction(self.theme.icon("bell"), _("End the snooze"), partial(self._snooze, rule.id, 0.0))
+        else:
+            for words, seconds in (
+                (_("Snooze for 10 min"), SNOOZE_S),
+                (_("Snooze for 1 h"), 3600.0),
+                (_("Snooze until tomorrow"), self._until_tomorrow()),
+            ):
+                menu.addAction(self.theme.icon("bell-off"), words, partial(self._snooze, rule.id, seconds))
+        menu.addSeparator()
+        group = QActionGroup(menu)
+        for calm_s in CALM_CHOICES_S:
+            said = _("On until it was well for {time}").format(time=time_words(calm_s))
+            action = menu.addAction(said)
+            action.setCheckable(True)
+            action.setChecked(rule.calm_s == calm_s)
+            action.triggered.connect(partial(self._set_calm, rule.id, calm_s))
+            group.addAction(action)
+        menu.addSeparator()
+        menu.addAction(self.theme.icon("copy"), _("Duplicate"), partial(self._duplicate, rule.id))
+        menu.addAction(self.theme.icon("trash-2"), _("Delete"), partial(self._delete, rule.id))
+        drop_below(menu, row.more)
+
+    def _set_calm(self, rule_id: str, calm_s: float, _on: bool = False) -> None:
+        rule = self._rule(rule_id)
+        if rule is not None:
+            self._put(replace(rule, calm_s=calm_s))
+
+    def _duplicate(self, rule_id: str) -> None:
+        rule = self._rule(rule_id)
+        if rule is not None:
+            made = replace(rule, id=new_id(), snoozed_until_s=0.0)
+            self._put(made)
+            self.edit(made.id, "")
+
+    def _delete(self, rule_id: str) -> None:
+        rule = self.alarms.remove(rule_id)
+        if rule is not None:
+            said = _("Deleted the alarm “{condition}”").format(condition=condition_words(rule.condition))
+            self.context.toast(said, _("Undo"), self.alarms.put_back)
+            self.refresh()
+            self.new.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    # -- history ------------------------------------------------------------------------------------------
+
+    def _open_record(self, key: str) -> None:
+        rule_id = key.partition(" ")[0]
+        row = next((row for row in self.rows if row.rule_id == rule_id), None)
+        if row is not None:
+            self.list.ensureWidgetVisible(row)
+
+    def _save(self) -> None:
+        suggestion = Path.home() / _("alarms.csv")
+        self.context.files.save_as(_("Save the history"), suggestion, [CSV], self._write)
+
+    def _write(self, path: Path, _kind: FileKind) -> None:
+        try:
+            write_atomically(path, csv_text(self.alarms.history.records).encode("utf-8"))
+        except OSError as error:
+            said = _("{file} can't be written: {reason}.")
+            self.session.alerts.put(
+                "alarms:csv", "warn", said.format(file=path.name, reason=error.strerror or error)
+            )
+        else:
+            self.session.alerts.resolve("alarms:csv")
+            self.context.toast(_("Saved {file}").format(file=path.name))
+
+    def _copy_line(self) -> None:
+        path = self.alarms.path
+        said = f'nep watch "{path}"' if path is not None else "nep watch"
+        QGuiApplication.clipboard().setText(said)
+        self.context.toast(_("Copied {line}").format(line=said))
+
+    # -- what every panel has -----------------------------------------------------------------------------
+
+    def more_actions(self) -> list[QAction]:
+        self._clear.setEnabled(len(self.alarms.history) > 0)
+        return [self._clear]
+
+    def focus_filter(self) -> bool:
+        if self.filter.isVisibleTo(self):
+            self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)
+            self.filter.selectAll()
+        return self.filter.isVisibleTo(self)
+
+    def set_density(self, density: Density) -> None:
+        super().set_density(density)
+        self.table.set_row_height(self.row_height(), large=density == "comfortable")
+
+    def theme_changed(self) -> None:
+        self.table.set_row_height(self.row_height(), large=self.density == "comfortable")
+
+    def shut(self) -> None:
+        if self.field is not None:
+            self.field.leave(keeps_focus=False)
+        if self._peek is not None:
+            self._peek.close()
+
+
+PANEL = Panel("alarms", lazy("Alarms"), "bell", (), AlarmsPanel)

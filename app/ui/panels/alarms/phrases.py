@@ -1,0 +1,336 @@
+"""An alarm as a sentence with slots, and what is chosen in each. Pure: no widgets here."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from string import Formatter
+from typing import Literal
+
+from nep.i18n import _, lazy, pgettext, plazy
+from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
+from nep.programs.alarms.rule import KEEP_S, NEEDS_LIMIT, NUMBER_KINDS, VALUE_KINDS, Scalar
+from nep.programs.alarms.sentences import action_words, limit_words, time_words
+from nep.text import quotable
+
+PartKind = Literal["word", "slot", "dashed"]
+CHOICES = frozenset({"kind", "add"})
+"""Slots whose words are chosen from a menu; into the others one types."""
+
+_TEMPLATES: Mapping[str, str] = {
+    "silent": lazy("When {subject} is {kind} for {time}"),
+    "rate_below": lazy("When {subject} has {kind} {limit} {time}"),
+    "rate_above": lazy("When {subject} has {kind} {limit} {time}"),
+    "loses": lazy("When {subject} {kind} {limit} in {time}"),
+    "appears": lazy("When a topic {subject} {kind}"),
+    "below": lazy("When {value} of {subject} is {kind} {limit} {time}"),
+    "above": lazy("When {value} of {subject} is {kind} {limit} {time}"),
+    "equals": lazy("When {value} of {subject} {kind} {limit} {time}"),
+    "is_not": lazy("When {value} of {subject} {kind} {limit} {time}"),
+    "changes": lazy("When {value} of {subject} {kind}"),
+    "leaves": lazy("When {subject} {kind} {time}"),
+    "comes": lazy("When {subject} {kind}"),
+}
+KIND_WORDS: Mapping[str, str] = {
+    "silent": plazy("alarm", "silent"),
+    "rate_below": plazy("alarm rate", "fewer than"),
+    "rate_above": plazy("alarm rate", "more than"),
+    "loses": plazy("alarm", "loses more than"),
+    "appears": plazy("alarm", "appears"),
+    "below": plazy("alarm", "below"),
+    "above": plazy("alarm", "above"),
+    "equals": plazy("alarm", "is"),
+    "is_not": plazy("alarm", "is not"),
+    "changes": plazy("alarm", "changes"),
+    "leaves": plazy("alarm", "leaves"),
+    "comes": plazy("alarm", "comes"),
+}
+MENU_WORDS: Sequence[Sequence[tuple[str, str]]] = (
+    (
+        ("silent", lazy("A topic is silent")),
+        ("rate_below", lazy("A topic has fewer messages")),
+        ("rate_above", lazy("A topic has more messages")),
+        ("loses", lazy("A topic loses messages")),
+        ("appears", lazy("A topic appears")),
+    ),
+    (
+        ("below", lazy("A value is below")),
+        ("above", lazy("A value is above")),
+        ("equals", lazy("A value is")),
+        ("is_not", lazy("A value is not")),
+        ("changes", lazy("A value changes")),
+    ),
+    (("leaves", lazy("A node leaves")), ("comes", lazy("A node comes"))),
+)
+"""The kinds, in the groups of a menu."""
+SLOT_NAMES: Mapping[str, str] = {
+    "subject": lazy("What it is about"),
+    "value": lazy("Value"),
+    "kind": lazy("What must be so"),
+    "limit": lazy("Limit"),
+    "time": lazy("For how long"),
+    "add": lazy("Add an action"),
+    "action": lazy("Action"),
+    "name": lazy("Name"),
+    "payload": lazy("With"),
+}
+NEW_ACTIONS: Sequence[AlarmAction] = (
+    AlarmAction("banner"),
+    AlarmAction("sound"),
+    AlarmAction("keep", seconds=KEEP_S),
+    AlarmAction("run"),
+    AlarmAction("call", payload={}),
+    AlarmAction("send"),
+    AlarmAction("stop"),
+    AlarmAction("console"),
+)
+ACTION_MENU: Mapping[str, str] = {
+    "banner": lazy("Show a banner"),
+    "sound": lazy("Play a sound"),
+    "keep": lazy("Keep the last 60 s"),
+    "run": lazy("Run a behaviour"),
+    "call": lazy("Call a service"),
+    "send": lazy("Send a message"),
+    "stop": lazy("Stop all robots"),
+    "console": lazy("Write to the Console"),
+}
+ACTION_ICONS: Mapping[str, str] = {
+    "banner": "bell",
+    "sound": "volume-2",
+    "keep": "history",
+    "run": "play",
+    "call": "spline",
+    "send": "send",
+    "stop": "square",
+    "console": "terminal",
+}
+_VERBS: Mapping[str, str] = {
+    "run": plazy("alarm", "run"),
+    "call": plazy("alarm", "call"),
+    "send": plazy("alarm", "send to"),
+}
+_DEFAULTS: Mapping[str, tuple[Scalar, float]] = {
+    "silent": (None, 2.0),
+    "loses": (1.0, 30.0),
+    "rate_below": (10.0, 2.0),
+    "rate_above": (100.0, 2.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PhrasePart:
+    """One word or slot of an alarm's sentence. ``key`` tells slots apart: "subject", "action:0"."""
+
+    key: str
+    text: str
+    kind: PartKind = "slot"
+    icon: str | None = None
+    mono: bool = False
+
+    @property
+    def role(self) -> str:
+        """What the slot is for, whichever action it belongs to."""
+        return self.key.partition(":")[0]
+
+    @property
+    def place(self) -> int:
+        """The place of its action."""
+        return int(self.key.partition(":")[2] or 0)
+
+
+def parts_of(rule: AlarmRule, icon: str = "braces") -> list[PhrasePart]:
+    """The sentence; ``icon`` is that of the topic's type."""
+    condition = rule.condition
+    parts: list[PhrasePart] = []
+    for words, hole, _spec, _conversion in Formatter().parse(_(_TEMPLATES[condition.kind])):
+        if words.strip():
+            parts.append(PhrasePart(f"word:{len(parts)}", words.strip(), "word"))
+        if hole:
+            parts.append(_slot(hole, condition, icon))
+    for place, action in enumerate(rule.actions):
+        joint = "," if place == 0 else _("and") if place == len(rule.actions) - 1 else ","
+        parts.append(PhrasePart(f"word:{len(parts)}", joint, "word"))
+        parts += _action_parts(place, action)
+    parts.append(PhrasePart("add", "", "dashed", "plus"))
+    return parts
+
+
+def _slot(hole: str, condition: AlarmCondition, icon: str) -> PhrasePart:
+    if hole == "subject":
+        if not condition.name:
+            missing = _("choose a node") if condition.is_about_node else _("choose a topic")
+            return PhrasePart(hole, missing, "dashed")
+        return PhrasePart(hole, quotable(condition.name), icon=_icon(condition, icon), mono=True)
+    if hole == "value":
+        missing = _("choose a value")
+        text = condition.path if condition.path != "." else _("the message")
+        return PhrasePart(hole, quotable(text) or missing, "slot" if text else "dashed", mono=bool(text))
+    if hole == "kind":
+        return PhrasePart(hole, _(KIND_WORDS[condition.kind]))
+    if hole == "limit":
+        return PhrasePart(hole, limit_words(condition, condition.limit))
+    if not condition.for_s:
+        return PhrasePart(hole, _("for…"), "dashed")
+    if condition.kind in {"silent", "loses"}:
+        return PhrasePart(hole, time_words(condition.for_s))
+    return PhrasePart(hole, _("for {time}").format(time=time_words(condition.for_s)))
+
+
+def _icon(condition: AlarmCondition, icon: str) -> str:
+    return "network" if condition.is_about_node else "list" if condition.kind == "appears" else icon
+
+
+def _action_parts(place: int, action: AlarmAction) -> list[PhrasePart]:
+    verb = _VERBS.get(action.kind)
+    if verb is None:
+        icon = "square" if action.kind == "stop" else None
+        return [PhrasePart(f"action:{place}", action_words(action), icon=icon)]
+    named = quotable(action.name) or _("choose")
+    parts = [
+        PhrasePart(f"action:{place}", _(verb)),
+        PhrasePart(f"name:{place}", named, "slot" if action.name else "dashed", mono=action.kind != "run"),
+    ]
+    if action.kind in {"call", "send"}:
+        text = payload_text(action.payload)
+        shown = text if len(text) <= 24 else f"{text[:23]}…"
+        is_there = action.payload not in ({}, None)
+        parts.append(
+            PhrasePart(
+                f"payload:{place}",
+                shown if is_there else _("with…"),
+                "slot" if is_there else "dashed",
+                mono=is_there,
+            )
+        )
+    return parts
+
+
+def payload_text(payload: object) -> str:
+    """JSON of what is asked or sent, on one line."""
+    return json.dumps(payload, ensure_ascii=False)
+
+
+def typed_now(rule: AlarmRule, part: PhrasePart) -> str:
+    """What stands in the field when a slot is opened."""
+    condition = rule.condition
+    match part.role:
+        case "subject":
+            return condition.name
+        case "value":
+            return condition.path
+        case "limit":
+            return condition.limit if isinstance(condition.limit, str) else payload_text(condition.limit)
+        case "time":
+            return time_words(condition.for_s) if condition.for_s else ""
+        case "name":
+            return rule.actions[part.place].name
+        case "payload":
+            return payload_text(rule.actions[part.place].payload)
+        case _:
+            return ""
+
+
+def taken(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
+    """The rule with what was typed into a slot; None when it can't be that."""
+    condition, text = rule.condition, text.strip()
+    match part.role:
+        case "subject":
+            return replace(rule, condition=replace(condition, name=text))
+        case "value":
+            return replace(rule, condition=replace(condition, path=text))
+        case "limit":
+            limit = read_limit(condition, text)
+            return None if limit is _WRONG else replace(rule, condition=replace(condition, limit=limit))  # type: ignore[arg-type]
+        case "time":
+            for_s = read_time(text)
+            return None if for_s is None else replace(rule, condition=replace(condition, for_s=for_s))
+        case "name":
+            return with_action(rule, part.place, replace(rule.actions[part.place], name=text))
+        case "payload":
+            try:
+                payload = json.loads(text) if text else None
+            except (ValueError, RecursionError):
+                return None
+            return with_action(rule, part.place, replace(rule.actions[part.place], payload=payload))
+        case _:
+            return None
+
+
+_WRONG = object()
+
+
+def read_limit(condition: AlarmCondition, text: str) -> object:
+    """A number where one is needed; else what JSON says of it, or the text as it is."""
+    if condition.kind in NUMBER_KINDS:
+        figures = text.replace("%", "").replace(",", ".").split()
+        try:
+            number = float(figures[0]) if figures else math.nan
+        except ValueError:
+            return _WRONG
+        if not math.isfinite(number):
+            return _WRONG
+        return int(number) if number.is_integer() and abs(number) < 2**53 else number
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        return text
+    return value if value is None or isinstance(value, str | int | float) else text
+
+
+def read_time(text: str) -> float | None:
+    """Seconds of "2", "2 s", "1.5 min", "3 h"; nothing is 0. None for what is no time."""
+    words = text.replace(",", ".").split()
+    if not words:
+        return 0.0
+    joined = "".join(words)
+    for unit, size in (("min", 60.0), ("ms", 0.001), ("h", 3600.0), ("s", 1.0), ("", 1.0)):
+        if joined.endswith(unit):
+            try:
+                seconds = float(joined[: len(joined) - len(unit)]) * size
+            except ValueError:
+                return None
+            return round(seconds, 6) if 0 <= seconds <= 86_400 else None
+    return None
+
+
+def with_action(rule: AlarmRule, place: int, action: AlarmAction | None) -> AlarmRule:
+    """The rule with another action in this place, or one more; None removes it."""
+    actions = [*rule.actions]
+    actions[place : place + 1] = [] if action is None else [action]
+    return replace(rule, actions=tuple(actions))
+
+
+def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
+    """The rule with another kind; what still fits it is kept."""
+    condition = rule.condition
+    if kind == condition.kind:
+        return rule
+    limit, for_s = _DEFAULTS.get(kind, (0 if kind in NUMBER_KINDS else None, 0.0))
+    both_values = kind in VALUE_KINDS and condition.is_about_value
+    if both_values and kind in NEEDS_LIMIT:
+        keeps = kind not in NUMBER_KINDS or not math.isnan(condition.number)
+        limit = condition.limit if keeps and condition.kind in NEEDS_LIMIT else limit
+        for_s = condition.for_s
+    made = AlarmCondition(kind, limit=limit, for_s=for_s)
+    if made.is_about_node is condition.is_about_node:
+        made = replace(made, name=condition.name)
+    if made.is_about_value:
+        made = replace(made, path=condition.path)
+    return replace(rule, condition=made)
+
+
+def example_of(part: PhrasePart, rule: AlarmRule) -> str:
+    """What may be typed into a slot, for an empty field."""
+    match part.role:
+        case "subject":
+            return _("a node") if rule.condition.is_about_node else _("a topic")
+        case "value":
+            return pgettext("example of a field's path", "pose.x")
+        case "time":
+            return pgettext("example of a time", "2 s")
+        case "payload":
+            return "{}"
+        case _:
+            return ""

@@ -1,0 +1,130 @@
+"""One alarm in the list: its switch, its sentence, how it is now, snooze and more."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+
+from app.ui.panels.alarms.phrases import SLOT_NAMES, PhrasePart, parts_of
+from app.ui.panels.alarms.slots import AlarmSlot
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Chip, ElidedLabel, IconButton, Separator, Switch, label
+from app.ui.widgets.flow_layout import Flow
+from nep.i18n import _
+from nep.programs.alarms import AlarmRule
+from nep.programs.alarms.sentences import condition_words
+
+
+class AlarmRow(QWidget):
+    """Shows a rule; what a person wants of it is told by signals, with the slot's part where there is one."""
+
+    switched = Signal(bool)
+    slot_pressed = Signal(object)
+    action_removed = Signal(object)
+    snooze_pressed = Signal()
+    more_pressed = Signal()
+
+    def __init__(self, theme: Theme, rule_id: str) -> None:
+        super().__init__()
+        self._theme, self.rule_id = theme, rule_id
+        self._shown: list[PhrasePart] = []
+        self.slots: dict[str, AlarmSlot] = {}
+        self._words: list[QLabel] = []
+        self.switch = Switch(theme, "")
+        self.switch.clicked.connect(lambda: self.switched.emit(self.switch.isChecked()))
+        self.sentence = QWidget()
+        self._flow = Flow(self.sentence, gap=5, row_gap=4)
+        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        policy.setHeightForWidth(True)
+        self.sentence.setSizePolicy(policy)
+        self.chip = Chip(theme, "", "off", "")
+        self.note = ElidedLabel("small", "textTertiary")
+        self.snooze = IconButton(theme, "bell-off", _("Snooze"), size=26)
+        self.more = IconButton(theme, "ellipsis", _("More"), size=26)
+        self.snooze.clicked.connect(self.snooze_pressed)
+        self.more.clicked.connect(self.more_pressed)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        below = QHBoxLayout()
+        below.setContentsMargins(0, 0, 0, 0)
+        below.setSpacing(10)
+        below.addWidget(self.chip)
+        below.addWidget(self.note, 1)
+        words = QVBoxLayout()
+        words.setContentsMargins(0, 0, 0, 0)
+        words.setSpacing(5)
+        words.addWidget(self.sentence)
+        words.addLayout(below)
+        row = QHBoxLayout()
+        row.setContentsMargins(12, 8, 8, 7)
+        row.setSpacing(8)
+        row.addWidget(self.switch, 0, Qt.AlignmentFlag.AlignTop)
+        row.addLayout(words, 1)
+        row.addWidget(self.snooze, 0, Qt.AlignmentFlag.AlignTop)
+        row.addWidget(self.more, 0, Qt.AlignmentFlag.AlignTop)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(row)
+        column.addWidget(Separator(self._theme))
+
+    def show_rule(self, rule: AlarmRule, icon: str, *, snoozed: bool) -> None:
+        """Show the rule; slots that stay keep the keyboard."""
+        said = condition_words(rule.condition)
+        self.setAccessibleName(said)
+        self.switch.setAccessibleName(_("Watch over it: {condition}").format(condition=said))
+        self.switch.setChecked(rule.is_on)
+        self.snooze.set_icon("bell" if snoozed else "bell-off")
+        self.snooze.set_name(_("End the snooze") if snoozed else _("Snooze for 10 min"))
+        parts = parts_of(rule, icon)
+        if parts != self._shown:
+            self._shown = parts
+            self._rebuild(parts)
+
+    def _rebuild(self, parts: list[PhrasePart]) -> None:
+        while self._flow.takeAt(0) is not None:
+            continue
+        for word in self._words:
+            word.deleteLater()
+        self._words = []
+        gone = {key: slot for key, slot in self.slots.items() if key not in {part.key for part in parts}}
+        for part in parts:
+            if part.kind == "word":
+                word = label(part.text, "body", role="textSecondary")
+                self._words.append(word)
+                self._flow.addWidget(word)
+                word.show()
+                continue
+            slot = self.slots.get(part.key)
+            if slot is None:
+                slot = self.slots[part.key] = self._new_slot(part)
+            slot.show_part(part)
+            self._flow.addWidget(slot)
+            slot.show()
+        for key, slot in gone.items():
+            if slot.hasFocus():
+                self.slots["add"].setFocus(Qt.FocusReason.OtherFocusReason)
+            del self.slots[key]
+            slot.hide()
+            slot.deleteLater()
+        before: QWidget = self.switch
+        for part in parts:
+            if part.kind != "word":
+                QWidget.setTabOrder(before, self.slots[part.key])
+                before = self.slots[part.key]
+        QWidget.setTabOrder(before, self.snooze)
+        QWidget.setTabOrder(self.snooze, self.more)
+        self.sentence.updateGeometry()
+
+    def _new_slot(self, part: PhrasePart) -> AlarmSlot:
+        slot = AlarmSlot(self._theme, part, _(SLOT_NAMES[part.role]))
+        slot.clicked.connect(lambda: self.slot_pressed.emit(slot.part))
+        slot.removed.connect(lambda: self.action_removed.emit(slot.part))
+        return slot
+
+    def show_state(self, words: str, status: str, icon: str | None, note: str) -> None:
+        """How it is now, and what else is worth saying."""
+        self.chip.set(words, status, icon)
+        if self.note.text() != note:
+            self.note.setText(note)

@@ -1,0 +1,209 @@
+"""The slots of a sentence: a word that is chosen, and the field in which one types another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import QPoint, QRect, QRectF, QSize, QStringListModel, Qt, QTimer, Signal
+from PySide6.QtGui import QFocusEvent, QFont, QKeyEvent, QPainter, QPen
+from PySide6.QtWidgets import QCompleter, QLineEdit, QStyledItemDelegate, QWidget
+
+from app.ui.panels.alarms.phrases import PhrasePart
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.buttons import PaintedButton
+from app.ui.widgets.keyboard import following, is_plain
+from app.ui.widgets.menus import EditMenu
+
+HEIGHT, PADDING, ICON, GAP, WIDEST = 24, 7, 14, 5, 300
+FIELD_WIDTH = 240
+
+
+class AlarmSlot(PaintedButton):
+    """A word of an alarm's sentence that a person may change; Delete and Backspace remove an action."""
+
+    shortens = True
+    removed = Signal()
+
+    def __init__(self, theme: Theme, part: PhrasePart, name: str) -> None:
+        super().__init__(theme)
+        self.part, self._name = part, name
+        self._say(part)
+
+    def show_part(self, part: PhrasePart) -> None:
+        """Show another word."""
+        if part != self.part:
+            self.part = part
+            self._say(part)
+
+    def _say(self, part: PhrasePart) -> None:
+        self.say(part.text, f"{self._name}: {part.text}" if part.text else self._name)
+        self.updateGeometry()
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        theme = self._theme
+        width = paint.width_of(self._font(), self.text()) + 2 * PADDING
+        if self.part.icon:
+            width += theme.scaled(ICON) + (GAP if self.text() else 0)
+        height = max(HEIGHT, round(paint.height_of(self._font())) + 6)
+        return QSize(min(round(width) + 2, round(theme.scaled(WIDEST))), height)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(min(self.sizeHint().width(), 40), self.sizeHint().height())
+
+    def _font(self) -> QFont:
+        font = self._theme.font("mono" if self.part.mono else "body")
+        font.setWeight(font.Weight.Medium)
+        return font
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self.part.role == "action":
+            self.removed.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme, dashed = self._theme, self.part.kind == "dashed"
+        fill = "pressed" if self.isDown() else "hover" if self.is_hovered else None
+        radius = theme.radius("small")
+        edge = theme.colour("controlBorder" if dashed else "borderStrong")
+        if dashed:
+            painter.setPen(QPen(edge, 1, Qt.PenStyle.DashLine))
+            painter.setBrush(theme.colour(fill) if fill else Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(rect.adjusted(0.5, 0.5, -0.5, -0.5), radius, radius)
+        else:
+            paint.box(painter, rect, radius, theme.colour(fill or "panel"), edge)
+        ink = theme.colour("textSecondary" if dashed else "text")
+        left = rect.left() + PADDING
+        if self.part.icon:
+            side = theme.scaled(ICON)
+            square = QRectF(left, rect.center().y() - side / 2, side, side)
+            if not self.text():
+                square.moveCenter(rect.center())
+            paint_icon(painter, square, self.part.icon, ink, filled=self.part.icon == "square")
+            left += side + GAP
+        paint.words(
+            painter, rect.adjusted(left - rect.left(), 0, 2 - PADDING, 0), self.text(), self._font(), ink
+        )
+
+
+class SlotField(QLineEdit):
+    """Lies over a slot while one types; what exists is offered. Enter and Tab take it, Esc gives up.
+
+    ``take`` is given the text and says whether it can be that; what can't stays, with an edge in red.
+    """
+
+    ended = Signal()
+
+    def __init__(
+        self,
+        theme: Theme,
+        row: QWidget,
+        slot: AlarmSlot,
+        text: str,
+        example: str,
+        take: Callable[[str], bool],
+    ) -> None:
+        """``row`` is what the sentence of the ``slot`` lies in: the field is higher than a line of it."""
+        super().__init__(text, row)
+        self.slot, self._take, self._is_over = slot, take, False
+        self.setAccessibleName(slot.accessibleName())
+        self.setPlaceholderText(example)
+        self.setProperty("focusRadius", theme.radius("small"))
+        EditMenu(theme, self)
+        self._offered = QStringListModel(self)
+        completer = QCompleter(self._offered, self)
+        completer.setFilterMode(Qt.MatchFlag.MatchContains)
+        completer.setCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
+        completer.setMaxVisibleItems(10)
+        completer.activated.connect(self._chosen)
+        popup = completer.popup()
+        if popup is not None:
+            popup.setProperty("offers", "true")
+            popup.setItemDelegate(QStyledItemDelegate(popup))  # which the style sheet can give room
+        self.setCompleter(completer)
+        self.textEdited.connect(lambda _text: self._mark(wrong=False))
+        self._place(theme, row)
+        self.selectAll()
+        self.show()
+        self.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _place(self, theme: Theme, row: QWidget) -> None:
+        rect = QRect(self.slot.mapTo(row, QPoint()), self.slot.size())
+        rect.setWidth(max(rect.width() + 24, round(theme.scaled(FIELD_WIDTH))))
+        if rect.right() > row.width() - 4:
+            rect.moveRight(max(rect.width(), row.width() - 4))
+        middle, high = rect.center().y(), max(rect.height() + 4, self.sizeHint().height())
+        rect.setHeight(high)
+        rect.moveTop(middle - high // 2)
+        self.setGeometry(rect)
+
+    def offer(self, words: Sequence[str]) -> None:
+        """What exists now."""
+        if list(words) == self._offered.stringList():
+            return
+        self._offered.setStringList(list(words))
+        if self.hasFocus() and words and self.text() == "":
+            self._show_all()
+
+    def _show_all(self) -> None:
+        completer = self.completer()
+        completer.setCompletionPrefix("")
+        completer.complete()
+
+    def _chosen(self, _text: str) -> None:
+        """One of those that exist was chosen: it is taken as soon as it stands in the field."""
+        QTimer.singleShot(0, self, self._take_and_leave)
+
+    def _take_and_leave(self) -> None:
+        if not self._is_over and self._taken():
+            self.leave()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        popup = self.completer().popup()
+        is_offering = popup is not None and popup.isVisible()
+        if event.key() == Qt.Key.Key_Escape and not is_offering:
+            self.leave()
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
+            self._take_and_leave()
+        elif event.key() == Qt.Key.Key_Down and not is_offering:
+            self._show_all()
+        else:
+            super().keyPressEvent(event)
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        if self._taken():
+            slot = self.slot
+            self.leave()
+            following(slot, forward=forward).setFocus(Qt.FocusReason.TabFocusReason)
+        return True
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_over:
+            self._taken()
+            self.leave(keeps_focus=False)
+
+    def _taken(self) -> bool:
+        well = self._take(self.text())
+        self._mark(wrong=not well)
+        return well
+
+    def _mark(self, *, wrong: bool) -> None:
+        if self.property("wrong") != ("true" if wrong else ""):
+            self.setProperty("wrong", "true" if wrong else "")
+            self.style().unpolish(self)
+            self.style().polish(self)
+
+    def leave(self, *, keeps_focus: bool = True) -> None:
+        """The field goes; the keyboard goes back to its slot."""
+        if self._is_over:
+            return
+        self._is_over = True
+        if keeps_focus:
+            self.slot.setFocus(Qt.FocusReason.OtherFocusReason)
+        self.hide()
+        self.ended.emit()
+        self.deleteLater()

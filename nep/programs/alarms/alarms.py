@@ -1,0 +1,175 @@
+"""Alarms: what is done when one comes on, what came of it, and the history. `nep watch` and Studio use it."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from nep.i18n import _
+from nep.programs.alarms.evaluator import AlarmEvaluator, AlarmEvent
+from nep.programs.alarms.history import AlarmDeed, AlarmHistory, AlarmRecord
+from nep.programs.alarms.rule import AlarmAction, AlarmRule
+from nep.programs.alarms.sentences import what_words
+
+__all__ = ["Alarms", "Carrier", "Done"]
+
+RETRY_S = 30.0
+MOST_TRIES = 20
+_MOST_DEEDS = 1_000
+
+Done = Callable[[bool, str], None]
+"""Whether an action was carried out, and what came of it in words; called once, in any thread."""
+Carrier = Callable[[AlarmEvent, AlarmAction, Done], None]
+"""Carries out one kind of action without waiting."""
+
+
+@dataclass(slots=True)
+class _Retry:
+    event: AlarmEvent
+    action: AlarmAction
+    tries: int
+    due: float
+
+
+class Alarms:
+    """Rules with their history. One thread uses it, but for `evaluator.take` and what carries out actions."""
+
+    def __init__(
+        self,
+        rules: Sequence[AlarmRule] = (),
+        history: AlarmHistory | None = None,
+        carriers: Mapping[str, Carrier] | None = None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        clock_s: Callable[[], float] = time.time,
+    ) -> None:
+        """`carriers` carry out actions by their kind; one that has none is written down as not done.
+
+        `clock` is monotonic, `clock_s` tells seconds since 1970.
+        """
+        self.evaluator = AlarmEvaluator(rules, clock=clock, clock_s=clock_s)
+        self.history = history if history is not None else AlarmHistory()
+        self._carriers = dict(carriers or {})
+        self._clock, self._clock_s = clock, clock_s
+        self._answers: queue.SimpleQueue[tuple[AlarmEvent, AlarmAction, int, bool, str]] = queue.SimpleQueue()
+        self._retries: dict[tuple[str, str], _Retry] = {}
+        self._deeds: deque[tuple[AlarmRule, str, float]] = deque(maxlen=_MOST_DEEDS)
+        self._under_way = 0
+        self.revision = 0
+        """Grows with the rules."""
+
+    @property
+    def rules(self) -> tuple[AlarmRule, ...]:
+        """All rules, in the order in which they are shown."""
+        return self.evaluator.rules
+
+    def set_rules(self, rules: Sequence[AlarmRule]) -> None:
+        """Watch these from now on."""
+        self.evaluator.set_rules(rules)
+        self.revision += 1
+
+    def rule(self, rule_id: str) -> AlarmRule | None:
+        """The rule of this id."""
+        return next((rule for rule in self.rules if rule.id == rule_id), None)
+
+    def put(self, rule: AlarmRule) -> None:
+        """Change the rule of this id, or add it as the first."""
+        if self.rule(rule.id) is None:
+            self.set_rules([rule, *self.rules])
+        else:
+            self.set_rules([rule if each.id == rule.id else each for each in self.rules])
+
+    def remove(self, rule_id: str) -> None:
+        """Watch this one no more."""
+        self.set_rules([each for each in self.rules if each.id != rule_id])
+
+    def snooze(self, rule_id: str, until_s: float) -> None:
+        """Let nothing be done until then (seconds since 1970; 0 ends a snooze)."""
+        rule = self.rule(rule_id)
+        if rule is not None:
+            self.put(replace(rule, snoozed_until_s=until_s))
+
+    def retry_in_s(self, rule_id: str) -> float | None:
+        """In how many seconds something that failed is tried again; None when nothing is."""
+        dues = [retry.due for (id, _kind), retry in self._retries.items() if id == rule_id]
+        return max(0.0, min(dues) - self._clock()) if dues else None
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether something is being carried out."""
+        return self._under_way > 0
+
+    def take_deeds(self) -> list[tuple[AlarmRule, str, float]]:
+        """What was done since the last time: of which rule, in words, when (seconds since 1970)."""
+        deeds = list(self._deeds)
+        self._deeds.clear()
+        return deeds
+
+    def tick(self) -> list[AlarmEvent]:
+        """Let time go by: what happened, which is in the history and whose actions have begun."""
+        self._take_answers()
+        events = self.evaluator.tick()
+        for event in events:
+            self._happened(event)
+        self._try_again()
+        return events
+
+    def _happened(self, event: AlarmEvent) -> None:
+        rule = event.rule
+        if event.kind == "on":
+            words = what_words(rule.condition, event.seen)
+            record = AlarmRecord(rule.id, words, event.at_s, is_on=True, was_snoozed=event.is_snoozed)
+            self.history.add(record)
+        if event.kind == "off":
+            record_now = self.history.current(rule.id)
+            if record_now is not None:
+                record_now.is_on, record_now.lasted_s, record_now.count = False, event.lasted_s, event.count
+                self.history.revision += 1
+            self._retries = {key: each for key, each in self._retries.items() if key[0] != rule.id}
+        elif not event.is_snoozed:
+            for action in rule.actions:
+                self._carry(event, action, 1)
+
+    def _carry(self, event: AlarmEvent, action: AlarmAction, tries: int) -> None:
+        carrier = self._carriers.get(action.kind)
+        self._under_way += 1
+        if carrier is None:
+            self._answers.put((event, action, MOST_TRIES, False, _("it can't be done here")))
+            return
+        done = partial(self._answer, event, action, tries)
+        try:
+            carrier(event, action, done)
+        except Exception as error:  # noqa: BLE001  one action that fails must not keep the next from its turn
+            done(False, str(error) or type(error).__name__)
+
+    def _answer(self, event: AlarmEvent, action: AlarmAction, tries: int, well: bool, words: str) -> None:
+        self._answers.put((event, action, tries, well, words))
+
+    def _take_answers(self) -> None:
+        for _number in range(self._answers.qsize()):
+            event, action, tries, well, words = self._answers.get()
+            self._under_way -= 1
+            self._deeds.append((event.rule, words, self._clock_s()))
+            record = self.history.last(event.rule.id)
+            if record is None:
+                continue
+            if words:
+                record.add(AlarmDeed(action.kind, words))
+                self.history.revision += 1
+            if not well and action.kind == "call" and record.is_on and tries < MOST_TRIES:
+                retry = _Retry(event, action, tries + 1, self._clock() + RETRY_S)
+                self._retries[event.rule.id, action.name] = retry
+
+    def _try_again(self) -> None:
+        now, now_s = self._clock(), self._clock_s()
+        for key, retry in list(self._retries.items()):
+            rule = self.rule(retry.event.rule.id)
+            if rule is None or retry.action not in rule.actions:
+                del self._retries[key]
+            elif now >= retry.due and not rule.is_snoozed(now_s):
+                del self._retries[key]
+                self._carry(retry.event, retry.action, retry.tries)

@@ -1,0 +1,93 @@
+"""Calling services and sending messages for alarms: clients and publishers are made once, and kept."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+
+from nep.errors import NepError, NoServerError, WaitTimeoutError
+from nep.i18n import _, number
+from nep.nodes.node import Node
+from nep.nodes.publisher import Publisher
+from nep.patterns.services.client import Client
+from nep.programs.alarms.alarms import Done
+from nep.programs.alarms.rule import AlarmAction
+
+__all__ = ["CALL_S", "AlarmCommands"]
+
+CALL_S = 5.0
+"""How long a call waits for a server and its answer."""
+_MOST_KEPT = 50
+
+
+class AlarmCommands:
+    """Carries out "call" and "send" with a node. `carry` may be called in any one thread at a time."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._clients: dict[str, Client] = {}
+        self._publishers: dict[tuple[str, str], Publisher] = {}
+        self._node: Node | None = None
+
+    def carry(self, node: Node, action: AlarmAction, done: Done) -> None:
+        """Call or send. Waits for a publisher's first handshake, not for answers. Never raises."""
+        try:
+            with self._lock:
+                self._use(node)
+                if action.kind == "call":
+                    self._call(node, action, done)
+                    return
+                heard = self._send(node, action)
+        except NepError as error:
+            done(False, str(error))
+            return
+        said = _("sent to {topic}") if heard else _("nobody hears {topic}")
+        done(heard, said.format(topic=action.name))
+
+    def close(self) -> None:
+        """Forget clients and publishers; their node closes them."""
+        with self._lock:
+            self._clients.clear()
+            self._publishers.clear()
+
+    def _use(self, node: Node) -> None:
+        if node is not self._node:
+            self._node = node
+            self._clients.clear()
+            self._publishers.clear()
+
+    def _call(self, node: Node, action: AlarmAction, done: Done) -> None:
+        client = self._clients.get(action.name)
+        if client is None:
+            if len(self._clients) >= _MOST_KEPT:
+                self._clients.pop(next(iter(self._clients))).close()
+            client = self._clients[action.name] = node.new_client(action.name, timeout_s=CALL_S)
+        client.call_async(action.payload).add_done_callback(_teller(action.name, done))
+
+    def _send(self, node: Node, action: AlarmAction) -> bool:
+        """Whether anybody hears it."""
+        key = (action.name, action.msg_type)
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            if len(self._publishers) >= _MOST_KEPT:
+                self._publishers.pop(next(iter(self._publishers))).close(0.0)
+            publisher = self._publishers[key] = node.new_pub(action.name, action.msg_type)
+        publisher.publish(action.payload)
+        return publisher.subscribers > 0
+
+
+def _teller(service: str, done: Done) -> Callable[[Future[object]], None]:
+    def tell(ended: Future[object]) -> None:
+        error = None if ended.cancelled() else ended.exception()
+        if isinstance(error, NoServerError):
+            done(False, _("nobody serves {service}").format(service=service))
+        elif isinstance(error, WaitTimeoutError):
+            said = _("{service} did not answer within {seconds} s")
+            done(False, said.format(service=service, seconds=number(CALL_S)))
+        elif error is not None or ended.cancelled():
+            done(False, _("{service}: {reason}").format(service=service, reason=str(error or "")))
+        else:
+            done(True, _("{service} answered").format(service=service))
+
+    return tell

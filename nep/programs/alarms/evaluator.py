@@ -1,0 +1,355 @@
+"""AlarmEvaluator: looks at messages, at the graph and at the clock, and tells what came on and went off.
+
+Messages are given in the thread in which they arrive, the graph and the time in another: a lock is held for
+what is compared, never while a message is decoded.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from nep.errors import DecodeError
+from nep.messages.message import Message
+from nep.programs.alarms.losses import TopicLosses
+from nep.programs.alarms.rule import MOST_LETTERS, AlarmRule, Scalar, problem_of, topics_of
+from nep.programs.alarms.track import AlarmTrack, Turn
+from nep.protocol.graph_view import GraphView
+from nep.protocol.topic_pattern import matches
+
+__all__ = ["AlarmEvaluator", "AlarmEvent", "AlarmPhase", "AlarmState"]
+
+LARGE_BYTES = 256 * 1024
+"""Of larger messages the newest of each batch is read; the others are counted."""
+MOST_EVENTS = 1_000
+MASTER_GRACE_S = 3.0
+"""A master that was started anew does not know all nodes at once."""
+RATE_WINDOW_S, LONGEST_RATE_WINDOW_S = 2.0, 60.0
+_SAMPLE_S = 0.25
+_SAMPLES = 256
+
+AlarmPhase = Literal["off", "faulty", "waits", "well", "pending", "on"]
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmEvent:
+    """What happened to an alarm: it came "on", went "off", or is "still" on when its snooze ended.
+
+    `seen` is the value that did it, `at_s` when in seconds since 1970, `lasted_s` how long it was on, `count`
+    how often it came in this time. `is_snoozed`: nothing is to be done.
+    """
+
+    kind: Literal["on", "off", "still"]
+    rule: AlarmRule
+    at_s: float
+    seen: Scalar = None
+    lasted_s: float = 0.0
+    count: int = 1
+    is_snoozed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmState:
+    """How an alarm is now.
+
+    `phase`: "off" (nobody wants it), "faulty" (the rule has a problem), "waits" (what it is about was never
+    there), "well", "pending" (it is so, not yet for long enough) or "on". `seen` is the newest value,
+    `on_for_s` for how long it is on. `trouble`: "missing" when the newest message has no such value,
+    "no_number" when it is none, "unreadable" when the message can't be decoded.
+    """
+
+    phase: AlarmPhase
+    seen: Scalar = None
+    on_for_s: float = 0.0
+    count: int = 0
+    trouble: str = ""
+
+
+@dataclass(slots=True, eq=False)
+class _Heard:
+    """A topic whose messages are heard."""
+
+    readers: list[AlarmTrack] = field(default_factory=list)
+    there_since: float | None = None
+    last: float | None = None
+    count: int = 0
+    unreadable: bool = False
+    samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_SAMPLES))
+
+    def rate_hz(self, window_s: float, now: float) -> float | None:
+        """Messages a second within the last `window_s`; None while it is not known for so long."""
+        begin = None
+        for at, count in self.samples:
+            if now - at < window_s:
+                break
+            begin = (at, count)
+        return None if begin is None else (self.count - begin[1]) / (now - begin[0])
+
+
+class AlarmEvaluator:
+    """Evaluates rules. `take` may be called in any thread, the rest in one."""
+
+    def __init__(
+        self,
+        rules: Sequence[AlarmRule] = (),
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        clock_s: Callable[[], float] = time.time,
+    ) -> None:
+        """`clock` is monotonic, `clock_s` tells seconds since 1970."""
+        self._clock, self._clock_s = clock, clock_s
+        self._lock = threading.Lock()
+        self._rules: tuple[AlarmRule, ...] = ()
+        self._tracks: dict[str, AlarmTrack] = {}
+        self._heard: dict[str, _Heard] = {}
+        self._losses: dict[str, TopicLosses] = {}
+        self._events: deque[AlarmEvent] = deque(maxlen=MOST_EVENTS)
+        self._quiet: set[str] = set()
+        """Those that came on while they were snoozed."""
+        self._view: GraphView | None = None
+        self._nodes: frozenset[str] = frozenset()
+        self._topics: frozenset[str] = frozenset()
+        self._epoch: int | None = None
+        self._epoch_at = 0.0
+        self._sampled_at = 0.0
+        self.skipped = 0
+        """Large messages that were not read."""
+        self.came = threading.Event()
+        """Set when a message brought an alarm on, for who waits for nothing else."""
+        self.set_rules(rules)
+
+    @property
+    def rules(self) -> tuple[AlarmRule, ...]:
+        """All rules."""
+        return self._rules
+
+    @property
+    def topics(self) -> frozenset[str]:
+        """The topics whose messages it wants."""
+        return topics_of([track.rule for track in self._tracks.values()])
+
+    def set_rules(self, rules: Sequence[AlarmRule]) -> None:
+        """Watch these from now on; what is known of those that stay the same is kept."""
+        now = self._clock()
+        with self._lock:
+            before, self._tracks = self._tracks, {}
+            for rule in rules:
+                if not rule.is_on or problem_of(rule) is not None:
+                    continue
+                known = before.get(rule.id)
+                if known is not None and _watches_the_same(known.rule, rule):
+                    known.rule = rule
+                    self._tracks[rule.id] = known
+                    del before[rule.id]
+                else:
+                    self._tracks[rule.id] = AlarmTrack(rule)
+            for id, track in before.items():
+                turn = track.end(now)
+                if turn is not None:
+                    self._tell(track, turn)
+                self._quiet.discard(id)
+            self._rules = tuple(rules)
+            self._listen()
+
+    def _listen(self) -> None:
+        heard, self._heard = self._heard, {}
+        losses, self._losses = self._losses, {}
+        for track in self._tracks.values():
+            condition = track.rule.condition
+            if condition.hears:
+                topic = self._heard.get(condition.name)
+                if topic is None:
+                    topic = self._heard[condition.name] = heard.get(condition.name) or _Heard()
+                    topic.readers = []
+                if condition.is_about_value:
+                    topic.readers.append(track)
+            elif condition.kind == "loses":
+                kept = losses.get(condition.name) or TopicLosses()
+                self._losses[condition.name] = kept
+
+    # ---- what is looked at
+
+    def take(self, topic: str, messages: Sequence[Message]) -> None:
+        """Messages of a topic arrived, oldest first. Costs nothing for topics that no rule is about."""
+        heard = self._heard.get(topic)
+        if heard is None or not messages:
+            return
+        payloads, unreadable, skipped = _payloads(messages) if heard.readers else ([], False, 0)
+        now, is_news = self._clock(), False
+        with self._lock:
+            heard.last = now
+            heard.count += len(messages)
+            heard.unreadable = unreadable
+            self.skipped += skipped
+            if heard.there_since is None:
+                heard.there_since = now
+            for track in heard.readers:
+                for payload in payloads:
+                    turn = track.read(payload, now)
+                    if turn is not None:
+                        self._tell(track, turn)
+                        is_news = True
+        if is_news:
+            self.came.set()
+
+    def see(self, view: GraphView | None) -> None:
+        """A new graph; None while no master answers: then nobody is taken to have left."""
+        now = self._clock()
+        with self._lock:
+            before, self._view = self._view, view
+            if view is None:
+                return
+            if view.epoch != self._epoch:
+                self._epoch, self._epoch_at = view.epoch, now
+            nodes = frozenset(node.name for node in view.nodes.values())
+            topics = frozenset(name for name, info in view.topics.items() if info.publishers)
+            came_nodes, came_topics = nodes - self._nodes, topics - self._topics
+            is_settled = before is not None and now - self._epoch_at >= MASTER_GRACE_S
+            self._nodes, self._topics = nodes, topics
+            for name, heard in self._heard.items():
+                if heard.there_since is None and name in topics:
+                    heard.there_since = now
+            for name, losses in self._losses.items():
+                losses.add(view.topics.get(name), now)
+            for track in self._tracks.values():
+                self._see(track, came_nodes, came_topics, now, is_settled=is_settled)
+
+    def _see(
+        self,
+        track: AlarmTrack,
+        nodes: frozenset[str],
+        topics: frozenset[str],
+        now: float,
+        *,
+        is_settled: bool,
+    ) -> None:
+        """Who came or left."""
+        kind, name = track.rule.condition.kind, track.rule.condition.name
+        turn: Turn | None = None
+        if kind == "leaves":
+            is_there = name in self._nodes
+            if is_there or (track.was_seen and now - self._epoch_at >= MASTER_GRACE_S):
+                turn = track.observe(not is_there, None, now)
+        elif kind == "comes":
+            track.was_seen = track.was_seen or name in self._nodes
+            if is_settled and name in nodes:
+                turn = track.happened(now)
+        elif kind == "appears":
+            found = sorted(topic for topic in topics if matches(name, topic))
+            track.was_seen = True
+            if is_settled and found:
+                track.seen = found[0][:MOST_LETTERS]
+                turn = track.happened(now)
+        if turn is not None:
+            self._tell(track, turn)
+
+    def tick(self) -> list[AlarmEvent]:
+        """Let time go by; what happened since the last time. Call it ten times a second or more often."""
+        now, now_s = self._clock(), self._clock_s()
+        with self._lock:
+            self.came.clear()
+            if now - self._sampled_at >= _SAMPLE_S:
+                self._sampled_at = now
+                for heard in self._heard.values():
+                    if heard.there_since is not None:
+                        heard.samples.append((now, heard.count))
+            for track in self._tracks.values():
+                turn = self._pass(track, now)
+                if turn is not None:
+                    self._tell(track, turn)
+            for id in [id for id in self._quiet if not self._tracks[id].rule.is_snoozed(now_s)]:
+                self._quiet.discard(id)
+                track = self._tracks[id]
+                if track.is_on:
+                    event = AlarmEvent("still", track.rule, now_s, track.seen, count=track.count)
+                    self._events.append(event)
+            events = list(self._events)
+            self._events.clear()
+        return events
+
+    def _pass(self, track: AlarmTrack, now: float) -> Turn | None:
+        condition = track.rule.condition
+        heard = self._heard.get(condition.name) if condition.hears else None
+        if condition.kind == "silent" and heard is not None and heard.there_since is not None:
+            silent_s = now - max(heard.there_since, heard.last or heard.there_since)
+            return track.observe(silent_s >= condition.for_s, silent_s, now)
+        if condition.kind in {"rate_below", "rate_above"} and heard is not None:
+            rate_hz = heard.rate_hz(_window_s(condition.number), now)
+            if rate_hz is not None:
+                return track.compare(rate_hz, now, is_below=condition.kind == "rate_below")
+        elif condition.kind == "loses" and self._view is not None:
+            percent = self._losses[condition.name].percent(condition.for_s, now)
+            if percent is not None:
+                return track.compare(percent, now, is_below=False)
+        elif condition.kind == "leaves" and self._view is None:
+            return None  # without a master nobody knows who is there
+        return track.settle(now)
+
+    def _tell(self, track: AlarmTrack, turn: Turn) -> None:
+        rule, now_s = track.rule, self._clock_s()
+        is_snoozed = rule.is_snoozed(now_s)
+        if turn.is_on and is_snoozed:
+            self._quiet.add(rule.id)
+        elif not turn.is_on:
+            self._quiet.discard(rule.id)
+        self._events.append(
+            AlarmEvent(
+                "on" if turn.is_on else "off", rule, now_s, turn.seen, turn.lasted_s, turn.times, is_snoozed
+            )
+        )
+
+    # ---- how it is
+
+    def state(self, rule: AlarmRule) -> AlarmState:
+        """How an alarm is now."""
+        if problem_of(rule) is not None:
+            return AlarmState("faulty")
+        now = self._clock()
+        with self._lock:
+            track = self._tracks.get(rule.id)
+            if track is None:
+                return AlarmState("off")
+            condition = track.rule.condition
+            heard = self._heard.get(condition.name) if condition.hears else None
+            was_seen = track.was_seen or (heard is not None and heard.there_since is not None)
+            if condition.is_about_value:
+                was_seen = heard is not None and heard.last is not None
+            trouble = track.trouble or ("unreadable" if heard is not None and heard.unreadable else "")
+            if track.on_since is not None:
+                return AlarmState("on", track.seen, now - track.on_since, track.count, trouble)
+            phase: AlarmPhase = "pending" if track.is_pending else "well" if was_seen else "waits"
+            return AlarmState(phase, track.seen, trouble=trouble)
+
+    @property
+    def states(self) -> Mapping[str, AlarmState]:
+        """How all alarms are now, by their ids."""
+        return {rule.id: self.state(rule) for rule in self._rules}
+
+
+def _watches_the_same(one: AlarmRule, other: AlarmRule) -> bool:
+    return one.condition == other.condition and one.calm_s == other.calm_s
+
+
+def _window_s(limit_hz: float) -> float:
+    """How far back a rate is counted: rare messages need a longer time until they are known to be rarer."""
+    return min(LONGEST_RATE_WINDOW_S, max(RATE_WINDOW_S, 3.0 / limit_hz))
+
+
+def _payloads(messages: Sequence[Message]) -> tuple[list[object], bool, int]:
+    """What they say; whether the newest could not be read; how many large ones were passed over."""
+    payloads: list[object] = []
+    unreadable, skipped, newest = False, 0, messages[-1]
+    for message in messages:
+        if message.size_bytes > LARGE_BYTES and message is not newest:
+            skipped += 1
+            continue
+        try:
+            payloads.append(dict(message.extension) if message.codec == "image" else message.payload)
+            unreadable = False
+        except DecodeError:
+            unreadable = True
+    return payloads, unreadable, skipped

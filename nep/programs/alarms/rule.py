@@ -1,0 +1,244 @@
+"""What an alarm is: when it comes on, and what is done then. Values only; nothing is looked at here."""
+
+from __future__ import annotations
+
+import math
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from nep.errors import BadNameError, BadTopicError, NepError
+from nep.i18n import _
+from nep.messages.fields import parse_path
+from nep.protocol.service_wire import check_service
+from nep.protocol.topic_pattern import is_pattern
+from nep.protocol.wire import check_node_name, check_topic
+
+__all__ = [
+    "ACTION_KINDS",
+    "KINDS",
+    "NEEDS_LIMIT",
+    "NODE_KINDS",
+    "NUMBER_KINDS",
+    "TOPIC_KINDS",
+    "VALUE_KINDS",
+    "AlarmAction",
+    "AlarmCondition",
+    "AlarmRule",
+    "RuleProblem",
+    "Scalar",
+    "new_id",
+    "problem_of",
+]
+
+Scalar = float | int | str | bool | None
+"""What a message's value is compared with."""
+
+TOPIC_KINDS = ("silent", "rate_below", "rate_above", "loses", "appears")
+VALUE_KINDS = ("below", "above", "equals", "is_not", "changes")
+NODE_KINDS = ("leaves", "comes")
+KINDS = (*TOPIC_KINDS, *VALUE_KINDS, *NODE_KINDS)
+NEEDS_LIMIT = frozenset({"rate_below", "rate_above", "loses", "below", "above", "equals", "is_not"})
+NUMBER_KINDS = NEEDS_LIMIT - {"equals", "is_not"}
+EVENT_KINDS = frozenset({"changes", "appears", "comes"})
+"""What happens at a moment, and does not last."""
+ACTION_KINDS = ("banner", "sound", "keep", "run", "call", "send", "stop", "console")
+NAMED_ACTIONS = frozenset({"run", "call", "send"})
+
+LEAST_S, LONGEST_S = 0.1, 86_400.0
+LEAST_CALM_S, LONGEST_CALM_S = 0.5, 3_600.0
+LONGEST_WINDOW_S = 600.0
+CALM_S = 2.0
+KEEP_S = 60.0
+MOST_ACTIONS = 10
+MOST_LETTERS = 300
+_GREATEST = 1e300
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmCondition:
+    """When an alarm comes on.
+
+    `kind` is one of `KINDS`. `name` is a topic (for "appears" perhaps with wildcards) or a node, "" while
+    nobody has said it. `path` is the value in the topic's messages, as in `nep topic echo`. `limit` is what
+    the value is compared with: a number for `NUMBER_KINDS` (messages a second for rates, per cent for
+    "loses"). `for_s`: how long it must be so without a break, in seconds; of "silent" how long nothing came,
+    of "loses" how far back is counted. `margin`: how far back beyond the limit a number must go until the
+    alarm may go off.
+    """
+
+    kind: str
+    name: str = ""
+    path: str = ""
+    limit: Scalar = None
+    for_s: float = 0.0
+    margin: float = 0.0
+
+    @property
+    def is_about_node(self) -> bool:
+        """Whether `name` is a node's."""
+        return self.kind in NODE_KINDS
+
+    @property
+    def is_about_value(self) -> bool:
+        """Whether messages must be read to know it."""
+        return self.kind in VALUE_KINDS
+
+    @property
+    def number(self) -> float:
+        """The limit of `NUMBER_KINDS`; no number (NaN) for what is compared otherwise."""
+        is_number = isinstance(self.limit, int | float) and not isinstance(self.limit, bool)
+        return float(self.limit) if is_number else math.nan  # type: ignore[arg-type]
+
+    @property
+    def hears(self) -> bool:
+        """Whether the messages of its topic must be heard."""
+        return self.is_about_value or self.kind in {"silent", "rate_below", "rate_above"}
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmAction:
+    """What is done when an alarm comes on.
+
+    `kind` is one of `ACTION_KINDS`. `name`: of the behaviour to run, the service to call, the topic to send
+    on. `payload`: what is asked or sent. `msg_type`: the type of the topic. `seconds`: how much is kept.
+    """
+
+    kind: str
+    name: str = ""
+    payload: object = None
+    msg_type: str = "json"
+    seconds: float = KEEP_S
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmRule:
+    """One alarm.
+
+    `is_on`: whether a person wants it. `calm_s`: so long it must be well again until the alarm goes off; what
+    happens again before is the same alarm, counted. `snoozed_until_s`: in seconds since 1970; until then
+    nothing is done, and the history goes on.
+    """
+
+    id: str
+    condition: AlarmCondition
+    actions: tuple[AlarmAction, ...] = ()
+    is_on: bool = True
+    calm_s: float = CALM_S
+    snoozed_until_s: float = 0.0
+
+    def is_snoozed(self, now_s: float) -> bool:
+        """Whether nothing is done now; `now_s` in seconds since 1970."""
+        return now_s < self.snoozed_until_s
+
+
+class RuleProblem(NamedTuple):
+    """What is wrong with a rule: which of its parts (a key of its file), and a sentence without full stop."""
+
+    key: str
+    sentence: str
+
+
+@dataclass(slots=True)
+class _Check:
+    found: list[RuleProblem] = field(default_factory=list)
+
+    def number(self, key: str, value: object, least: float, most: float) -> None:
+        """A number between these."""
+        if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
+            said = _("it must be a number from {least:g} to {most:g}")
+            self.found.append(RuleProblem(key, said.format(least=least, most=most)))
+
+    def named(self, key: str, check: object, name: str) -> None:
+        """What `check` does not raise for."""
+        try:
+            check(name)  # type: ignore[operator]
+        except (BadTopicError, BadNameError) as error:
+            self.found.append(RuleProblem(key, error.reason))
+        except NepError as error:
+            self.found.append(RuleProblem(key, str(error)))
+
+
+def new_id() -> str:
+    """An id that no other rule has."""
+    return secrets.token_hex(4)
+
+
+def problem_of(rule: AlarmRule) -> RuleProblem | None:
+    """What is wrong or still missing; None when it can be watched."""
+    check = _Check()
+    _check_condition(rule.condition, check)
+    check.number("calm_s", rule.calm_s, LEAST_CALM_S, LONGEST_CALM_S)
+    if len(rule.actions) > MOST_ACTIONS:
+        said = _("it has more than {most} actions; make two alarms of it")
+        check.found.append(RuleProblem("do", said.format(most=MOST_ACTIONS)))
+    for action in rule.actions:
+        _check_action(action, check)
+    return check.found[0] if check.found else None
+
+
+def _check_condition(condition: AlarmCondition, check: _Check) -> None:
+    if not condition.name:
+        key, said = (
+            ("node", _("no node is named")) if condition.is_about_node else ("topic", _("no topic is named"))
+        )
+        check.found.append(RuleProblem(key, said))
+        return
+    if condition.is_about_node:
+        check.named("node", check_node_name, condition.name)
+    else:
+        check.named("topic", check_topic, condition.name)
+        if is_pattern(condition.name) and condition.kind != "appears":
+            said = _("it has wildcards, and only 'appears' may have them; name one topic")
+            check.found.append(RuleProblem("topic", said))
+    if condition.is_about_value:
+        check.named("value", parse_path, condition.path)
+    _check_limit(condition, check)
+    _check_time(condition, check)
+
+
+def _check_limit(condition: AlarmCondition, check: _Check) -> None:
+    limit = condition.limit
+    if condition.kind in {"rate_below", "rate_above"}:
+        check.number("than", limit, 0.001, 1e6)
+    elif condition.kind == "loses":
+        check.number("than", limit, 0, 100)
+    elif condition.kind in NUMBER_KINDS:
+        check.number("than", limit, -_GREATEST, _GREATEST)
+    elif condition.kind in NEEDS_LIMIT and not _is_scalar(limit):
+        check.found.append(RuleProblem("than", _("it must be a number, a text, true, false or null")))
+    check.number("margin", condition.margin, 0, _GREATEST)
+
+
+def _check_time(condition: AlarmCondition, check: _Check) -> None:
+    if condition.kind == "silent":
+        check.number("for_s", condition.for_s, LEAST_S, LONGEST_S)
+    elif condition.kind == "loses":
+        check.number("for_s", condition.for_s, 1, LONGEST_WINDOW_S)
+    else:
+        check.number("for_s", condition.for_s, 0, LONGEST_S)
+
+
+def _check_action(action: AlarmAction, check: _Check) -> None:
+    if action.kind in NAMED_ACTIONS and not action.name:
+        check.found.append(RuleProblem(action.kind, _("it has no name")))
+    elif action.kind == "call":
+        check.named("call", check_service, action.name)
+    elif action.kind == "send":
+        check.named("send", check_topic, action.name)
+    elif action.kind == "keep":
+        check.number("keep_s", action.seconds, 1, LONGEST_WINDOW_S)
+
+
+def _is_scalar(value: object) -> bool:
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, str):
+        return len(value) <= MOST_LETTERS
+    return value is None or isinstance(value, int)
+
+
+def topics_of(rules: Sequence[AlarmRule]) -> frozenset[str]:
+    """The topics whose messages must be heard for these rules."""
+    return frozenset(rule.condition.name for rule in rules if rule.condition.hears and rule.condition.name)

@@ -1,0 +1,392 @@
+"""The file of alarms: JSON ↔ rules and history. What is wrong is a sentence with its line.
+
+::
+
+    {"format": 1, "alarms": [
+      {"when": {"topic": "/robot/camera", "is": "silent", "for_s": 2}, "do": ["banner", {"keep_s": 60}]},
+      {"when": {"topic": "/distance", "value": "range", "is": "below", "than": 0.4}, "do": ["stop"]},
+      {"when": {"node": "lidar_driver", "is": "leaves"}, "do": [{"call": "restart_lidar", "with": {}}]}
+    ]}
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+from nep.errors import NepError, did_you_mean
+from nep.i18n import _
+from nep.programs.alarms.history import AlarmHistory, record_from, record_plain
+from nep.programs.alarms.rule import (
+    ACTION_KINDS,
+    CALM_S,
+    KINDS,
+    NEEDS_LIMIT,
+    NODE_KINDS,
+    VALUE_KINDS,
+    AlarmAction,
+    AlarmCondition,
+    AlarmRule,
+    Scalar,
+    new_id,
+    problem_of,
+)
+from nep.text import escaped, quotable, shortened
+
+__all__ = ["EXAMPLE", "AlarmFile", "NewerAlarmsError", "alarms_text", "read_alarms", "read_text"]
+
+FORMAT = 1
+MOST_ALARMS = 200
+_MOST_BYTES = 4_000_000
+_LATEST_S = 1e12
+
+EXAMPLE = """\
+{
+ "format": 1,
+ "alarms": [
+  {
+   "when": {"topic": "/robot/camera", "is": "silent", "for_s": 2},
+   "do": ["banner", "sound"]
+  },
+  {
+   "when": {"topic": "/distance", "value": "range", "is": "below", "than": 0.4, "for_s": 1, "margin": 0.05},
+   "do": ["banner", {"send": "/robot/speech", "message": {"say": "Too near"}}]
+  },
+  {
+   "when": {"topic": "/cmd_vel", "is": "loses", "than": 1, "for_s": 30},
+   "do": ["console"]
+  },
+  {
+   "when": {"topic": "/odom", "is": "rate_below", "than": 10, "for_s": 3},
+   "do": ["banner"]
+  },
+  {
+   "when": {"node": "lidar_driver", "is": "leaves"},
+   "do": ["banner", {"call": "restart_lidar", "with": {}}]
+  }
+ ]
+}
+"""
+"""What `nep watch --example` prints."""
+
+_ROOT_KEYS = ("format", "alarms", "history")
+_RULE_KEYS = ("id", "on", "when", "do", "calm_s", "snoozed_until_s")
+_WHEN_KEYS = ("topic", "node", "value", "is", "than", "for_s", "margin")
+_SIMPLE = ("banner", "sound", "keep", "stop", "console")
+_ACTION_KEYS: Mapping[str, tuple[str, ...]] = {
+    "keep_s": (),
+    "run": (),
+    "call": ("with",),
+    "send": ("message", "type"),
+}
+_DEFAULT_FOR: Mapping[str, float] = {"silent": 2.0, "loses": 30.0}
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmFile:
+    """What a file holds: the rules, what happened before, and what was wrong with rules that are left out."""
+
+    rules: tuple[AlarmRule, ...] = ()
+    history: AlarmHistory | None = None
+    problems: tuple[str, ...] = ()
+
+
+def read_alarms(path: Path) -> AlarmFile:
+    """The alarms in a file. Raises `NepError` for the first thing that is wrong."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(_MOST_BYTES + 1)
+    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+        reason = getattr(error, "strerror", None) or str(error)
+        said = _("'{path}' cannot be read: {reason}; 'nep watch --example' shows what a file looks like")
+        raise NepError(said.format(path=path, reason=reason[:1].lower() + reason[1:])) from error
+    return read_text(data, str(path))
+
+
+def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
+    """The alarms in the bytes of a file at `path`. Raises `NepError`.
+
+    `lenient`: alarms that are wrong are left out, and `AlarmFile.problems` says why; what is no file of
+    alarms at all is raised for anyway.
+    """
+    if len(data) > _MOST_BYTES:
+        said = _("'{path}' is larger than {most} bytes, so it is no file of alarms; give another")
+        raise NepError(said.format(path=path, most=_MOST_BYTES))
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        said = _("line {line} of '{path}' is no UTF-8; save it as UTF-8")
+        raise NepError(said.format(line=line, path=path)) from error
+    try:
+        value = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise NepError(_json_sentence(path, error)) from error
+    except (ValueError, RecursionError) as error:  # a number with thousands of digits, or much too deep
+        said = _("'{path}' is no file of alarms: {reason}")
+        raise NepError(said.format(path=path, reason=escaped(shortened(str(error), 200)))) from error
+    return _Reader(path, text, lenient=lenient).file(value)
+
+
+def alarms_text(rules: Sequence[AlarmRule], history: AlarmHistory | None = None) -> bytes:
+    """The bytes of a file with these."""
+    records = [record_plain(record) for record in history.records] if history is not None else []
+    value: dict[str, object] = {"format": FORMAT, "alarms": [_rule_plain(rule) for rule in rules]}
+    if records:
+        value["history"] = records
+    text = json.dumps(value, indent=1, ensure_ascii=False) + "\n"
+    return text.encode("utf-8", "backslashreplace")
+
+
+def _json_sentence(path: str, error: json.JSONDecodeError) -> str:
+    said = _(
+        "line {line} of '{path}' is no JSON: {reason}; 'nep watch --example' shows what a file looks like"
+    )
+    reason = escaped(error.msg[:1].lower() + error.msg[1:])
+    return said.format(line=error.lineno, path=path, reason=reason)
+
+
+def _rule_plain(rule: AlarmRule) -> dict[str, object]:
+    condition = rule.condition
+    when: dict[str, object] = {"node" if condition.is_about_node else "topic": condition.name}
+    if condition.is_about_value:
+        when["value"] = condition.path
+    when["is"] = condition.kind
+    if condition.kind in NEEDS_LIMIT:
+        when["than"] = condition.limit
+    if condition.for_s:
+        when["for_s"] = condition.for_s
+    if condition.margin:
+        when["margin"] = condition.margin
+    plain: dict[str, object] = {"id": rule.id}
+    if not rule.is_on:
+        plain["on"] = False
+    plain |= {"when": when, "do": [_action_plain(action) for action in rule.actions], "calm_s": rule.calm_s}
+    if rule.snoozed_until_s:
+        plain["snoozed_until_s"] = rule.snoozed_until_s
+    return plain
+
+
+def _action_plain(action: AlarmAction) -> object:
+    match action.kind:
+        case "keep":
+            return {"keep_s": action.seconds}
+        case "run":
+            return {"run": action.name}
+        case "call":
+            return {"call": action.name, "with": action.payload}
+        case "send":
+            return {"send": action.name, "message": action.payload, "type": action.msg_type}
+        case _:
+            return action.kind
+
+
+class NewerAlarmsError(NepError):
+    """A file of alarms is of a newer version, and well, as far as anybody knows here."""
+
+
+class _Wrong(Exception):  # noqa: N818 - never leaves this module
+    """An alarm that is wrong; the sentence is whole."""
+
+
+class _Reader:
+    """Turns maps into rules, and knows on which line each alarm and its keys are."""
+
+    def __init__(self, path: str, text: str, *, lenient: bool) -> None:
+        self._path, self._text, self._lenient = path, text, lenient
+        self._places: list[tuple[int, int]] | None = None
+
+    def file(self, value: object) -> AlarmFile:
+        try:
+            told = self._root(value)
+        except _Wrong as wrong:
+            raise NepError(str(wrong)) from None
+        rules: list[AlarmRule] = []
+        problems: list[str] = []
+        ids: set[str] = set()
+        for place, each in enumerate(told):
+            try:
+                rule = self._rule(each, place)
+                if rule.id in ids:
+                    self._fail("id", _("another alarm has it, too; give each its own, or none"), place)
+            except _Wrong as wrong:
+                if not self._lenient:
+                    raise NepError(str(wrong)) from None
+                problems.append(str(wrong))
+            else:
+                ids.add(rule.id)
+                rules.append(rule)
+        return AlarmFile(tuple(rules), self._history(value), tuple(problems))
+
+    def _root(self, value: object) -> list[object]:
+        if not isinstance(value, dict):
+            self._fail("", _('it is no file of alarms; it begins with {"format": 1, "alarms": ['))
+        version = value.get("format", FORMAT)
+        if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+            self._fail("format", _("it must be {format}").format(format=FORMAT))
+        if version > FORMAT:
+            said = _("'{path}' is of a newer version of nep (format {found}, known is {format}); update nep")
+            raise NewerAlarmsError(said.format(path=self._path, found=version, format=FORMAT))
+        self._check_keys(value, _ROOT_KEYS, None)
+        told = value.get("alarms")
+        if not isinstance(told, list):
+            self._fail("alarms", _('no alarms are in it; write "alarms": [...]'))
+        if len(told) > MOST_ALARMS:
+            self._fail("alarms", _("there are more than {most} alarms").format(most=MOST_ALARMS))
+        return told
+
+    def _history(self, value: object) -> AlarmHistory:
+        told = value.get("history") if isinstance(value, dict) else None
+        found = [record_from(each) for each in told] if isinstance(told, list) else []
+        return AlarmHistory([record for record in found if record is not None])
+
+    def _rule(self, told: object, place: int) -> AlarmRule:
+        if not isinstance(told, dict):
+            self._fail("", _('it is no alarm; write {"when": {...}, "do": [...]}'), place)
+        self._check_keys(told, _RULE_KEYS, place)
+        when = told.get("when")
+        if not isinstance(when, dict):
+            self._fail("when", _('it does not say when; write "when": {"topic": ..., "is": ...}'), place)
+        do = told.get("do", [])
+        if not isinstance(do, list):
+            self._fail("do", _("it must be a list of what is done"), place)
+        is_on = told.get("on", True)
+        if not isinstance(is_on, bool):
+            self._fail("on", _("it must be true or false"), place)
+        rule_id = told.get("id") or new_id()
+        if not isinstance(rule_id, str) or len(rule_id) > 64:
+            self._fail("id", _("it must be a short text"), place)
+        rule = AlarmRule(
+            rule_id,
+            self._condition(when, place),
+            tuple(self._action(each, place) for each in do),
+            is_on,
+            self._number(told, "calm_s", CALM_S, place),
+            min(self._number(told, "snoozed_until_s", 0.0, place), _LATEST_S),
+        )
+        problem = problem_of(rule)
+        if problem is not None:
+            self._fail(problem.key, problem.sentence, place)
+        return rule
+
+    def _condition(self, when: dict[str, object], place: int) -> AlarmCondition:
+        self._check_keys(when, _WHEN_KEYS, place)
+        kind = when.get("is")
+        if not isinstance(kind, str) or kind not in KINDS:
+            if kind is None:
+                self._fail("when", _('it does not say what; write "is": "silent"'), place)
+            said = _("there is no '{kind}'; {did_you_mean}")
+            told = quotable(str(kind))
+            self._fail("is", said.format(kind=told, did_you_mean=did_you_mean(told, KINDS)), place)
+        subject = "node" if kind in NODE_KINDS else "topic"
+        other = "topic" if kind in NODE_KINDS else "node"
+        if other in when:
+            said = _("'{kind}' is about a {subject}; write \"{subject}\": ...")
+            self._fail(other, said.format(kind=kind, subject=subject), place)
+        name, path = when.get(subject, ""), when.get("value", "")
+        if not isinstance(name, str) or not isinstance(path, str):
+            self._fail(subject if not isinstance(name, str) else "value", _("it must be a text"), place)
+        if path and kind not in VALUE_KINDS:
+            self._fail("value", _("'{kind}' is about no value; leave it out").format(kind=kind), place)
+        if kind in NEEDS_LIMIT and "than" not in when:
+            self._fail("is", _('it does not say how much; write "than": ...'), place)
+        return AlarmCondition(
+            kind,
+            name,
+            path,
+            self._scalar(when.get("than"), place),
+            self._number(when, "for_s", _DEFAULT_FOR.get(kind, 0.0), place),
+            self._number(when, "margin", 0.0, place),
+        )
+
+    def _action(self, told: object, place: int) -> AlarmAction:
+        if isinstance(told, str):
+            if told not in _SIMPLE:
+                known = [*_SIMPLE, *(kind for kind in ACTION_KINDS if kind not in _SIMPLE)]
+                said = _("there is no action '{kind}'; {did_you_mean}")
+                shown = quotable(told)
+                self._fail("do", said.format(kind=shown, did_you_mean=did_you_mean(shown, known)), place)
+            return AlarmAction(told)
+        kind = next((key for key in _ACTION_KEYS if isinstance(told, dict) and key in told), None)
+        if not isinstance(told, dict) or kind is None:
+            said = _('an action is {simple}, or {{"call": "name", "with": {{}}}}, "send", "run" or "keep_s"')
+            self._fail("do", said.format(simple=", ".join(f'"{each}"' for each in _SIMPLE)), place)
+        self._check_keys(told, (kind, *_ACTION_KEYS[kind]), place)
+        if kind == "keep_s":
+            return AlarmAction("keep", seconds=self._number(told, "keep_s", 60.0, place))
+        name, msg_type = told[kind], told.get("type", "json")
+        if not isinstance(name, str) or not isinstance(msg_type, str) or not msg_type:
+            self._fail(kind if not isinstance(name, str) else "type", _("it must be a text"), place)
+        payload = told.get("message" if kind == "send" else "with", {} if kind == "call" else None)
+        return AlarmAction(kind, name, payload, msg_type)
+
+    def _scalar(self, value: object, place: int) -> Scalar:
+        if value is not None and not isinstance(value, str | int | float):
+            self._fail("than", _("it must be a number, a text, true, false or null"), place)
+        return value
+
+    def _number(self, told: Mapping[str, object], key: str, default: float, place: int) -> float:
+        value = told.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not -1e300 < value < 1e300:
+            self._fail(key, _("it must be a number"), place)
+        return float(value)
+
+    def _check_keys(self, told: Mapping[str, object], known: Sequence[str], place: int | None) -> None:
+        for key in told:
+            if key not in known:
+                said = _("there is no '{key}' here; {did_you_mean}")
+                shown = quotable(key)
+                self._fail(key, said.format(key=shown, did_you_mean=did_you_mean(shown, known)), place)
+
+    def _fail(self, key: str, sentence: str, place: int | None = None) -> NoReturn:
+        line = self._line(key, place)
+        if key:
+            said = _("line {line} of '{path}', '{key}': {sentence}")
+            raise _Wrong(said.format(line=line, path=self._path, key=quotable(key), sentence=sentence))
+        raise _Wrong(
+            _("line {line} of '{path}': {sentence}").format(line=line, path=self._path, sentence=sentence)
+        )
+
+    def _line(self, key: str, place: int | None) -> int:
+        """The line of a key: in the alarm at this place, or of the whole file."""
+        if self._places is None:
+            self._places = list(_places_of(self._text))
+        begin, end = 0, len(self._text)
+        if place is not None and place < len(self._places):
+            begin, end = self._places[place]
+        found = re.compile(re.escape(json.dumps(key, ensure_ascii=False))).search(self._text, begin, end)
+        at = found.start() if key and found is not None else begin
+        return self._text.count("\n", 0, at) + 1
+
+
+def _places_of(text: str) -> list[tuple[int, int]]:
+    """Where in a JSON text each alarm begins and ends; as far as it is one."""
+    places: list[tuple[int, int]] = []
+    decode: Callable[[str, int], tuple[object, int]] = json.JSONDecoder().raw_decode
+    at = _after(text, 1 if text[:1] == "{" else text.find("{") + 1)
+    while at < len(text) and text[at] == '"':
+        key, at = decode(text, at)
+        at = _after(text, _after(text, at) + 1)
+        if key != "alarms" or text[at : at + 1] != "[":
+            _value, at = decode(text, at)
+            at = _after(text, _after(text, at) + 1)
+            continue
+        at = _after(text, at + 1)
+        while at < len(text) and text[at] != "]":
+            _value, end = decode(text, at)
+            places.append((at, end))
+            end = _after(text, end)
+            at = _after(text, end + 1) if text[end : end + 1] == "," else end
+        return places
+    return places
+
+
+def _after(text: str, at: int) -> int:
+    """The next place that is not white space."""
+    while at < len(text) and text[at] in " \t\r\n":
+        at += 1
+    return at

@@ -1,0 +1,162 @@
+"""Alarms as people read them: the rule, what came on, what is seen now."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from nep.i18n import _, lazy, listed, number
+from nep.programs.alarms.rule import KEEP_S, AlarmAction, AlarmCondition, AlarmRule, Scalar
+from nep.text import quotable, shortened
+
+__all__ = [
+    "action_words",
+    "condition_words",
+    "limit_words",
+    "rule_words",
+    "seen_words",
+    "subject_words",
+    "time_words",
+    "value_words",
+    "what_words",
+]
+
+_SHOWN = 40
+_DO_NOTHING = lazy("say it in the list of alarms")
+
+_CONDITIONS: Mapping[str, str] = {
+    "silent": lazy("{subject} is silent for {time}"),
+    "rate_below": lazy("{subject} has fewer than {limit}"),
+    "rate_above": lazy("{subject} has more than {limit}"),
+    "loses": lazy("{subject} loses more than {limit} in {time}"),
+    "appears": lazy("a topic {subject} appears"),
+    "below": lazy("{subject} is below {limit}"),
+    "above": lazy("{subject} is above {limit}"),
+    "equals": lazy("{subject} is {limit}"),
+    "is_not": lazy("{subject} is not {limit}"),
+    "changes": lazy("{subject} changes"),
+    "leaves": lazy("{subject} leaves"),
+    "comes": lazy("{subject} comes"),
+}
+_FOR: Mapping[str, str] = {
+    "rate_below": lazy("{subject} has fewer than {limit} for {time}"),
+    "rate_above": lazy("{subject} has more than {limit} for {time}"),
+    "below": lazy("{subject} is below {limit} for {time}"),
+    "above": lazy("{subject} is above {limit} for {time}"),
+    "equals": lazy("{subject} is {limit} for {time}"),
+    "is_not": lazy("{subject} is not {limit} for {time}"),
+    "leaves": lazy("{subject} is away for {time}"),
+}
+_CAME: Mapping[str, str] = {
+    "silent": lazy("{subject} is silent"),
+    "rate_below": lazy("{subject} has {seen}, fewer than {limit}"),
+    "rate_above": lazy("{subject} has {seen}, more than {limit}"),
+    "loses": lazy("{subject} loses {seen}"),
+    "appears": lazy("the topic {seen} has appeared"),
+    "below": lazy("{subject} is {seen}, below {limit}"),
+    "above": lazy("{subject} is {seen}, above {limit}"),
+    "equals": lazy("{subject} is {seen}"),
+    "is_not": lazy("{subject} is {seen}, not {limit}"),
+    "changes": lazy("{subject} has changed to {seen}"),
+    "leaves": lazy("{subject} has left"),
+    "comes": lazy("{subject} has come"),
+}
+_ACTIONS: Mapping[str, str] = {
+    "banner": lazy("show a banner"),
+    "sound": lazy("play a sound"),
+    "keep": lazy("keep the last {time}"),
+    "run": lazy("run “{name}”"),
+    "call": lazy("call {name}"),
+    "send": lazy("send to {name}"),
+    "stop": lazy("stop all robots"),
+    "console": lazy("write to the Console"),
+}
+
+
+def time_words(seconds: float) -> str:
+    """A time as a person would say it: 0.5 s, 60 s, 10 min, 3 h."""
+    for unit, size in ((_("{count} h"), 3600.0), (_("{count} min"), 60.0)):
+        if seconds > size and math.isclose(seconds % size, 0.0, abs_tol=1e-9):
+            return unit.format(count=number(seconds / size))
+    return _("{count} s").format(count=number(round(seconds, 3)))
+
+
+def value_words(value: object) -> str:
+    """A value of a message; a long text is shortened, and what is no single value told by its kind."""
+    if isinstance(value, bool) or value is None:
+        return {True: _("true"), False: _("false"), None: _("null")}[value]
+    if isinstance(value, int | float):
+        return number(value, "d" if isinstance(value, int) and abs(value) < 10**15 else ".6g")
+    if isinstance(value, str):
+        return f"“{quotable(shortened(value, _SHOWN))}”"
+    return _("a list") if isinstance(value, list | tuple) else _("an object")
+
+
+def limit_words(condition: AlarmCondition, value: Scalar) -> str:
+    """A limit or a value that was seen, with the unit of the condition."""
+    if condition.kind in {"rate_below", "rate_above"} and isinstance(value, int | float):
+        return _("{count} messages a second").format(count=number(value, ".4g"))
+    if condition.kind == "loses" and isinstance(value, int | float):
+        return _("{count} %").format(count=number(value, ".3g"))
+    return value_words(value)
+
+
+def subject_words(condition: AlarmCondition) -> str:
+    """What it is about: a topic, a node, or "range of /distance"."""
+    if not condition.name:
+        return _("a node") if condition.is_about_node else _("a topic")
+    name = quotable(condition.name)
+    if condition.is_about_value and condition.path not in {"", "."}:
+        return _("{value} of {topic}").format(value=quotable(condition.path), topic=name)
+    return name
+
+
+def condition_words(condition: AlarmCondition) -> str:
+    """The condition: "/robot/camera is silent for 2 s"."""
+    words = _CONDITIONS[condition.kind]
+    if condition.for_s > 0:
+        words = _FOR.get(condition.kind, words)
+    return _(words).format(
+        subject=subject_words(condition),
+        limit=limit_words(condition, condition.limit),
+        time=time_words(condition.for_s),
+    )
+
+
+def action_words(action: AlarmAction) -> str:
+    """What is done: "show a banner", "call restart_lidar"."""
+    return _(_ACTIONS[action.kind]).format(
+        name=quotable(action.name), time=time_words(action.seconds or KEEP_S)
+    )
+
+
+def rule_words(rule: AlarmRule) -> str:
+    """The whole rule in one sentence, without full stop."""
+    actions = [action_words(action) for action in rule.actions]
+    return _("When {condition}: {actions}").format(
+        condition=condition_words(rule.condition), actions=listed(actions) if actions else _(_DO_NOTHING)
+    )
+
+
+def what_words(condition: AlarmCondition, seen: Scalar) -> str:
+    """What came on, for the history: "/distance: range is 0.36, below 0.4"; no full stop."""
+    return _(_CAME[condition.kind]).format(
+        subject=subject_words(condition),
+        limit=limit_words(condition, condition.limit),
+        seen=quotable(seen)
+        if condition.kind == "appears" and isinstance(seen, str)
+        else limit_words(condition, seen),
+    )
+
+
+def seen_words(condition: AlarmCondition, seen: Scalar) -> str:
+    """What is seen now, in a few words: "0.82 now", "silent for 4 s"; "" when nothing was."""
+    if condition.kind == "silent":
+        if not isinstance(seen, int | float) or seen < 1:
+            return ""
+        return _("silent for {time}").format(time=time_words(round(seen)))
+    if seen is None and condition.kind not in {"equals", "is_not"}:
+        return ""
+    if condition.kind in {"leaves", "comes", "appears"}:
+        return ""
+    return _("{value} now").format(value=limit_words(condition, seen))

@@ -1,0 +1,196 @@
+"""One alarm while it is watched: since when it is so, and whether that is for long enough.
+
+Pure: it is told the time. An alarm that is on stays on until it was well for `calm_s`; what comes again
+before is counted, not told anew.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from nep.messages.fields import MISSING, Path, parse_path, pick
+from nep.programs.alarms.rule import EVENT_KINDS, MOST_LETTERS, AlarmRule, Scalar
+
+__all__ = ["AlarmTrack", "Turn", "scalar_of"]
+
+EVENT_SHOWN_S = 5.0
+"""So long is an alarm on, at least, that tells of a moment."""
+
+Trouble = Literal["", "missing", "no_number"]
+
+
+class Turn(NamedTuple):
+    """An alarm came on or went off; `lasted_s` is how long it was on, 0 when it came."""
+
+    is_on: bool
+    seen: Scalar
+    lasted_s: float
+    times: int
+
+
+@dataclass(slots=True)
+class _Value:
+    """What was read last."""
+
+    path: Path = ()
+    last: object = MISSING
+
+
+class AlarmTrack:
+    """What is known of one alarm. `observe` what is so, `settle` as time goes by; each may give a `Turn`."""
+
+    def __init__(self, rule: AlarmRule) -> None:
+        """`rule` has no problem (`problem_of`)."""
+        self.rule = rule
+        condition = rule.condition
+        self._for_s = 0.0 if condition.kind in {"silent", "loses"} else condition.for_s
+        self._calm_s = max(rule.calm_s, EVENT_SHOWN_S) if condition.kind in EVENT_KINDS else rule.calm_s
+        self._value = _Value(parse_path(condition.path) if condition.is_about_value else ())
+        self._is_below = condition.kind == "below"
+        self._bound = condition.number if condition.kind in {"below", "above"} else None
+        self._true_since: float | None = None
+        self._false_since: float | None = None
+        self.on_since: float | None = None
+        self.count = 0
+        self.seen: Scalar = None
+        self.was_seen = False
+        """Whether what it is about was ever there."""
+        self.trouble: Trouble = ""
+        """Why the value can't be compared, as it was last."""
+
+    @property
+    def is_on(self) -> bool:
+        """Whether it is on."""
+        return self.on_since is not None
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether it is so, but not yet for long enough."""
+        return self._true_since is not None and not self.is_on
+
+    def read(self, payload: object, now: float) -> Turn | None:
+        """Take over a message of its topic; `now` is a monotonic clock in s."""
+        value = pick(payload, self._value.path)
+        if self._is_well(value):
+            self.seen, self.trouble, self.was_seen = value, "", True  # type: ignore[assignment]  # a number
+            return None
+        self.was_seen = True
+        if value is MISSING:
+            self.trouble = "missing"
+            return None
+        kind, before = self.rule.condition.kind, self._value.last
+        self._value.last = value
+        if kind == "changes":
+            self.seen = scalar_of(value)
+            self.trouble = ""
+            return self.happened(now) if before is not MISSING and not _same(before, value) else None
+        if kind in {"equals", "is_not"}:
+            self.trouble = ""
+            same = _same(value, self.rule.condition.limit)
+            return self.observe(same is (kind == "equals"), scalar_of(value), now)
+        number = _number(value)
+        self.trouble = "no_number" if number is None else ""
+        if number is None:
+            return None
+        seen = scalar_of(value) if math.isfinite(number) else number
+        return self.compare(number, now, is_below=kind == "below", seen=seen)
+
+    def _is_well(self, value: object) -> bool:
+        """Whether it is a number on the well side of the limit, and nothing was otherwise: nearly always."""
+        if self._bound is None or self.on_since is not None or self._true_since is not None:
+            return False
+        if type(value) is not float and type(value) is not int:
+            return False
+        return value >= self._bound if self._is_below else value <= self._bound
+
+    def compare(self, number: float, now: float, *, is_below: bool, seen: Scalar = None) -> Turn | None:
+        """Take over a number that is compared with the limit; back beyond the margin it is well.
+
+        `seen` is what it was before it became a float, if it was another number.
+        """
+        limit, margin = self.rule.condition.number, self.rule.condition.margin
+        if self.is_on:
+            is_so = number < limit + margin if is_below else number > limit - margin
+        else:
+            is_so = number < limit if is_below else number > limit
+        return self.observe(is_so, number if seen is None else seen, now)
+
+    def happened(self, now: float) -> Turn | None:
+        """What it waits for happened at this moment."""
+        turn = self.observe(True, self.seen, now)
+        self.observe(False, self.seen, now)
+        return turn
+
+    def observe(self, is_so: bool, seen: Scalar, now: float) -> Turn | None:
+        """It is so, or it is not, and what was seen."""
+        turn = self.settle(now)
+        self.was_seen = True
+        self.seen = seen
+        if is_so:
+            if self.is_on and self._false_since is not None:
+                self.count += 1  # well for a moment only
+            self._false_since = None
+            if self._true_since is None:
+                self._true_since = now
+        else:
+            self._true_since = None
+            if self.is_on and self._false_since is None:
+                self._false_since = now
+        return turn or self.settle(now)
+
+    def settle(self, now: float) -> Turn | None:
+        """Time went by."""
+        since, well = self._true_since, self._false_since
+        if self.on_since is None:
+            if since is None or now - since < self._for_s:
+                return None
+            self.on_since, self.count, self._false_since = now, 1, None
+            return Turn(True, self.seen, 0.0, 1)
+        if well is None or now - well < self._calm_s:
+            return None
+        turn = Turn(False, self.seen, max(0.0, well - self.on_since), self.count)
+        self.on_since = self._false_since = None
+        return turn
+
+    def end(self, now: float) -> Turn | None:
+        """It is watched no more."""
+        if self.on_since is None:
+            return None
+        end = now if self._false_since is None else self._false_since
+        turn = Turn(False, self.seen, max(0.0, end - self.on_since), self.count)
+        self.on_since = self._true_since = self._false_since = None
+        return turn
+
+
+def scalar_of(value: object) -> Scalar:
+    """A value as an alarm tells it: lists and maps have none, long texts are cut."""
+    if isinstance(value, str):
+        return value[:MOST_LETTERS]
+    if isinstance(value, bool | int | float):
+        return value
+    return (
+        f"{{{len(value)}}}"
+        if isinstance(value, Mapping)
+        else f"[{len(value)}]"
+        if isinstance(value, list)
+        else None
+    )
+
+
+def _number(value: object) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or (value != value):  # noqa: PLR0124  NaN
+        return None
+    try:
+        return float(value)
+    except OverflowError:  # an integer beyond every float
+        return math.inf if value > 0 else -math.inf
+
+
+def _same(one: object, other: object) -> bool:
+    """Whether two values are equal; yes is not 1."""
+    if isinstance(one, bool) is not isinstance(other, bool):
+        return False
+    return one == other

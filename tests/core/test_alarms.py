@@ -1,0 +1,145 @@
+"""Alarms of a session: alerts, what is carried out on a real network, and their file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.alarms import FILE, LATE_S
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
+from nep.programs.alarms.rule_file import alarms_text, read_alarms
+from tests.core.waiting import tick_until
+
+BELOW = AlarmCondition("below", "/distance", "range", 0.4)
+
+
+def alert(session: Session, rule: AlarmRule):
+    return next((each for each in session.alerts.active if each.id == f"alarm:{rule.id}"), None)
+
+
+def test_a_value_brings_an_alarm_on_which_calls_and_sends(session: Session) -> None:
+    asked, answer = [], "fine"
+
+    def restart(request: object) -> object:
+        asked.append(request)
+        return answer
+
+    with nep.node("robot") as node:
+        node.new_server("restart", restart, threads=1)
+        heard = node.new_sub("/say", "json")
+        publisher = node.new_pub("/distance", "json")
+        actions = (
+            AlarmAction("banner"),
+            AlarmAction("call", "restart", {"n": 1}),
+            AlarmAction("send", "/say", {"say": "near"}),
+            AlarmAction("keep"),
+            AlarmAction("run", "Greeting"),
+            AlarmAction("console"),
+        )
+        rule = AlarmRule("d", BELOW, actions)
+        session.alarms.put(rule)
+        tick_until(session, lambda: publisher.subscribers == 1)
+        publisher.publish({"range": 0.36})
+        tick_until(session, lambda: alert(session, rule) is not None)
+        record = session.alarms.history.records[0]
+        tick_until(session, lambda: len(record.deeds) == 4)
+        assert asked == [{"n": 1}]
+        assert heard.listen(timeout_s=5.0) == (True, {"say": "near"})
+        assert {deed.kind: deed.words for deed in record.deeds} == {
+            "call": "restart answered",
+            "send": "sent to /say",
+            "keep": "nothing was kept: nothing is being recorded",
+            "run": "“Greeting” was not run: there is no window",
+        }
+        said = alert(session, rule)
+        assert said.title == "Range of /distance is 0.36, below 0.4."
+        assert not session.alerts.dismissed(said.id)
+        assert any(line.text.startswith("range of /distance") for line in session.console.records)
+        publisher.publish({"range": 2})
+        tick_until(session, lambda: alert(session, rule) is None)
+        assert record.lasted_s is not None
+
+
+def test_an_alarm_without_a_banner_is_among_the_alerts_only(session: Session) -> None:
+    with nep.node("robot") as node:
+        publisher = node.new_pub("/distance", "json")
+        rule = AlarmRule("d", BELOW, ())
+        session.alarms.put(rule)
+        tick_until(session, lambda: publisher.subscribers == 1)
+        publisher.publish({"range": 0.1})
+        tick_until(session, lambda: alert(session, rule) is not None)
+        assert session.alerts.dismissed("alarm:d")
+        assert [each.id for each in session.alarms.on] == ["d"]
+        session.alarms.remove("d")
+        tick_until(session, lambda: alert(session, rule) is None)
+        assert publisher.subscribers == 1 or not session.alarms.alarms.evaluator.topics
+        session.alarms.put_back()
+        assert [each.id for each in session.alarms.rules] == ["d"]
+
+
+def at_rest(folder: Path) -> Session:
+    """A session that has not joined any network."""
+    return Session(Settings(folder), address="127.0.0.1:1", start_processes=False)
+
+
+def test_alarms_and_their_history_survive_a_restart(tmp_path: Path) -> None:
+    first = at_rest(tmp_path)
+    kept = first.alarms.new(BELOW)
+    first.alarms.new(AlarmCondition("silent", "", for_s=2.0))  # nobody has said which topic
+    first.alarms.snooze(kept.id, 4e9)
+    first.close()
+    assert [rule.id for rule in read_alarms(tmp_path / FILE).rules] == [kept.id]
+    second = at_rest(tmp_path)
+    assert [(rule.id, rule.snoozed_until_s) for rule in second.alarms.rules] == [(kept.id, 4e9)]
+    second.close()
+
+
+@pytest.mark.parametrize("data", [b"{oops", b"\xff", b"[]", b""])
+def test_a_damaged_file_is_kept_beside_and_told(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / FILE).write_bytes(data)
+    session = at_rest(tmp_path)
+    assert session.alarms.rules == ()
+    assert (tmp_path / "alarms.damaged.json").read_bytes() == data
+    (said,) = [each for each in session.alerts.active if each.id == "alarms:file"]
+    assert "alarms.damaged.json" in said.detail
+    session.alarms.new(BELOW)
+    session.close()
+    assert len(read_alarms(tmp_path / FILE).rules) == 1
+
+
+def test_of_a_file_with_one_wrong_alarm_the_others_are_watched(tmp_path: Path) -> None:
+    text = json.loads(alarms_text([AlarmRule("good", BELOW)]))
+    text["alarms"].append({"when": {"topic": "/t", "is": "sielnt"}})
+    (tmp_path / FILE).write_text(json.dumps(text), encoding="utf-8")
+    session = at_rest(tmp_path)
+    assert [rule.id for rule in session.alarms.rules] == ["good"]
+    assert json.loads((tmp_path / "alarms.damaged.json").read_text(encoding="utf-8")) == text
+    session.close()
+
+
+def test_the_file_of_a_newer_version_stays_as_it_is(tmp_path: Path) -> None:
+    data = b'{"format": 2, "alarms": [], "more": true}'
+    (tmp_path / FILE).write_bytes(data)
+    session = at_rest(tmp_path)
+    session.alarms.new(BELOW)
+    session.close()
+    assert (tmp_path / FILE).read_bytes() == data
+    assert not (tmp_path / "alarms.damaged.json").exists()
+
+
+def test_what_waited_too_long_for_a_master_is_not_sent(tmp_path: Path) -> None:
+    now = [0.0]
+    session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False, clock=lambda: now[0])
+    jobs = []
+    session.source.submit = lambda _what, job: jobs.append(job)  # type: ignore[method-assign]
+    told: list[tuple[bool, str]] = []
+    session.alarms._command(None, AlarmAction("send", "/cmd", 1), lambda *said: told.append(said))  # type: ignore[arg-type]
+    now[0] += LATE_S + 1
+    jobs[0](None)
+    assert told == [(False, "no master was there")]
+    session.close()

@@ -1,0 +1,42 @@
+"""A right click on a topic makes an alarm, which tells by a banner and goes off by itself."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+import nep
+from tests.e2e.person import middle
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+from tests.e2e.x11 import RIGHT
+
+pytestmark = pytest.mark.timeout(240)
+
+
+def test_a_right_click_makes_an_alarm_which_tells_and_goes_off(studio: Studio) -> None:
+    with nep.node("talker", wait_s=60.0) as node:
+        publisher = node.new_pub("/distance", "json")
+        studio.screen.key("2", ["Alt"])
+        row = studio.row("Topics", "/distance")
+        studio.screen.click(*middle(row["rect"]), RIGHT)
+        studio.pick("New alarm")
+        studio.find("/distance is silent for 2 s", kind="AlarmRow")
+        studio.says("/distance has been silent for")
+        talking = threading.Event()
+
+        def talk() -> None:
+            while not talking.wait(0.1):
+                publisher.publish({"range": 0.3})
+
+        thread = threading.Thread(target=talk)
+        thread.start()
+        try:
+            until(lambda: not studio.all("Close this message"), "the banner goes")
+            studio.click("What must be so: silent")
+            studio.pick("A topic has more messages")
+            studio.find("/distance has more than 100 messages a second for 2 s", kind="AlarmRow")
+        finally:
+            talking.set()
+            thread.join()

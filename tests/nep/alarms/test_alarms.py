@@ -1,0 +1,139 @@
+"""What is done when an alarm comes on, what came of it, snooze and history."""
+
+from __future__ import annotations
+
+from nep.programs.alarms import AlarmAction
+from nep.programs.alarms.alarms import RETRY_S
+from nep.programs.alarms.history import MOST_RECORDS, AlarmHistory, AlarmRecord
+from tests.nep.alarms.scene import MIDNIGHT_S, Scene, rule
+
+CALL = AlarmAction("call", "restart", {})
+
+
+class Hands:
+    """Carries out actions as a test says: ``well`` or not, ``later`` or at once."""
+
+    def __init__(self) -> None:
+        self.done = []
+        self.well = True
+
+    def __call__(self, event, action, done) -> None:
+        self.done.append((event.kind, action.kind))
+        done(self.well, "answered" if self.well else "no answer")
+
+
+def near(scene: Scene) -> None:
+    scene.send("/d", {"r": 0})
+
+
+def far(scene: Scene) -> None:
+    scene.send("/d", {"r": 9})
+
+
+def scene_with(*actions: AlarmAction, hands: Hands, **more: object) -> Scene:
+    kinds = ("banner", "call", "stop")
+    made = Scene(
+        rule("below", "/d", *actions, path="r", limit=1, **more), carriers=dict.fromkeys(kinds, hands)
+    )
+    made.graph(("/d",))
+    return made
+
+
+def test_actions_are_done_once_in_their_order_and_written_down() -> None:
+    hands = Hands()
+    scene = scene_with(AlarmAction("stop"), AlarmAction("banner"), AlarmAction("sound"), hands=hands)
+    near(scene)
+    near(scene)
+    scene.wait(0.2)
+    assert hands.done == [("on", "stop"), ("on", "banner")]
+    (record,) = scene.alarms.history
+    assert [deed.kind for deed in record.deeds] == ["stop", "banner", "sound"]
+    assert record.deeds[-1].words == "it can't be done here"  # nobody carries out a sound
+    assert record.words == "r of /d is 0, below 1"
+    assert not scene.alarms.is_busy
+
+
+def test_a_call_that_fails_is_tried_again_while_it_is_on() -> None:
+    hands = Hands()
+    hands.well = False
+    scene = scene_with(CALL, hands=hands)
+    near(scene)
+    scene.wait(0.1)
+    assert 0 < (scene.alarms.retry_in_s("r") or 0) <= RETRY_S
+    scene.wait(RETRY_S + 1)
+    assert len(hands.done) == 2
+    hands.well = True
+    scene.wait(RETRY_S + 1)
+    assert scene.alarms.retry_in_s("r") is None
+    assert [deed.words for deed in scene.alarms.history.records[-1].deeds] == ["answered"]
+    scene.wait(3 * RETRY_S)
+    assert len(hands.done) == 3
+
+
+def test_nothing_is_tried_again_when_it_is_well_or_the_rule_has_changed() -> None:
+    hands = Hands()
+    hands.well = False
+    scene = scene_with(CALL, hands=hands)
+    near(scene)
+    far(scene)
+    scene.wait(RETRY_S + 5)
+    assert len(hands.done) == 1
+    near(scene)
+    scene.wait(1)
+    scene.alarms.remove("r")
+    scene.wait(RETRY_S + 5)
+    assert len(hands.done) == 2
+
+
+def test_an_action_that_raises_does_not_keep_the_next_from_its_turn() -> None:
+    def broken(_event, _action, _done) -> None:
+        raise RuntimeError("no arm")
+
+    hands = Hands()
+    condition = rule("below", "/d", AlarmAction("stop"), AlarmAction("banner"), path="r", limit=1)
+    scene = Scene(condition, carriers={"stop": broken, "banner": hands})
+    scene.graph(("/d",))
+    near(scene)
+    scene.wait(0.1)
+    assert hands.done == [("on", "banner")]
+    assert [deed.words for deed in scene.alarms.history.records[0].deeds] == ["no arm", "answered"]
+
+
+def test_while_it_is_snoozed_nothing_is_done_and_the_history_goes_on() -> None:
+    hands = Hands()
+    scene = scene_with(AlarmAction("banner"), hands=hands, snoozed_until_s=MIDNIGHT_S + 110)
+    near(scene)
+    assert hands.done == []
+    assert [record.was_snoozed for record in scene.alarms.history] == [True]
+    scene.wait(11)  # the snooze ends, and it is still so
+    assert hands.done == [("still", "banner")]
+    assert len(scene.alarms.history) == 1
+    scene.wait(60)
+    assert len(hands.done) == 1
+
+
+def test_a_snooze_that_ends_when_it_is_well_does_nothing() -> None:
+    hands = Hands()
+    scene = scene_with(AlarmAction("banner"), hands=hands, snoozed_until_s=MIDNIGHT_S + 110)
+    near(scene)
+    far(scene)
+    scene.wait(30)
+    assert hands.done == []
+    scene.alarms.snooze("r", 0.0)
+    near(scene)
+    assert hands.done == [("on", "banner")]
+
+
+def test_the_history_is_bounded_and_says_how_often() -> None:
+    history = AlarmHistory()
+    for number in range(MOST_RECORDS + 10):
+        history.add(AlarmRecord("a" if number % 2 else "b", "x", float(number), is_on=number == 509))
+    assert len(history) == MOST_RECORDS
+    assert history.since("a", 500.0) == 5
+    last = history.last("a")
+    assert last is not None
+    assert last.at_s == 509.0
+    assert history.current("a") is last
+    assert history.current("b") is None
+    history.clear()
+    assert [record.at_s for record in history] == [509.0]

@@ -1,0 +1,259 @@
+"""What brings an alarm on, and what does not."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import pytest
+
+from nep.programs.alarms.evaluator import LARGE_BYTES
+from nep.programs.alarms.losses import TopicLosses
+from nep.protocol.graph_view import SubscriberInfo, TopicInfo
+from tests.nep.alarms.scene import MIDNIGHT_S, Scene, message, rule
+
+
+def test_a_topic_that_was_never_there_is_waited_for() -> None:
+    scene = Scene(rule("silent", "/cam", for_s=2.0))
+    scene.graph(("/other",))
+    assert scene.wait(10) == []
+    assert scene.state() == "waits"
+
+
+def test_silence_is_told_with_its_length_and_ends_with_a_message() -> None:
+    scene = Scene(rule("silent", "/cam", for_s=2.0))
+    scene.graph(("/cam",))
+    assert scene.wait(1.5) == []
+    scene.send("/cam", 1)
+    assert scene.wait(1.9) == []
+    ((kind, seen),) = scene.wait(0.2)
+    assert kind == "on"
+    assert seen == pytest.approx(2.0, abs=0.11)
+    scene.wait(2)
+    assert scene.state() == "on"
+    scene.send("/cam", 1)
+    assert scene.happened() == []
+    scene.wait(1.5)
+    scene.send("/cam", 1)
+    (record,) = scene.alarms.history
+    assert [kind for kind, _seen in scene.wait(1)] == ["off"]
+    assert record.lasted_s == pytest.approx(2.1, abs=0.25)
+    assert not record.is_on
+
+
+def test_a_publisher_that_leaves_is_silent_too_and_a_master_that_is_away_changes_nothing() -> None:
+    scene = Scene(rule("silent", "/cam", for_s=1.0))
+    scene.graph(("/cam",))
+    scene.send("/cam", 1)
+    scene.alarms.evaluator.see(None)
+    scene.wait(0.5)
+    scene.send("/cam", 1)
+    assert scene.wait(0.8) == []
+    assert [kind for kind, _ in scene.wait(0.5)] == ["on"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "limit", "well", "bad"),
+    [
+        ("below", 0.4, 0.4, 0.39), ("above", 20, 20, 20.5), ("equals", "stuck", "well", "stuck"),
+        ("equals", True, 1, True), ("equals", 0, False, 0), ("equals", None, 0, None),
+        ("is_not", "ok", "ok", "hot"), ("above", 2**53, 2**53, 2**64 - 1),
+    ],
+)  # fmt: skip
+def test_a_value_is_compared(kind: str, limit: object, well: object, bad: object) -> None:
+    scene = Scene(rule(kind, "/d", path="a.v[1]", limit=limit))
+    scene.graph(("/d",))
+    assert scene.send("/d", {"a": {"v": [0, well]}}) == []
+    assert scene.send("/d", {"a": {"v": [0, bad]}}) == [("on", bad)]
+
+
+def test_an_integer_beyond_every_float_is_very_large() -> None:
+    scene = Scene(rule("below", "/d", path=".", limit=-1))
+    scene.graph(("/d",))
+    huge = message("/d", 0)
+    huge.decoded = -(10**400)
+    assert scene.send("/d", huge) == [("on", -math.inf)]
+
+
+def test_a_moment_is_seen_though_the_next_message_of_the_batch_is_well() -> None:
+    scene = Scene(rule("below", "/d", path="r", limit=0.4))
+    scene.graph(("/d",))
+    assert scene.send("/d", {"r": 1}, {"r": 0.3}, {"r": 1}) == [("on", 0.3)]
+
+
+@pytest.mark.parametrize(
+    "payload", [b"{oops", {"r": "near"}, {"r": True}, {"other": 0}, b'{"r": NaN}', [], 0]
+)
+def test_what_cannot_be_compared_is_no_alarm_and_says_so(payload: object) -> None:
+    scene = Scene(rule("below", "/d", path="r", limit=0.4))
+    scene.graph(("/d",))
+    assert scene.send("/d", payload) == []
+    state = scene.alarms.evaluator.state(scene.alarms.rules[0])
+    assert state.trouble in {"missing", "no_number", "unreadable"}
+    assert scene.send("/d", {"r": 0.3}) == [("on", 0.3)]
+    assert scene.alarms.evaluator.state(scene.alarms.rules[0]).trouble == ""
+
+
+def test_it_must_be_so_for_its_time_without_a_break() -> None:
+    scene = Scene(rule("below", "/d", path="r", limit=1, for_s=1.0))
+    scene.graph(("/d",))
+    scene.send("/d", {"r": 0})
+    assert scene.state() == "pending"
+    scene.wait(0.8)
+    scene.send("/d", {"r": 2})
+    assert scene.wait(3) == []
+    scene.send("/d", {"r": 0.5})
+    assert scene.wait(1.2) == [("on", 0.5)]
+
+
+def test_what_flutters_is_one_alarm_with_a_count() -> None:
+    scene = Scene(rule("below", "/d", path="r", limit=1, calm_s=1.0))
+    scene.graph(("/d",))
+    events = []
+    for value in (0, 2, 0, 2, 0, 2):
+        events += scene.send("/d", {"r": value}) + scene.wait(0.5)
+    events += scene.wait(2)
+    assert [kind for kind, _seen in events] == ["on", "off"]
+    (record,) = scene.alarms.history
+    assert record.count == 3
+    assert record.lasted_s == pytest.approx(2.5, abs=0.2)
+
+
+def test_within_the_margin_it_stays_on() -> None:
+    scene = Scene(rule("below", "/d", path="r", limit=1, margin=0.5, calm_s=1.0))
+    scene.graph(("/d",))
+    scene.send("/d", {"r": 0.9})
+    scene.send("/d", {"r": 1.2})
+    assert scene.wait(5) == []
+    scene.send("/d", {"r": 1.5})
+    assert scene.wait(1.2) == [("off", 1.5)]
+
+
+def test_a_change_is_told_but_not_the_first_value() -> None:
+    scene = Scene(rule("changes", "/mode", path="."))
+    scene.graph(("/mode",))
+    assert scene.send("/mode", "idle", "idle") == []
+    assert scene.send("/mode", "run") == [("on", "run")]
+    assert scene.wait(6) == [("off", "run")]
+
+
+def test_a_node_leaves_only_when_it_was_there_and_the_master_knows_all() -> None:
+    scene = Scene(rule("leaves", "lidar"))
+    scene.graph(nodes=("other",))
+    scene.wait(5)
+    assert scene.state() == "waits"
+    scene.graph(nodes=("lidar",))
+    assert scene.state() == "well"
+    scene.graph(nodes=(), epoch=2)  # a new master, who does not know it yet
+    assert scene.wait(2) == []
+    scene.graph(nodes=("lidar",), epoch=2)
+    scene.alarms.evaluator.see(None)
+    assert scene.wait(20) == []
+    assert scene.graph(nodes=(), epoch=2) == [("on", None)]
+    scene.graph(nodes=("lidar",), epoch=2)
+    assert scene.wait(3) == [("off", None)]
+
+
+def test_a_node_that_comes_and_a_topic_that_appears_are_moments() -> None:
+    scene = Scene(rule("comes", "arm"), rule("appears", "/debug/*", id="t"))
+    scene.graph(("/debug/old",), ("arm",))
+    scene.wait(4)
+    assert scene.graph(("/debug/old",), ()) == []
+    assert scene.graph(("/debug/old", "/debug/new", "/else"), ("arm",)) == [
+        ("on", None),
+        ("on", "/debug/new"),
+    ]
+    assert [kind for kind, _ in scene.wait(6)] == ["off", "off"]
+
+
+def test_rates_are_counted_and_not_known_at_once() -> None:
+    scene = Scene(rule("rate_below", "/odom", limit=8.0, calm_s=1.0))
+    scene.graph(("/odom",))
+    events = []
+    for _ in range(40):
+        events += scene.send("/odom", 1) + scene.wait(0.1)
+    assert events == []
+    events = scene.wait(3)
+    assert [kind for kind, _ in events] == ["on"]
+    assert events[0][1] < 8.0
+
+
+def test_losses_of_any_subscriber_are_a_share_of_the_last_seconds() -> None:
+    scene = Scene(rule("loses", "/cmd", limit=1.0, for_s=10.0))
+    events = []
+    for second in range(20):
+        lost = 5 if second >= 5 else 0
+        events += scene.graph(("/cmd",), losses={"/cmd": (lost, second * 20)}) + scene.wait(1)
+    assert [kind for kind, _ in events] == ["on", "off"]
+    assert 1.0 < events[0][1] < 20.0
+
+
+def test_a_subscriber_that_begins_anew_is_no_loss() -> None:
+    losses = TopicLosses()
+    assert losses.percent(10, 0.0) is None
+
+    def told(id: int, lost: int, received: int) -> TopicInfo:
+        return TopicInfo("/t", "json", "json", (), (SubscriberInfo(id, "n", received, lost),))
+
+    losses.add(told(1, 50, 100), 0.0)
+    losses.add(told(1, 51, 109), 1.0)
+    assert losses.percent(10, 1.0) == pytest.approx(10.0)
+    losses.add(told(2, 900, 0), 2.0)
+    losses.add(told(2, 900, 0), 3.0)
+    losses.add(told(2, 0, 5), 4.0)
+    losses.add(None, 5.0)
+    assert losses.percent(10, 5.0) == pytest.approx(100 * 1 / 15)
+    assert losses.percent(10, 50.0) == 0.0
+
+
+def test_large_messages_are_read_once_a_batch_and_the_others_counted() -> None:
+    scene = Scene(rule("above", "/big", path="n", limit=5))
+    scene.graph(("/big",))
+    large = [message("/big", {"n": n, "x": "x" * LARGE_BYTES}) for n in (9, 9, 1)]
+    assert scene.send("/big", *large) == []
+    assert scene.alarms.evaluator.skipped == 2
+    assert scene.send("/big", large[0]) == [("on", 9)]
+
+
+def test_rules_that_stay_keep_what_is_known_and_one_that_goes_ends_its_alarm() -> None:
+    stays = rule("below", "/d", path="r", limit=1)
+    scene = Scene(stays, rule("above", "/d", path="r", limit=-1, id="goes"))
+    scene.graph(("/d",))
+    assert len(scene.send("/d", {"r": 0})) == 2
+    scene.alarms.snooze("r", MIDNIGHT_S + 500)
+    scene.alarms.remove("goes")
+    assert [kind for kind, _ in scene.happened()] == ["off"]
+    assert scene.state() == "on"
+    scene.alarms.put(rule("below", "/d", path="other", limit=1))
+    assert [kind for kind, _ in scene.happened()] == ["off"]
+    assert scene.state() == "well"  # it was heard
+
+
+def test_who_is_off_or_has_a_problem_is_not_watched() -> None:
+    scene = Scene(rule("silent", "/cam", for_s=1.0, is_on=False), rule("silent", "", for_s=1.0, id="new"))
+    scene.graph(("/cam",))
+    assert scene.wait(5) == []
+    phases = [state.phase for state in scene.alarms.evaluator.states.values()]
+    assert phases == ["off", "faulty"]
+    assert scene.alarms.evaluator.topics == frozenset()
+
+
+def test_messages_and_ticks_in_two_threads_lose_nothing() -> None:
+    scene = Scene(rule("changes", "/n", path=".", calm_s=0.5))
+    scene.graph(("/n",))
+    batches = [[message("/n", number) for number in range(start, start + 50)] for start in range(0, 2000, 50)]
+
+    def arrive() -> None:
+        for batch in batches:
+            scene.alarms.evaluator.take("/n", batch)
+
+    thread = threading.Thread(target=arrive)
+    thread.start()
+    kinds = []
+    while thread.is_alive():
+        kinds += [kind for kind, _ in scene.happened()]
+    thread.join()
+    kinds += [kind for kind, _ in scene.happened()]
+    assert kinds == ["on"]
+    assert scene.alarms.evaluator.state(scene.alarms.rules[0]).count == 1999
+    assert not math.isnan(scene.now)

@@ -1,0 +1,175 @@
+"""The file of alarms: what is written is read again, and what is wrong is a sentence with its line."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nep.errors import NepError
+from nep.programs.alarms import AlarmAction, AlarmFile, AlarmRule
+from nep.programs.alarms.history import AlarmDeed, AlarmHistory, AlarmRecord, record_plain
+from nep.programs.alarms.rule import ACTION_KINDS, KINDS, NEEDS_LIMIT, NODE_KINDS, VALUE_KINDS, problem_of
+from nep.programs.alarms.rule_file import EXAMPLE, alarms_text, read_alarms, read_text
+from nep.programs.alarms.sentences import rule_words
+from tests.nep.alarms.scene import rule
+
+
+def read(text: str, **how: bool) -> AlarmFile:
+    return read_text(text.encode("utf-8", "surrogatepass"), "f.json", **how)
+
+
+def of(*alarms: object) -> str:
+    return json.dumps({"format": 1, "alarms": list(alarms)}, indent=1)
+
+
+def every_rule() -> list[AlarmRule]:
+    actions = tuple(
+        AlarmAction(kind, "name" if kind in {"run", "call", "send"} else "", {} if kind == "call" else None)
+        for kind in ACTION_KINDS
+    )
+    made = []
+    for kind in KINDS:
+        more: dict[str, object] = {"id": kind, "for_s": 3.0}
+        if kind in VALUE_KINDS:
+            more["path"] = "a[0].b"
+        if kind in NEEDS_LIMIT:
+            more["limit"] = 5
+        made.append(rule(kind, "n" if kind in NODE_KINDS else "/t", *actions, **more))
+    return made
+
+
+def test_every_rule_is_the_same_after_writing_and_reading() -> None:
+    rules = every_rule()
+    rules[0] = rule("silent", "/t", for_s=2.0, is_on=False, calm_s=9.0, snoozed_until_s=5.0)
+    rules.append(rule("is_not", "/t", path='["a key"]', limit='“quoted” \n"', margin=0.5, id="text"))
+    rules.append(rule("equals", "/t", path=".", limit=True, id="yes"))
+    assert [problem_of(each) for each in rules] == [None] * len(rules)
+    assert read_text(alarms_text(rules), "f").rules == tuple(rules)
+    assert len({rule_words(each) for each in rules}) == len(rules)
+
+
+def test_the_example_is_right() -> None:
+    assert len(read(EXAMPLE).rules) == 5
+
+
+@pytest.mark.parametrize(
+    ("alarm", "said"),
+    [
+        ({"when": {"topic": "/t", "is": "bellow", "than": 1}}, "there is no 'bellow'; did you mean 'below'"),
+        ({"when": {"topic": "/t"}}, "it does not say what"),
+        ({"when": {"is": "silent"}}, "no topic is named"),
+        ({"when": {"node": "n", "is": "silent"}}, "is about a topic"),
+        ({"when": {"topic": "/t", "is": "below", "value": "x"}}, 'write "than"'),
+        ({"when": {"topic": "/t", "is": "below", "value": "x", "than": "1"}}, "must be a number"),
+        ({"when": {"topic": "/t", "is": "below", "value": "x[", "than": 1}}, "is no field"),
+        ({"when": {"topic": "/t", "is": "above", "value": "", "than": 1}}, "needs a name"),
+        ({"when": {"topic": "/a b", "is": "silent"}}, "'topic'"),
+        ({"when": {"topic": "/*/b", "is": "silent"}}, "wildcards"),
+        ({"when": {"topic": "/t", "is": "silent", "for_s": 0}}, "0.1 to 86400"),
+        ({"when": {"topic": "/t", "is": "silent", "for_s": -1}}, "0.1 to 86400"),
+        ({"when": {"topic": "/t", "is": "silent", "for_s": True}}, "must be a number"),
+        ({"when": {"topic": "/t", "is": "loses", "than": 101}}, "0 to 100"),
+        ({"when": {"topic": "/t", "is": "rate_below", "than": 0}}, "0.001 to 1e+06"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": ["baner"]}, "did you mean 'banner'"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": [{"cal": "x"}]}, "an action is"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": [{"call": ""}]}, "it has no name"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": ["stop"] * 11}, "more than 10 actions"),
+        ({"when": {"topic": "/t", "is": "silent"}, "calm_s": 0}, "0.5 to 3600"),
+        ({"when": {"topic": "/t", "is": "silent"}, "onn": True}, "there is no 'onn' here; did you mean 'on'"),
+        ([], "it is no alarm"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_its_line(alarm: object, said: str) -> None:
+    good = {"when": {"topic": "/t", "is": "silent"}, "do": ["banner"]}
+    text = of(good, alarm)
+    with pytest.raises(NepError) as error:
+        read(text)
+    assert said in str(error.value)
+    line = int(str(error.value).split()[1])
+    begin = text[: text.index("silent")].count("\n") + 4
+    assert begin <= line <= text.count("\n") + 1
+    kept = read(text, lenient=True)
+    assert len(kept.rules) == 1
+    assert said in kept.problems[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "line 1 of 'f.json' is no JSON"),
+        ('{"alarms": [\n{"when": }]}', "line 2 of 'f.json' is no JSON"),
+        ("[]", "no file of alarms"),
+        ('{"format": 2, "alarms": []}', "newer version"),
+        ('{"format": true, "alarms": []}', "'format': it must be 1"),
+        ('{"alarm": []}', "there is no 'alarm' here; did you mean 'alarms'"),
+        ('{"format": 1}', "no alarms are in it"),
+        ('{"alarms": [' + "1" * 5000 + "]}", ""),
+        ("[" * 100_000, ""),
+        (json.dumps({"alarms": [{}] * 201}), "more than 200"),
+    ],
+)
+def test_what_is_no_file_of_alarms_is_said_also_to_who_is_lenient(text: str, said: str) -> None:
+    for lenient in (False, True):
+        if lenient and "1" * 5000 in text:
+            continue
+        with pytest.raises(NepError, match=r"f\.json") as error:
+            read(text, lenient=lenient)
+        assert said in str(error.value)
+
+
+def test_bytes_that_are_no_text_and_a_file_that_is_not_there(tmp_path) -> None:
+    with pytest.raises(NepError, match="line 2 of 'f' is no UTF-8"):
+        read_text(b'{\n"\xff": 1}', "f")
+    with pytest.raises(NepError, match="cannot be read"):
+        read_alarms(tmp_path / "none.json")
+    with pytest.raises(NepError, match="larger than"):
+        read_text(b" " * 4_000_001, "f")
+
+
+def test_two_alarms_with_one_id() -> None:
+    alarm = {"id": "a", "when": {"topic": "/t", "is": "silent"}}
+    with pytest.raises(NepError, match="another alarm has it"):
+        read(of(alarm, alarm))
+
+
+def test_the_history_is_kept_and_what_is_damaged_of_it_left_out() -> None:
+    history = AlarmHistory([AlarmRecord("a", "x is 1", 12.5, 3.0, count=2, was_snoozed=True)])
+    history.records[0].add(AlarmDeed("call", "no answer"))
+    history.records[0].add(AlarmDeed("call", "answered"))
+    again = read_text(alarms_text([], history), "f").history
+    assert again is not None
+    assert [record_plain(each) for each in again] == [record_plain(each) for each in history]
+    assert again.records[0].deeds == [AlarmDeed("call", "answered")]
+    strange = [
+        None,
+        {},
+        {"alarm": 1, "words": "", "at_s": 1},
+        {"alarm": "a", "words": "w", "at_s": 1e300},
+        {"alarm": "a", "words": "w", "at_s": 1, "did": [1, ["a"], "x"], "count": -1, "lasted_s": "no"},
+    ]
+    found = read(json.dumps({"alarms": [], "history": strange})).history
+    assert found is not None
+    assert [(each.words, each.deeds, each.count, each.lasted_s) for each in found] == [("w", [], 1, None)]
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.floats(allow_nan=True) | st.integers() | st.text(max_size=8)
+    | st.sampled_from(["topic", "is", "silent", "when", "banner", "/t", "below", "call"]),
+    lambda inner: st.lists(inner, max_size=3)
+    | st.dictionaries(
+        st.sampled_from(["when", "do", "topic", "node", "is", "than", "for_s", "value", "on", "id", "call"]),
+        inner, max_size=4,
+    ),
+    max_leaves=8,
+)  # fmt: skip
+
+
+@given(st.lists(VALUES, max_size=3))
+def test_whatever_stands_in_it_is_read_or_said(alarms: list[object]) -> None:
+    text = json.dumps({"alarms": alarms})
+    kept = read(text, lenient=True)
+    assert len(kept.rules) + len(kept.problems) == len(alarms)
+    assert read_text(alarms_text(kept.rules), "f").rules == kept.rules

@@ -1,0 +1,163 @@
+"""`nep watch`: alarms in a terminal."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import threading
+
+import pytest
+
+import nep
+from nep.cli import screen
+from nep.masters.master import Master
+from nep.programs.alarms.rule_file import EXAMPLE
+from tests.nep.programs import eventually, running
+
+
+@pytest.fixture
+def file(tmp_path):
+    """Writes alarms into a file; its name."""
+
+    def write(*alarms: object) -> str:
+        path = tmp_path / "alarms.json"
+        path.write_text(json.dumps({"alarms": list(alarms)}), encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+BELOW = {"topic": "/distance", "value": "range", "is": "below", "than": 0.4}
+
+
+class Talker:
+    """Publishes a payload until it is told to end."""
+
+    def __init__(self, master: str, topic: str, payload: object) -> None:
+        self._node = nep.node("talker", master=master)
+        self._end = threading.Event()
+        publisher = self._node.new_pub(topic, "json")
+
+        def talk() -> None:
+            while not self._end.wait(0.02):
+                publisher.publish(payload)
+
+        self._thread = threading.Thread(target=talk)
+        self._thread.start()
+
+    def __enter__(self) -> nep.Node:
+        return self._node
+
+    def __exit__(self, *_exc: object) -> None:
+        self._end.set()
+        self._thread.join()
+        self._node.close()
+
+
+def test_an_alarm_is_a_line_and_calls_a_service(master, type_in, file) -> None:
+    asked = []
+    name = file({"id": "near", "when": BELOW, "do": ["banner", "sound", {"call": "brake", "with": {"n": 1}}]})
+    with Talker(master.address, "/distance", {"range": 0.3}) as node:
+        node.new_server("brake", lambda request: asked.append(request) or "ok", threads=1)
+        done = type_in("watch", name, "-n", "1", "--master", master.address)
+    assert done.returncode == 0
+    lines = [line.split("  ", 1)[1] for line in done.stdout.splitlines()]
+    assert lines == ["range of /distance is 0.3, below 0.4", "  brake answered"]
+    assert asked == [{"n": 1}]
+    assert "When range of /distance is below 0.4" in done.stderr
+    assert "\a" not in done.stderr  # no terminal
+
+
+def test_alarms_are_json_for_programs_and_what_only_studio_can_do_is_said(master, type_in, file) -> None:
+    name = file({"id": "near", "when": BELOW, "do": ["stop"]})
+    with Talker(master.address, "/distance", {"range": 0.3}):
+        done = type_in("watch", name, "-n", "1", "--master", master.address, "--json")
+        plain = type_in("watch", name, "-n", "1", "--master", master.address)
+    records = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [(each["event"], each["alarm"]) for each in records] == [("on", "near"), ("did", "near")]
+    assert records[0]["seen"] == 0.3
+    assert records[1]["what"] == "only Studio can do this: stop all robots"
+    assert "so it is not done here: stop all robots" in plain.stderr
+
+
+def test_a_message_is_sent_and_a_typo_is_told(master, type_in, file) -> None:
+    name = file(
+        {"when": BELOW, "do": [{"send": "/say", "message": {"say": "near"}}]},
+        {"when": {"topic": "/distanse", "is": "silent"}},
+    )
+    with Talker(master.address, "/distance", {"range": 0.3}) as node, node.new_sub("/say", "json") as heard:
+        done = type_in("watch", name, "-n", "1", "--master", master.address)
+        assert heard.listen(timeout_s=5.0) == (True, {"say": "near"})
+    assert "'/distanse' is not there yet; waiting. did you mean '/distance'?" in done.stderr
+    assert "sent to /say" in done.stdout
+
+
+def test_a_master_that_is_away_is_waited_for(type_in, file, monkeypatch) -> None:
+    with Master("127.0.0.1:0") as first:
+        address = first.address
+    name = file({"when": {"node": "lidar", "is": "comes"}}, {"when": BELOW})
+    waits, ended = threading.Event(), threading.Event()
+
+    def say(sentence: str) -> None:
+        screen.say(sentence)
+        if sentence.endswith("; waiting"):
+            waits.set()
+
+    monkeypatch.setattr("nep.cli.watch.say", say)
+
+    def come_later() -> None:
+        if waits.wait(30):
+            with Master(address) as late, Talker(late.address, "/distance", {"range": 0.3}):
+                ended.wait(30)
+
+    thread = threading.Thread(target=come_later)
+    thread.start()
+    try:
+        done = type_in("watch", name, "-n", "1", "--master", address)
+    finally:
+        waits.set()
+        ended.set()
+        thread.join()
+    assert "; waiting" in done.stderr
+    assert "a master is there" in done.stderr
+    assert "range of /distance is 0.3" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ((), 1, "give a file of alarms"),
+        (("none.json",), 1, "'none.json' cannot be read"),
+        (("FILE", "--check"), 0, "the file is right"),
+        (("OFF",), 1, "is switched on"),
+        (("BAD",), 1, "line 1 of"),
+    ],
+)
+def test_how_it_ends_without_a_network(type_in, file, words, code: int, said: str) -> None:
+    made = {
+        "FILE": lambda: file({"when": BELOW}),
+        "OFF": lambda: file({"on": False, "when": BELOW}),
+        "BAD": lambda: file({"when": {"topic": "/t", "is": "sielnt"}}),
+    }
+    done = type_in("watch", *(made[word]() if word in made else word for word in words))
+    assert done.returncode == code
+    assert said in done.stderr
+
+
+def test_the_example_is_printed(type_in) -> None:
+    assert type_in("watch", "--example").stdout == EXAMPLE
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a program of Windows cannot be sent Ctrl+C alone")
+def test_ctrl_c_ends_it_quietly(master, file) -> None:
+    begin = "import sys\nfrom nep.cli import main\nsys.argv[1:1] = ['watch']\nmain()"
+    with nep.node("talker") as node:
+        publisher = node.new_pub("/distance", "json")
+        with running(begin, file({"when": BELOW}), NEP_MASTER=master.address) as program:
+            eventually(lambda: publisher.subscribers == 1)
+            program.signal(signal.SIGINT)
+            _out, said = program.end()
+            assert program.process.returncode == 130, said
+            assert "Traceback" not in said
+        eventually(lambda: publisher.subscribers == 0)
