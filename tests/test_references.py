@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 HOMES = ("nep", "app", "tests", "tools", "bench", "docs", "examples", "installers")
 FILES = ("README.md", "CONTRIBUTING.md", "dev.py", "hatch_build.py", "pyproject.toml")
@@ -155,16 +157,17 @@ def test_what_is_not_there_is_found() -> None:
     ]
 
 
-def test_each_habit_of_the_comparison_has_its_test() -> None:
-    """Every row of docs/compare-blocks.md in which Studio has a Y names tests that are there."""
+@pytest.mark.parametrize("name", ["compare-blocks", "compare-monitors"])
+def test_each_row_of_a_comparison_has_its_test(name: str) -> None:
+    """Every row in which Studio has a Y names tests that are there."""
     rows = [
-        line for line in (ROOT / "docs" / "compare-blocks.md").read_text("utf-8").splitlines()
-        if line.startswith("| ") and not line.startswith("| habit")
+        line for line in (ROOT / "docs" / f"{name}.md").read_text("utf-8").splitlines()
+        if line.startswith("| ") and not line.startswith(("| habit", "| feature"))
     ]  # fmt: skip
     assert len(rows) > 40
     for row in rows:
         *_marks, studio, tests = [cell.strip() for cell in row.strip("|").split("|")]
         named = re.findall(r"`(tests/[\w/]+\.py)::(test_\w+)`", tests)
         assert named or not studio.startswith("Y"), row
-        for path, name in named:
-            assert f"def {name}(" in (ROOT / path).read_text("utf-8"), f"{path}::{name}"
+        for path, test in named:
+            assert f"def {test}(" in (ROOT / path).read_text("utf-8"), f"{path}::{test}"
