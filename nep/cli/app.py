@@ -22,6 +22,7 @@ from nep.cli import (
     record,
     recordings,
     services,
+    top,
     topics,
     watch,
 )
@@ -52,6 +53,7 @@ app = typer.Typer(
 app.command("master")(masters.master)
 app.command("bridge")(bridge.bridge)
 app.command("log")(log.log)
+app.command("top")(top.top)
 app.command("record")(record.record)
 app.command("play")(play.play)
 app.command("doctor")(doctor.doctor)

@@ -1,0 +1,330 @@
+"""`nep top`: a table of all topics and nodes in the terminal, which is renewed every second."""
+
+from __future__ import annotations
+
+import enum
+import itertools
+import math
+import shutil
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from nep.cli.options import JsonOption, MasterOption
+from nep.cli.screen import (
+    UNKNOWN,
+    TextColumn,
+    console,
+    duration,
+    rate,
+    say,
+    show_json,
+    show_table,
+    size,
+    write,
+)
+from nep.cli.values import ids_as_text
+from nep.errors import NepError
+from nep.i18n import _, lazy, ngettext
+from nep.masters.process import view
+from nep.protocol.graph_view import GraphView, NodeInfo, TopicInfo
+from nep.protocol.topic_glob import glob_matches, is_glob
+from nep.text import escaped, shortened
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+    from rich.live import Live
+
+__all__ = ["Order", "node_rows", "top", "topic_rows"]
+
+_SLICE_S = 0.1
+_NAMES_MOST = 40
+_FRAME_LINES = 6
+"""Of the terminal that have no rows: two heads with their lines, the line above, and one to spare."""
+_NODES_PART = 3
+"""Nodes have a third of the room, and what topics leave."""
+
+
+class Order(str, enum.Enum):
+    """What stands first: the largest of it, or the first by its name."""
+
+    RATE = "rate"
+    BANDWIDTH = "bandwidth"
+    LOST = "lost"
+    NAME = "name"
+
+
+_TOPIC_COLUMNS = (
+    TextColumn(lazy("topic"), style="bold", is_whole=True),
+    TextColumn(lazy("type")),
+    TextColumn(lazy("publishers"), style="green"),
+    TextColumn(lazy("rate"), "right"),
+    TextColumn(lazy("bandwidth"), "right"),
+    TextColumn(lazy("subscribers"), "right"),
+    TextColumn(lazy("lost"), "right"),
+)
+_NODE_COLUMNS = (
+    TextColumn(lazy("node"), style="bold", is_whole=True),
+    TextColumn(lazy("computer")),
+    TextColumn(lazy("pid"), "right"),
+    TextColumn(lazy("language")),
+    TextColumn(lazy("cpu"), "right"),
+    TextColumn(lazy("publishes"), "right"),
+    TextColumn(lazy("since"), "right"),
+)
+
+
+def top(
+    pattern: Annotated[
+        str,
+        typer.Argument(
+            metavar=_("PATTERN"),
+            help=_("Only topics that match, such as '/robot/**', or that have this in their names."),
+            show_default=False,
+        ),
+    ] = "",
+    order: Annotated[
+        Order, typer.Option("--sort", help=_("What stands first."), case_sensitive=False)
+    ] = Order.RATE,
+    every_s: Annotated[
+        float,
+        typer.Option(
+            "--every", min=0.2, max=3600.0, metavar=_("SECONDS"), help=_("How often it is renewed.")
+        ),
+    ] = 1.0,
+    count: Annotated[
+        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N tables; 0 goes on."))
+    ] = 0,
+    master: MasterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show all topics and nodes in a table that is renewed every second. Ctrl+C ends it.
+
+    Nothing is subscribed: the figures are those that publishers and subscribers tell the master. Into a file
+    or a program the tables follow each other. A master that goes away is waited for.
+    """
+    graph = view(master)  # without a master there is nothing to wait for: it may be a wrong address
+    shown = _Shown(pattern, order)
+    show: Callable[[GraphView, str], None]
+    with _screen(as_json=as_json) as live:
+        if as_json:
+            show = shown.show_json
+        elif live is None:
+            show = shown.show_plain
+        else:
+            show = _Live(shown, live).show
+        _run(graph, show, every_s, count, master)
+
+
+def _run(
+    graph: GraphView, show: Callable[[GraphView, str], None], every_s: float, count: int, master: str | None
+) -> None:
+    """Show the graph, and each later one, until Ctrl+C or `count` times."""
+    never, started, trouble = threading.Event(), time.monotonic(), ""
+    for number in itertools.count(1):
+        show(graph, trouble)
+        if number == count:
+            return
+        due = started + number * every_s
+        if due < time.monotonic() - every_s:  # the computer slept, or the master kept us waiting
+            started, due = time.monotonic() - number * every_s, time.monotonic()
+        while (left := due - time.monotonic()) > 0:
+            never.wait(min(left, _SLICE_S))  # in slices: Windows does not interrupt a wait for Ctrl+C
+        try:
+            graph, trouble = view(master), ""
+        except NepError as error:  # the last figures stay, and why they do stands above them
+            trouble = str(error)
+
+
+def _screen(*, as_json: bool) -> AbstractContextManager[Live | None]:
+    """A terminal of our own while it lasts; none for files and programs."""
+    if as_json or not sys.stdout.isatty():
+        return nullcontext(None)
+    from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
+
+    signal.signal(signal.SIGTERM, _end)  # the terminal gets back what stood there
+    out: Console = console()
+    out.soft_wrap = False
+    return Live(console=out, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
+
+
+def _end(_signal: int, _frame: FrameType | None) -> None:
+    sys.exit(0)
+
+
+# ---- what is shown
+
+
+def _sortable(value: float | None) -> float:
+    """What is not known, and what is no number, comes last."""
+    return -1.0 if value is None or math.isnan(value) else value
+
+
+def _matches(name: str, pattern: str) -> bool:
+    return glob_matches(pattern, name) if is_glob(pattern) else pattern.casefold() in name.casefold()
+
+
+def topic_rows(graph: GraphView, pattern: str = "", order: Order = Order.RATE) -> list[TopicInfo]:
+    """The topics that match, in this order; those with equal figures by their names."""
+    found = sorted(
+        (topic for topic in graph.topics.values() if _matches(topic.name, pattern)),
+        key=lambda each: each.name,
+    )
+    figures: Mapping[Order, Callable[[TopicInfo], float | None]] = {
+        Order.RATE: lambda each: each.rate_hz,
+        Order.BANDWIDTH: lambda each: each.bandwidth_Bps,
+        Order.LOST: lambda each: each.lost,
+    }
+    if order in figures:
+        found.sort(key=lambda each: _sortable(figures[order](each)), reverse=True)
+    return found
+
+
+def node_rows(graph: GraphView) -> list[tuple[NodeInfo, float | None]]:
+    """The nodes with the messages a second that each publishes: who uses its processor most is first."""
+    published: dict[str, float] = {}
+    for topic in graph.topics.values():
+        for publisher in topic.publishers:
+            if publisher.rate_hz is not None:
+                published[publisher.node_id] = published.get(publisher.node_id, 0.0) + publisher.rate_hz
+    nodes = sorted(graph.nodes.values(), key=lambda node: (-_sortable(node.cpu_ratio), node.name, node.id))
+    return [(node, published.get(node.id)) for node in nodes]
+
+
+@dataclass
+class _Shown:
+    """Which part of a graph is shown, and how."""
+
+    pattern: str
+    order: Order
+
+    def show_json(self, graph: GraphView, trouble: str) -> None:
+        """One line of JSON; nothing new is no line, and said beside."""
+        if trouble:
+            say(trouble)
+            return
+        plain = graph.to_plain()
+        names = {topic.name for topic in topic_rows(graph, self.pattern)}
+        topics = [each for each in plain["topics"] if each["name"] in names]  # type: ignore[attr-defined]  # a list
+        told = {
+            "stamp_ns": time.time_ns(),
+            "topics": topics,
+            "nodes": plain["nodes"],
+            "alerts": plain["alerts"],
+        }
+        show_json(ids_as_text(told))
+
+    def show_plain(self, graph: GraphView, trouble: str) -> None:
+        """Two tables for a file."""
+        if trouble:
+            say(trouble)
+            return
+        write(f"{self.head(graph)}\n")
+        topics = topic_rows(graph, self.pattern, self.order)
+        show_table(_TOPIC_COLUMNS, [self.topic_cells(graph, each) for each in topics])
+        write("\n")
+        show_table(_NODE_COLUMNS, [self.node_cells(*each) for each in node_rows(graph)])
+        write("\n")
+
+    def head(self, graph: GraphView) -> str:
+        """All of it in one line."""
+        rates = [each.rate_hz for each in graph.topics.values() if each.rate_hz is not None]
+        bytes_s = [each.bandwidth_Bps for each in graph.topics.values() if each.bandwidth_Bps is not None]
+        lost = [each.lost for each in graph.topics.values() if each.lost is not None]
+        parts = [
+            ngettext("{count} node", "{count} nodes", len(graph.nodes)).format(count=len(graph.nodes)),
+            ngettext("{count} topic", "{count} topics", len(graph.topics)).format(count=len(graph.topics)),
+            rate(sum(rates) if rates else None),
+            size(sum(bytes_s) if bytes_s else None, "/s"),
+            _("{count} lost").format(count=sum(lost)) if lost else "",
+        ]
+        return " · ".join(part for part in parts if part)
+
+    def topic_cells(self, graph: GraphView, topic: TopicInfo) -> tuple[str, ...]:
+        """In the order of the columns."""
+        names = [graph.nodes[each.node_id].name for each in topic.publishers if each.node_id in graph.nodes]
+        return (
+            escaped(topic.name),
+            escaped(topic.msg_type),
+            shortened(escaped(", ".join(dict.fromkeys(names))), _NAMES_MOST) or UNKNOWN,
+            rate(topic.rate_hz),
+            size(topic.bandwidth_Bps, "/s"),
+            str(len(topic.subscribers)),
+            UNKNOWN if topic.lost is None else str(topic.lost),
+        )
+
+    def node_cells(self, node: NodeInfo, published_hz: float | None) -> tuple[str, ...]:
+        """In the order of the columns."""
+        return (
+            escaped(node.name),
+            escaped(node.host) or UNKNOWN,
+            UNKNOWN if node.pid is None else str(node.pid),
+            escaped(node.language) or UNKNOWN,
+            UNKNOWN if node.cpu_ratio is None else f"{100 * node.cpu_ratio:.0f} %",
+            rate(published_hz),
+            duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
+        )
+
+
+class _Live:
+    """Tables that take the whole terminal, as far as it reaches; what grew since the last look is yellow."""
+
+    def __init__(self, shown: _Shown, live: Live) -> None:
+        self._shown, self._live = shown, live
+        self._lost: dict[str, int] = {}
+
+    def show(self, graph: GraphView, trouble: str) -> None:
+        """Take the place of what stood there."""
+        from rich.console import Group  # noqa: PLC0415 - only a terminal needs it
+        from rich.text import Text  # noqa: PLC0415
+
+        topics, nodes = topic_rows(graph, self._shown.pattern, self._shown.order), node_rows(graph)
+        notes = [Text(f"! {trouble}", "yellow")] if trouble else []
+        notes += [Text(f"! {escaped(alert.sentence)}", "yellow", no_wrap=True) for alert in graph.alerts]
+        room = max(2, shutil.get_terminal_size().lines - _FRAME_LINES - len(notes[:_NODES_PART]))
+        for_nodes = max(min(len(nodes), room // _NODES_PART), room - len(topics))
+        above, below = topics[: room - min(len(nodes), for_nodes)], nodes[:for_nodes]
+        parts: list[RenderableType] = [Text(self._shown.head(graph), "dim", no_wrap=True)]
+        parts += notes[:_NODES_PART]
+        rows = [self._shown.topic_cells(graph, each) for each in above]
+        grown = {
+            at
+            for at, each in enumerate(above)
+            if (each.lost or 0) > self._lost.get(each.name, each.lost or 0)
+        }
+        parts.append(_table(_TOPIC_COLUMNS, rows, len(topics) - len(above), grown))
+        rows = [self._shown.node_cells(*each) for each in below]
+        parts.append(_table(_NODE_COLUMNS, rows, len(nodes) - len(below), set()))
+        self._lost = {each.name: each.lost for each in topics if each.lost is not None}
+        self._live.update(Group(*parts), refresh=True)
+
+
+def _table(
+    columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], left: int, grown: set[int]
+) -> RenderableType:
+    from rich import box  # noqa: PLC0415 - only a terminal needs it
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
+    for number, column in enumerate(columns):
+        head = _(column.head) if number or left <= 0 else f"{_(column.head)} (+{left})"
+        is_number = column.justify == "right"
+        table.add_column(
+            head, justify=column.justify, style=column.style, no_wrap=True,
+            overflow="ellipsis", min_width=len(head) if is_number else None,
+        )  # fmt: skip
+    for at, row in enumerate(rows):
+        texts = [Text(cell, style="dim" if cell == UNKNOWN else "") for cell in row]
+        if at in grown:
+            texts[-1].stylize("yellow bold")
+        table.add_row(*texts)
+    return table
