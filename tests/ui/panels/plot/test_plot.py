@@ -528,6 +528,24 @@ def test_the_second_curve_over_the_first(panel) -> None:
     assert panel.drawings.currentWidget() is panel.canvas
 
 
+@pytest.mark.parametrize(
+    "values", [[1.7e308, -1.7e308], [5e-324, 0], [2**64 - 1, 2**64 - 2], [7, 7], [1e300, 1e300], [10**400, 1]]
+)
+def test_the_largest_and_smallest_numbers_are_drawn_over_each_other(panel, values) -> None:
+    show(panel, "/odom.x", "/odom.y")
+    rows = [(t / 10, {"x": value, "y": value}) for t, value in enumerate(values * 20)]
+    send(panel, "/odom", rows)
+    panel.across.click()
+    panel.cursors.click()
+    panel._put_cursor("A", 0.0)
+    panel._put_cursor("B", 1.0)
+    look(panel)
+    assert panel.drawings.currentWidget() is panel.xy
+    assert not panel.xy.grab().isNull()
+    (path,) = panel.xy._paths
+    assert len(path[2]) > 1
+
+
 # -- kept, exported ----------------------------------------------------------------------------------------
 
 
