@@ -503,6 +503,8 @@ def test_a_field_travels_in_the_hand() -> None:
 def test_a_topic_of_which_nobody_knows_a_field_is_asked_for(panel) -> None:
     panel.plot_field("/odom", "")
     assert panel.add.text() == "/odom."
+    QTest.keyClicks(panel.add, "x")
+    assert panel.add.text() == "/odom.x"
 
 
 # -- one over another --------------------------------------------------------------------------------------
