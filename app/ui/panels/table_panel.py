@@ -90,17 +90,16 @@ class TablePanel(PanelWidget, Generic[Row]):
         """What the menu of the row of this key offers; no menu where that is nothing."""
         return (RowAction(_("Show"), "eye", lambda: self.open_row(key)),)
 
-    def menu_of(self, key: str) -> Menu:
-        """The menu of the row of this key."""
-        return filled(Menu(self.theme, self), self.theme, self.row_actions(key))
+    def menu_of(self, key: str) -> Menu | None:
+        """The menu of the row of this key; None where there is nothing to do."""
+        actions = self.row_actions(key)
+        return filled(Menu(self.theme, self), self.theme, actions) if actions else None
 
     def _show_row_menu(self, key: str, at: QPoint) -> None:
         menu = self.menu_of(key)
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        if menu.actions():
+        if menu is not None:
+            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
             menu.popup(at)
-        else:
-            menu.deleteLater()
 
     def filter_words(self) -> list[str]:
         """What a row must have, each of them, to be shown."""

@@ -275,6 +275,7 @@ def test_a_name_of_twenty_letters_fits_at_the_usual_width(qtbot, panel) -> None:
 
 def test_a_right_click_on_a_topic_opens_plots_watches_it_or_copies_its_name(panel, window) -> None:
     menu = panel.menu_of("/blackboard")
+    assert menu is not None
     for action in menu.actions():
         action.trigger()
     assert len({action.text() for action in menu.actions()}) == 5
