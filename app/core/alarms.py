@@ -26,8 +26,8 @@ from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmEvent, AlarmFi
 from nep.programs.alarms.alarms import Carrier, Done
 from nep.programs.alarms.commands import AlarmCommands
 from nep.programs.alarms.history import AlarmHistory
-from nep.programs.alarms.rule import EVENT_KINDS, new_id
-from nep.programs.alarms.rule_file import NewerAlarmsError, alarms_text, read_text
+from nep.programs.alarms.rule import EVENT_KINDS, Scalar, new_id, problem_of
+from nep.programs.alarms.rule_file import MOST_ALARMS, NewerAlarmsError, alarms_text, read_text
 from nep.programs.alarms.sentences import subject_words, time_words, what_words
 from nep.protocol.graph_view import GraphView
 from nep.system.replace_file import replace_file
@@ -101,7 +101,7 @@ class SessionAlarms:
             "stop": self._stop,
         }
         self.alarms = Alarms(found.rules, found.history, carriers, clock=clock, clock_s=clock_s)
-        self._written = self._state()
+        self._written: object = self._state()
         self._view: GraphView | None = None
         self._on: set[str] = set()
 
@@ -134,9 +134,21 @@ class SessionAlarms:
         return rule
 
     def put(self, rule: AlarmRule) -> None:
-        """Add an alarm, or change the one of this id."""
-        self.alarms.put(rule)
-        self._follow_rules()
+        """Add an alarm, or change the one of this id; what is one too many an alert tells."""
+        if self.alarms.rule(rule.id) is not None or self._has_room():
+            self.alarms.put(rule)
+            self._follow_rules()
+
+    def _has_room(self) -> bool:
+        """Whether one more may be added: no file holds more."""
+        if len(self.rules) < MOST_ALARMS:
+            return True
+        said = _("There are {count} alarms, and no more can be kept.").format(count=MOST_ALARMS)
+        hint = _("Delete one that you do not need.")
+        self._session.alerts.put(
+            "alarms:most", "warn", said, hint, button=_("Show the alarms"), action=SHOW, count=0
+        )
+        return False
 
     def remove(self, rule_id: str) -> AlarmRule | None:
         """Remove an alarm; `put_back` is its undo."""
@@ -144,12 +156,13 @@ class SessionAlarms:
         if rule is not None:
             self._removed = (rule, self.rules.index(rule))
             self.alarms.remove(rule_id)
+            self._session.alerts.resolve("alarms:most")
             self._follow_rules()
         return rule
 
     def put_back(self) -> None:
         """Put the alarm that was removed last in its place again."""
-        if self._removed is not None:
+        if self._removed is not None and self._has_room():
             (rule, place), self._removed = self._removed, None
             rules = [*self.rules]
             rules.insert(place, rule)
@@ -193,6 +206,7 @@ class SessionAlarms:
             if self._worker.take(FILE):
                 self._session.alerts.resolve("alarms:kept")
         except OSError as error:
+            self._written = None  # tried again in a second
             self._session.alerts.put(
                 "alarms:kept",
                 "warn",
@@ -235,9 +249,10 @@ class SessionAlarms:
         if event.is_snoozed or not any(action.kind == "banner" for action in rule.actions):
             alerts.dismiss(_alert_id(rule.id))
 
-    def _say(self, rule: AlarmRule, seen: object, count: int) -> None:
+    def _say(self, rule: AlarmRule, seen: Scalar, count: int) -> None:
         condition, record = rule.condition, self.history.last(rule.id)
-        words = record.words if record is not None else ""  # of the value that did it, not of what is now
+        # of the value that did it, not of what is now, as long as the history has it
+        words = record.words if record is not None else what_words(condition, seen)
         if condition.kind == "silent" and isinstance(seen, int | float) and seen >= 1:
             said = _("{topic} has been silent for {time}")
             words = said.format(topic=subject_words(condition), time=time_words(round(seen)))
@@ -307,7 +322,7 @@ class SessionAlarms:
         if path is None or self._is_newer or state == self._written:
             return
         self._written = state
-        rules = [rule for rule in self.rules if rule.condition.name]
+        rules = [rule for rule in self.rules if problem_of(rule) is None]  # or it can't be read back
         kept = AlarmHistory([replace(record) for record in self.history.records])
 
         def write() -> bool:

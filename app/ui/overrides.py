@@ -13,7 +13,7 @@ import traceback
 from collections.abc import Callable
 from types import FunctionType
 
-from PySide6.QtCore import QModelIndex, QObject, QSize, Qt
+from PySide6.QtCore import QModelIndex, QObject, QRectF, QSize, Qt
 from PySide6.QtGui import QPixmap
 
 NOTHING: Callable[[], object] = type(None)
@@ -44,6 +44,7 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "pixmap": QPixmap,
     "scaledPixmap": QPixmap,
     "paintSection": NOTHING,
+    "boundingRect": QRectF,
     "drawRow": NOTHING,
     "drawBranches": NOTHING,
     "dataChanged": NOTHING,

@@ -9,7 +9,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.text import quotable
 
-__all__ = ["MISSING", "Path", "leaves", "parse_path", "pick"]
+__all__ = ["MISSING", "Path", "leaves", "parse_path", "path_text", "pick"]
 
 Path = tuple[str | int, ...]
 MISSING = object()
@@ -64,6 +64,17 @@ def pick(payload: object, path: Path) -> object:
     return value
 
 
+def path_text(path: Path) -> str:
+    """The path as it is written: `parse_path` reads it back."""
+    return "".join(_written(step) for step in path).removeprefix(".") or "."
+
+
+def _written(step: str | int) -> str:
+    if isinstance(step, int):
+        return f"[{step}]"
+    return f".{step}" if _PLAIN.fullmatch(step) else '["' + re.sub(r'(["\\])', r"\\\1", step) + '"]'
+
+
 def leaves(payload: object, most: int = 200) -> Iterator[str]:
     """The paths of all single values in a message, `most` of them at most; what is deeper is one value."""
     left = [most]
@@ -75,13 +86,10 @@ def _leaves(value: object, so_far: str, left: list[int], depth: int) -> Iterator
         return
     if depth and isinstance(value, Mapping) and value:
         for key, each in value.items():
-            name = str(key)
-            step = name if _PLAIN.fullmatch(name) else '["' + re.sub(r'(["\\])', r"\\\1", name) + '"]'
-            joint = "." if so_far and not step.startswith("[") else ""
-            yield from _leaves(each, f"{so_far}{joint}{step}", left, depth - 1)
+            yield from _leaves(each, so_far + _written(str(key)), left, depth - 1)
     elif depth and isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and value:
         for number, each in enumerate(value[:10]):
             yield from _leaves(each, f"{so_far}[{number}]", left, depth - 1)
     else:
         left[0] -= 1
-        yield so_far or "."
+        yield so_far.removeprefix(".") or "."

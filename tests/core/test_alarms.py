@@ -14,6 +14,7 @@ from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
 from nep.programs.alarms.rule_file import alarms_text, read_alarms
 from tests.core.waiting import tick_until
+from tests.nep.alarms.scene import message
 
 BELOW = AlarmCondition("below", "/distance", "range", 0.4)
 
@@ -91,12 +92,48 @@ def test_alarms_and_their_history_survive_a_restart(tmp_path: Path) -> None:
     first = at_rest(tmp_path)
     kept = first.alarms.new(BELOW)
     first.alarms.new(AlarmCondition("silent", "", for_s=2.0))  # nobody has said which topic
+    first.alarms.new(AlarmCondition("below", "/distance", "", 1))  # ... or which value
     first.alarms.snooze(kept.id, 4e9)
     first.close()
     assert [rule.id for rule in read_alarms(tmp_path / FILE).rules] == [kept.id]
     second = at_rest(tmp_path)
     assert [(rule.id, rule.snoozed_until_s) for rule in second.alarms.rules] == [(kept.id, 4e9)]
+    assert [each.id for each in second.alerts.active if each.id.startswith("alarms:")] == []
     second.close()
+
+
+def test_no_more_alarms_are_made_than_a_file_holds(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("app.core.alarms.MOST_ALARMS", 5)
+    session = at_rest(tmp_path)
+    for _ in range(5):
+        session.alarms.new(BELOW)
+    first = session.alarms.rules[-1]
+    session.alarms.remove(first.id)
+    session.alarms.new(BELOW)
+    assert all(each.id != "alarms:most" for each in session.alerts.active)
+    one_more = session.alarms.new(BELOW)
+    session.alarms.put_back()  # its place is taken
+    assert not {one_more.id, first.id} & {rule.id for rule in session.alarms.rules}
+    assert any(each.id == "alarms:most" for each in session.alerts.active)
+    session.alarms.remove(session.alarms.rules[0].id)
+    assert all(each.id != "alarms:most" for each in session.alerts.active)
+    session.alarms.put_back()
+    session.close()
+    assert len(read_alarms(tmp_path / FILE).rules) == 5
+
+
+def test_an_alarm_that_is_on_is_told_though_the_history_has_forgotten_it(tmp_path: Path) -> None:
+    session = at_rest(tmp_path)
+    rule = AlarmRule("d", BELOW, (AlarmAction("banner"),))
+    session.alarms.put(rule)
+    session.alarms.take("/distance", [message("/distance", {"range": 0.1})])
+    session.tick()
+    session.alarms.history.records.clear()
+    session.alarms.check()
+    said = alert(session, rule)
+    assert said is not None
+    assert said.title == "Range of /distance is 0.1, below 0.4."
+    session.close()
 
 
 @pytest.mark.parametrize("data", [b"{oops", b"\xff", b"[]", b""])

@@ -27,6 +27,8 @@ class Window:
     toasts: list[str] = field(default_factory=list)
     toast_buttons: list[tuple[str, Callable[[], object] | None]] = field(default_factory=list)
     commands: list[str] = field(default_factory=list)
+    plotted: list[tuple[str, str]] = field(default_factory=list)
+    beside: list[str] = field(default_factory=list)
     answers: Answers = field(default_factory=Answers)
 
     def context(self) -> PanelContext:
@@ -37,6 +39,8 @@ class Window:
             self.say,
             self.commands.append,
             self.answers,
+            plot=lambda topic, path: self.plotted.append((topic, path)),
+            open_beside=self.beside.append,
         )
 
     def say(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:

@@ -29,6 +29,7 @@ from app.ui.panels.topics import panel as topics
 from app.ui.shell.docking.dock import Dock
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme
+from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
 from tests.ui.fakes import Session
 from tests.ui.sample_data import blackboard
 from tests.ui.shell_parts import Answers
@@ -52,6 +53,28 @@ SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "robots": (robots.PANEL, 1032, 818, "comfortable"),
     "behaviour": (behaviour.PANEL, 1032, 626, "comfortable"),
 }
+
+
+ALARMS = (
+    AlarmRule(
+        "off",
+        AlarmCondition("loses", "/cmd_vel", limit=1.0, for_s=30.0),
+        (
+            AlarmAction("stop"),
+            AlarmAction("call", "restart_lidar", {"now": True}),
+            AlarmAction("run", "Rest"),
+        ),
+        is_on=False,
+    ),
+    AlarmRule("new", AlarmCondition("leaves", ""), (AlarmAction("banner"),)),
+    AlarmRule(
+        "battery",
+        AlarmCondition("below", "/blackboard", "robots.Pepper.battery", 20),
+        (AlarmAction("banner"), AlarmAction("console")),
+    ),
+    AlarmRule("silent", AlarmCondition("silent", "/robot/camera", for_s=2.0), (AlarmAction("keep"),)),
+)
+"""One that is off, one that is not finished, one that is on, one that is well; the last one is on top."""
 
 
 def wait(milliseconds: int) -> None:
@@ -130,6 +153,10 @@ def prepare(name: str, widget: PanelWidget) -> None:
     if name == "topics" and isinstance(widget, topics.TopicsPanel):
         widget.refresh()
         widget.show_topic("/blackboard")
+    if name == "alarms" and isinstance(widget, alarms.AlarmsPanel) and "/blackboard" in widget.session.topics:
+        for rule in ALARMS:
+            widget.session.alarms.put(rule)
+        widget.session.send("/blackboard", {"robots": {"Pepper": {"battery": 12}}})  # type: ignore[attr-defined]
 
 
 def main() -> int:

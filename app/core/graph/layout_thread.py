@@ -88,7 +88,10 @@ class LayoutThread:
         with self._news:
             if self._is_closing:
                 return GraphLayout()
-            self._process = process = LayoutProcess()
+            try:
+                self._process = process = LayoutProcess()
+            except OSError:  # this computer starts no more processes
+                return arrange_plainly(graph, sizes)
         try:
             made = process.arrange(graph, before, sizes)
         finally:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 from app.core.series.samples import LATE_S
 
@@ -67,15 +68,38 @@ class States:
         del self._begins[place:], self._words[place:]
         self.last_s = time_s if self._begins else None
 
-    def runs(self, begin_s: float, end_s: float) -> Iterator[StateRun]:
-        """The runs that a range sees, oldest first; the newest one ends with the last message."""
+    def runs(
+        self, begin_s: float, end_s: float, *, step_s: float = 0.0, without: Collection[str] | None = None
+    ) -> Iterator[StateRun]:
+        """The runs that a range sees, oldest first; the newest one ends with the last message.
+
+        With a ``step_s`` one in each such time is enough. ``without``: these words are passed over, and so is
+        what is not known.
+        """
+        place, end = self._places(begin_s, end_s)
+        while place < end:
+            at_s, word = self._begins[place], self._words[place]
+            if without is not None and (word is None or word in without):
+                place += 1
+                continue
+            yield StateRun(at_s, self._end_of(place), word)
+            # the last one that begins within the step may go on beyond it
+            place = max(place + 1, bisect_right(self._begins, at_s + step_s) - 1)
+
+    def words(self, begin_s: float, end_s: float) -> set[str]:
+        """The values that it had in a range."""
+        first, end = self._places(begin_s, end_s)
+        return {word for word in set(self._words[first:end]) if word is not None}
+
+    def _places(self, begin_s: float, end_s: float) -> tuple[int, int]:
+        """The indexes of the runs that a range sees: the first, and one behind the last."""
         first = max(0, bisect_right(self._begins, begin_s) - 1)
-        for place in range(first, len(self._begins)):
-            if self._begins[place] > end_s:
-                return
-            is_last = place + 1 == len(self._begins)
-            until = self.last_s if is_last else self._begins[place + 1]
-            yield StateRun(self._begins[place], until or self._begins[place], self._words[place])
+        return first, bisect_right(self._begins, end_s)
+
+    def _end_of(self, place: int) -> float:
+        if place + 1 < len(self._begins):
+            return self._begins[place + 1]
+        return self._begins[place] if self.last_s is None else self.last_s
 
     def at(self, time_s: float) -> str | None:
         """The value at a time; None when none is known."""
@@ -84,18 +108,14 @@ class States:
 
     def changes(self, begin_s: float, end_s: float) -> int:
         """How often it changed in a range."""
-        first = self.at(begin_s)
-        count = 0
-        for run in self.runs(begin_s, end_s):
-            if run.word is not None and run.word != first:
-                count += first is not None
-                first = run.word
-        return count
+        first, end = self._places(begin_s, end_s)
+        words = [word for word in self._words[first:end] if word is not None]
+        return sum(one != other for one, other in pairwise(words))
 
     def lasted_s(self, word: str, begin_s: float, end_s: float) -> float:
         """How long it had a value in a range."""
         return sum(
-            max(0.0, min(run.end_s, end_s) - max(run.begin_s, begin_s))
-            for run in self.runs(begin_s, end_s)
-            if run.word == word
+            max(0.0, min(self._end_of(place), end_s) - max(self._begins[place], begin_s))
+            for place in range(*self._places(begin_s, end_s))
+            if self._words[place] == word
         )

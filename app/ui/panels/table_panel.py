@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, TypeVar
 
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.panels.base import Density, PanelContext, PanelWidget
+from app.ui.panels.row_actions import RowAction, filled
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ElidedLabel, EmptyAction, EmptyState, Separator, label
 from app.ui.widgets.buttons import LinkButton
@@ -31,14 +32,6 @@ class TableWords:
     filter: str
     nothing_fits: str
     clear_the_filter: str
-
-
-class RowAction(NamedTuple):
-    """An entry in the menu of a row: its words, its icon, what it does."""
-
-    words: str
-    icon: str
-    run: Callable[[], object]
 
 
 class TablePanel(PanelWidget, Generic[Row]):
@@ -97,12 +90,15 @@ class TablePanel(PanelWidget, Generic[Row]):
         """What the menu of the row of this key offers; no menu where that is nothing."""
         return (RowAction(_("Show"), "eye", lambda: self.open_row(key)),)
 
+    def menu_of(self, key: str) -> Menu | None:
+        """The menu of the row of this key; None where there is nothing to do."""
+        actions = self.row_actions(key)
+        return filled(Menu(self.theme, self), self.theme, actions) if actions else None
+
     def _show_row_menu(self, key: str, at: QPoint) -> None:
-        menu = Menu(self.theme, self)
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        for action in self.row_actions(key):
-            menu.addAction(self.theme.icon(action.icon), action.words, action.run)
-        if menu.actions():
+        menu = self.menu_of(key)
+        if menu is not None:
+            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
             menu.popup(at)
 
     def filter_words(self) -> list[str]:

@@ -306,13 +306,11 @@ class AlarmEvaluator:
 
     def state(self, rule: AlarmRule) -> AlarmState:
         """How an alarm is now."""
-        if problem_of(rule) is not None:
-            return AlarmState("faulty")
         now = self._clock()
         with self._lock:
             track = self._tracks.get(rule.id)
-            if track is None:
-                return AlarmState("off")
+            if track is None:  # only then is it worth to look for a problem again
+                return AlarmState("off" if problem_of(rule) is None else "faulty")
             condition = track.rule.condition
             heard = self._heard.get(condition.name) if condition.hears else None
             was_seen = track.was_seen or (heard is not None and heard.there_since is not None)

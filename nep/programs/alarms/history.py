@@ -14,7 +14,8 @@ __all__ = ["MOST_RECORDS", "AlarmDeed", "AlarmHistory", "AlarmRecord", "record_f
 MOST_RECORDS = 500
 _MOST_DEEDS = 20
 _MOST_LETTERS = 300
-_LATEST_S = 1e12
+_LATEST_S = 3e10
+"""Later times (the year 2920) are none: not every system has a date for them."""
 
 
 class AlarmDeed(NamedTuple):

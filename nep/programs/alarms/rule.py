@@ -28,6 +28,7 @@ __all__ = [
     "AlarmRule",
     "RuleProblem",
     "Scalar",
+    "float_of",
     "new_id",
     "problem_of",
 ]
@@ -89,7 +90,7 @@ class AlarmCondition:
     def number(self) -> float:
         """The limit of `NUMBER_KINDS`; no number (NaN) for what is compared otherwise."""
         is_number = isinstance(self.limit, int | float) and not isinstance(self.limit, bool)
-        return float(self.limit) if is_number else math.nan  # type: ignore[arg-type]
+        return float_of(self.limit) if is_number else math.nan  # type: ignore[arg-type]
 
     @property
     def hears(self) -> bool:
@@ -158,6 +159,14 @@ class _Check:
             self.found.append(RuleProblem(key, error.reason))
         except NepError as error:
             self.found.append(RuleProblem(key, str(error)))
+
+
+def float_of(number: float) -> float:
+    """A number as a float; an integer beyond every float is infinite."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
 
 
 def new_id() -> str:

@@ -37,12 +37,20 @@ from nep.programs.alarms.rule import (
 )
 from nep.text import escaped, quotable, shortened
 
-__all__ = ["EXAMPLE", "AlarmFile", "NewerAlarmsError", "alarms_text", "read_alarms", "read_text"]
+__all__ = [
+    "EXAMPLE",
+    "MOST_ALARMS",
+    "AlarmFile",
+    "NewerAlarmsError",
+    "alarms_text",
+    "read_alarms",
+    "read_text",
+]
 
 FORMAT = 1
 MOST_ALARMS = 200
 _MOST_BYTES = 4_000_000
-_LATEST_S = 1e12
+_LATEST_S = 3e10  # the year 2920: not every system has a date for what is later
 
 EXAMPLE = """\
 {

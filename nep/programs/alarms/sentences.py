@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from nep.i18n import _, lazy, listed, number
-from nep.programs.alarms.rule import KEEP_S, AlarmAction, AlarmCondition, AlarmRule, Scalar
+from nep.programs.alarms.rule import KEEP_S, AlarmAction, AlarmCondition, AlarmRule, Scalar, float_of
 from nep.text import quotable, shortened
 
 __all__ = [
@@ -85,8 +85,10 @@ def value_words(value: object) -> str:
     """A value of a message; a long text is shortened, and what is no single value told by its kind."""
     if isinstance(value, bool) or value is None:
         return {True: _("true"), False: _("false"), None: _("null")}[value]
-    if isinstance(value, int | float):
-        return number(value, "d" if isinstance(value, int) and abs(value) < 10**15 else ".6g")
+    if isinstance(value, int):
+        return number(value, "d") if abs(value) < 10**15 else number(float_of(value), ".6g")
+    if isinstance(value, float):
+        return number(value, ".6g")
     if isinstance(value, str):
         return f"“{quotable(shortened(value, _SHOWN))}”"
     return _("a list") if isinstance(value, list | tuple) else _("an object")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from nep.messages.fields import MISSING, Path, parse_path, pick
-from nep.programs.alarms.rule import EVENT_KINDS, MOST_LETTERS, AlarmRule, Scalar
+from nep.programs.alarms.rule import EVENT_KINDS, MOST_LETTERS, AlarmRule, Scalar, float_of
 
 __all__ = ["AlarmTrack", "Turn", "scalar_of"]
 
@@ -166,11 +166,14 @@ class AlarmTrack:
 
 
 def scalar_of(value: object) -> Scalar:
-    """A value as an alarm tells it: lists and maps have none, long texts are cut."""
+    """A value as an alarm tells it: of lists and maps their size, of long texts the beginning.
+
+    An integer of more than 64 bits is told as a float: few programs that read what happened take it.
+    """
     if isinstance(value, str):
         return value[:MOST_LETTERS]
     if isinstance(value, bool | int | float):
-        return value
+        return value if -(1 << 63) <= value < 1 << 64 else float_of(value)
     return (
         f"{{{len(value)}}}"
         if isinstance(value, Mapping)
@@ -183,14 +186,11 @@ def scalar_of(value: object) -> Scalar:
 def _number(value: object) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float) or (value != value):  # noqa: PLR0124  NaN
         return None
-    try:
-        return float(value)
-    except OverflowError:  # an integer beyond every float
-        return math.inf if value > 0 else -math.inf
+    return float_of(value)
 
 
 def _same(one: object, other: object) -> bool:
-    """Whether two values are equal; yes is not 1."""
+    """Whether two values are equal; yes is not 1, and what is no number (NaN) stays so."""
     if isinstance(one, bool) is not isinstance(other, bool):
         return False
-    return one == other
+    return one == other or (one != one and other != other)  # noqa: PLR0124

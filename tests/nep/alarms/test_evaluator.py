@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 import threading
 
 import pytest
 
+from nep.cli.values import json_of
 from nep.programs.alarms.evaluator import LARGE_BYTES
 from nep.programs.alarms.losses import TopicLosses
+from nep.programs.alarms.sentences import condition_words, seen_words
 from nep.protocol.graph_view import SubscriberInfo, TopicInfo
 from tests.nep.alarms.scene import MIDNIGHT_S, Scene, message, rule
 
@@ -73,6 +76,32 @@ def test_an_integer_beyond_every_float_is_very_large() -> None:
     huge = message("/d", 0)
     huge.decoded = -(10**400)
     assert scene.send("/d", huge) == [("on", -math.inf)]
+
+
+@pytest.mark.parametrize("kind", ["changes", "equals", "is_not"])
+@pytest.mark.parametrize("huge", [10**400, -(10**400), 2**64, 2**64 - 1, -(2**63)])
+def test_a_huge_integer_is_told_in_words(kind: str, huge: int) -> None:
+    scene = Scene(rule(kind, "/d", path=".", limit=1 if kind == "is_not" else huge))
+    scene.graph(("/d",))
+    told = message("/d", 0)
+    told.decoded = huge
+    scene.send("/d", 1)
+    ((what, seen),) = scene.send("/d", told)
+    assert what == "on"
+    assert json.loads(json_of(seen)) == (None if abs(huge) > 1e308 else seen)
+    (record,) = scene.alarms.history
+    assert record.words
+    state = scene.alarms.evaluator.state(scene.alarms.rules[0])
+    assert seen_words(scene.alarms.rules[0].condition, state.seen)
+    assert condition_words(scene.alarms.rules[0].condition)
+
+
+def test_what_stays_no_number_has_not_changed() -> None:
+    scene = Scene(rule("changes", "/d", path="r"))
+    scene.graph(("/d",))
+    nan = b'{"r": NaN}'
+    assert scene.send("/d", nan, nan) == []
+    assert [kind for kind, _seen in scene.send("/d", {"r": 1}, nan)] == ["on"]
 
 
 def test_a_moment_is_seen_though_the_next_message_of_the_batch_is_well() -> None:

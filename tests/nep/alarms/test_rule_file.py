@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import pytest
 from hypothesis import given
@@ -155,16 +156,14 @@ def test_the_history_is_kept_and_what_is_damaged_of_it_left_out() -> None:
     assert [(each.words, each.deeds, each.count, each.lasted_s) for each in found] == [("w", [], 1, None)]
 
 
-VALUES = st.recursive(
-    st.none() | st.booleans() | st.floats(allow_nan=True) | st.integers() | st.text(max_size=8)
-    | st.sampled_from(["topic", "is", "silent", "when", "banner", "/t", "below", "call"]),
-    lambda inner: st.lists(inner, max_size=3)
-    | st.dictionaries(
-        st.sampled_from(["when", "do", "topic", "node", "is", "than", "for_s", "value", "on", "id", "call"]),
-        inner, max_size=4,
-    ),
-    max_leaves=8,
+KEYS = st.sampled_from(["when", "do", "topic", "node", "is", "than", "for_s", "value", "on", "id", "call"])
+FLAT = st.sampled_from(
+    [None, True, False, math.nan, -math.inf, -0.0, 1e300, 0, -1, 2**64 - 1, 10**400, "", "\ud800", "“",
+     "topic", "is", "silent", "when", "banner", "/t", "below", "call", [], {}]
 )  # fmt: skip
+"""From a list: `hypothesis` needs far longer to find deep values of every kind than they take to be read."""
+DEEPER = FLAT | st.lists(FLAT, max_size=2) | st.dictionaries(KEYS, FLAT, max_size=4)
+VALUES = DEEPER | st.lists(DEEPER, max_size=2) | st.dictionaries(KEYS, DEEPER, max_size=4)
 
 
 @given(st.lists(VALUES, max_size=3))

@@ -15,7 +15,7 @@ import nep
 from nep.cli.echo import echo
 from nep.cli.table_file import Fields, Table
 from nep.errors import NepError
-from nep.messages.fields import MISSING, leaves, parse_path, pick
+from nep.messages.fields import MISSING, leaves, parse_path, path_text, pick
 from nep.messages.message import Message
 
 ODOM = {"pose": {"x": 1.5, "y": None}, "joints": [0.1, 0.2, {"name": 'knee "left", bent'}], "a key": True}
@@ -45,6 +45,11 @@ def message(payload, stamp_ns=1_700_000_000_000_000_001, codec="json", **more):
 )
 def test_a_path_picks_a_value(text, value):
     assert pick(ODOM, parse_path(text)) == value
+
+
+@given(st.lists(st.integers(-(10**6), 10**6) | st.text(), max_size=5))
+def test_a_path_that_is_written_is_read_as_it_was(steps):
+    assert parse_path(path_text(tuple(steps))) == tuple(steps)
 
 
 @pytest.mark.parametrize("text", ["", "joints[x]", "joints[", "a..b", "a.", "]", 'a["b'])

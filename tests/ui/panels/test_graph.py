@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QContextMenuEvent, QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from app.core.graph.activity import QUIET_S
 from app.core.graph.walk import GraphChoice
@@ -213,6 +214,10 @@ def test_a_click_on_a_line_shows_its_topic_and_inspect_opens_it(panel: GraphPane
     assert panel.card.isVisible()
     press(panel.card.inspect)
     assert window.opened == ["/blackboard"]
+    press(panel.card.plot)
+    assert window.plotted == [("/blackboard", "")]
+    press(panel.card.alarm)
+    assert window.commands == ["alarm.topic:/blackboard"]
     press(panel.card.close_button)
     assert panel.canvas.choice is None
     assert not panel.card.isVisible()
@@ -238,6 +243,9 @@ def test_the_card_of_a_node_leads_to_its_topics(panel: GraphPanel, window: Windo
         ("Serves", ["remember"]),
     ]
     assert not panel.card.inspect.isVisible()
+    assert not panel.card.plot.isVisible()
+    press(panel.card.alarm)
+    assert window.commands == ["alarm.node:blackboard"]
     press(button(panel.card, "/touch"))
     assert panel.canvas.choice == GraphChoice("topic", "/touch")
     press(button(panel.card, "pepper_driver"))
@@ -250,8 +258,73 @@ def test_the_card_of_a_service(panel: GraphPanel) -> None:
     content = panel.card.content
     assert content is not None
     assert [(figure.title, figure.value) for figure in content.figures] == [("Calls", "7"), ("Errors", "1")]
-    assert not panel.card.inspect.isVisible()
+    assert not panel.card.steps.isVisible()
     panel.canvas.opened.emit("remember")  # Enter: there is nothing to inspect
+
+
+def menu_at(panel: GraphPanel, place: QPoint, *, by_keys: bool = False) -> QMenu:
+    """The menu that a right click, or the menu key, opens."""
+    reasons = QContextMenuEvent.Reason
+    reason = reasons.Keyboard if by_keys else reasons.Mouse
+    event = QContextMenuEvent(reason, place, panel.canvas.mapToGlobal(place))
+    QApplication.sendEvent(panel.canvas, event)
+    menu = QApplication.activePopupWidget()
+    assert isinstance(menu, QMenu)
+    menu.close()
+    return menu
+
+
+def run_all(menu: QMenu) -> list[str]:
+    """Do everything that a menu offers; the words."""
+    words = [action.text() for action in menu.actions()]
+    for action in menu.actions():
+        action.trigger()
+    return words
+
+
+@pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+def test_a_right_click_on_a_line_offers_what_its_topic_can(panel: GraphPanel, window: Window) -> None:
+    scene = panel.canvas.scene
+    assert scene is not None
+    item = next(each for each in scene.lines if each.line.topics == ("/blackboard",))
+    assert item.label is not None
+    words = run_all(menu_at(panel, at(panel, item.label.center())))
+    assert words == [
+        "Show its messages", "Show it in one more panel", "Plot a field of it", "New alarm", "Copy its name",
+    ]  # fmt: skip
+    assert panel.canvas.choice == GraphChoice("topic", "/blackboard", key_of(panel, "blackboard"))
+    assert (window.opened, window.beside, window.plotted) == (
+        ["/blackboard"], ["/blackboard"], [("/blackboard", "")],
+    )  # fmt: skip
+    assert window.commands == ["alarm.topic:/blackboard"]
+    assert QGuiApplication.clipboard().text() == "/blackboard"
+    assert [each.text() for each in panel.menu_of(GraphChoice("topic", "remember")).actions()] == [
+        "Copy its name"
+    ]
+
+
+@pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+def test_the_menu_key_opens_the_menu_of_the_chosen_node(panel: GraphPanel, window: Window) -> None:
+    panel.canvas.choose(GraphChoice("node", key_of(panel, "pepper_driver")))
+    assert run_all(menu_at(panel, QPoint(1, 1), by_keys=True)) == ["New alarm", "Copy its name"]
+    assert window.commands == ["alarm.node:pepper_driver"]
+
+
+def test_a_line_of_several_topics_has_a_menu_for_each(qtbot, panel: GraphPanel, window: Window) -> None:
+    more = graph(2)
+    twin = replace(more.topics["/touch"], name="/touch&go")
+    show(window, replace(more, topics={**more.topics, twin.name: twin}))
+    settle(qtbot, panel)
+    assert panel.canvas.scene is not None
+    line = panel.canvas.scene.graph.line_of(twin.name)
+    assert line is not None
+    assert set(line.topics) == {"/touch", "/touch&go"}
+    menu = panel.menu_of(GraphChoice("topic", twin.name))
+    assert [action.text() for action in menu.actions()] == ["/touch&&go", "/touch"]
+    part = menu.actions()[0].menu()
+    assert isinstance(part, QMenu)
+    run_all(part)
+    assert window.commands == ["alarm.topic:/touch&go"]
 
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, 2.0**64, -1.0])

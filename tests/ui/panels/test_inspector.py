@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QMouseEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from app.core.messages import lazy_json
 from app.core.messages.reader import LARGE_BYTES
@@ -20,7 +20,9 @@ from app.ui.panels.inspector.footer import message_facts
 from app.ui.panels.inspector.panel import PANEL, InspectorPanel
 from app.ui.panels.inspector.tree_model import TreeNode
 from app.ui.panels.inspector.values import image_summary, plain_words
+from app.ui.shell.commands.view import read_value
 from nep.messages.clocks import SAME_CLOCK, ClockDifference, PublisherClock
+from nep.messages.fields import parse_path
 from nep.messages.message import Message, kind_of
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
@@ -563,6 +565,24 @@ def test_its_ctrl_f_goes_before_the_window_s(qtbot, panel, window) -> None:
     QTest.keyClick(panel.tree, Qt.Key.Key_F, Qt.KeyboardModifier.ControlModifier)
     assert panel.finder.field.hasFocus()
     assert asked == []
+
+
+@pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+def test_an_alarm_is_begun_on_a_value_whatever_its_keys_are(panel, window) -> None:
+    message = {"a.b": {"c d": [{"": 7}]}, "x": 1}
+    panel.show_topic("/blackboard")
+    window.session.send("/blackboard", message)
+    panel.refresh()
+    for steps in (("a.b", "c d", 0, ""), ("x",)):
+        choose(panel, *steps)
+        panel._show_menu(QPoint(5, 5))
+        menu = QApplication.activePopupWidget()
+        assert isinstance(menu, QMenu)
+        menu.close()
+        next(each for each in menu.actions() if each.text() == "New alarm").trigger()
+        command, _colon, about = window.commands[-1].partition(":")
+        topic, path = read_value(about)
+        assert (command, topic, parse_path(path)) == ("alarm.value", "/blackboard", steps)
 
 
 def test_a_value_is_plotted_by_its_menu_its_key_the_foot_and_by_dragging_it(

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
@@ -275,12 +273,14 @@ def test_a_name_of_twenty_letters_fits_at_the_usual_width(qtbot, panel) -> None:
     assert room >= panel.theme.font("mono").pixelSize() * 0.6 * len("/Pepper/head_touched")
 
 
-def test_a_right_click_on_a_topic_opens_it_plots_it_or_copies_its_name(panel, window, monkeypatch) -> None:
-    plotted: list[tuple[str, str]] = []
-    monkeypatch.setattr(panel, "context", replace(panel.context, plot=lambda *field: plotted.append(field)))
+def test_a_right_click_on_a_topic_opens_plots_watches_it_or_copies_its_name(panel, window) -> None:
     menu = panel.menu_of("/blackboard")
+    assert menu is not None
     for action in menu.actions():
         action.trigger()
+    assert len({action.text() for action in menu.actions()}) == 5
     assert window.opened == ["/blackboard"]
-    assert plotted == [("/blackboard", "")]
+    assert window.beside == ["/blackboard"]
+    assert window.plotted == [("/blackboard", "")]
+    assert window.commands == ["alarm.topic:/blackboard"]
     assert QGuiApplication.clipboard().text() == "/blackboard"

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
 
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Robot
+from app.ui.panels.alarms.phrases import payload_text
 from app.ui.panels.base import Panel, PanelWidget
 from app.ui.panels.behaviour import panel as behaviour
 from app.ui.panels.inspector.tree_view import TreeView
@@ -22,6 +23,7 @@ from app.ui.panels.topics import columns as topics
 from app.ui.shell.docking.dock import Dock
 from app.ui.theme.theme import Theme
 from app.ui.widgets.table.cells import PADDING, head_font, head_width
+from nep.programs.alarms import AlarmRule
 from tests.pseudo import ROOT, texts_of, untranslated
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
@@ -124,6 +126,14 @@ def words_of(robot: Robot) -> Iterator[str]:
         yield from (field.title for field in (*action.feedback, *action.output))
 
 
+def named_in(rules: Iterable[AlarmRule]) -> Iterator[str]:
+    """What a person, or a program, has named in alarms."""
+    for rule in rules:
+        yield from (rule.condition.name, rule.condition.path)
+        for action in rule.actions:
+            yield from (action.name, payload_text(action.payload))
+
+
 def data_of(session: Session) -> Iterator[str]:
     """What comes from elsewhere, in whatever language it is."""
     for topic in session.topics:
@@ -140,6 +150,7 @@ def data_of(session: Session) -> Iterator[str]:
         yield from (alert.title, alert.detail, alert.button or "")
     for finding in session.doctor.findings:
         yield from (finding.sentence, finding.mend, finding.command)
+    yield from named_in(session.alarms.rules)
     for document in session.documents:
         yield from (document.name, "NAO")
         for problem in document.program().problems:

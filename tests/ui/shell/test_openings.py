@@ -11,13 +11,16 @@ from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPoint
 from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QWidget
 
+from app.core.graph.walk import GraphChoice
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description.description import parse, td_for
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.panel import BehaviourPanel
+from app.ui.panels.graph.panel import GraphPanel
 from app.ui.panels.registry import PanelRegistry
+from app.ui.panels.table_panel import TablePanel
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.main_window import MainWindow
@@ -153,13 +156,27 @@ def test_the_menu_in_a_title(window: MainWindow, panel: str, opener: str) -> Non
         ("image", "_show_actions"),
         ("console", "_show_actions"),
         ("inspector", "_show_menu"),
-        ("topics", "_show_menu"),
     ],
 )
 def test_the_menu_under_the_mouse(window: MainWindow, panel: str, opener: str) -> None:
     window.show()
     dock = opened(window, panel)
     leaves_nothing(window, lambda: getattr(dock.panel, opener)(QPoint(5, 5)))
+
+
+@pytest.mark.parametrize("panel", ["nodes", "topics"])
+def test_the_menu_of_a_row(window: MainWindow, panel: str) -> None:
+    window.show()
+    inside = opened(window, panel).panel
+    assert isinstance(inside, TablePanel)
+    leaves_nothing(window, lambda: inside._show_row_menu("/odom", QPoint(5, 5)))
+
+
+def test_the_menu_of_a_line_in_the_graph(window: MainWindow) -> None:
+    window.show()
+    inside = opened(window, "graph").panel
+    assert isinstance(inside, GraphPanel)
+    leaves_nothing(window, lambda: inside._show_menu(GraphChoice("topic", "/blackboard"), QPoint(5, 5)))
 
 
 def test_the_columns_of_a_table(window: MainWindow) -> None:

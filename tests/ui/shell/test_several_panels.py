@@ -7,15 +7,19 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from app.core.session import Session
 from app.ui.panels.base import PanelContext
+from app.ui.shell.dialogs.command_palette import TITLES, Palette
 from app.ui.shell.docking.dock import Dock, key_of, kind_of
 from app.ui.shell.docking.layouts import layout_named
 from app.ui.shell.docking.workbench import MOST_OF_A_KIND, Workbench
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
+from app.ui.widgets.lists.entry_list import Heading
 from tests.ui.shell_parts import PANELS, Answers, PlainPanel
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -220,3 +224,23 @@ def test_the_menu_and_the_palette_know_them(bench, window) -> None:
     found = {entry.words: entry for entry in window.commands.view._entries.all()}
     window.commands.view.do(found["One more: Inspector"])
     assert "inspector#2" in bench.docks
+
+
+def test_one_more_is_found_in_the_palette(bench, window, qtbot) -> None:
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    window.commands.run("palette.open")
+    palette = window.findChild(Palette)
+    assert palette is not None
+    lines = palette.rows.lines.lines
+    assert "One more panel" in [line.words for line in lines if isinstance(line, Heading)]
+    palette.field.setText("One more: Inspector")
+    QTest.keyClick(palette.field, Qt.Key.Key_Return)
+    assert "inspector#2" in bench.docks
+    assert bench.docks["inspector#2"].isVisible()
+
+
+def test_every_kind_that_the_palette_lists_has_a_heading(bench, window) -> None:
+    kinds = {entry.kind for entry in window.commands.view._entries.all()}
+    assert kinds <= TITLES.keys()
+    assert "another" in kinds

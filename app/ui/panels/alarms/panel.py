@@ -83,8 +83,9 @@ class AlarmsPanel(PanelWidget):
     # -- its parts ----------------------------------------------------------------------------------------
 
     def _make_header(self) -> None:
+        self.count = label("", "small", role="textSecondary")
         self.chip = Chip(self.theme)
-        self.chips = [self.chip]
+        self.chips = [self.count, self.chip]
         self.new = Button(self.theme, _("New alarm"), "plus", size="small")
         self.new.clicked.connect(self.begin)
         self.header = [self.new]
@@ -210,7 +211,7 @@ class AlarmsPanel(PanelWidget):
             row.snooze.setVisible(rule.is_on)
         count = len(self.rows)
         words = ngettext("{count} alarm", "{count} alarms", count).format(count=count)
-        self.set_title(_("Alarms"), words if count else "")
+        self.count.setText(words if count else "")
         self.chip.set(ngettext("{count} on", "{count} on", on).format(count=on) if on else "", "error")
 
     def _show_history(self) -> None:

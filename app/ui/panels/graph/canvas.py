@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, QSizeF, Qt, Signal
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, QSizeF, Qt, Signal
 from PySide6.QtGui import (
+    QContextMenuEvent,
     QFocusEvent,
     QHelpEvent,
     QKeyEvent,
@@ -52,7 +53,8 @@ class GraphCanvas(QWidget):
 
     `chosen` tells what a person chose (None: nothing), `opened` a topic that is to be looked at, `entered` a
     node whose card is wanted, `toggled` a group to be opened or closed, `quiet_wanted` one whose quiet nodes
-    are wanted, `letter` a key that is the panel's, `moved` that the part that shows is another.
+    are wanted, `letter` a key that is the panel's, `moved` that the part that shows is another. `menu_wanted`
+    tells of what is chosen, and where on the screen, a menu is wanted.
     """
 
     chosen = Signal(object)
@@ -62,6 +64,7 @@ class GraphCanvas(QWidget):
     quiet_wanted = Signal(str)
     letter = Signal(str)
     moved = Signal()
+    menu_wanted = Signal(object, QPoint)
 
     def __init__(
         self, theme: Theme, describe: Callable[[GraphChoice | None], str], tip: Callable[[str], str]
@@ -200,18 +203,21 @@ class GraphCanvas(QWidget):
         self.move_by((middle.x() - at.x()) * self.scale, (middle.y() - at.y()) * self.scale)
 
     def _bring_into_sight(self) -> None:
-        scene, choice = self.scene, self.choice
-        if scene is None or choice is None:
-            return
-        rect = QRectF()
-        if choice.kind == "node" and choice.key in scene.nodes:
-            rect = scene.nodes[choice.key].rect
-        else:
-            item = next((each for each in scene.lines if choice.key in each.line.topics), None)
-            if item is not None:
-                rect = item.label if item.label is not None else QRectF(item.bounds.center(), QSizeF(1, 1))
+        rect = self._place_of(self.choice)
         if not rect.isNull() and not self.visible().contains(rect):
             self.show_place(rect.center())
+
+    def _place_of(self, choice: GraphChoice | None) -> QRectF:
+        """Where a node, or the words of a topic, are in the scene; null where nothing is."""
+        scene = self.scene
+        if scene is None or choice is None:
+            return QRectF()
+        if choice.kind == "node":
+            return scene.nodes[choice.key].rect if choice.key in scene.nodes else QRectF()
+        item = next((each for each in scene.lines if choice.key in each.line.topics), None)
+        if item is None:
+            return QRectF()
+        return item.label if item.label is not None else QRectF(item.bounds.center(), QSizeF(1, 1))
 
     def _to_screen(self, area: QRectF) -> QRectF:
         return QRectF(
@@ -324,13 +330,25 @@ class GraphCanvas(QWidget):
         if isinstance(meant, GraphChoice) and meant.kind == "topic":
             self.opened.emit(meant.key)
 
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        """What the mouse is over is chosen first, so that its card says what the menu is about."""
+        if event.reason() == QContextMenuEvent.Reason.Keyboard:
+            choice, place = self.choice, self._to_screen(self._place_of(self.choice)).center()
+        else:
+            meant, place = self._means(QPointF(event.pos())), QPointF(event.pos())
+            choice = meant if isinstance(meant, GraphChoice) else None
+            if choice is not None:
+                self.choose(choice)
+        if choice is not None:
+            self.menu_wanted.emit(choice, self.mapToGlobal(place.toPoint()))
+
     def _press(self, at: QPointF) -> None:
         meant = self._means(at)
         if isinstance(meant, tuple):
             group, is_head = meant
             (self.toggled if is_head else self.quiet_wanted).emit(group)
             return
-        if meant is not None and meant.kind == "node" and self._open_group(meant.key):
+        if meant is not None and meant.kind == "node" and self.open_group(meant.key):
             return
         self.choose(meant)
 
@@ -349,7 +367,7 @@ class GraphCanvas(QWidget):
         group = scene.group_at(here)
         return (group[0].key, group[1]) if group is not None else None
 
-    def _open_group(self, key: str) -> bool:
+    def open_group(self, key: str) -> bool:
         """Open a group that is drawn as one box."""
         node = self.scene.graph.node(key) if self.scene is not None else None
         if node is None or node.kind != "group":
@@ -404,7 +422,7 @@ class GraphCanvas(QWidget):
             return
         if choice.kind == "topic":
             self.opened.emit(choice.key)
-        elif not self._open_group(choice.key):
+        elif not self.open_group(choice.key):
             self.entered.emit()
 
 

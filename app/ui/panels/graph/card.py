@@ -18,6 +18,7 @@ from app.ui.text.numbers import age_words, bandwidth_words, grouped, latency_wor
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, ElidedLabel, IconButton, Scrolled, Separator, Sparkline, label
 from app.ui.widgets.buttons import LinkButton
+from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, ngettext, number
 
 if TYPE_CHECKING:
@@ -64,19 +65,23 @@ class CardContent:
     foot: str = ""
     topic: str = ""
     """What *Inspect* opens; "" where there is nothing to inspect."""
+    has_fields: bool = False
+    """Whether a field of its messages can be plotted."""
+    alarm: str = ""
+    """The window's command that begins an alarm about it; "" where there can't be one."""
 
 
 class GraphCard(QWidget):
     """Shows a `CardContent`; what did not change is left alone.
 
-    `closed` when a person closes it, `inspected` tells a topic, `chose` a node's or topic's key.
-
-    More next steps of a topic (plot its rate, record it, make an alarm of it) stand beside `inspect` in
-    `steps` as soon as Studio can do them.
+    `closed` when a person closes it, `inspected` and `plotted` tell a topic, `warned` the command that begins
+    an alarm, `chose` a node's or topic's key. The next steps stand in `steps`.
     """
 
     closed = Signal()
     inspected = Signal(str)
+    plotted = Signal(str)
+    warned = Signal(str)
     chose = Signal(str, str)
 
     def __init__(self, theme: Theme) -> None:
@@ -93,13 +98,7 @@ class GraphCard(QWidget):
         self._column.setSpacing(8)
         scroll = Scrolled(self._inside)
         scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.inspect = Button(theme, _("Inspect"), "list-tree", size="form")
-        self.inspect.clicked.connect(self._inspect)
-        self.steps = QHBoxLayout()
-        self.steps.setContentsMargins(14, 6, 14, 8)
-        self.steps.setSpacing(8)
-        self.steps.addWidget(self.inspect)
-        self.steps.addStretch(1)
+        self._make_steps()
         self.foot = label("", "small", role="textTertiary", wrap=True)
         self.foot.setContentsMargins(14, 5, 14, 7)
         column = QVBoxLayout(self)
@@ -107,7 +106,7 @@ class GraphCard(QWidget):
         column.setSpacing(0)
         column.addLayout(self._head())
         column.addWidget(scroll, 1)
-        column.addLayout(self.steps)
+        column.addWidget(self.steps)
         self._line = Separator(theme)
         column.addWidget(self._line)
         column.addWidget(self.foot)
@@ -115,6 +114,23 @@ class GraphCard(QWidget):
         self._tables: list[_Table] = []
         self.setAccessibleName(_("What is chosen"))
         self.hide()
+
+    def _make_steps(self) -> None:
+        theme = self._theme
+        self.inspect = Button(theme, _("Inspect"), "list-tree", size="form")
+        self.inspect.clicked.connect(self._inspect)
+        self.plot = Button(theme, _("Plot a field"), "chart-line", size="form")
+        self.plot.clicked.connect(self._plot)
+        self.alarm = Button(theme, _("New alarm"), "bell", size="form")
+        self.alarm.clicked.connect(self._warn)
+        self.steps = QWidget()
+        flow = Flow(self.steps, gap=8, row_gap=6)
+        flow.setContentsMargins(14, 6, 14, 8)
+        for step in (self.inspect, self.plot, self.alarm):
+            flow.addWidget(step)
+        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        policy.setHeightForWidth(True)
+        self.steps.setSizePolicy(policy)
 
     def _head(self) -> QHBoxLayout:
         head = QHBoxLayout()
@@ -135,6 +151,14 @@ class GraphCard(QWidget):
         if self.content is not None and self.content.topic:
             self.inspected.emit(self.content.topic)
 
+    def _plot(self) -> None:
+        if self.content is not None and self.content.topic:
+            self.plotted.emit(self.content.topic)
+
+    def _warn(self) -> None:
+        if self.content is not None and self.content.alarm:
+            self.warned.emit(self.content.alarm)
+
     def show_content(self, content: CardContent | None) -> None:
         """Say this, or nothing: then the card is not there."""
         if content == self.content:
@@ -146,6 +170,9 @@ class GraphCard(QWidget):
         self.title.setText(content.title)
         self.kind.setText(content.kind)
         self.inspect.setVisible(bool(content.topic))
+        self.plot.setVisible(bool(content.topic) and content.has_fields)
+        self.alarm.setVisible(bool(content.alarm))
+        self.steps.setVisible(bool(content.topic or content.alarm))
         self.foot.setText(content.foot)
         self.foot.setVisible(bool(content.foot))
         self._line.setVisible(bool(content.foot))
@@ -335,6 +362,8 @@ def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
         tuple(table for table in tables if table.rows),
         clock_words(facts.view) if not topic.network else "",
         topic.key,
+        topic.codec != "image",
+        "" if topic.network else f"alarm.topic:{topic.name}",  # alarms are about Studio's own network
     )
 
 
@@ -422,6 +451,7 @@ def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: Card
         figures if entry.cpu_ratio is not None else (),
         (", ".join(lines),) if lines else (),
         tuple(table for table in tables if table.rows),
+        alarm="" if entry.network else f"alarm.node:{entry.name}",
     )
 
 

@@ -215,13 +215,16 @@ class _Painting:
         quiet = theme.colour("textDisabled" if item.node.is_gone else "textSecondary")
         paint_icon(painter, square, node_icon(item.node), quiet)
         left = rect.left() + 12 + side + 10
-        area = QRectF(left, rect.top() + 5, rect.right() - 4 - left, rect.height() / 2 - 4)
+        has_line = self.has_small and bool(item.line)
+        area = QRectF(left, rect.top(), rect.right() - 4 - left, rect.height())
+        if has_line:
+            area.adjust(0, 5, 0, 1 - rect.height() / 2)
         font = self.scene.name_font
         if item.node.is_gone:
             font = QFont(font)
             font.setStrikeOut(True)
         _text(painter, area, item.name, font, theme.colour(role))
-        if self.has_small and item.line:
+        if has_line:
             area.translate(0, rect.height() / 2 - 4)
             _text(painter, area, item.line, self.scene.small_font, theme.colour("textTertiary"))
 

@@ -7,9 +7,8 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QBuffer, QIODevice, QRectF, Qt
+from PySide6.QtCore import QBuffer, QIODevice, QPoint, QRectF, Qt
 from PySide6.QtGui import QAction, QColor, QPainter, QResizeEvent
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
@@ -20,6 +19,7 @@ from app.core.graph.layout import GraphLayout, LayoutSizes
 from app.core.graph.layout_thread import LayoutThread
 from app.core.graph.node_graph import (
     MOST_OPEN,
+    DrawnNode,
     GraphChoices,
     GraphFacts,
     GraphLine,
@@ -47,14 +47,20 @@ from app.ui.panels.graph.words import (
     node_name,
     short_rate,
 )
+from app.ui.panels.row_actions import (
+    RowAction,
+    copies,
+    filled,
+    node_actions,
+    show_messages,
+    topic_actions,
+)
+from app.ui.text import plain
 from app.ui.text.numbers import bandwidth_words, grouped
 from app.ui.widgets import Button, EmptyAction, EmptyState, Separator, label
 from app.ui.widgets.file_dialogs import FileKind
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy, ngettext
-
-if TYPE_CHECKING:
-    pass
 
 SVG = FileKind(lazy("Picture that stays sharp at any size"), ".svg")
 DOT = FileKind(lazy("Graph for other programs"), ".dot")
@@ -62,6 +68,8 @@ BESIDE_FROM = 700
 """From this width on, in px at 100 % text, the card stands beside the graph, else below it."""
 QUIET_EVERY = 30
 """Refreshes of 30 a second: who is quiet is looked at once a second."""
+MOST_IN_MENU = 20
+"""Topics of one line that its menu has; the others are in the cards of its nodes."""
 GROUPS: tuple[GroupBy, ...] = ("computer", "robot", "nothing")
 
 
@@ -135,8 +143,11 @@ class GraphPanel(PanelWidget):
         canvas.toggled.connect(self._toggle)
         canvas.quiet_wanted.connect(self._show_quiet)
         canvas.letter.connect(self._letter)
+        canvas.menu_wanted.connect(self._show_menu)
         self.card.closed.connect(lambda: canvas.choose(None))
         self.card.inspected.connect(self._open)
+        self.card.plotted.connect(lambda key: self.context.plot(key, ""))
+        self.card.warned.connect(self.context.run)
         self.card.chose.connect(self._choose_key)
 
     def _make_page(self) -> QWidget:
@@ -336,8 +347,42 @@ class GraphPanel(PanelWidget):
 
     def _open(self, key: str) -> None:
         if self.session.topic(key) is not None:
-            self.session.mark_seen(key)
-            self.context.open_topic(key)
+            show_messages(self.context, key)
+
+    def _show_menu(self, choice: GraphChoice, at: QPoint) -> None:
+        menu = self.menu_of(choice)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        if menu.actions():
+            menu.popup(at)
+        else:
+            menu.deleteLater()
+
+    def menu_of(self, choice: GraphChoice) -> Menu:
+        """What can be done with a node, or with the topics and services of a line."""
+        menu, scene = Menu(self.theme, self), self.canvas.scene
+        graph = scene.graph if scene is not None else NodeGraph()
+        if choice.kind == "node":
+            return filled(menu, self.theme, self._node_actions(graph.node(choice.key)))
+        line = graph.line_of(choice.key)
+        topics = line.topics if line is not None else (choice.key,)
+        if len(topics) == 1:
+            return filled(menu, self.theme, self._topic_actions(topics[0]))
+        for topic in sorted(topics, key=lambda each: each != choice.key)[:MOST_IN_MENU]:
+            part = Menu(self.theme, menu, plain.entry(split_key(topic)[1]))
+            menu.addMenu(filled(part, self.theme, self._topic_actions(topic)))
+        return menu
+
+    def _topic_actions(self, key: str) -> list[RowAction]:
+        if self.session.topic(key) is None:
+            return [copies(self.context, split_key(key)[1])]  # a service
+        return topic_actions(self.context, key)
+
+    def _node_actions(self, node: DrawnNode | None) -> list[RowAction]:
+        if node is None:
+            return []
+        if node.entry is None:
+            return [RowAction(_("Open the group"), "box", lambda: self.canvas.open_group(node.key))]
+        return node_actions(self.context, node.entry.network, node.entry.name)
 
     def _chosen(self, _choice: object) -> None:
         self._say_card()

@@ -19,12 +19,13 @@ from app.ui.panels.inspector.actions import InspectorActions
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE, InspectorBody
 from app.ui.panels.inspector.diff import OFF, count_changes
 from app.ui.panels.inspector.footer import message_facts
-from app.ui.panels.inspector.tree_model import TreeNode, field_of
+from app.ui.panels.inspector.tree_model import TreeNode, field_of, steps_of
 from app.ui.panels.inspector.values import payload_or, read_at_once
 from app.ui.widgets import Chip, IconButton
 from app.ui.widgets.field_drag import drag_field
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy, pgettext
+from nep.messages.fields import path_text
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
@@ -280,7 +281,7 @@ class InspectorPanel(PanelWidget):
         menu.addActions(self.own.listed())
         index = self.tree.currentIndex()
         if index.isValid() and self._topic and not split_key(self._topic)[0]:
-            what = f"alarm.value:{self._topic} {self.model.node(index).path}"
+            what = f"alarm.value:{self._topic} {path_text(steps_of(self.model.node(index)))}"
             menu.addSeparator()
             menu.addAction(self.theme.icon("bell"), _("New alarm"), lambda: self.context.run(what))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

@@ -61,12 +61,18 @@ class TreeNode:
 def field_of(node: TreeNode) -> str:
     """The field path of a value that can be plotted, of a list of numbers all elements'; else ""."""
     kind = kind_of_value(node.value)
-    steps: list[Step] = [ALL] if kind == "list" else []
+    every: tuple[Step, ...] = (ALL,) if kind == "list" else ()
+    return str(FieldPath((*steps_of(node), *every))) if kind is not None else ""
+
+
+def steps_of(node: TreeNode) -> tuple[str | int, ...]:
+    """The keys and places that lead from the message to a value."""
+    steps: list[str | int] = []
     above: TreeNode | None = node
     while above is not None and above.parent is not None:
         steps.insert(0, above.key)
         above = above.parent
-    return str(FieldPath(tuple(steps))) if kind is not None else ""
+    return tuple(steps)
 
 
 class TreeModel(QAbstractItemModel):

@@ -15,7 +15,8 @@ from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.network_table import NetworkTable, own_everywhere
 from app.ui.panels.nodes.parameters import ParametersPart
 from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, lack_of_parameters, limits_of, rows_of
-from app.ui.panels.table_panel import RowAction, TableWords
+from app.ui.panels.row_actions import RowAction, copies, node_actions, show_messages, topic_actions
+from app.ui.panels.table_panel import TableWords
 from app.ui.text.numbers import rate_words
 from app.ui.widgets import Scrolled
 from app.ui.widgets.paint import show_when
@@ -147,8 +148,7 @@ class NodesPanel(NetworkTable[NodeRow]):
             said = _("{pattern} has wildcards: it stands for all topics that match")
             self.context.toast(said.format(pattern=row.topic))
         elif row.topic:
-            self.session.mark_seen(row.topic_key)
-            self.context.open_topic(row.topic_key)
+            show_messages(self.context, row.topic_key)
         else:
             network = self.session.networks.get(row.node.network)
             (network.nodes if network is not None else self.session.nodes).mark_seen(row.node.id)
@@ -158,12 +158,12 @@ class NodesPanel(NetworkTable[NodeRow]):
         row = self.model.row_at(self.model.index_of(key))
         if row is None:
             return ()
-        words = _("Show its messages") if row.topic else _("Show its topics")
-        shows = RowAction(words, "list-tree", lambda: self.open_row(key))
-        if row.node.network or row.is_pattern:
-            return (shows,)  # alarms are about Studio's own network
-        what = f"alarm.topic:{row.topic}" if row.topic else f"alarm.node:{row.node.name}"
-        return (shows, RowAction(_("New alarm"), "bell", lambda: self.context.run(what)))
+        if row.is_pattern and self.session.topic(row.topic_key) is None:
+            return (copies(self.context, row.topic),)  # it stands for many topics
+        if row.topic:
+            return topic_actions(self.context, row.topic_key)
+        shows = RowAction(_("Show its topics"), "list-tree", lambda: self.open_row(key))
+        return (shows, *node_actions(self.context, row.node.network, row.node.name))
 
     def _fold(self, key: str, opened: bool) -> None:
         row = self.model.row_at(self.model.index_of(key))

@@ -59,12 +59,11 @@ class StateLanes(QWidget):
             if states is None or curve.hidden:
                 continue
             top = row * self._lane()
-            runs = list(states.runs(canvas.begin_s, canvas.end_s))
-            is_yes_or_no = {run.word for run in runs} <= {"true", "false", None}
+            is_yes_or_no = states.words(canvas.begin_s, canvas.end_s) <= {"true", "false"}
+            without = ("false",) if is_yes_or_no else ()
+            pixel_s = (canvas.end_s - canvas.begin_s) / canvas.columns
             painted = -1.0  # up to here: of what changes within a pixel one is enough
-            for run in runs:
-                if run.word is None or (is_yes_or_no and run.word == "false"):
-                    continue
+            for run in states.runs(canvas.begin_s, canvas.end_s, step_s=pixel_s / 2, without=without):
                 left = max(area.left(), canvas.x_of(run.begin_s))
                 right = min(area.right(), canvas.x_of(run.end_s))
                 if right >= left and max(right, left + LEAST_BOX) > painted + 0.5:

@@ -172,9 +172,11 @@ class AddCurve(SearchField):
             self._matches.hide()
 
     def ask(self, text: str) -> None:
-        """Get the keyboard, with this typed already."""
+        """Get the keyboard, with this typed already; what a person types goes on from there."""
         self.setText(text)
         self.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        if text.endswith("."):
+            self.end(False)  # the focus has selected all, which the first letter would take away
         self._search()
 
     def complain(self, sentence: str) -> None:

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QGraphicsView
 
 from app.core.series.calculated import held_values
 from app.core.series.samples import Floats
-from app.ui.panels.plot.canvas import FLAG, ValueAxis
+from app.ui.panels.plot.canvas import FARTHEST, FLAG, ValueAxis
 from app.ui.panels.plot.shown_curve import ShownCurve
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -34,9 +34,9 @@ def path_of(
     first, end = samples.places(begin_s, end_s)
     step = max(1, math.ceil((end - first) / MOST_POINTS))
     part = slice(first, end, step)
-    times, xs = samples.times[part].copy(), samples.values[part].copy()
+    times, xs = samples.times[part].copy(), np.clip(samples.values[part], -FARTHEST, FARTHEST)
     gaps = samples.gaps[part]
-    ys = held_values(up.curve.samples, times)
+    ys = np.clip(held_values(up.curve.samples, times), -FARTHEST, FARTHEST)
     if step == 1:
         xs[gaps] = np.nan
     return times, xs, ys

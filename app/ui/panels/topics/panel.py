@@ -4,26 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.network.source import NODE_NAME
-from app.core.network.topics import split_key
 from app.core.networks.networks import network_words
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.network_table import NetworkTable, own_everywhere
-from app.ui.panels.table_panel import RowAction, TableWords
+from app.ui.panels.row_actions import RowAction, show_messages, topic_actions
+from app.ui.panels.table_panel import TableWords
 from app.ui.panels.topics.columns import columns
 from app.ui.text.numbers import grouped
 from app.ui.widgets import EmptyAction, label
-from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, listed, ngettext
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from app.core.network.topics import Topic
     from app.core.networks.kinds import NetworkKind
@@ -57,8 +54,6 @@ class TopicsPanel(NetworkTable["Topic"]):
         parts = ((self.pages, 1), (self.networks, 0), (self.line, 0), (self.foot, 0), (self.doctor, 0))
         for widget, stretch in parts:
             column.addWidget(widget, stretch)
-        self.table.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        self.table.customContextMenuRequested.connect(self._show_menu)
         self._seen: tuple[object, ...] = ()
         self._ours: tuple[str, ...] = ()
         self._ticks = 0
@@ -137,42 +132,11 @@ class TopicsPanel(NetworkTable["Topic"]):
     def _use_virtual(self) -> None:
         self.context.run("robots.virtual")
 
-    def _show_menu(self, at: QPoint) -> None:
-        """What can be done with the topic under the mouse, or with the chosen one."""
-        topic = self.model.row_at(self.table.indexAt(at))
-        if topic is not None:
-            menu = self.menu_of(topic.key)
-            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-            menu.popup(self.table.viewport().mapToGlobal(at))
-
-    def menu_of(self, key: str) -> Menu:
-        """The menu of a topic."""
-        menu = Menu(self.theme, self)
-        rows: tuple[tuple[str, str, Callable[[], object]], ...] = (
-            (_("Show it"), "list-tree", lambda: self.open_row(key)),
-            (_("Show it in one more panel"), "plus", lambda: self.context.open_beside(key)),
-            (_("Plot a field of it"), "chart-line", lambda: self.context.plot(key, "")),
-            (_("Copy its name"), "copy", lambda: self._copy(key)),
-        )
-        for words, icon, does in rows:
-            menu.addAction(self.theme.icon(icon), words).triggered.connect(lambda _on=False, do=does: do())
-        return menu
-
-    def _copy(self, key: str) -> None:
-        name = split_key(key)[1]
-        QGuiApplication.clipboard().setText(name)
-        self.context.toast(_("Copied {path}").format(path=name))
-
     def open_row(self, key: str) -> None:
-        self.session.mark_seen(key)
-        self.context.open_topic(key)
+        show_messages(self.context, key)
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
-        shows = RowAction(_("Show its messages"), "list-tree", lambda: self.open_row(key))
-        if split_key(key)[0]:
-            return (shows,)  # alarms are about Studio's own network
-        warns = RowAction(_("New alarm"), "bell", lambda: self.context.run(f"alarm.topic:{key}"))
-        return (shows, warns)
+        return topic_actions(self.context, key)
 
     def show_topic(self, name: str) -> None:
         self._wanted = "" if self.model.index_of(name).isValid() else name  # its row may still come

@@ -253,6 +253,7 @@ TITLES = {
     "recent": lazy("Recently used"),
     "command": lazy("Commands"),
     "panel": lazy("Panels"),
+    "another": lazy("One more panel"),
     "topic": lazy("Topics"),
     "robot": lazy("Robots"),
     "layout": lazy("Layouts"),

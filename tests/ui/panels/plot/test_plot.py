@@ -503,6 +503,8 @@ def test_a_field_travels_in_the_hand() -> None:
 def test_a_topic_of_which_nobody_knows_a_field_is_asked_for(panel) -> None:
     panel.plot_field("/odom", "")
     assert panel.add.text() == "/odom."
+    QTest.keyClicks(panel.add, "x")
+    assert panel.add.text() == "/odom.x"
 
 
 # -- one over another --------------------------------------------------------------------------------------
@@ -526,6 +528,24 @@ def test_the_second_curve_over_the_first(panel) -> None:
     assert len(path[2]) == 300
     panel.across.click()
     assert panel.drawings.currentWidget() is panel.canvas
+
+
+@pytest.mark.parametrize(
+    "values", [[1.7e308, -1.7e308], [5e-324, 0], [2**64 - 1, 2**64 - 2], [7, 7], [1e300, 1e300], [10**400, 1]]
+)
+def test_the_largest_and_smallest_numbers_are_drawn_over_each_other(panel, values) -> None:
+    show(panel, "/odom.x", "/odom.y")
+    rows = [(t / 10, {"x": value, "y": value}) for t, value in enumerate(values * 20)]
+    send(panel, "/odom", rows)
+    panel.across.click()
+    panel.cursors.click()
+    panel._put_cursor("A", 0.0)
+    panel._put_cursor("B", 1.0)
+    look(panel)
+    assert panel.drawings.currentWidget() is panel.xy
+    assert not panel.xy.grab().isNull()
+    (path,) = panel.xy._paths
+    assert len(path[2]) > 1
 
 
 # -- kept, exported ----------------------------------------------------------------------------------------

@@ -1,0 +1,54 @@
+"""States that change often: what is asked of them is as their runs say, and the pixels are enough."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from app.core.series.states import States
+
+
+def dense(count: int) -> States:
+    """No and yes a thousand times a second, so many changes, then yes for long."""
+    states = States()
+    for place in range(count):
+        states.add(place / 1000, "true" if place % 2 else "false")
+    states.add(count / 1000 + 50, "true")
+    return states
+
+
+def test_of_states_that_change_within_a_step_one_is_enough() -> None:
+    states = dense(8000)
+    every = list(states.runs(-1, 100))
+    assert len(every) == 8000
+    few = list(states.runs(-1, 100, step_s=0.5, without=("false",)))
+    assert len(few) <= 20
+    assert {run.word for run in few} == {"true"}
+    assert all(run in every for run in few)
+    assert few[-1].end_s == states.last_s
+    assert all(later.begin_s - sooner.begin_s < 0.51 for sooner, later in pairwise(few))
+    assert states.words(0, 0.0005) == {"false"}
+    assert states.words(-1, 100) == {"true", "false"}
+
+
+def test_what_is_not_known_is_passed_over_only_when_it_is_wished() -> None:
+    states = States()
+    states.add(1.0, "")
+    states.add(2.0, None)
+    states.add(3.0, "up")
+    assert [run.word for run in states.runs(0, 9)] == ["", None, "up"]
+    assert [run.word for run in states.runs(0, 9, without=())] == ["", "up"]
+    assert states.words(0, 9) == {"", "up"}
+    assert list(States().runs(0, 9, step_s=1.0)) == []
+
+
+@pytest.mark.parametrize(
+    ("begin_s", "end_s"), [(-1.0, 100.0), (0.01, 0.0205), (0.05, 0.05), (90.0, 95.0), (-9.0, -8.0)]
+)
+def test_changes_and_how_long_are_as_the_runs_say(begin_s: float, end_s: float) -> None:
+    states = dense(100)
+    runs = list(states.runs(begin_s, end_s))
+    assert states.changes(begin_s, end_s) == max(0, len(runs) - 1)
+    lasted = [min(run.end_s, end_s) - max(run.begin_s, begin_s) for run in runs if run.word == "true"]
+    assert states.lasted_s("true", begin_s, end_s) == pytest.approx(sum(max(0.0, each) for each in lasted))
