@@ -29,7 +29,8 @@ class RecordingFacts:
 
     ``problem`` says why it cannot be read; "" when it can. ``is_complete``: it was ended; else it can be
     read as far as it is whole, and repaired. ``is_kept``: made by a flight recorder. ``is_read``: whether
-    more than name, size and time is known yet. ``topics``: the first 200 names.
+    more than name, size and time is known yet. ``topics``: the first 200 names. ``lost``: messages that did
+    not come or could not be written, None where nobody counted.
     """
 
     path: Path
@@ -45,6 +46,7 @@ class RecordingFacts:
     is_repaired: bool = False
     is_kept: bool = False
     problem: str = ""
+    lost: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +134,7 @@ def read_facts(plain: RecordingFacts) -> RecordingFacts:
     """The same with what the file says of itself, or why it cannot be read."""
     try:
         with Recording(plain.path) as recording:
-            words = recording.words
+            words, figures = recording.words, recording.figures()
             return RecordingFacts(
                 plain.path,
                 plain.size_bytes,
@@ -146,6 +148,7 @@ def read_facts(plain: RecordingFacts) -> RecordingFacts:
                 is_complete=recording.is_complete,
                 is_repaired=words.get("repaired") == "1",
                 is_kept=words.get("kept") == "1",
+                lost=sum((each.lost or 0) + each.unkept for each in figures.values()) if figures else None,
             )
     except (NepError, OSError) as error:
         return RecordingFacts(plain.path, plain.size_bytes, plain.changed_s, is_read=True, problem=str(error))
