@@ -126,8 +126,8 @@ class SessionRecordings:
 
     @property
     def elapsed_s(self) -> float:
-        """For how long this one has been recorded; 0 when nothing is."""
-        return 0.0 if self._began is None or not self.is_recording else max(0.0, self._clock() - self._began)
+        """For how long this one has been recorded; 0 when nothing is, or its process is only beginning."""
+        return 0.0 if self._began is None else max(0.0, self._clock() - self._began)
 
     def choose(self, choice: RecordingChoice) -> None:
         """Record this the next time, and after the next start."""
@@ -151,7 +151,7 @@ class SessionRecordings:
         path = free_path(folder / f"{stem}{SUFFIX}") if stem else new_path(folder, self._now())
         selection = choice.selection
         self.client.record(path, selection.topics, selection.left_out, note)
-        self.recorded, self._began = choice, self._clock()
+        self.recorded, self._began = choice, None
         return ""
 
     def stop(self) -> None:
@@ -222,6 +222,8 @@ class SessionRecordings:
         was = self.client.state
         self.client.on_event(event)
         state = self.client.state
+        if was.phase == "starting" and state.phase == "recording":
+            self._began = self._clock()
         if was.phase and not state.phase:
             self._began = None
             if state.last is not None and state.last == was.path:

@@ -69,14 +69,16 @@ class CardContent:
 class GraphCard(QWidget):
     """Shows a `CardContent`; what did not change is left alone.
 
-    `closed` when a person closes it, `inspected` tells a topic, `chose` a node's or topic's key.
+    `closed` when a person closes it, `inspected` and `record_wanted` tell a topic, `chose` a node's or
+    topic's key.
 
-    More next steps of a topic (plot its rate, record it, make an alarm of it) stand beside `inspect` in
-    `steps` as soon as Studio can do them.
+    More next steps of a topic (plot its rate, make an alarm of it) stand beside `inspect` in `steps` as soon
+    as Studio can do them.
     """
 
     closed = Signal()
     inspected = Signal(str)
+    record_wanted = Signal(str)
     chose = Signal(str, str)
 
     def __init__(self, theme: Theme) -> None:
@@ -99,6 +101,10 @@ class GraphCard(QWidget):
         self.steps.setContentsMargins(14, 6, 14, 8)
         self.steps.setSpacing(8)
         self.steps.addWidget(self.inspect)
+        self.record = Button(theme, _("Record it"), "circle-dot", size="form")
+        self.record.clicked.connect(self._record)
+        self.record.let_shrink()
+        self.steps.addWidget(self.record)
         self.steps.addStretch(1)
         self.foot = label("", "small", role="textTertiary", wrap=True)
         self.foot.setContentsMargins(14, 5, 14, 7)
@@ -135,6 +141,10 @@ class GraphCard(QWidget):
         if self.content is not None and self.content.topic:
             self.inspected.emit(self.content.topic)
 
+    def _record(self) -> None:
+        if self.content is not None and self.content.topic:
+            self.record_wanted.emit(self.content.topic)
+
     def show_content(self, content: CardContent | None) -> None:
         """Say this, or nothing: then the card is not there."""
         if content == self.content:
@@ -146,6 +156,7 @@ class GraphCard(QWidget):
         self.title.setText(content.title)
         self.kind.setText(content.kind)
         self.inspect.setVisible(bool(content.topic))
+        self.record.setVisible(bool(content.topic) and not split_key(content.topic)[0])
         self.foot.setText(content.foot)
         self.foot.setVisible(bool(content.foot))
         self._line.setVisible(bool(content.foot))

@@ -137,6 +137,7 @@ class GraphPanel(PanelWidget):
         canvas.letter.connect(self._letter)
         self.card.closed.connect(lambda: canvas.choose(None))
         self.card.inspected.connect(self._open)
+        self.card.record_wanted.connect(lambda key: self.context.run(f"record.topic:{key}"))
         self.card.chose.connect(self._choose_key)
 
     def _make_page(self) -> QWidget:

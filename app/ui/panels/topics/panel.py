@@ -152,11 +152,15 @@ class TopicsPanel(NetworkTable["Topic"]):
             (_("Show it"), "list-tree", lambda: self.open_row(key)),
             (_("Show it in one more panel"), "plus", lambda: self.context.open_beside(key)),
             (_("Plot a field of it"), "chart-line", lambda: self.context.plot(key, "")),
+            (_("Record this topic"), "circle-dot", lambda: self._record(key)),
             (_("Copy its name"), "copy", lambda: self._copy(key)),
         )
         for words, icon, does in rows:
             menu.addAction(self.theme.icon(icon), words).triggered.connect(lambda _on=False, do=does: do())
         return menu
+
+    def _record(self, key: str) -> None:
+        self.context.run(f"record.topic:{key}")
 
     def _copy(self, key: str) -> None:
         name = split_key(key)[1]
@@ -172,7 +176,8 @@ class TopicsPanel(NetworkTable["Topic"]):
         if split_key(key)[0]:
             return (shows,)  # alarms are about Studio's own network
         warns = RowAction(_("New alarm"), "bell", lambda: self.context.run(f"alarm.topic:{key}"))
-        return (shows, warns)
+        records = RowAction(_("Record this topic"), "circle-dot", lambda: self._record(key))
+        return (shows, records, warns)
 
     def show_topic(self, name: str) -> None:
         self._wanted = "" if self.model.index_of(name).isValid() else name  # its row may still come

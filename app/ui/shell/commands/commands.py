@@ -12,6 +12,7 @@ from app.ui.shell.commands.behaviours import BehaviourCommands, bring_into_view
 from app.ui.shell.commands.editing import EditCommands
 from app.ui.shell.commands.menus import MenuLists
 from app.ui.shell.commands.palette_entries import PaletteEntries
+from app.ui.shell.commands.recording import RecordCommands
 from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands
 from app.ui.shell.commands.shell import Shell
@@ -38,6 +39,7 @@ class Commands:
         self.robots = RobotCommands(shell, session, self.files, self.behaviours.undo)
         self.view = ViewCommands(shell, session, self.files, keys)
         self.shortcuts = keys
+        self.recording = RecordCommands(shell, session, asks, self.run)
         self.variables = VariableCommands(shell, session, self.files)
         self._do = Handlers(
             session,
@@ -49,6 +51,7 @@ class Commands:
             self.view,
             EditCommands(shell),
             ReportCommands(shell, session, self.files, asks),
+            self.recording,
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.why_not, keys)
