@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nep.errors import BadTopicError
-from nep.i18n import _
+from nep.i18n import _, lazy
 from nep.recordings.recorder import TopicSelection
 
 MODES = ("all", "chosen", "pattern")
@@ -17,7 +17,7 @@ LEAST_GB, MOST_GB, USUAL_GB = 0.1, 1_000.0, 2.0
 MOST_NAMES = 1_000
 MOST_LETTERS = 80
 """Of a name for a file: with what is put behind it all file systems take it."""
-NOT = "not"
+NOT = lazy("not")
 _NEVER_IN_NAMES = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*\ud800-\udfff]+')
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
 

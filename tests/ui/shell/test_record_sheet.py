@@ -190,15 +190,15 @@ def test_a_recording_is_opened_by_who_can_else_a_line_says_who(window, recorder,
     window.commands.run(f"recording.play:{path}")
     assert "not there any more" in window.toast.accessibleName()
     path.touch()
-    opened: list[str] = []
-    monkeypatch.setattr(window.commands.recording, "_run", opened.append)
+    opened: list[tuple[str, str]] = []
+    monkeypatch.setattr(window.commands.recording, "_do_about", lambda *about: opened.append(about))
     window.commands.run(f"recording.play:{path}")
-    assert opened == [f"recording.open:{path}"]
+    assert opened == [("recording.open", str(path))]
 
-    def unknown(name: str) -> None:
+    def unknown(name: str, _argument: str) -> None:
         raise commands_module.UnknownCommandError(name)
 
-    monkeypatch.setattr(window.commands.recording, "_run", unknown)
+    monkeypatch.setattr(window.commands.recording, "_do_about", unknown)
     window.commands.run(f"recording.play:{path}")
     assert f'nep play "{path}"' in window.toast.accessibleName()
 

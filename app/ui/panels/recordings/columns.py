@@ -158,7 +158,7 @@ def columns(
         )
 
     return (
-        Column("name", lazy("Recording"), 250, name, key=lambda facts: facts.path.stem.casefold(),
+        Column("name", lazy("Recording"), 280, name, key=lambda facts: facts.path.stem.casefold(),
                stretch=True, tip=lambda facts: str(facts.path)),
         Column("when", lazy("Recorded"), 132, when,
                key=lambda facts: facts.started_ns or facts.changed_s * 1e9, yields=1),

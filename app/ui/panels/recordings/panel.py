@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import QFile, Qt, QUrl
-from PySide6.QtGui import QAction, QImage
+from PySide6.QtCore import QEvent, QFile, Qt, QUrl
+from PySide6.QtGui import QAction, QImage, QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.documents.background_worker import BackgroundWorker
@@ -27,6 +27,7 @@ from app.ui.panels.recordings.table import RecordingTable
 from app.ui.panels.table_panel import RowAction, TablePanel, TableWords
 from app.ui.text.numbers import grouped, size_words
 from app.ui.widgets import EmptyAction, label
+from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.table.model import TableModel
 from nep.i18n import _, lazy, ngettext
 
@@ -363,6 +364,17 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             self.context.toast(job.words())
 
     # ---- what every panel has
+
+    def event(self, event: QEvent) -> bool:
+        """Wherever the keyboard is in here, F2 renames the chosen recording, not the behaviour."""
+        if isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_F2 and is_plain(event):
+            if event.type() == QEvent.Type.ShortcutOverride:
+                event.accept()
+                return True
+            if event.type() == QEvent.Type.KeyPress:
+                self._of_chosen(self._rename)
+                return True
+        return super().event(event)
 
     def row_height(self) -> int:
         return round(self.theme.scaled(ROW))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QModelIndex, QRect, Qt, Signal
+from PySide6.QtCore import QModelIndex, QRect, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent
 from PySide6.QtWidgets import QLineEdit, QWidget
 
@@ -83,18 +83,6 @@ class RecordingTable(TableView[RecordingFacts]):
 
     def _tell_chosen(self) -> None:
         self.chosen.emit(self.chosen_key() or "")
-
-    def event(self, event: QEvent) -> bool:
-        """Here F2 renames a recording, not the behaviour."""
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and event.key() == Qt.Key.Key_F2
-            and is_plain(event)
-        ):
-            event.accept()
-            return True
-        return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = self.chosen_key()

@@ -23,7 +23,7 @@ else:
     record_sheet = lazy_module("app.ui.shell.dialogs.record")
 
 OPEN = "recording.open"
-"""The command that shows a recording in the panels, with its path behind a colon."""
+"""The command that shows a recording in the panels, about its path; not every Studio has it."""
 
 
 @runtime_checkable
@@ -38,10 +38,10 @@ class RecordCommands:
     """Recording as a person does it: by keys, menus, the tool bar and the sheet."""
 
     def __init__(
-        self, shell: Shell, session: Session, asks: FileDialogs, run: Callable[[str], object]
+        self, shell: Shell, session: Session, asks: FileDialogs, do_about: Callable[[str, str], object]
     ) -> None:
-        """``run`` does a command of the window by its name."""
-        self._shell, self._session, self._asks, self._run = shell, session, asks, run
+        """``do_about`` does a command of the window about something; UnknownCommandError without it."""
+        self._shell, self._session, self._asks, self._do_about = shell, session, asks, do_about
         self._recordings = session.recordings
         self._recordings.on_made = self._made
         self._sheet: record_sheet.RecordSheet | None = None
@@ -134,7 +134,7 @@ class RecordCommands:
             self._shell.say(_("{file} is not there any more").format(file=path.name))
             return
         try:
-            self._run(f"{OPEN}:{path}")
+            self._do_about(OPEN, str(path))
         except UnknownCommandError:
             words = _("In a terminal this plays it: {line}")
             self._shell.say(words.format(line=f'nep play "{path}" --all'))
