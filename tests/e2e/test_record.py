@@ -35,3 +35,8 @@ def test_what_was_published_while_it_recorded_is_in_the_file(studio: Studio) -> 
             assert recording.figures()["/distance"].lost == 0
         studio.click("Show")
         studio.find(path.stem, kind="ElidedLabel")
+        studio.screen.key("F2")
+        studio.find("Name of the recording")
+        studio.screen.type("my tour")
+        studio.screen.key("Return")
+        until((folder / "my tour.mcap").exists, "it has another name")

@@ -11,9 +11,13 @@ from app.ui.text.numbers import grouped
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel, Segments, Separator, ValueBar, label
 from app.ui.widgets.flow_layout import Flow
-from nep.i18n import _, ngettext
+from nep.i18n import _, lazy, ngettext
 
 BAR_PX = 120
+FORMAT_WORDS = {
+    "csv": lazy("CSV"), "parquet": lazy("Parquet"), "pictures": lazy("Pictures"), "mp4": lazy("MP4"),
+}  # fmt: skip
+"""As what a recording is exported, by the names of `nep.recordings.export`."""
 
 
 class RecordingDetails(QWidget):
@@ -31,10 +35,8 @@ class RecordingDetails(QWidget):
         self.rename = Button(theme, _("Rename"), "pencil", size="small")
         self.show_file = Button(theme, _("Show the file"), "folder-open", size="small")
         self.delete = Button(theme, _("Delete"), "trash-2", size="small")
-        formats = [("csv", "CSV", None), ("parquet", "Parquet", None), ("pictures", _("Pictures"), None)]
-        self.format = Segments(
-            theme, [*formats, ("mp4", "MP4", None)], size="small", name=_("Export as"), wraps=True
-        )
+        formats = [(kind, _(words), None) for kind, words in FORMAT_WORDS.items()]
+        self.format = Segments(theme, formats, size="small", name=_("Export as"), wraps=True)
         self.export = Button(theme, _("Export"), "download", size="small")
         self.export.clicked.connect(self._press)
         self.bar = ValueBar(theme)

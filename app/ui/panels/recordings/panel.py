@@ -22,7 +22,7 @@ from app.core.recording.recordings import FOLDER_KEY
 from app.ui.other_programs import open_outside
 from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.recordings.columns import PICTURE, columns, cropped
-from app.ui.panels.recordings.details import RecordingDetails
+from app.ui.panels.recordings.details import FORMAT_WORDS, RecordingDetails
 from app.ui.panels.recordings.table import RecordingTable
 from app.ui.panels.table_panel import RowAction, TablePanel, TableWords
 from app.ui.text.numbers import grouped, size_words
@@ -339,8 +339,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         facts = self._chosen()
         if facts is None or self._job is not None:
             return
-        words = {"csv": "CSV", "parquet": "Parquet", "pictures": _("Pictures"), "mp4": "MP4"}
-        folder = free(facts.path.parent / f"{facts.path.stem}, {words[kind]}")
+        folder = free(facts.path.parent / f"{facts.path.stem}, {_(FORMAT_WORDS[kind])}")
         self._job = RecordingExport(facts.path, kind, folder)
         self.details.show_export(self._job)
 
