@@ -11,6 +11,7 @@ from pathlib import Path
 import platformdirs
 
 from app.core.documents.background_worker import BackgroundWorker
+from app.core.messages.picture import Picture, Size, decode
 from nep.errors import NepError
 from nep.i18n import _
 from nep.recordings.reader import Recording
@@ -20,6 +21,8 @@ MOST_FILES = 2_000
 AT_ONCE = 50
 """So many files are opened before what is known so far is shown."""
 MOST_TOPICS = 200
+CACHE_BYTES = 8_000_000
+"""Of one recording that is open for a moment only."""
 _OWNER = "recordings"
 
 
@@ -152,3 +155,18 @@ def read_facts(plain: RecordingFacts) -> RecordingFacts:
             )
     except (NepError, OSError) as error:
         return RecordingFacts(plain.path, plain.size_bytes, plain.changed_s, is_read=True, problem=str(error))
+
+
+def picture_in(path: Path, fit: Size) -> Picture | None:
+    """A picture of its fullest topic of pictures, for a view of that size; None where it has none."""
+    try:
+        with Recording(path, cache_bytes=CACHE_BYTES) as recording:
+            topics = [each for each in recording.topics.values() if each.codec == "image"]
+            if not topics:
+                return None
+            topic = max(topics, key=lambda each: each.message_count).name
+            middle = (recording.start_ns + recording.end_ns) // 2
+            found = recording.newest(middle, (topic,)).get(topic) or recording.after(middle, topic)
+            return decode(found.message, 0.0, fit)[0] if found is not None else None
+    except (NepError, OSError):
+        return None

@@ -6,7 +6,7 @@ import threading
 
 from app.core.recording import exporting as exporting_module
 from app.core.recording.exporting import RecordingExport
-from app.core.recording.preview import picture_in
+from app.core.recording.folder import picture_in
 from nep.recordings.export import export
 from tests.nep.programs import eventually
 from tests.nep.recordings.messages import json_message, record

@@ -16,8 +16,7 @@ from app.core.documents.background_worker import BackgroundWorker
 from app.core.recording.choice import file_stem
 from app.core.recording.choice import free_path as free
 from app.core.recording.exporting import RecordingExport
-from app.core.recording.folder import FolderLook, RecordingFacts, RecordingFolder
-from app.core.recording.preview import picture_in
+from app.core.recording.folder import FolderLook, RecordingFacts, RecordingFolder, picture_in
 from app.core.recording.recordings import FOLDER_KEY
 from app.ui.other_programs import open_outside
 from app.ui.panels.base import Density, Panel, PanelContext
@@ -30,6 +29,7 @@ from app.ui.widgets import EmptyAction, label
 from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.table.model import TableModel
 from nep.i18n import _, lazy, ngettext
+from nep.system.replace_file import replace_file
 
 WORDS = TableWords(
     title=lazy("Recordings"),
@@ -275,10 +275,10 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def _moved(self, path: Path, new: Path) -> bool:
         try:
-            path.rename(new)
+            replace_file(path, new)
             beside = path.with_name(path.name + SIDECAR)
             if beside.exists():
-                beside.rename(new.with_name(new.name + SIDECAR))
+                replace_file(beside, new.with_name(new.name + SIDECAR))
         except OSError as error:
             words = _("{file} can't be renamed: {reason}")
             self.context.toast(words.format(file=path.name, reason=(error.strerror or str(error)).lower()))
@@ -318,7 +318,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def _put_back(self, there: Path, path: Path) -> None:
         try:
-            there.rename(free(path))
+            replace_file(there, free(path))
             about = there.parent.parent / "info" / f"{there.name}.trashinfo"
             about.unlink(missing_ok=True)
         except OSError as error:
