@@ -211,6 +211,8 @@ def test_a_click_on_a_line_shows_its_topic_and_inspect_opens_it(panel: GraphPane
         [("greeting", ("100", "2")), ("studio", ("100", "2"))],
     ]
     assert panel.card.isVisible()
+    press(panel.card.record)
+    assert window.commands == ["record.topic:/blackboard"]
     press(panel.card.inspect)
     assert window.opened == ["/blackboard"]
     press(panel.card.close_button)

@@ -5,16 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QFile, Qt
+from PySide6.QtCore import QFile, QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QApplication, QLabel, QMenu
 
 from app.core.recording.client import RecorderState
+from app.ui.panels.alarms import panel as alarms
 from app.ui.panels.recordings import PANEL
 from app.ui.panels.recordings import panel as panel_module
 from app.ui.panels.recordings.columns import badge_of
 from app.ui.panels.recordings.panel import RecordingsPanel
 from app.ui.panels.recordings.table import RecordingTable
+from app.ui.panels.topics import panel as topics
+from nep.programs.alarms.history import AlarmDeed, AlarmRecord
 from nep.recordings.writer import RecordingWriter
 from tests.nep.recordings.messages import TestClock, json_message, limits, picture, record
 from tests.ui.fakes import Session
@@ -221,3 +224,37 @@ def test_an_empty_folder_and_one_that_is_away_say_what_to_do(qtbot, panel, windo
     qtbot.waitUntil(lambda: says("is not there"))
     (tmp_path / "stick").mkdir()
     qtbot.waitUntil(lambda: says("No recordings yet"))
+
+
+def test_what_an_alarm_kept_is_opened_from_its_history(qtbot, window, folder):
+    panel = window.make(alarms.PANEL, (752, 600))
+    qtbot.addWidget(panel)
+    for widget in panel.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(panel, alarms.AlarmsPanel)
+    kept = AlarmDeed("keep", "kept alarm-2026-11-26-22-01-05.mcap")
+    panel.alarms.history.add(AlarmRecord("r", "/camera is silent", panel.now_s(), deeds=[kept]))
+    panel.refresh()
+    index = panel.model.index(0, 0)
+    panel.table.menu_wanted.emit(
+        panel.model.key_of(panel.model.row_at(index)), panel.table.mapToGlobal(QPoint())
+    )
+    menu = QApplication.activePopupWidget()
+    assert isinstance(menu, QMenu)
+    (action,) = (each for each in menu.actions() if each.text() == "Open the recording")
+    menu.close()
+    action.trigger()
+    assert window.commands == [f"recording.play:{folder / 'alarm-2026-11-26-22-01-05.mcap'}"]
+    panel.shut()
+
+
+def test_a_topic_is_recorded_from_its_menu(qtbot, folder):
+    window = Window(Session.full())
+    panel = window.make(topics.PANEL)
+    qtbot.addWidget(panel)
+    for widget in panel.header_widgets():
+        qtbot.addWidget(widget)
+    (run,) = (each.run for each in panel.row_actions("/odom") if each.words == "Record this topic")
+    run()
+    assert window.commands == ["record.topic:/odom"]
+    panel.shut()
