@@ -6,10 +6,16 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from nep.errors import BadTopicError
 from nep.i18n import _, lazy
-from nep.recordings.recorder import TopicSelection
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from nep.recordings import recorder
+else:
+    recorder = lazy_module("nep.recordings.recorder")  # no start waits for it
 
 MODES = ("all", "chosen", "pattern")
 LEAST_S, MOST_S, USUAL_S = 5, 3_600, 60
@@ -36,13 +42,13 @@ class RecordingChoice:
     left_out: tuple[str, ...] = ()
 
     @property
-    def selection(self) -> TopicSelection:
+    def selection(self) -> recorder.TopicSelection:
         """As the recorder takes it. Raises `BadTopicError` for what can be no topic."""
         if self.mode == "chosen":
-            return TopicSelection(self.topics)
+            return recorder.TopicSelection(self.topics)
         if self.mode == "pattern":
-            return TopicSelection(self.patterns, self.left_out)
-        return TopicSelection()
+            return recorder.TopicSelection(self.patterns, self.left_out)
+        return recorder.TopicSelection()
 
     @property
     def problem(self) -> str:

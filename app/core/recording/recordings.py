@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.core.alerts import Alerts
 from app.core.recording.choice import (
@@ -28,13 +29,18 @@ from app.core.recording.client import (
     RingChoice,
     StartRecorder,
 )
-from app.core.recording.folder import SUFFIX, new_path, usual_folder
 from app.core.storage.settings import Settings, data_home
 from app.errors import SettingsError
 from nep.i18n import _
 from nep.programs.alarms import AlarmAction, AlarmEvent
 from nep.programs.alarms.alarms import Done
 from nep.programs.alarms.sentences import what_words
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.core.recording import folder as folders
+else:
+    folders = lazy_module("app.core.recording.folder")  # which reads recordings: no start waits for it
 
 FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
 NO_FOLDER = "recorder:folder"
@@ -82,7 +88,7 @@ class SessionRecordings:
     def folder(self) -> Path:
         """Where recordings go."""
         chosen = self._settings.get(FOLDER_KEY, "")
-        return Path(chosen) if chosen else usual_folder()
+        return Path(chosen) if chosen else folders.usual_folder()
 
     def set_folder(self, folder: Path) -> None:
         """Let recordings go there from now on."""
@@ -148,7 +154,9 @@ class SessionRecordings:
         if folder is None:
             return _("The folder for recordings is not there.")
         stem = file_stem(name)
-        path = free_path(folder / f"{stem}{SUFFIX}") if stem else new_path(folder, self._now())
+        path = (
+            free_path(folder / f"{stem}{folders.SUFFIX}") if stem else folders.new_path(folder, self._now())
+        )
         selection = choice.selection
         self.client.record(path, selection.topics, selection.left_out, note)
         self.recorded, self._began = choice, None
@@ -190,7 +198,7 @@ class SessionRecordings:
         if folder is None:
             return _("The folder for recordings is not there.")
         word = "alarm" if done is not None else "kept"
-        path = new_path(folder, self._now(), word)
+        path = folders.new_path(folder, self._now(), word)
         number = 2
         while path in self._keeping:
             path, number = path.with_stem(f"{path.stem}-{number}"), number + 1
