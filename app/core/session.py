@@ -44,6 +44,8 @@ from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import NetworkEvent, Networks, by_network
 from app.core.networks.parameters import ParameterSetter
 from app.core.own_process import OwnProgram
+from app.core.recording.client import RecorderGone, RecorderSaid
+from app.core.recording.recordings import SessionRecordings
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
@@ -131,15 +133,20 @@ class Session:
         )
         self.runs.coming = lambda: self.coming
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
-        self.alarms = SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9)
+        self.alarms, self.recordings = (
+            SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
+            SessionRecordings(
+                self.settings, self.alerts, self.address, self._mailbox.post_event, clock=clock
+            ),
+        )
+        self.alarms.keep = self.recordings.carry
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, self._mailbox.post_event)
         self._program, self.tick_ms = OwnProgram(), 0.0
         self._robots_seen = self._topics_seen = -1
         self._reachable: tuple[StopTarget, ...] = ()
-        self._tries_to_reach = False
-        self._next_check = 0.0
+        self._tries_to_reach, self._next_check = False, 0.0
         self._learning = MasterChange()
 
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:
@@ -166,6 +173,7 @@ class Session:
         self.source.start()
         self.networks.start()
         self.alarms.start()
+        self.recordings.start()
         self.source.submit(NO_WATCH, self._make_stopper)
         if self._start_processes:
             self.launcher.ensure_master()
@@ -236,6 +244,8 @@ class Session:
         self._faults.check()
         with self.guarded(lazy("keep the alarms")):
             self.alarms.check()
+        with self.guarded(lazy("look after the recorder")):
+            self.recordings.check()
         with self.guarded(lazy("keep which tabs are open")):
             self.tabs.follow()
         with self.guarded(lazy("check what was started here")):
@@ -271,6 +281,7 @@ class Session:
             ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),
             ("end the pictures", self.images.close),
             ("end the doctor", self.doctor.close),
+            ("end the recorder", self.recordings.close),  # before the master goes that it may need
             ("leave the network", self.source.close),
             ("leave other networks", self.networks.close),
             ("end setting parameters", self.parameters.close),
@@ -378,18 +389,22 @@ class Session:
                     _("{topic} can't be read.").format(topic=event.topic),
                     event.sentence,
                 )
-            case RemoteAccessChanged() | NetworkEvent():
-                self._on_network(event, now)
+            case RemoteAccessChanged() | NetworkEvent() | RecorderSaid() | RecorderGone():
+                self._on_part(event, now)
             case JobFailed() if event.what:
                 self.console.add("error", "studio", _(event.what).format(error=event.sentence))
             case _:
                 pass
 
-    def _on_network(self, event: RemoteAccessChanged | NetworkEvent, now: float) -> None:
+    def _on_part(
+        self, event: RemoteAccessChanged | NetworkEvent | RecorderSaid | RecorderGone, now: float
+    ) -> None:
         if isinstance(event, NetworkEvent):
             self.networks.on_event(event, now)
-        else:
+        elif isinstance(event, RemoteAccessChanged):
             self.remote_access.changed(event)
+        else:
+            self.recordings.on_event(event)
 
     def _on_graph(self, view: GraphView, now: float) -> None:
         self.remote_access.follow(view)

@@ -24,6 +24,7 @@ from app.ui.panels.graph import panel as graph
 from app.ui.panels.image import panel as image
 from app.ui.panels.inspector import panel as inspector
 from app.ui.panels.nodes import panel as nodes
+from app.ui.panels.recordings import panel as recordings
 from app.ui.panels.robots import panel as robots
 from app.ui.panels.topics import panel as topics
 from app.ui.shell.docking.dock import Dock
@@ -50,6 +51,7 @@ SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "sensors": (sensors.PANEL, 384, 250, "comfortable"),
     "health": (health.PANEL, 384, 240, "comfortable"),
     "problems": (problems.PANEL, 1032, 124, "comfortable"),
+    "recordings": (recordings.PANEL, 760, 560, "compact"),
     "robots": (robots.PANEL, 1032, 818, "comfortable"),
     "behaviour": (behaviour.PANEL, 1032, 626, "comfortable"),
 }

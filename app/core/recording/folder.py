@@ -11,6 +11,7 @@ from pathlib import Path
 import platformdirs
 
 from app.core.documents.background_worker import BackgroundWorker
+from app.core.messages.picture import Picture, Size, decode
 from nep.errors import NepError
 from nep.i18n import _
 from nep.recordings.reader import Recording
@@ -20,6 +21,8 @@ MOST_FILES = 2_000
 AT_ONCE = 50
 """So many files are opened before what is known so far is shown."""
 MOST_TOPICS = 200
+CACHE_BYTES = 8_000_000
+"""Of one recording that is open for a moment only."""
 _OWNER = "recordings"
 
 
@@ -29,7 +32,8 @@ class RecordingFacts:
 
     ``problem`` says why it cannot be read; "" when it can. ``is_complete``: it was ended; else it can be
     read as far as it is whole, and repaired. ``is_kept``: made by a flight recorder. ``is_read``: whether
-    more than name, size and time is known yet. ``topics``: the first 200 names.
+    more than name, size and time is known yet. ``topics``: the first 200 names. ``lost``: messages that did
+    not come or could not be written, None where nobody counted.
     """
 
     path: Path
@@ -45,6 +49,7 @@ class RecordingFacts:
     is_repaired: bool = False
     is_kept: bool = False
     problem: str = ""
+    lost: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +137,7 @@ def read_facts(plain: RecordingFacts) -> RecordingFacts:
     """The same with what the file says of itself, or why it cannot be read."""
     try:
         with Recording(plain.path) as recording:
-            words = recording.words
+            words, figures = recording.words, recording.figures()
             return RecordingFacts(
                 plain.path,
                 plain.size_bytes,
@@ -146,6 +151,22 @@ def read_facts(plain: RecordingFacts) -> RecordingFacts:
                 is_complete=recording.is_complete,
                 is_repaired=words.get("repaired") == "1",
                 is_kept=words.get("kept") == "1",
+                lost=sum((each.lost or 0) + each.unkept for each in figures.values()) if figures else None,
             )
     except (NepError, OSError) as error:
         return RecordingFacts(plain.path, plain.size_bytes, plain.changed_s, is_read=True, problem=str(error))
+
+
+def picture_in(path: Path, fit: Size) -> Picture | None:
+    """A picture of its fullest topic of pictures, for a view of that size; None where it has none."""
+    try:
+        with Recording(path, cache_bytes=CACHE_BYTES) as recording:
+            topics = [each for each in recording.topics.values() if each.codec == "image"]
+            if not topics:
+                return None
+            topic = max(topics, key=lambda each: each.message_count).name
+            middle = (recording.start_ns + recording.end_ns) // 2
+            found = recording.newest(middle, (topic,)).get(topic) or recording.after(middle, topic)
+            return decode(found.message, 0.0, fit)[0] if found is not None else None
+    except (NepError, OSError):
+        return None

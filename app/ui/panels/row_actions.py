@@ -38,8 +38,11 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
     ]
     if has_fields(context, key):
         actions.append(RowAction(_("Plot a field of it"), "chart-line", lambda: context.plot(key, "")))
-    if not network:  # alarms are about Studio's own network
+    if not network:  # alarms and recordings are of Studio's own network
         actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.topic:{key}")))
+        actions.append(
+            RowAction(_("Record this topic"), "circle-dot", lambda: context.run(f"record.topic:{key}"))
+        )
     return [*actions, copies(context, name)]
 
 

@@ -156,7 +156,7 @@ class MainWindow(QMainWindow):
         actions, files, shortcuts = commands.actions, commands.files, commands.shortcuts
         for bar in (self.bar, self.run_bar, self.tool_bar):
             bar.use(actions)
-        self.tools = DeveloperTools(self, self.tool_bar, commands)
+        self.tools = DeveloperTools(self, self.tool_bar, commands, self.session)
         self.bar.layout_chosen.connect(lambda layout: run(f"layout.{layout}"))
         self.use_robot.clicked.connect(actions["robots.start"].trigger)
         self.status.opened.connect(actions["network.others"].trigger)
@@ -454,11 +454,13 @@ class MainWindow(QMainWindow):
         self.status.link = facts.remote_access()[1]
         if self.showing == "behaviour":
             self.status.show_facts(
-                (facts.health(), facts.saved()), (facts.topics(), facts.remote_access_quietly())
+                (facts.health(), facts.saved()),
+                (facts.recording(), facts.topics(), facts.remote_access_quietly()),
             )
         elif self.showing == "developer":
             left = (facts.master(), facts.remote_access(), facts.traffic(), facts.lost())
-            self.status.show_facts(left, (facts.shown(), facts.window()))
+            right = (facts.recording(), facts.ring(), facts.shown(), facts.window())
+            self.status.show_facts(left, right)
         title = (
             "NEP Studio"
             if self.showing == START

@@ -114,3 +114,11 @@ def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
 def _named_keys(shortcut: str, signs: Mapping[str, str]) -> str:
     """The shortcut with the words that stand on its keys, or these signs instead of them."""
     return _KEY.sub(lambda key: signs.get(key[0]) or _(KEYS.get(key[0], key[0])), shortcut)
+
+
+def length_words(seconds: float) -> str:
+    """0:42, 12:04, 1:32:10: how long a recording is."""
+    whole = int(seconds) if 0 <= seconds < 1e9 else 0
+    minutes, rest = divmod(whole, 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

@@ -166,6 +166,8 @@ class Button(PaintedButton):
         self.kind: Kind = kind
         self.icon_name = icon
         self.fill_icon = False
+        self.icon_role = ""
+        """The colour of its icon, where that is not the one of its words."""
         self._least: int | None = None
         self.setCursor(Qt.CursorShape.ArrowCursor)
 
@@ -228,7 +230,8 @@ class Button(PaintedButton):
         if self.icon_name is not None:
             top = frame.center().y() - icon / 2
             filled = self.fill_icon and self.isEnabled()
-            paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, ink, filled=filled)
+            own = self._theme.colour(self.icon_role) if self.icon_role and self.isEnabled() else ink
+            paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, own, filled=filled)
         end = frame.bottomRight() - QPointF(4, 0)
         area = QRectF(QPointF(left + icon + gap, frame.top()), end)
         paint.words(painter, area, word, font, ink)

@@ -53,7 +53,7 @@ class FileDialogs(Protocol):
         """Which picture; "" for the folder where this computer keeps pictures."""
 
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which folder pictures are to be kept in."""
+        """Which folder."""
 
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg")
@@ -119,7 +119,7 @@ class SystemDialogs:
         dialog.show()
 
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Folder for pictures"), folder, take)
+        dialog = self._dialog(_("Choose a folder"), folder, take)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.show()
 

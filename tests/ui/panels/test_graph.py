@@ -212,12 +212,14 @@ def test_a_click_on_a_line_shows_its_topic_and_inspect_opens_it(panel: GraphPane
         [("greeting", ("100", "2")), ("studio", ("100", "2"))],
     ]
     assert panel.card.isVisible()
+    press(panel.card.record)
+    assert window.commands == ["record.topic:/blackboard"]
     press(panel.card.inspect)
     assert window.opened == ["/blackboard"]
     press(panel.card.plot)
     assert window.plotted == [("/blackboard", "")]
     press(panel.card.alarm)
-    assert window.commands == ["alarm.topic:/blackboard"]
+    assert window.commands == ["record.topic:/blackboard", "alarm.topic:/blackboard"]
     press(panel.card.close_button)
     assert panel.canvas.choice is None
     assert not panel.card.isVisible()
@@ -290,13 +292,14 @@ def test_a_right_click_on_a_line_offers_what_its_topic_can(panel: GraphPanel, wi
     assert item.label is not None
     words = run_all(menu_at(panel, at(panel, item.label.center())))
     assert words == [
-        "Show its messages", "Show it in one more panel", "Plot a field of it", "New alarm", "Copy its name",
+        "Show its messages", "Show it in one more panel", "Plot a field of it", "New alarm",
+        "Record this topic", "Copy its name",
     ]  # fmt: skip
     assert panel.canvas.choice == GraphChoice("topic", "/blackboard", key_of(panel, "blackboard"))
     assert (window.opened, window.beside, window.plotted) == (
         ["/blackboard"], ["/blackboard"], [("/blackboard", "")],
     )  # fmt: skip
-    assert window.commands == ["alarm.topic:/blackboard"]
+    assert window.commands == ["alarm.topic:/blackboard", "record.topic:/blackboard"]
     assert QGuiApplication.clipboard().text() == "/blackboard"
     assert [each.text() for each in panel.menu_of(GraphChoice("topic", "remember")).actions()] == [
         "Copy its name"

@@ -273,14 +273,14 @@ def test_a_name_of_twenty_letters_fits_at_the_usual_width(qtbot, panel) -> None:
     assert room >= panel.theme.font("mono").pixelSize() * 0.6 * len("/Pepper/head_touched")
 
 
-def test_a_right_click_on_a_topic_opens_plots_watches_it_or_copies_its_name(panel, window) -> None:
+def test_a_right_click_on_a_topic_does_whatever_can_be_done_with_it(panel, window) -> None:
     menu = panel.menu_of("/blackboard")
     assert menu is not None
     for action in menu.actions():
         action.trigger()
-    assert len({action.text() for action in menu.actions()}) == 5
+    assert len({action.text() for action in menu.actions()}) == 6
     assert window.opened == ["/blackboard"]
     assert window.beside == ["/blackboard"]
     assert window.plotted == [("/blackboard", "")]
-    assert window.commands == ["alarm.topic:/blackboard"]
+    assert window.commands == ["alarm.topic:/blackboard", "record.topic:/blackboard"]
     assert QGuiApplication.clipboard().text() == "/blackboard"

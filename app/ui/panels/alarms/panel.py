@@ -10,11 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction, QActionGroup, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.alarms import severity_of
+from app.core.recording.recordings import kept_file
 from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.alarms.columns import csv_text, history_columns, moment, note_words, state_words
 from app.ui.panels.alarms.phrases import (
@@ -118,6 +119,7 @@ class AlarmsPanel(PanelWidget):
         self.table.order_changed.connect(self._show_history)
         self.table.filter_wanted.connect(self.focus_filter)
         self.table.opened.connect(self._open_record)
+        self.table.menu_wanted.connect(self._show_record_menu)
         self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self._clear = QAction(_("Clear the history"), self)
         self._clear.triggered.connect(self.alarms.history.clear)
@@ -494,6 +496,18 @@ class AlarmsPanel(PanelWidget):
         row = next((row for row in self.rows if row.rule_id == rule_id), None)
         if row is not None:
             self.list.ensureWidgetVisible(row)
+
+    def _show_record_menu(self, key: str, at: QPoint) -> None:
+        record = next((each for each in self.alarms.history if self.model.key_of(each) == key), None)
+        kept = [kept_file(deed.words) for deed in record.deeds if deed.kind == "keep"] if record else []
+        menu = Menu(self.theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.addAction(self.theme.icon("bell"), _("Show the alarm"), partial(self._open_record, key))
+        for name in filter(None, kept):
+            path = self.session.recordings.folder / name
+            run = partial(self.context.run, f"recording.play:{path}")
+            menu.addAction(self.theme.icon("history"), _("Open the recording"), run)
+        menu.popup(at)
 
     def _save(self) -> None:
         suggestion = Path.home() / _("alarms.csv")

@@ -74,14 +74,15 @@ class CardContent:
 class GraphCard(QWidget):
     """Shows a `CardContent`; what did not change is left alone.
 
-    `closed` when a person closes it, `inspected` and `plotted` tell a topic, `warned` the command that begins
-    an alarm, `chose` a node's or topic's key. The next steps stand in `steps`.
+    `closed` when a person closes it, `inspected`, `plotted` and `record_wanted` tell a topic, `warned` the
+    command that begins an alarm, `chose` a node's or topic's key. The next steps stand in `steps`.
     """
 
     closed = Signal()
     inspected = Signal(str)
     plotted = Signal(str)
     warned = Signal(str)
+    record_wanted = Signal(str)
     chose = Signal(str, str)
 
     def __init__(self, theme: Theme) -> None:
@@ -123,10 +124,12 @@ class GraphCard(QWidget):
         self.plot.clicked.connect(self._plot)
         self.alarm = Button(theme, _("New alarm"), "bell", size="form")
         self.alarm.clicked.connect(self._warn)
+        self.record = Button(theme, _("Record it"), "circle-dot", size="form")
+        self.record.clicked.connect(self._record)
         self.steps = QWidget()
         flow = Flow(self.steps, gap=8, row_gap=6)
         flow.setContentsMargins(14, 6, 14, 8)
-        for step in (self.inspect, self.plot, self.alarm):
+        for step in (self.inspect, self.plot, self.alarm, self.record):
             flow.addWidget(step)
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         policy.setHeightForWidth(True)
@@ -159,6 +162,10 @@ class GraphCard(QWidget):
         if self.content is not None and self.content.alarm:
             self.warned.emit(self.content.alarm)
 
+    def _record(self) -> None:
+        if self.content is not None and self.content.topic:
+            self.record_wanted.emit(self.content.topic)
+
     def show_content(self, content: CardContent | None) -> None:
         """Say this, or nothing: then the card is not there."""
         if content == self.content:
@@ -173,6 +180,7 @@ class GraphCard(QWidget):
         self.plot.setVisible(bool(content.topic) and content.has_fields)
         self.alarm.setVisible(bool(content.alarm))
         self.steps.setVisible(bool(content.topic or content.alarm))
+        self.record.setVisible(bool(content.topic) and not split_key(content.topic)[0])
         self.foot.setText(content.foot)
         self.foot.setVisible(bool(content.foot))
         self._line.setVisible(bool(content.foot))

@@ -148,6 +148,7 @@ class GraphPanel(PanelWidget):
         self.card.inspected.connect(self._open)
         self.card.plotted.connect(lambda key: self.context.plot(key, ""))
         self.card.warned.connect(self.context.run)
+        self.card.record_wanted.connect(lambda key: self.context.run(f"record.topic:{key}"))
         self.card.chose.connect(self._choose_key)
 
     def _make_page(self) -> QWidget:

@@ -1,31 +1,89 @@
-"""The left end of the tool bar: freeze what shows, which layout this is, and its panels."""
+"""The left end of the tool bar: record, keep, freeze what shows, which layout this is, and its panels."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject
+from PySide6.QtCore import QEvent, QObject, QSize
+from PySide6.QtGui import QColor
 
+from app.core.recording.recordings import SessionRecordings
+from app.core.session import Session
 from app.ui.shell.bars.run_bar import ToolBar
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.freeze import all_frozen, freezable
 from app.ui.shell.commands.shell import Shell
 from app.ui.text import plain
-from app.ui.widgets import MenuButton, Separator, ToggleButton, paint
+from app.ui.text.numbers import length_words, size_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, MenuButton, Separator, ToggleButton, name_command, paint
 from nep.i18n import _
 
-FREEZE = "view.freeze"
+FREEZE, RECORD, KEEP = "view.freeze", "recording.toggle", "recording.keep"
 EVERY = 8  # half ticks
-ROOM_PX = 780  # what the whole bar needs at 100 % text
-FREEZE_ROOM_PX = 520  # below that nothing of what a stop brought would be whole beside it
+RECORD_PX = 146  # of the button in both states, so that nothing moves when it begins
+KEEP_ROOM_PX = 1180  # what the whole bar needs at 100 % text
+ROOM_PX = 940  # without Keep, which has a key
+WORDS_ROOM_PX = 680  # below that the button to record is its dot alone
+FREEZE_ROOM_PX = 548
+RECORD_ROOM_PX = 520  # below that nothing of what a stop brought would be whole beside it
+
+
+class RecordButton(Button):
+    """Begins a recording; while one goes on it tells how long and how large it is."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme, _("Record"), "circle-dot", size="small")
+        self.icon_role = "error"
+        self._is_on = self._is_bare = False
+
+    def set_bare(self, bare: bool) -> None:
+        """Show the dot alone, or the words again."""
+        if bare != self._is_bare:
+            self._is_bare = bare
+            self.updateGeometry()
+            self.update()
+
+    def shown_word(self) -> str:
+        return "" if self._is_bare else self.text()
+
+    def show_recording(self, recordings: SessionRecordings) -> None:
+        """Say what is so now."""
+        self._is_on = recordings.is_recording
+        if not self._is_on:
+            self.set_word(_("Record"))
+            return
+        length = length_words(recordings.elapsed_s)
+        size = size_words(recordings.client.state.size_bytes)
+        words = _("{length}, {size}").format(length=length, size=size)
+        if words != self.text():
+            self.set_word(words)
+            self.setAccessibleName(_("Recording"))
+
+    def sizeHint(self) -> QSize:
+        high = super().sizeHint().height()
+        bare = self.icon_side() + 2 * self.measure.padding
+        return QSize(bare if self._is_bare else round(self._theme.scaled(RECORD_PX)), high)
+
+    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+        colour = self._theme.colour
+        if self._is_on and self.isEnabled():
+            return colour("pressed"), colour("borderStrong"), colour("error")
+        return super()._look()
 
 
 class DeveloperTools(QObject):
     """Puts the tools into the tool bar; `follow` keeps them true."""
 
-    def __init__(self, shell: Shell, bar: ToolBar, commands: Commands) -> None:
+    def __init__(self, shell: Shell, bar: ToolBar, commands: Commands, session: Session) -> None:
         super().__init__(bar)
         self._shell, self._bar, self._actions = shell, bar, commands.actions
+        self._recordings = session.recordings
         self._ticks = 0
         theme, menus = shell.theme, commands.menus
+        self.record = RecordButton(theme)
+        self.keep = Button(theme, "", "history", size="small")
+        name_command(self.record, RECORD)
+        self.record.clicked.connect(commands.recording.press)
+        self._actions.bind(self.keep, KEEP)
         self.freeze = ToggleButton(theme, _("Freeze"), "snowflake")
         self.layout = MenuButton(theme, _("Developer"), "panel-left", size="small")
         self.panels = MenuButton(theme, _("Panels"), size="small")
@@ -35,10 +93,10 @@ class DeveloperTools(QObject):
         self.layout.clicked.connect(lambda: menus.drop_layouts(self.layout))
         self.panels.clicked.connect(lambda: menus.drop_panels(self.panels))
         self._wide_only = (Separator(theme, upright=True, length=24), self.layout, self.panels)
-        tools = (self.freeze, *self._wide_only)
+        tools = (self.record, self.keep, self.freeze, *self._wide_only)
         for place, tool in enumerate(tools):
             bar.add_tool(tool, place)
-        for button in (self.freeze, self.layout, self.panels):
+        for button in (self.record, self.keep, self.freeze, self.layout, self.panels):
             button.let_shrink()
         bar.installEventFilter(self)
         theme.changed.connect(self._fit)
@@ -49,6 +107,8 @@ class DeveloperTools(QObject):
         self._actions[FREEZE].setChecked(frozen)
         self.freeze.setChecked(frozen)
         self.freeze.setEnabled(bool(freezable(shell.bench)))
+        self.record.show_recording(self._recordings)
+        self.keep.set_word(_("Keep the last {count} s").format(count=self._recordings.wish.seconds))
         own = shell.saved_layouts.own("developer")
         name = own or _("Developer")
         self.layout.set_word(name)
@@ -60,11 +120,14 @@ class DeveloperTools(QObject):
         return False
 
     def _fit(self) -> None:
-        """Large text in a narrow window: layouts and panels, then Freeze, are in the View menu."""
-        room = self._bar.width() >= self._shell.theme.scaled(ROOM_PX)
+        """Large text in a narrow window: Keep, layouts and panels, Freeze, Record are in the View menu."""
+        width, scaled = self._bar.width(), self._shell.theme.scaled
         for tool in self._wide_only:
-            paint.show_when(tool, room)
-        paint.show_when(self.freeze, self._bar.width() >= self._shell.theme.scaled(FREEZE_ROOM_PX))
+            paint.show_when(tool, width >= scaled(ROOM_PX))
+        paint.show_when(self.keep, width >= scaled(KEEP_ROOM_PX))
+        self.record.set_bare(width < scaled(WORDS_ROOM_PX))
+        paint.show_when(self.freeze, width >= scaled(FREEZE_ROOM_PX))
+        paint.show_when(self.record, width >= scaled(RECORD_ROOM_PX))
 
     def follow(self) -> None:
         """Called with every half tick: say what is so, while it can be seen."""

@@ -14,7 +14,7 @@ from app.core.robots.health_facts import facts_of, has_told
 from app.core.robots.robot_link import STOPPING
 from app.core.run.view import connected_words
 from app.core.session import Session
-from app.ui.text.numbers import age_words, grouped
+from app.ui.text.numbers import age_words, grouped, length_words, size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, StatusItem, paint
 from nep.i18n import _, ngettext
@@ -136,6 +136,30 @@ class StatusFacts:
             return NOTHING
         words = ngettext("{count} lost in 30 s", "{count} lost in 30 s", lost)
         return "triangle-alert", words.format(count=grouped(lost)), "warn"
+
+    def recording(self) -> Fact:
+        """That something is recorded: how long, how much, and what was lost; nothing when nothing is."""
+        recordings = self._session.recordings
+        state = recordings.client.state
+        if not recordings.is_recording:
+            return NOTHING
+        if state.phase == "starting":
+            return "circle-dot", _("Recording begins"), "recording"
+        lost = state.lost + state.unkept
+        losses = ngettext("{count} lost", "{count} lost", lost).format(count=grouped(lost))
+        words = _("Recording {time}, {size}, {losses}").format(
+            time=length_words(recordings.elapsed_s),
+            size=size_words(state.size_bytes),
+            losses=losses if lost else _("none lost"),
+        )
+        return ("triangle-alert", words, "warn") if state.unkept else ("circle-dot", words, "recording")
+
+    def ring(self) -> Fact:
+        """How much of the last seconds could be kept; nothing without a flight recorder."""
+        seconds = self._session.recordings.client.state.ring_s
+        if seconds is None:
+            return NOTHING
+        return "history", _("{count} s can be kept").format(count=round(seconds)), None
 
     def shown(self) -> Fact:
         """How many messages of the topics that are looked at were shown; nothing when all were."""

@@ -12,6 +12,7 @@ from app.ui.shell.commands.behaviours import BehaviourCommands, bring_into_view
 from app.ui.shell.commands.editing import EditCommands
 from app.ui.shell.commands.menus import MenuLists
 from app.ui.shell.commands.palette_entries import PaletteEntries
+from app.ui.shell.commands.recording import RecordCommands
 from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands
 from app.ui.shell.commands.shell import Shell
@@ -38,6 +39,7 @@ class Commands:
         self.robots = RobotCommands(shell, session, self.files, self.behaviours.undo)
         self.view = ViewCommands(shell, session, self.files, keys)
         self.shortcuts = keys
+        self.recording = RecordCommands(shell, session, asks, self.do_about)
         self.variables = VariableCommands(shell, session, self.files)
         self._do = Handlers(
             session,
@@ -49,6 +51,7 @@ class Commands:
             self.view,
             EditCommands(shell),
             ReportCommands(shell, session, self.files, asks),
+            self.recording,
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.why_not, keys)
@@ -67,6 +70,10 @@ class Commands:
         id, colon, argument = name.partition(":")
         if not colon:
             return self.actions.run(id)
+        return self.do_about(id, argument)
+
+    def do_about(self, id: str, argument: str) -> bool:
+        """Do a command about one thing; False when there is none. Raises UnknownCommandError."""
         command = _ABOUT.get(id)
         if command is None:
             raise UnknownCommandError(id)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
 from app.core.session import Session
@@ -15,6 +16,7 @@ from app.ui.shell.actions.command import ArgumentCommand, Command
 from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPlace, read_stack
 from app.ui.shell.commands.editing import Edit, EditCommands
 from app.ui.shell.commands.freeze import freezable
+from app.ui.shell.commands.recording import RecordCommands
 from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
 from app.ui.shell.commands.shell import START, Shell
@@ -27,7 +29,7 @@ from nep.programs.alarms import AlarmCondition
 from nep.version import RELEASES_PAGE
 
 A = TypeVar("A")
-LOOK = lazy("Look")
+LOOK, RECORD = lazy("Look"), lazy("Record")
 MENUS = (lazy("File"), lazy("Edit"), lazy("View"), lazy("Run"), lazy("Robots"), lazy("Help"))
 WHY_NO_RUN = {
     "stopping": lazy("Robots are being stopped"),
@@ -49,6 +51,7 @@ class Handlers:
     view: ViewCommands
     editing: EditCommands
     reports: ReportCommands
+    recording: RecordCommands
 
 
 # ---- why a command can't be done now: menus grey it, the palette says the sentence ------------------
@@ -112,6 +115,10 @@ def _no_room(do: Handlers) -> str:
 
 def _no_virtual_robot(do: Handlers) -> str:
     return "" if do.session.launcher.wanted else _("No virtual robot was started here")
+
+
+def _nothing_recorded(do: Handlers) -> str:
+    return "" if do.session.recordings.is_recording else _("Nothing is recorded")
 
 
 def _largest_text(do: Handlers) -> str:
@@ -292,6 +299,18 @@ COMMANDS: tuple[C, ...] = (
       icon="waypoints"),
     C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell", above=True,
       why_not=_no_panels),
+    C("recording.toggle", lazy("Start or stop recording"), lambda do: do.recording.toggle(), "View",
+      ("Ctrl+R",), "circle-dot", lazy("Records what programs say, until it is stopped"), under=RECORD),
+    C("recording.stop", lazy("Stop recording"), lambda do: do.session.recordings.stop(), icon="circle-dot",
+      in_shortcuts=False, why_not=_nothing_recorded),
+    C("recording.sheet", lazy("Choose what to record"), lambda do: do.recording.open_sheet(), "View",
+      icon="list-checks", under=RECORD),
+    C("recording.keep", lazy("Keep the last seconds"), lambda do: do.recording.keep(), "View", ("F9",),
+      "history", lazy("Makes a recording of what just happened"), under=RECORD, above=True),
+    C("recording.folder", lazy("Folder for recordings"), lambda do: do.recording.choose_folder(), "View",
+      icon="folder-open", under=RECORD, above=True),
+    C("recording.show", lazy("Recordings"), lambda do: do.recording.show(), "View", icon="film",
+      under=RECORD, in_palette=False),
     C("help.first_steps", lazy("First steps"), lambda do: do.view.first_steps(), "Help", icon="lightbulb"),
     C("help.guide", lazy("Guide"), lambda do: do.view.open_guide(), "Help", icon="book-open"),
     C("help.examples", lazy("Examples"), lambda do: do.view.examples(), "Help", icon="blocks"),
@@ -325,6 +344,8 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     ),
     _about("alarm.node", str, lambda do, node: do.view.new_alarm(AlarmCondition("leaves", node))),
     _about("alarm.value", read_value, lambda do, about: do.view.alarm_on_value(about)),
+    _about("recording.play", Path, lambda do, path: do.recording.play(path)),
+    _about("record.topic", str, lambda do, topic: do.recording.record_topic(topic)),
     _about("key", str, lambda do, key: do.view.press(key)),
     _about("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
     _about("try", read_stack, lambda do, stack: do.behaviours.try_stack(stack)),

@@ -79,7 +79,7 @@ PICTURE = FileQuestion(
     icon="image",
 )
 FOLDER = FileQuestion(
-    lazy("Folder for pictures"),
+    lazy("Choose a folder"),
     lazy("Use this folder"),
     "",
     endings=(),

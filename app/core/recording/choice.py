@@ -1,0 +1,158 @@
+"""What a person chose to record, by names or by patterns, and how it is kept between starts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nep.errors import BadTopicError
+from nep.i18n import _, lazy
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from nep.recordings import recorder
+else:
+    recorder = lazy_module("nep.recordings.recorder")  # no start waits for it
+
+MODES = ("all", "chosen", "pattern")
+LEAST_S, MOST_S, USUAL_S = 5, 3_600, 60
+LEAST_GB, MOST_GB, USUAL_GB = 0.1, 1_000.0, 2.0
+MOST_NAMES = 1_000
+MOST_LETTERS = 80
+"""Of a name for a file: with what is put behind it all file systems take it."""
+NOT = lazy("not")
+_NEVER_IN_NAMES = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*\ud800-\udfff]+')
+_DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingChoice:
+    """Which topics are recorded.
+
+    ``mode``: "all"; "chosen", those in ``topics``; "pattern", what fits ``patterns`` (all, when there are
+    none) and none of ``left_out``.
+    """
+
+    mode: str = "all"
+    topics: tuple[str, ...] = ()
+    patterns: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def selection(self) -> recorder.TopicSelection:
+        """As the recorder takes it. Raises `BadTopicError` for what can be no topic."""
+        if self.mode == "chosen":
+            return recorder.TopicSelection(self.topics)
+        if self.mode == "pattern":
+            return recorder.TopicSelection(self.patterns, self.left_out)
+        return recorder.TopicSelection()
+
+    @property
+    def problem(self) -> str:
+        """Why nothing can be recorded so, in a sentence; "" when it can."""
+        if self.mode == "chosen" and not self.topics:
+            return _("No topic is chosen.")
+        try:
+            self.selection  # noqa: B018  it is asked whether it can be
+        except BadTopicError as error:
+            return f"{str(error)[:1].upper()}{str(error)[1:]}."
+        return ""
+
+
+def read_choice(told: object) -> RecordingChoice:
+    """The choice that settings keep; whatever does not fit is as at first."""
+    if not isinstance(told, Mapping):
+        return RecordingChoice()
+    mode = told.get("mode")
+    return RecordingChoice(
+        mode if isinstance(mode, str) and mode in MODES else "all",
+        _names(told.get("topics")),
+        _names(told.get("patterns")),
+        _names(told.get("left_out")),
+    )
+
+
+def plain_choice(choice: RecordingChoice) -> dict[str, object]:
+    """The choice as settings keep it."""
+    return {
+        "mode": choice.mode,
+        "topics": list(choice.topics),
+        "patterns": list(choice.patterns),
+        "left_out": list(choice.left_out),
+    }
+
+
+def _names(told: object) -> tuple[str, ...]:
+    return (
+        tuple(each for each in told if isinstance(each, str))[:MOST_NAMES] if isinstance(told, list) else ()
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class RingWish:
+    """Whether the flight recorder is on, for how many seconds, and in how many GB (10^9 bytes) at most."""
+
+    is_on: bool = False
+    seconds: int = USUAL_S
+    size_gb: float = USUAL_GB
+
+
+def read_wish(told: object) -> RingWish:
+    """What settings keep of it; whatever does not fit is as at first."""
+    if not isinstance(told, Mapping):
+        return RingWish()
+    seconds, size_gb = told.get("seconds"), told.get("size_gb")
+    return RingWish(
+        told.get("is_on") is True,
+        int(seconds) if _within(seconds, LEAST_S, MOST_S) else USUAL_S,  # type: ignore[arg-type]
+        float(size_gb) if _within(size_gb, LEAST_GB, MOST_GB) else USUAL_GB,  # type: ignore[arg-type]
+    )
+
+
+def plain_wish(wish: RingWish) -> dict[str, object]:
+    """The wish as settings keep it."""
+    return {"is_on": wish.is_on, "seconds": wish.seconds, "size_gb": wish.size_gb}
+
+
+def _within(value: object, least: float, most: float) -> bool:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and least <= value <= most  # type: ignore[operator]
+
+
+def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """(wanted, left out) of "/arm/* *action* not /arm/raw": words, and what follows "not" is left out."""
+    wanted: list[str] = []
+    unwanted: list[str] = []
+    is_not = False
+    for word in text.replace(",", " ").split():
+        if word.casefold() in {NOT, _(NOT).casefold()}:
+            is_not = True
+            continue
+        into = unwanted if is_not else wanted
+        if word not in into:
+            into.append(word)
+        is_not = False
+    return tuple(wanted), tuple(unwanted)
+
+
+def pattern_words(choice: RecordingChoice) -> str:
+    """The patterns as a person types them."""
+    return " ".join([*choice.patterns, *(f"{_(NOT)} {each}" for each in choice.left_out)])
+
+
+def file_stem(name: str) -> str:
+    """The name as every system takes it for a file, "" when nothing of it is left."""
+    plain = _NEVER_IN_NAMES.sub(" ", name)
+    plain = " ".join(plain.split())[:MOST_LETTERS].strip(" .")
+    return f"_{plain}" if _DEVICES.fullmatch(plain) else plain
+
+
+def free_path(wanted: Path) -> Path:
+    """This path, or with a number behind its name when there is such a file already."""
+    made, number = wanted, 2
+    while made.exists():
+        made, number = wanted.with_name(f"{wanted.stem} {number}{wanted.suffix}"), number + 1
+    return made

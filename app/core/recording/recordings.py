@@ -1,0 +1,260 @@
+"""What a session records: when a person wants it, the last seconds always, and where the files are."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.core.alerts import Alerts
+from app.core.recording.choice import (
+    RecordingChoice,
+    RingWish,
+    file_stem,
+    free_path,
+    plain_choice,
+    plain_wish,
+    read_choice,
+    read_wish,
+)
+from app.core.recording.client import (
+    RecorderClient,
+    RecorderGone,
+    RecorderProcess,
+    RecorderSaid,
+    RingChoice,
+    StartRecorder,
+)
+from app.core.storage.settings import Settings, data_home
+from app.errors import SettingsError
+from nep.i18n import _
+from nep.programs.alarms import AlarmAction, AlarmEvent
+from nep.programs.alarms.alarms import Done
+from nep.programs.alarms.sentences import what_words
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.core.recording import folder as folders
+else:
+    folders = lazy_module("app.core.recording.folder")  # which reads recordings: no start waits for it
+
+FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
+NO_FOLDER = "recorder:folder"
+CHOOSE_FOLDER = "recording.folder"
+"""The window's command that asks for another folder."""
+_GB = 1_000_000_000
+_KEPT_FILE = re.compile(r"[\w.-]+\.mcap\b")
+
+
+def _nobody(_path: Path, _kind: str) -> None:
+    """Nobody wants to know what was made."""
+
+
+class SessionRecordings:
+    """The recordings of a session. One thread uses it (the window's), which `on_event` brings what happens.
+
+    ``on_made`` is told of each file that is finished, with "recorded" or "kept".
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        alerts: Alerts,
+        address: str,
+        post_event: Callable[[object], object],
+        *,
+        start: StartRecorder = RecorderProcess,
+        clock: Callable[[], float] = time.monotonic,
+        now: Callable[[], datetime] = datetime.now,
+    ) -> None:
+        """Read what was chosen; nothing is started before `start`, or before something is recorded."""
+        self._settings, self._alerts, self._clock, self._now = settings, alerts, clock, now
+        self.client = RecorderClient(address, alerts, post_event, start=start, clock=clock)
+        self.choice = read_choice(settings.get(CHOICE_KEY, {}))
+        self.wish = read_wish(settings.get(RING_KEY, {}))
+        self.on_made: Callable[[Path, str], object] = _nobody
+        self.recorded = self.choice
+        """What the recording that goes on has."""
+        self._began: float | None = None
+        self._keeping: dict[Path, Done | None] = {}
+
+    # ---- where the files are
+
+    @property
+    def folder(self) -> Path:
+        """Where recordings go."""
+        chosen = self._settings.get(FOLDER_KEY, "")
+        return Path(chosen) if chosen else folders.usual_folder()
+
+    def set_folder(self, folder: Path) -> None:
+        """Let recordings go there from now on."""
+        self._put(FOLDER_KEY, str(folder))
+        self._alerts.resolve(NO_FOLDER)
+
+    def _ready_folder(self) -> Path | None:
+        """The folder, which is there; None when it can't be, which an alert says.
+
+        A folder that a person chose is not made anew: its disk may be away.
+        """
+        folder = self.folder
+        problem = ""
+        try:
+            if not self._settings.get(FOLDER_KEY, ""):
+                folder.mkdir(parents=True, exist_ok=True)
+            if not folder.is_dir():
+                problem = _("{folder} is not there.").format(folder=folder)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            problem = _("{folder} can't be made: {reason}.").format(folder=folder, reason=reason)
+        if not problem:
+            self._alerts.resolve(NO_FOLDER)
+            return folder
+        self._alerts.put(
+            NO_FOLDER,
+            "error",
+            _("Nothing is recorded: the folder for recordings is missing."),
+            problem,
+            button=_("Choose a folder"),
+            action=CHOOSE_FOLDER,
+        )
+        return None
+
+    # ---- recording
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a recording begins, goes on, or is being finished."""
+        return bool(self.client.state.phase)
+
+    @property
+    def elapsed_s(self) -> float:
+        """For how long this one has been recorded; 0 when nothing is, or its process is only beginning."""
+        return 0.0 if self._began is None else max(0.0, self._clock() - self._began)
+
+    def choose(self, choice: RecordingChoice) -> None:
+        """Record this the next time, and after the next start."""
+        self.choice = choice
+        self._put(CHOICE_KEY, plain_choice(choice))
+
+    def record(self, name: str = "", note: str = "", choice: RecordingChoice | None = None) -> str:
+        """Begin; ``choice`` is for this time only. Gives why not in a sentence, "" when it begins.
+
+        Without a ``name`` the file has the time as its name.
+        """
+        choice = choice if choice is not None else self.choice
+        if self.is_recording:
+            return _("A recording goes on already.")
+        if choice.problem:
+            return choice.problem
+        folder = self._ready_folder()
+        if folder is None:
+            return _("The folder for recordings is not there.")
+        stem = file_stem(name)
+        path = (
+            free_path(folder / f"{stem}{folders.SUFFIX}") if stem else folders.new_path(folder, self._now())
+        )
+        selection = choice.selection
+        self.client.record(path, selection.topics, selection.left_out, note)
+        self.recorded, self._began = choice, None
+        return ""
+
+    def stop(self) -> None:
+        """End the recording."""
+        self.client.stop()
+
+    # ---- the flight recorder
+
+    @property
+    def is_ring_on(self) -> bool:
+        """Whether the last seconds can be kept, or will soon."""
+        return self.client.state.ring_s is not None
+
+    def set_wish(self, wish: RingWish) -> None:
+        """Have the flight recorder on or off, now and after the next start."""
+        self.wish = wish
+        self._put(RING_KEY, plain_wish(wish))
+        self._follow_wish()
+
+    def _follow_wish(self) -> None:
+        wish = self.wish
+        if not wish.is_on:
+            self.client.follow_ring(None)
+            return
+        folder = data_home() / "flight-recorder"
+        self.client.follow_ring(RingChoice(folder, float(wish.seconds), round(wish.size_gb * _GB)))
+
+    def keep(self, note: str = "", seconds: float | None = None, done: Done | None = None) -> str:
+        """Make a recording of the last seconds; gives why not in a sentence, "" when it is being made.
+
+        ``done`` is told when it is there, or why it is not.
+        """
+        if not self.wish.is_on:
+            return _("The flight recorder is off.")
+        folder = self._ready_folder()
+        if folder is None:
+            return _("The folder for recordings is not there.")
+        word = "alarm" if done is not None else "kept"
+        path = folders.new_path(folder, self._now(), word)
+        number = 2
+        while path in self._keeping:
+            path, number = path.with_stem(f"{path.stem}-{number}"), number + 1
+        if not self.client.keep(path, seconds if seconds is not None else float(self.wish.seconds), note):
+            return _("The last seconds can't be kept now.")
+        self._keeping[path] = done
+        return ""
+
+    def carry(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+        """An alarm keeps the last seconds."""
+        said = what_words(event.rule.condition, event.seen)
+        why_not = self.keep(said, action.seconds, done)
+        if why_not:
+            words = _("nothing was kept: {reason}")
+            done(False, words.format(reason=f"{why_not[:1].lower()}{why_not[1:]}".rstrip(".")))
+
+    # ---- what the session does
+
+    def start(self) -> None:
+        """Begin what was on when Studio ended."""
+        self._follow_wish()
+
+    def check(self) -> None:
+        """Once a second."""
+        self.client.check()
+
+    def on_event(self, event: RecorderSaid | RecorderGone) -> None:
+        """Take over what the recorder's process told."""
+        was = self.client.state
+        self.client.on_event(event)
+        state = self.client.state
+        if was.phase == "starting" and state.phase == "recording":
+            self._began = self._clock()
+        if was.phase and not state.phase:
+            self._began = None
+            if state.last is not None and state.last == was.path:
+                self.on_made(state.last, "recorded")
+        for path in [each for each in self._keeping if each not in state.keeping]:
+            done = self._keeping.pop(path)
+            is_there = state.last == path
+            if is_there:
+                self.on_made(path, "kept")
+            if done is not None:
+                words = _("kept {file}") if is_there else _("nothing was kept: see the alerts")
+                done(is_there, words.format(file=path.name))
+
+    def close(self) -> None:
+        """End: what is being recorded is finished by its process, also when that takes longer than Studio."""
+        self.client.close()
+
+    def _put(self, key: str, value: object) -> None:
+        with suppress(SettingsError):  # an alert says that settings can't be kept
+            self._settings.set(key, value)
+
+
+def kept_file(words: str) -> str:
+    """The name of the file in "kept alarm-2026-11-27-10-00-00.mcap"; "" where there is none."""
+    found = _KEPT_FILE.search(words)
+    return found[0] if found is not None else ""

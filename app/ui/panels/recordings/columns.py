@@ -1,0 +1,172 @@
+"""How a recording is shown in the table: its picture, name and note, and its figures."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from PySide6.QtCore import QPointF, QRectF, QSize
+from PySide6.QtGui import QImage, QPainter, QPainterPath
+
+from app.core.recording.folder import RecordingFacts
+from app.ui.text.dates import when_words
+from app.ui.text.numbers import grouped, length_words, size_words
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.table.model import Cell, Column
+from nep.i18n import _, lazy
+
+PICTURE = QSize(64, 48)
+GAP, CHIP_HIGH, CHIP_PADDING = 14, 18, 8
+BADGES = {
+    "recording": (lazy("recording"), "error", "circle-dot"),
+    "unreadable": (lazy("can't be read"), "error", "circle-x"),
+    "cut": (lazy("cut off"), "warn", "triangle-alert"),
+    "repaired": (lazy("repaired"), "info", "wrench"),
+    "kept": (lazy("last seconds"), "off", "history"),
+}
+"""What is special about a recording: words, status, icon."""
+
+
+def badge_of(facts: RecordingFacts, being_written: bool) -> str:
+    """Which of `BADGES` it has; "" for none."""
+    if being_written:
+        return "recording"
+    if facts.problem:
+        return "unreadable"
+    if not facts.is_read:
+        return ""
+    if facts.is_repaired:
+        return "repaired"
+    if not facts.is_complete:
+        return "cut"
+    return "kept" if facts.is_kept else ""
+
+
+@dataclass(frozen=True)
+class RecordingMark:
+    """Picture, name with its badge, and a line below. A picture is told from others by its number."""
+
+    name: str
+    note: str
+    badge: str
+    picture_id: int
+    picture: QImage | None = field(compare=False)
+
+    def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
+        """See `CellMark`."""
+        side = theme.scaled(1.0)
+        place = QRectF(box.left(), 0, PICTURE.width() * side, PICTURE.height() * side)
+        place.moveCenter(QPointF(place.center().x(), box.center().y()))
+        self._paint_picture(painter, place, theme)
+        words = QRectF(box)
+        words.setLeft(place.right() + GAP)
+        name, small = theme.font("label"), theme.font("small")
+        name.setWeight(name.Weight.DemiBold)
+        high, low = paint.height_of(name), paint.height_of(small)
+        top = box.center().y() - (high + (low if self.note else 0)) / 2
+        chip = self._chip_width(theme)
+        room = max(0.0, words.width() - (chip + 8 if chip else 0))
+        wide = min(paint.width_of(name, self.name) + 1, room)
+        paint.words(painter, QRectF(words.left(), top, wide, high), self.name, name, theme.colour("text"))
+        if chip:
+            middle = QRectF(words.left() + wide + 8, top + high / 2 - CHIP_HIGH / 2, chip, CHIP_HIGH)
+            self._paint_chip(painter, middle, theme)
+        if self.note:
+            line = QRectF(words.left(), top + high, words.width(), low)
+            paint.words(painter, line, self.note, small, theme.colour("textSecondary"))
+
+    def _paint_picture(self, painter: QPainter, place: QRectF, theme: Theme) -> None:
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        radius = theme.radius("key")
+        paint.box(painter, place, radius, theme.colour("sunken"))
+        if self.picture is None:
+            icon = QRectF(0, 0, 18, 18)
+            icon.moveCenter(place.center())
+            paint_icon(painter, icon, "chart-line", theme.colour("textTertiary"))
+            return
+        edge = QPainterPath()
+        edge.addRoundedRect(place, radius, radius)
+        painter.save()
+        painter.setClipPath(edge)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        painter.drawImage(place, self.picture)
+        painter.restore()
+
+    def _chip_width(self, theme: Theme) -> float:
+        if not self.badge:
+            return 0.0
+        return paint.width_of(theme.font("caption"), _(BADGES[self.badge][0])) + 2 * CHIP_PADDING + 16
+
+    def _paint_chip(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
+        words, status_name, icon = BADGES[self.badge]
+        status = theme.status(status_name)
+        ink = theme.colour("textSecondary" if status_name == "off" else status.colour)
+        paint.box(painter, box, box.height() / 2, theme.colour(status.tint or "sunken"))
+        paint_icon(painter, QRectF(box.left() + CHIP_PADDING - 2, box.center().y() - 6, 12, 12), icon, ink)
+        inside = box.adjusted(CHIP_PADDING + 13, 0, -2, 0)
+        paint.words(painter, inside, _(words), theme.font("caption"), ink)
+
+
+def cropped(image: QImage) -> QImage:
+    """The middle of a picture in the shape in which it is shown, twice as large for fine screens."""
+    wide, high = image.width(), image.height()
+    if not wide or not high:
+        return image
+    share = PICTURE.width() / PICTURE.height()
+    across = min(wide, round(high * share))
+    down = min(high, round(wide / share))
+    middle = image.copy((wide - across) // 2, (high - down) // 2, max(1, across), max(1, down))
+    return middle.scaled(2 * PICTURE.width(), 2 * PICTURE.height())
+
+
+def note_of(facts: RecordingFacts) -> str:
+    """The line below the name: why it can't be read, the note, else its first topics."""
+    return facts.problem or facts.note or ", ".join(facts.topics[:3])
+
+
+def columns(
+    picture: Callable[[RecordingFacts], QImage | None],
+    is_written: Callable[[RecordingFacts], bool],
+    now: Callable[[], dt.datetime],
+) -> tuple[Column[RecordingFacts], ...]:
+    """``picture`` gives what is known of it now, ``is_written`` whether it is being made."""
+
+    def name(facts: RecordingFacts) -> Cell:
+        image = picture(facts)
+        badge = badge_of(facts, is_written(facts))
+        note = note_of(facts)
+        mark = RecordingMark(facts.path.stem, note, badge, image.cacheKey() if image else 0, image)
+        said = ", ".join(filter(None, (facts.path.stem, _(BADGES[badge][0]) if badge else "", note)))
+        return Cell(mark=mark, said=said)
+
+    def when(facts: RecordingFacts) -> Cell:
+        seconds = facts.started_ns / 1e9 if facts.started_ns else facts.changed_s
+        then = dt.datetime.fromtimestamp(min(max(seconds, 0.0), 4e10), tz=dt.timezone.utc).astimezone()
+        return Cell(when_words(then, now()))
+
+    def length(facts: RecordingFacts) -> Cell:
+        return Cell(length_words(facts.duration_s) if facts.message_count else "")
+
+    def lost(facts: RecordingFacts) -> Cell:
+        if facts.lost is None:
+            return Cell()
+        return Cell(
+            grouped(facts.lost), "triangle-alert" if facts.lost else None, "warn" if facts.lost else "text"
+        )
+
+    return (
+        Column("name", lazy("Recording"), 280, name, key=lambda facts: facts.path.stem.casefold(),
+               stretch=True, tip=lambda facts: str(facts.path)),
+        Column("when", lazy("Recorded"), 132, when,
+               key=lambda facts: facts.started_ns or facts.changed_s * 1e9, yields=1),
+        Column("length", lazy("Length"), 68, length, key=lambda facts: facts.duration_s, figures=True),
+        Column("size", lazy("Size"), 72, lambda facts: Cell(size_words(facts.size_bytes)),
+               key=lambda facts: facts.size_bytes, figures=True, yields=2),
+        Column("messages", lazy("Messages"), 84,
+               lambda facts: Cell(grouped(facts.message_count) if facts.message_count else ""),
+               key=lambda facts: facts.message_count, figures=True, yields=4),
+        Column("lost", lazy("Lost"), 72, lost, key=lambda facts: facts.lost, figures=True, yields=3),
+    )  # fmt: skip

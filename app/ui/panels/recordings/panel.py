@@ -1,0 +1,421 @@
+"""Recordings: a browser of the folder, which is read in another thread."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import QEvent, QFile, Qt, QUrl
+from PySide6.QtGui import QAction, QImage, QKeyEvent
+from PySide6.QtWidgets import QVBoxLayout
+
+from app.core.documents.background_worker import BackgroundWorker
+from app.core.recording.choice import file_stem
+from app.core.recording.choice import free_path as free
+from app.core.recording.exporting import RecordingExport
+from app.core.recording.folder import FolderLook, RecordingFacts, RecordingFolder, picture_in
+from app.core.recording.recordings import FOLDER_KEY
+from app.ui.other_programs import open_outside
+from app.ui.panels.base import Density, Panel, PanelContext
+from app.ui.panels.recordings.columns import PICTURE, columns, cropped
+from app.ui.panels.recordings.details import FORMAT_WORDS, RecordingDetails
+from app.ui.panels.recordings.table import RecordingTable
+from app.ui.panels.row_actions import RowAction
+from app.ui.panels.table_panel import TablePanel, TableWords
+from app.ui.text.numbers import grouped, size_words
+from app.ui.widgets import EmptyAction, label
+from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.table.model import TableModel
+from nep.i18n import _, lazy, ngettext
+from nep.system.replace_file import replace_file
+
+WORDS = TableWords(
+    title=lazy("Recordings"),
+    filter=lazy("Filter names, notes and topics"),
+    nothing_fits=lazy("No recording has these words"),
+    clear_the_filter=lazy("Clear the filter to see all recordings."),
+)
+ROW = 56
+LOOK_EVERY = 30  # refreshes of 30 a second
+FIRST_LOOK = 1
+PICTURES_KEPT = 300
+SIDECAR = ".bookmarks.json"
+
+
+class RecordingsPanel(TablePanel[RecordingFacts]):
+    """The table, and below it what can be done with the chosen recording."""
+
+    def __init__(self, context: PanelContext) -> None:
+        self._recordings = context.session.recordings
+        self._folder = RecordingFolder(self._recordings.folder)
+        self._look = FolderLook(is_whole=False)
+        self._has_looked = False
+        self._pictures: OrderedDict[tuple[Path, float, int], QImage | None] = OrderedDict()
+        self._asked: dict[str, tuple[Path, float, int]] = {}
+        self._artist: BackgroundWorker[tuple[QImage | None]] = BackgroundWorker("recordings-pictures")
+        self._job: RecordingExport | None = None
+        self._ticks, self._wanted, self._recorder_seen = 0, "", -1
+        super().__init__(context, WORDS, "film")
+        self.count = label("", "small", role="textSecondary")
+        self.header.insert(0, self.count)
+        self.details = RecordingDetails(self.theme)
+        self._connect()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget, stretch in ((self.pages, 1), (self.line, 0), (self.foot, 0), (self.details, 0)):
+            column.addWidget(widget, stretch)
+        self.foot.hide()
+        self.line.hide()
+        self.details.hide()
+
+    def _connect(self) -> None:
+        details = self.details
+        self.table.chosen.connect(lambda _key: self._show_details())  # type: ignore[attr-defined]
+        self.table.rename_wanted.connect(self._rename)  # type: ignore[attr-defined]
+        self.table.delete_wanted.connect(self._delete)  # type: ignore[attr-defined]
+        details.open.clicked.connect(lambda: self._of_chosen(self.open_row))
+        details.rename.clicked.connect(lambda: self._of_chosen(self._rename))
+        details.delete.clicked.connect(lambda: self._of_chosen(self._delete))
+        details.show_file.clicked.connect(lambda: self._of_chosen(self._show_file))
+        details.wants_export.connect(self._export)
+        details.cancelled.connect(self._cancel)
+
+    def make_model(self) -> TableModel[RecordingFacts]:
+        made = columns(self._picture, self._is_written, lambda: dt.datetime.now().astimezone())
+        return TableModel(made, lambda facts: str(facts.path))
+
+    def make_table(self, model: TableModel[RecordingFacts]) -> RecordingTable:
+        return RecordingTable(self.theme, model)
+
+    # ---- what it shows
+
+    def refresh(self) -> None:
+        self._ticks += 1
+        recordings = self._recordings
+        if recordings.folder != self._folder.folder:
+            self._folder.close()
+            self._folder = RecordingFolder(recordings.folder)
+            self._ticks = FIRST_LOOK
+        seen = recordings.client.revision
+        is_new = seen != self._recorder_seen
+        if self._ticks % LOOK_EVERY == FIRST_LOOK:
+            self._folder.look(recordings.client.state.path if recordings.is_recording else None)
+        found = self._folder.take()
+        if found is not None:
+            self._look, self._has_looked = found, True
+        if found is not None or is_new:
+            self._recorder_seen = seen
+            self.rebuild()
+        if self._take_pictures():
+            self.table.tell_visible_changed()
+        self._follow_export()
+
+    def rebuild(self) -> None:
+        words = self.filter_words()
+        known = [self._now(each) for each in self._look.files]
+        rows = [each for each in known if all(word in _haystack(each) for word in words)]
+        self.model.set_rows(self.table.order.sort(rows))
+        self.table.tell_visible_changed()
+        if self._wanted and self.model.index_of(self._wanted).isValid():
+            self.table.choose(self._wanted)
+            self._wanted = ""
+        self._say_counts(known)
+        self.show_table(bool(rows), bool(words) and bool(known))
+        self._show_details()
+
+    def _now(self, facts: RecordingFacts) -> RecordingFacts:
+        """The one that is being written, as its recorder tells."""
+        if not self._is_written(facts):
+            return facts
+        state = self._recordings.client.state
+        return replace(
+            facts,
+            size_bytes=max(facts.size_bytes, state.size_bytes),
+            duration_s=state.duration_s,
+            message_count=state.message_count,
+            lost=state.lost + state.unkept,
+            topics=tuple(sorted(state.topics))[:3],
+        )
+
+    def _is_written(self, facts: RecordingFacts) -> bool:
+        state = self._recordings.client.state
+        return bool(state.phase) and facts.path == state.path
+
+    def _say_counts(self, known: Sequence[RecordingFacts]) -> None:
+        count = len(known) + self._look.left_out
+        words = ngettext("{count} recording, {size}", "{count} recordings, {size}", count)
+        size = size_words(sum(each.size_bytes for each in known))
+        self.count.setText(words.format(count=grouped(count), size=size) if count else "")
+        self.filter.setVisible(count > 0)
+        left_out = self._look.left_out
+        older = ngettext("{count} older one is not listed", "{count} older ones are not listed", left_out)
+        self.foot.setText(older.format(count=grouped(left_out)) if left_out else "")
+        self.foot.setVisible(bool(left_out))
+        self.line.setVisible(bool(left_out))
+
+    def show_table(self, any_rows: bool, filtered: bool) -> None:
+        if any_rows or filtered:
+            super().show_table(any_rows, filtered)
+            return
+        self.pages.setCurrentIndex(1)
+        self.say_empty()
+
+    def say_empty(self) -> None:
+        folder = self._recordings.folder
+        is_own = bool(self.session.settings.get(FOLDER_KEY, ""))
+        if not self._has_looked:
+            self.empty.say(_("Looking into the folder"), str(folder), "folder-open")
+            self.empty.set_actions([])
+        elif self._look.problem and is_own:
+            said = _("{folder}: {reason}.").format(folder=folder, reason=self._look.problem)
+            self.empty.say(_("The folder for recordings is not there"), said, "folder-open")
+            choose = EmptyAction(_("Choose a folder"), lambda: self.context.run("recording.folder"), "folder")
+            self.empty.set_actions([choose])
+        else:
+            said = _("Record, or keep the last seconds when something happened.")
+            self.empty.say(_("No recordings yet"), said, "film")
+            record = EmptyAction(
+                _("Record"), lambda: self.context.run("recording.toggle"), "circle-dot", primary=True
+            )
+            self.empty.set_actions([record])
+
+    def _show_details(self) -> None:
+        facts = self._chosen()
+        self.details.setVisible(facts is not None)
+        if facts is not None:
+            self.details.show_facts(facts, self._is_written(facts))
+
+    def _chosen(self) -> RecordingFacts | None:
+        return self.model.row_at(self.table.currentIndex())
+
+    # ---- pictures
+
+    def _picture(self, facts: RecordingFacts) -> QImage | None:
+        """What is known now; the rest is asked for, in another thread."""
+        if not facts.is_read or facts.problem:
+            return None
+        mark = (facts.path, facts.changed_s, facts.size_bytes)
+        if mark in self._pictures:
+            self._pictures.move_to_end(mark)
+            return self._pictures[mark]
+        owner = str(facts.path)
+        if self._asked.get(owner) != mark:
+            self._asked[owner] = mark
+            self._artist.ask(owner, lambda: (_drawn(facts.path),))
+        return None
+
+    def _take_pictures(self) -> bool:
+        is_any = False
+        for owner, mark in list(self._asked.items()):
+            made = self._artist.take(owner)
+            if made is not None:
+                is_any = True
+                del self._asked[owner]
+                self._pictures[mark] = made[0]
+        while len(self._pictures) > PICTURES_KEPT:
+            self._pictures.popitem(last=False)
+        return is_any
+
+    # ---- what a person does
+
+    def _of_chosen(self, do: Callable[[str], object]) -> None:
+        facts = self._chosen()
+        if facts is not None:
+            do(str(facts.path))
+
+    def open_row(self, key: str) -> None:
+        self.context.run(f"recording.play:{key}")
+
+    def row_actions(self, key: str) -> Sequence[RowAction]:
+        return (
+            RowAction(_("Open"), "play", lambda: self.open_row(key)),
+            RowAction(_("Rename"), "pencil", lambda: self._rename(key)),
+            RowAction(_("Show the file"), "folder-open", lambda: self._show_file(key)),
+            RowAction(_("Delete"), "trash-2", lambda: self._delete(key)),
+        )
+
+    def choose_file(self, path: Path) -> None:
+        """Show this one as the chosen one, as soon as it is listed."""
+        self.filter.clear()
+        self._wanted = str(path)
+        self._ticks = 0
+        self.rebuild()
+
+    def _facts_of(self, key: str) -> RecordingFacts | None:
+        return self.model.row_at(self.model.index_of(key))
+
+    def _rename(self, key: str) -> None:
+        facts = self._facts_of(key)
+        if facts is None or self._is_written(facts):
+            self.context.toast(_("It is being recorded: it can be renamed when it has ended"))
+            return
+        table = self.table
+        if isinstance(table, RecordingTable):
+            table.rename(key, facts.path.stem, lambda name: self._take_name(facts.path, name))
+
+    def _take_name(self, path: Path, name: str) -> bool:
+        stem = file_stem(name)
+        if stem == path.stem:
+            return True
+        if not stem:
+            self.context.toast(_("A recording needs a name"))
+            return False
+        new = path.with_name(f"{stem}{path.suffix}")
+        if new.exists():
+            self.context.toast(_("There is a recording “{name}” already").format(name=stem))
+            return False
+        if not self._moved(path, new):
+            return False
+        self._wanted = str(new)
+        self._put(path, new)
+        return True
+
+    def _moved(self, path: Path, new: Path) -> bool:
+        try:
+            replace_file(path, new)
+            beside = path.with_name(path.name + SIDECAR)
+            if beside.exists():
+                replace_file(beside, new.with_name(new.name + SIDECAR))
+        except OSError as error:
+            words = _("{file} can't be renamed: {reason}")
+            self.context.toast(words.format(file=path.name, reason=(error.strerror or str(error)).lower()))
+            return False
+        return True
+
+    def _put(self, path: Path, new: Path | None) -> None:
+        """Show at once what a person did; the next look finds the same."""
+        files = [
+            replace(each, path=new) if each.path == path and new is not None else each
+            for each in self._look.files
+            if each.path != path or new is not None
+        ]
+        self._look = replace(self._look, files=tuple(files))
+        self._ticks = 0
+        self.rebuild()
+
+    def _delete(self, key: str) -> None:
+        facts = self._facts_of(key)
+        if facts is None or self._is_written(facts):
+            self.context.toast(_("It is being recorded: it can be deleted when it has ended"))
+            return
+        path = facts.path
+        bin_file = QFile(str(path))
+        if not bin_file.moveToTrash():
+            words = _("{file} can't be moved to the bin: {reason}")
+            self.context.toast(words.format(file=path.name, reason=bin_file.errorString().lower()))
+            return
+        self._put(path, None)
+        self.table.setFocus(Qt.FocusReason.OtherFocusReason)
+        there = Path(bin_file.fileName())
+        words = _("Moved “{name}” to the bin").format(name=path.stem)
+        if there != path and there.is_file():
+            self.context.toast(words, _("Undo"), lambda: self._put_back(there, path))
+        else:
+            self.context.toast(words)
+
+    def _put_back(self, there: Path, path: Path) -> None:
+        try:
+            replace_file(there, free(path))
+            about = there.parent.parent / "info" / f"{there.name}.trashinfo"
+            about.unlink(missing_ok=True)
+        except OSError as error:
+            words = _("{file} could not be put back: {reason}")
+            self.context.toast(words.format(file=path.name, reason=(error.strerror or str(error)).lower()))
+            return
+        self._wanted = str(path)
+        self._ticks = 0
+
+    def _show_file(self, key: str) -> None:
+        path = Path(key)
+        if not open_outside(QUrl.fromLocalFile(str(path.parent))):
+            self.context.toast(_("The file is {path}").format(path=path))
+
+    # ---- export
+
+    def _export(self, kind: str) -> None:
+        facts = self._chosen()
+        if facts is None or self._job is not None:
+            return
+        folder = free(facts.path.parent / f"{facts.path.stem}, {_(FORMAT_WORDS[kind])}")
+        self._job = RecordingExport(facts.path, kind, folder)
+        self.details.show_export(self._job)
+
+    def _cancel(self) -> None:
+        if self._job is not None:
+            self._job.cancel()
+
+    def _follow_export(self) -> None:
+        job = self._job
+        if job is None:
+            return
+        if not job.is_over:
+            self.details.show_export(job)
+            return
+        self._job = None
+        self.details.show_export(None)
+        self._show_details()
+        if job.files:
+            self.context.toast(job.words(), _("Show"), lambda: self._show_file(str(job.files[0].path)))
+        else:
+            self.context.toast(job.words())
+
+    # ---- what every panel has
+
+    def event(self, event: QEvent) -> bool:
+        """Wherever the keyboard is in here, F2 renames the chosen recording, not the behaviour."""
+        if isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_F2 and is_plain(event):
+            if event.type() == QEvent.Type.ShortcutOverride:
+                event.accept()
+                return True
+            if event.type() == QEvent.Type.KeyPress:
+                self._of_chosen(self._rename)
+                return True
+        return super().event(event)
+
+    def row_height(self) -> int:
+        return round(self.theme.scaled(ROW))
+
+    def set_density(self, density: Density) -> None:
+        super().set_density(density)
+        self._fit_head()
+
+    def theme_changed(self) -> None:
+        super().theme_changed()
+        self._fit_head()
+
+    def _fit_head(self) -> None:
+        """The head is no higher than in other tables."""
+        self.table.horizontalHeader().setFixedHeight(super().row_height() + 1)
+
+    def more_actions(self) -> list[QAction]:
+        folder = QAction(self.theme.icon("folder-open"), _("Folder for recordings"), self)
+        folder.triggered.connect(lambda _on=False: self.context.run("recording.folder"))
+        return [*super().more_actions(), folder]
+
+    def shut(self) -> None:
+        self._folder.close()
+        self._artist.close()
+        if self._job is not None:
+            self._job.close()
+
+
+def _drawn(path: Path) -> QImage | None:
+    """The small picture of a recording; asked in another thread."""
+    found = picture_in(path, (2 * PICTURE.width(), 2 * PICTURE.height()))
+    if found is None:
+        return None
+    pixels = found.bgra
+    high, wide = pixels.shape[:2]
+    whole = QImage(pixels.tobytes(), wide, high, wide * 4, QImage.Format.Format_RGB32)
+    return cropped(whole).copy()
+
+
+def _haystack(facts: RecordingFacts) -> str:
+    return " ".join((facts.path.stem, facts.note, *facts.topics)).casefold()
+
+
+PANEL = Panel("recordings", WORDS.title, "film", (), RecordingsPanel)

@@ -1,0 +1,116 @@
+"""The table of recordings: Enter or a double click opens, F2 renames in the row, Delete deletes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QModelIndex, QRect, Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent
+from PySide6.QtWidgets import QLineEdit, QWidget
+
+from app.core.recording.folder import RecordingFacts
+from app.ui.panels.recordings.columns import GAP, PICTURE
+from app.ui.theme.theme import Theme
+from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.table.cells import EDGE
+from app.ui.widgets.table.model import TableModel
+from app.ui.widgets.table.view import TableView
+from nep.i18n import _
+
+
+class RenameField(QLineEdit):
+    """The name of one recording, in its row. ``take`` gets it and says whether it can be."""
+
+    ended = Signal()
+
+    def __init__(
+        self, theme: Theme, place: QWidget, rect: QRect, name: str, take: Callable[[str], bool]
+    ) -> None:
+        super().__init__(name, place)
+        self._take, self._is_over = take, False
+        self.setAccessibleName(_("Name of the recording"))
+        self.setProperty("focusRadius", theme.radius("control"))
+        EditMenu(theme, self)
+        self.setGeometry(rect)
+        self.selectAll()
+        self.show()
+        self.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.leave()
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
+            if self._take(self.text()):
+                self.leave()
+        else:
+            super().keyPressEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_over:
+            self._take(self.text())
+            self.leave()
+
+    def leave(self) -> None:
+        """It goes; the name is as it was taken last."""
+        if not self._is_over:
+            self._is_over = True
+            self.hide()
+            self.ended.emit()
+            self.deleteLater()
+
+
+class RecordingTable(TableView[RecordingFacts]):
+    """A click chooses a row. `chosen` tells its key, also when arrows lead there."""
+
+    chosen = Signal(str)
+    rename_wanted = Signal(str)
+    delete_wanted = Signal(str)
+
+    def __init__(self, theme: Theme, model: TableModel[RecordingFacts]) -> None:
+        super().__init__(theme, model, "when")
+        self.order.falling = True
+        self.field: RenameField | None = None
+        self.doubleClicked.connect(self._open_row)
+        self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._tell_chosen())
+
+    def _open(self, index: QModelIndex) -> None:
+        """A click only chooses: what a recording opens takes the place of what shows."""
+
+    def _open_row(self, index: QModelIndex) -> None:
+        super()._open(index)
+
+    def _tell_chosen(self) -> None:
+        self.chosen.emit(self.chosen_key() or "")
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        key = self.chosen_key()
+        if key is None or not is_plain(event):
+            super().keyPressEvent(event)
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self._open_row(self.currentIndex())
+        elif event.key() == Qt.Key.Key_F2:
+            self.rename_wanted.emit(key)
+        elif event.key() == Qt.Key.Key_Delete:
+            self.delete_wanted.emit(key)
+        else:
+            super().keyPressEvent(event)
+
+    def rename(self, key: str, name: str, take: Callable[[str], bool]) -> None:
+        """Let a person type another name into the row."""
+        self.choose(key)
+        index = self.currentIndex()
+        self.scrollTo(index)
+        row = self.visualRect(self.model().index(index.row(), 0))
+        left = row.left() + EDGE + round(self.theme.scaled(PICTURE.width())) + GAP - 8
+        high = min(row.height() - 8, round(self.theme.scaled(32)))
+        rect = QRect(left, row.center().y() - high // 2, max(80, row.right() - left - 8), high)
+        self.field = RenameField(self.theme, self.viewport(), rect, name, take)
+        self.field.ended.connect(self._renamed)
+
+    def _renamed(self) -> None:
+        had = self.field is not None and self.field.hasFocus()
+        self.field = None
+        if had:
+            self.setFocus(Qt.FocusReason.OtherFocusReason)

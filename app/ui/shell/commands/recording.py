@@ -1,0 +1,161 @@
+"""What the commands about recordings do: begin and end one, keep the last seconds, choose what and where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+from app.core.network.topics import split_key
+from app.core.recording.choice import RecordingChoice
+from app.core.session import Session
+from app.ui.shell.actions.command import UnknownCommandError
+from app.ui.shell.commands.shell import Shell
+from app.ui.text.numbers import length_words, size_words
+from app.ui.widgets.file_dialogs import FileDialogs
+from nep.i18n import _
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.ui.shell.dialogs import record as record_sheet
+else:
+    record_sheet = lazy_module("app.ui.shell.dialogs.record")
+
+OPEN = "recording.open"
+"""The command that shows a recording in the panels, about its path; not every Studio has it."""
+
+
+@runtime_checkable
+class SupportsRecordings(Protocol):
+    """The panel of recordings."""
+
+    def choose_file(self, path: Path) -> None:
+        """Show this one as the chosen one, as soon as it is listed."""
+
+
+class RecordCommands:
+    """Recording as a person does it: by keys, menus, the tool bar and the sheet."""
+
+    def __init__(
+        self, shell: Shell, session: Session, asks: FileDialogs, do_about: Callable[[str, str], object]
+    ) -> None:
+        """``do_about`` does a command of the window about something; UnknownCommandError without it."""
+        self._shell, self._session, self._asks, self._do_about = shell, session, asks, do_about
+        self._recordings = session.recordings
+        self._recordings.on_made = self._made
+        self._sheet: record_sheet.RecordSheet | None = None
+
+    # ---- one recording
+
+    def toggle(self) -> None:
+        """Begin with the last choice, or end what goes on."""
+        if self._recordings.is_recording:
+            self._recordings.stop()
+        else:
+            self._begin()
+
+    def press(self) -> None:
+        """The button in the tool bar: begin with the last choice, and show what is recorded."""
+        if not self._recordings.is_recording:
+            self._begin()
+        self.open_sheet()
+
+    def _begin(self, choice: RecordingChoice | None = None) -> bool:
+        why_not = self._recordings.record(choice=choice)
+        if why_not and choice is None:
+            self._shell.say(why_not, _("Choose what to record"), self.open_sheet)
+        elif why_not:
+            self._shell.say(why_not)
+        elif self._session.master.kind != "connected":
+            self._shell.say(_("Recording begins as soon as a master is there"))
+        return not why_not
+
+    def record_topic(self, key: str) -> bool:
+        """Record this topic alone; what was chosen stays for the next time."""
+        network, topic = split_key(key)
+        if network:
+            self._shell.say(_("Only topics of Studio's own network can be recorded"))
+            return False
+        if not self._begin(RecordingChoice("chosen", (topic,))):
+            return False
+        self._shell.say(
+            _("Recording {topic}").format(topic=topic), _("Stop recording"), self._recordings.stop
+        )
+        return True
+
+    def open_sheet(self) -> None:
+        """Show what is recorded, and how."""
+        if self._sheet is None:
+            shell = self._shell
+            self._sheet = record_sheet.RecordSheet(
+                shell.theme, shell.surface, self._session, self.keep, shell.say
+            )
+        self._sheet.open()
+
+    # ---- the last seconds
+
+    def keep(self) -> None:
+        """Make a recording of the last seconds."""
+        recordings = self._recordings
+        if not recordings.wish.is_on:
+            self._shell.say(
+                _("The flight recorder is off: there are no last seconds to keep"),
+                _("Switch it on"),
+                self._switch_on,
+            )
+            return
+        why_not = recordings.keep()
+        if why_not:
+            self._shell.say(why_not)
+
+    def _switch_on(self) -> None:
+        recordings = self._recordings
+        recordings.set_wish(replace(recordings.wish, is_on=True))
+        words = _("From now on the last {count} s can be kept")
+        self._shell.say(words.format(count=recordings.wish.seconds))
+
+    # ---- the files
+
+    def show(self, path: Path | None = None) -> None:
+        """Show the panel of recordings, with this one chosen."""
+        if self._sheet is not None:
+            self._sheet.shut()  # it may lie over the panel
+        if self._shell.bench is None:
+            self._shell.show_layout("developer")
+        dock = self._shell.open_panel("recordings")
+        if dock is not None and path is not None and isinstance(dock.panel, SupportsRecordings):
+            dock.panel.choose_file(path)
+        self._shell.panel_focus.give(dock)
+
+    def play(self, path: Path) -> None:
+        """Open a recording; where this Studio can't, say what can."""
+        if not path.is_file():
+            self._shell.say(_("{file} is not there any more").format(file=path.name))
+            return
+        try:
+            self._do_about(OPEN, str(path))
+        except UnknownCommandError:
+            words = _("In a terminal this plays it: {line}")
+            self._shell.say(words.format(line=f'nep play "{path}" --all'))
+
+    def choose_folder(self) -> None:
+        """Ask where recordings are to go."""
+        recordings = self._recordings
+
+        def take(folder: Path) -> None:
+            recordings.set_folder(folder)
+            self._shell.say(_("Recordings go to {folder}").format(folder=folder))
+
+        place = recordings.folder
+        self._asks.choose_folder(str(place if place.is_dir() else Path.home()), take)
+
+    def _made(self, path: Path, kind: str) -> None:
+        if kind == "kept":
+            words = _("Kept the last seconds: {file}").format(file=path.stem)
+        else:
+            state = self._recordings.client.state
+            words = _("Recorded {file}: {length}, {size}").format(
+                file=path.stem, length=length_words(state.duration_s), size=size_words(state.size_bytes)
+            )
+        self._shell.say(words, _("Show"), lambda: self.show(path))

@@ -1,0 +1,519 @@
+"""The sheet Record: what is recorded, how it goes, and the flight recorder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPoint, QRect, QSize, Qt, QTimer
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QScrollArea, QVBoxLayout, QWidget
+
+from app.core.network.topics import Topic
+from app.core.recording.choice import (
+    LEAST_GB,
+    LEAST_S,
+    MOST_GB,
+    MOST_S,
+    RecordingChoice,
+    pattern_words,
+    read_patterns,
+)
+from app.core.recording.client import LOW_DISK_BYTES
+from app.ui.shell.dialogs.overlay import EDGE, Overlay
+from app.ui.text.numbers import age_words, bandwidth_words, grouped, length_words, rate_words, size_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import (
+    Button,
+    Card,
+    FixedWidthLabel,
+    NumberEdit,
+    Segments,
+    Separator,
+    Switch,
+    ValueBar,
+    label,
+    name_command,
+    set_role,
+)
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.table.model import Cell, Column, TableModel
+from app.ui.widgets.table.view import TableView
+from nep.errors import BadTopicError
+from nep.i18n import _, lazy, ngettext
+
+if TYPE_CHECKING:
+    from app.core.session import Session
+    from app.ui.panels.base import ShowToast
+    from nep.recordings.recorder import TopicSelection
+
+WIDE, HIGH, SIDE = 640, 760, 20
+BESIDE_FROM = 1280  # px at 100 % text: from there on it lies over one column, without a scrim
+BELOW_BARS = 88
+LOOK_MS = 300
+ROWS_HIGH = 190
+LABEL_WIDE, NUMBER_WIDE, BAR_WIDE = 80, 84, 120
+LONG_S = 2 * 86_400.0
+"""When a disk has room for longer, nobody needs to know for how long."""
+_GB = 1e9
+
+
+class RecordMeter(QWidget):
+    """One figure with its name above and a note below; blank where it is not known."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._name = name
+        self.value, self.note = FixedWidthLabel("title", "text"), FixedWidthLabel("small", "textSecondary")
+        column = QVBoxLayout(self)
+        column.setContentsMargins(12, 8, 8, 8)
+        column.setSpacing(1)
+        column.addWidget(label(name, "small", role="textSecondary"))
+        column.addWidget(self.value)
+        column.addWidget(self.note)
+
+    def say(self, value: str, note: str = "", role: str = "textSecondary") -> None:
+        """Show this figure."""
+        self.value.setText(value)
+        self.note.setText(note)
+        set_role(self.note, role)
+        self.setAccessibleName(f"{self._name}: {value}" if value else self._name)
+
+
+class RecordSheet(Overlay):
+    """What is chosen applies to the next recording, and is kept; the flight recorder follows at once."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        window: QWidget,
+        session: Session,
+        keep: Callable[[], None],
+        say: ShowToast,
+    ) -> None:
+        """``keep`` keeps the last seconds."""
+        super().__init__(theme, window, _("Record"))
+        self._session, self._recordings, self._say = session, session.recordings, say
+        self._seen: object = None
+        self._included: set[str] = set()
+        self._written: tuple[float, int] | None = None
+        self._speed: float | None = None
+        self._make_meters()
+        self._make_form()
+        self._make_ring(keep)
+        self._make_foot()
+        self._arrange()
+        self._timer = QTimer(self)
+        self._timer.setInterval(LOOK_MS)
+        self._timer.timeout.connect(self.show_state)
+        self.closed.connect(self._timer.stop)
+
+    # ---- its parts
+
+    def _make_meters(self) -> None:
+        self.length = RecordMeter(_("Length"))
+        self.size_so_far = RecordMeter(_("Size so far"))
+        self.unkept = RecordMeter(_("Lost in writing"))
+        self.disk = RecordMeter(_("Disk left"))
+        self._meters = Card(self.theme)
+        row = QHBoxLayout(self._meters)
+        row.setContentsMargins(1, 1, 1, 1)
+        row.setSpacing(0)
+        for place, meter in enumerate((self.length, self.size_so_far, self.unkept, self.disk)):
+            if place:
+                row.addWidget(Separator(self.theme, upright=True))
+            row.addWidget(meter, 1)
+
+    def _make_form(self) -> None:
+        theme = self.theme
+        self.name = self._field(_("Name"), _("the time, when it has no name"))
+        self.note = self._field(_("Note"), _("what it is about"))
+        options = [("all", _("All"), None), ("chosen", _("Chosen"), None), ("pattern", _("By pattern"), None)]
+        self.mode = Segments(theme, options, check=True, name=_("Topics"))
+        self.mode.changed.connect(self._choose_mode)
+        self.count = label("", "small", role="textSecondary")
+        self.patterns = self._field(_("Patterns"), _("/arm/* *camera* not /arm/raw"))
+        self.patterns.textEdited.connect(self._take_patterns)
+        self.wrong = label("", "small", role="error", wrap=True)
+        self.model: TableModel[Topic] = TableModel(self._columns(), lambda topic: topic.name)
+        self.table: TableView[Topic] = TableView(theme, self.model, "topic")
+        self.table.setAccessibleName(_("Topics that are recorded"))
+        self.table.opened.connect(self._toggle)
+        self.table.order_changed.connect(self._show_topics)
+        self.table.setMinimumHeight(ROWS_HIGH)
+        self.later = label(
+            _("New topics that fit are recorded from their first message."), "small", role="textTertiary",
+            wrap=True,
+        )  # fmt: skip
+
+    def _field(self, name: str, example: str) -> QLineEdit:
+        made = QLineEdit()
+        made.setAccessibleName(name)
+        made.setPlaceholderText(example)
+        made.setProperty("focusRadius", self.theme.radius("control"))
+        made.setMaxLength(400)
+        EditMenu(self.theme, made)
+        return made
+
+    def _make_ring(self, keep: Callable[[], None]) -> None:
+        theme = self.theme
+        self.ring = Switch(theme, _("Flight recorder"))
+        self.ring.clicked.connect(self._switch_ring)
+        self.seconds = NumberEdit(theme, LEAST_S, MOST_S, _("s"))
+        self.seconds.setAccessibleName(_("Seconds that are kept"))
+        self.seconds.number.connect(lambda value: self._wish(seconds=round(value)))
+        self.size_gb = NumberEdit(theme, LEAST_GB, MOST_GB, "GB", 1)
+        self.size_gb.setAccessibleName(_("GB on the disk at most"))
+        self.size_gb.number.connect(lambda value: self._wish(size_gb=value))
+        for field in (self.seconds, self.size_gb):
+            field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
+            field.problem.connect(self._ring_problem)
+        self.ring_bar = ValueBar(theme)
+        self.ring_words = label("", "small", role="textSecondary", wrap=True)
+        self.keep = Button(theme, "", "history", size="small")
+        name_command(self.keep, "recording.keep")
+        self.keep.clicked.connect(keep)
+
+    def _make_foot(self) -> None:
+        theme = self.theme
+        self.foot = label(_("A power cut costs 1 s at most"), "small", role="textTertiary", wrap=True)
+        self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="form")
+        self.bookmark.clicked.connect(self._bookmark)
+        self.record = Button(theme, _("Record"), "circle-dot", kind="primary", size="form")
+        name_command(self.record, "recording.toggle")
+        self.record.clicked.connect(self._press)
+
+    def _form_rows(self) -> QGridLayout:
+        form = QGridLayout()
+        form.setHorizontalSpacing(8)
+        form.setVerticalSpacing(8)
+        form.setColumnMinimumWidth(0, round(self.theme.scaled(LABEL_WIDE)))
+        form.setColumnStretch(1, 1)
+        modes = _flow(self.mode, self.count)
+        for place, (words, field) in enumerate(((_("Name"), self.name), (_("Note"), self.note))):
+            form.addWidget(label(words, "body", role="textSecondary"), place, 0)
+            form.addWidget(field, place, 1)
+        form.addWidget(label(_("Topics"), "body", role="textSecondary"), 2, 0)
+        form.addLayout(modes, 2, 1)
+        form.addWidget(self.patterns, 3, 1)
+        form.addWidget(self.wrong, 4, 1)
+        return form
+
+    def _ring_box(self) -> Card:
+        box = Card(self.theme, fill="sunken")
+        rows = QVBoxLayout(box)
+        rows.setContentsMargins(12, 10, 12, 10)
+        rows.setSpacing(8)
+        words = [label(each) for each in (_("keeps the last"), _("in at most"), _("on disk"))]
+        self.ring_bar.setFixedWidth(round(self.theme.scaled(BAR_WIDE)))
+        wish = _flow(self.ring, words[0], self.seconds, words[1], self.size_gb, words[2])
+        there = _flow(self.ring_bar, self.ring_words, self.keep)
+        rows.addLayout(wish)
+        rows.addLayout(there)
+        return box
+
+    def _middle(self) -> QScrollArea:
+        self._inside = QWidget()
+        self._inside.setProperty("bare", "true")
+        column = QVBoxLayout(self._inside)
+        column.setContentsMargins(SIDE, 0, SIDE, 4)
+        column.setSpacing(12)
+        column.addWidget(self._meters)
+        column.addLayout(self._form_rows())
+        column.addWidget(self.table, 1)
+        column.addWidget(self.later)
+        column.addWidget(self._ring_box())
+        area = QScrollArea()
+        area.setWidgetResizable(True)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        area.viewport().setAutoFillBackground(False)
+        area.setWidget(self._inside)
+        return area
+
+    def _arrange(self) -> None:
+        self._area = self._middle()
+        head = self.head(label(_("Record"), "heading"))
+        head.setContentsMargins(SIDE, 0, 12, 0)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(SIDE, 0, SIDE, 0)
+        foot.setSpacing(8)
+        foot.addWidget(self.foot, 1)
+        foot.addWidget(self.bookmark)
+        foot.addWidget(self.record)
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(1, 12, 1, 12)
+        whole.setSpacing(10)
+        whole.addLayout(head)
+        whole.addWidget(self._area, 1)
+        whole.addWidget(Separator(self.theme))
+        whole.addLayout(foot)
+
+    # ---- where it lies
+
+    def first(self) -> QWidget:
+        return self.record
+
+    def wanted_size(self, room: QSize) -> QSize:
+        scaled = self.theme.scaled
+        least = self._inside.minimumSizeHint().width() + 2
+        return QSize(max(round(scaled(WIDE)), least), round(scaled(HIGH))).boundedTo(room)
+
+    def _is_beside(self) -> bool:
+        return self.window_below().width() >= self.theme.scaled(BESIDE_FROM)
+
+    def _placed(self, top: int) -> QRect:
+        if not self._is_beside():
+            return super()._placed(top)
+        window = self.window_below()
+        top = max(top, round(self.theme.scaled(BELOW_BARS)))
+        room = QSize(window.width() - 2 * EDGE, window.height() - top - 2 * EDGE)
+        return QRect(QPoint(EDGE // 2, top), self.wanted_size(room))
+
+    def place(self) -> None:
+        super().place()
+        if self.isVisible():
+            self._scrim.setVisible(not self._is_beside())
+
+    def _focus_changed(self, old: QWidget | None, new: QWidget | None) -> None:
+        if not self._is_beside():  # else a person works on in the window, and it tells how it goes
+            super()._focus_changed(old, new)
+
+    def open(self) -> None:
+        """Show what is chosen and how it goes, as long as it is open."""
+        self._show_choice()
+        self.show_state()
+        self._timer.start()
+        super().open()
+        self.place()
+
+    # ---- what it shows
+
+    def _columns(self) -> tuple[Column[Topic], ...]:
+        def figures(topic: Topic) -> Cell:
+            known = self._recordings.client.state.topics.get(topic.name)
+            if not self._has(topic.name):
+                return Cell(_("left out"), role="textTertiary")
+            return Cell(size_words(known.size_bytes) if known is not None else "")
+
+        def lost(topic: Topic) -> Cell:
+            known = self._recordings.client.state.topics.get(topic.name)
+            if known is None or known.lost is None:
+                return Cell()
+            bad = known.lost > 0
+            return Cell(grouped(known.lost), "triangle-alert" if bad else None, "warn" if bad else "text")
+
+        def is_there(topic: Topic) -> Cell:
+            if self._has(topic.name):
+                return Cell(icon="check", role="accentText", said=_("is recorded"))
+            return Cell(icon="minus", role="textTertiary", said=_("left out"))
+
+        def ink(topic: Topic) -> str:
+            return "text" if self._has(topic.name) else "textTertiary"
+
+        return (
+            Column("has", "", 40, is_there, words=lazy("Is recorded")),
+            Column("topic", lazy("Topic"), 170, lambda topic: Cell(topic.name, role=ink(topic), mono=True),
+                   key=lambda topic: topic.name, stretch=True, tip=lambda topic: topic.name),
+            Column("rate", lazy("Rate /s"), 72,
+                   lambda topic: Cell(rate_words(topic.rate_hz), role=ink(topic)),
+                   key=lambda topic: topic.rate_hz, figures=True, yields=3),
+            Column("bandwidth", lazy("Bandwidth"), 88,
+                   lambda topic: Cell(bandwidth_words(topic.bandwidth_Bps), role=ink(topic)),
+                   key=lambda topic: topic.bandwidth_Bps, figures=True, yields=2),
+            Column("size", lazy("So far"), 84, figures, figures=True, yields=1),
+            Column("lost", lazy("Lost on the way"), 112, lost, figures=True),
+        )  # fmt: skip
+
+    @property
+    def choice(self) -> RecordingChoice:
+        """What is recorded now, else what would be."""
+        recordings = self._recordings
+        return recordings.recorded if recordings.is_recording else recordings.choice
+
+    def _selection(self) -> TopicSelection | None:
+        choice = self.choice
+        if choice.mode == "chosen" and not choice.topics:
+            return None
+        try:
+            return choice.selection
+        except BadTopicError:
+            return None
+
+    def _has(self, topic: str) -> bool:
+        return topic in self._included
+
+    def _show_choice(self) -> None:
+        choice, wish = self.choice, self._recordings.wish
+        self.mode.set_value(choice.mode)
+        self.patterns.setText(pattern_words(choice))
+        self.patterns.setVisible(choice.mode == "pattern")
+        problem = choice.problem if choice.mode == "pattern" else ""
+        self._mark_patterns(problem)
+        self.ring.setChecked(wish.is_on)
+        self.seconds.show_number(wish.seconds)
+        self.size_gb.show_number(wish.size_gb)
+        self._seen = None
+
+    def _mark_patterns(self, problem: str) -> None:
+        self.wrong.setText(problem)
+        self.wrong.setVisible(bool(problem))
+        wanted = "true" if problem else "false"
+        if self.patterns.property("wrong") != wanted:
+            self.patterns.setProperty("wrong", wanted)
+            self.patterns.style().unpolish(self.patterns)
+            self.patterns.style().polish(self.patterns)
+
+    def show_state(self) -> None:
+        """Say how it goes now."""
+        recordings = self._recordings
+        going = recordings.is_recording
+        self.record.set_word(_("Stop recording") if going else _("Record"))
+        self.record.setEnabled(recordings.client.state.phase != "ending")
+        self.bookmark.setEnabled(recordings.client.state.phase == "recording")
+        for field in (self.name, self.note, self.mode, self.patterns):
+            field.setEnabled(not going)
+        self._show_meters()
+        self._show_topics()
+        self._show_ring()
+        no_master = self._session.master.kind != "connected"
+        self.foot.setText(
+            _("No master is there: it records as soon as one is")
+            if no_master
+            else _("A power cut costs 1 s at most")
+        )
+
+    def _show_meters(self) -> None:
+        recordings, state = self._recordings, self._recordings.client.state
+        if not recordings.is_recording:
+            self._written = self._speed = None
+            for meter in (self.length, self.size_so_far, self.unkept, self.disk):
+                meter.say("")
+            return
+        elapsed = recordings.elapsed_s
+        if self._written is None or state.size_bytes < self._written[1]:
+            self._written = (elapsed, state.size_bytes)
+        elif elapsed - self._written[0] >= 1.0 and state.size_bytes != self._written[1]:
+            self._speed = (state.size_bytes - self._written[1]) / (elapsed - self._written[0])
+            self._written = (elapsed, state.size_bytes)
+        speed = self._speed
+        begins = state.phase == "starting"
+        self.length.say(length_words(elapsed), _("begins") if begins else _("recording"), "error")
+        written = _("{speed} written").format(speed=bandwidth_words(speed)) if speed is not None else ""
+        self.size_so_far.say(size_words(state.size_bytes), written)
+        count = ngettext("{count} message", "{count} messages", state.unkept)
+        self.unkept.say(
+            count.format(count=grouped(state.unkept)) if state.unkept else _("none"),
+            _("the disk is too slow") if state.unkept else _("all is written"),
+            "warn" if state.unkept else "ok",
+        )
+        free = state.free_bytes
+        if free is None:
+            self.disk.say("")
+            return
+        left_s = free / speed if speed else LONG_S
+        full = _("full in {time}").format(time=age_words(left_s)) if left_s < LONG_S else ""
+        self.disk.say(size_words(free), full, "warn" if free < LOW_DISK_BYTES else "textSecondary")
+
+    def _show_topics(self) -> None:
+        topics = sorted(self._session.topics.live(), key=lambda topic: topic.name)
+        facts = (self._session.topics.revision, self.choice)
+        if facts != self._seen:
+            self._seen = facts
+            selection = self._selection()
+            self._included = {
+                each.name for each in topics if selection is not None and selection.has(each.name)
+            }
+            self.model.set_rows(self.table.order.sort(topics))
+            self.table.viewport().update()
+        else:
+            self.table.tell_visible_changed()
+        included = [each for each in topics if each.name in self._included]
+        bandwidth = sum(each.bandwidth_Bps or 0.0 for each in included)
+        count = ngettext("{count} of {all}", "{count} of {all}", len(topics))
+        words = count.format(count=grouped(len(included)), all=grouped(len(topics)))
+        if bandwidth:
+            words = _("{topics}, {bandwidth}").format(topics=words, bandwidth=bandwidth_words(bandwidth))
+        self.count.setText(words)
+        self.later.setVisible(self.choice.mode != "chosen")
+
+    def _show_ring(self) -> None:
+        recordings, state = self._recordings, self._recordings.client.state
+        wish = recordings.wish
+        self.keep.set_word(_("Keep the last {count} s").format(count=wish.seconds))
+        self.keep.setEnabled(state.ring_s is not None)
+        if state.ring_s is None:
+            self.ring_bar.set_fraction(None)
+            self.ring_words.setText(_("It begins.") if wish.is_on else _("It is off: nothing is kept."))
+            return
+        self.ring_bar.set_fraction(state.ring_s / wish.seconds)
+        words = _("{count} s there, {size} of {most}").format(
+            count=round(min(state.ring_s, wish.seconds)),
+            size=size_words(state.ring_bytes),
+            most=size_words(wish.size_gb * _GB),
+        )
+        self.ring_words.setText(words)
+
+    # ---- what a person does
+
+    def _choose_mode(self, mode: str) -> None:
+        recordings = self._recordings
+        choice = replace(recordings.choice, mode=mode)
+        if mode == "chosen" and not choice.topics:
+            choice = replace(choice, topics=tuple(sorted(self._included)))
+        recordings.choose(choice)
+        self._show_choice()
+        self.show_state()
+
+    def _toggle(self, topic: str) -> None:
+        """A row was pressed: it is chosen, or not any more."""
+        recordings = self._recordings
+        if recordings.is_recording or recordings.choice.mode != "chosen":
+            return
+        topics = recordings.choice.topics
+        rest = tuple(each for each in topics if each != topic)
+        recordings.choose(replace(recordings.choice, topics=rest if topic in topics else (*topics, topic)))
+        self.show_state()
+
+    def _take_patterns(self, text: str) -> None:
+        wanted, unwanted = read_patterns(text)
+        choice = replace(self._recordings.choice, patterns=wanted, left_out=unwanted)
+        self._mark_patterns(choice.problem)
+        self._recordings.choose(choice)
+        self.show_state()
+
+    def _switch_ring(self) -> None:
+        self._wish(is_on=self.ring.isChecked())
+
+    def _wish(self, **changes: object) -> None:
+        recordings = self._recordings
+        wish = replace(recordings.wish, **changes)  # type: ignore[arg-type]
+        if wish != recordings.wish:
+            recordings.set_wish(wish)
+        self._show_ring()
+
+    def _ring_problem(self, sentence: str) -> None:
+        self.ring_words.setText(sentence or self.ring_words.text())
+
+    def _bookmark(self) -> None:
+        self._recordings.client.note("")
+        self._say(_("Bookmark at {time}").format(time=length_words(self._recordings.elapsed_s)))
+
+    def _press(self) -> None:
+        recordings = self._recordings
+        if recordings.is_recording:
+            recordings.stop()
+        else:
+            why_not = recordings.record(self.name.text(), self.note.text())
+            if why_not:
+                self._say(why_not)
+        self.show_state()
+
+
+def _flow(*widgets: QWidget) -> Flow:
+    """These in a row, or in more where there is too little room."""
+    made = Flow(gap=8, row_gap=6)
+    for each in widgets:
+        made.addWidget(each)
+    return made

@@ -1,0 +1,105 @@
+"""What a person chose to record: kept in words that settings can hold, and read back whatever they hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.core.recording.choice import (
+    RecordingChoice,
+    RingWish,
+    file_stem,
+    free_path,
+    pattern_words,
+    plain_choice,
+    plain_wish,
+    read_choice,
+    read_patterns,
+    read_wish,
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted", "unwanted"),
+    [
+        ("", (), ()),
+        ("/arm/* *action*", ("/arm/*", "*action*"), ()),
+        ("/a not /b, NOT /c /d", ("/a", "/d"), ("/b", "/c")),
+        ("/a /a not /b not /b", ("/a",), ("/b",)),
+        ("/a not", ("/a",), ()),
+        ("not not /a", (), ("/a",)),
+    ],
+)
+def test_patterns_are_words_and_not_leaves_out(text, wanted, unwanted):
+    assert read_patterns(text) == (wanted, unwanted)
+    choice = RecordingChoice("pattern", patterns=wanted, left_out=unwanted)
+    assert read_patterns(pattern_words(choice)) == (wanted, unwanted)
+
+
+def test_what_is_left_out_wins_and_none_wanted_is_all():
+    choice = RecordingChoice("pattern", patterns=("/arm/*",), left_out=("/arm/raw",))
+    assert [choice.selection.has(topic) for topic in ("/arm/x", "/arm/raw", "/odom")] == [True, False, False]
+    assert RecordingChoice("pattern", left_out=("/raw",)).selection.has("/odom")
+    assert RecordingChoice("all", topics=("/a",), left_out=("/b",)).selection.has("/b")
+
+
+def test_what_can_not_be_recorded_says_why():
+    assert RecordingChoice("chosen").problem == "No topic is chosen."
+    assert RecordingChoice("chosen", topics=("/a",)).problem == ""
+    assert RecordingChoice("pattern").problem == ""
+    assert RecordingChoice("pattern", patterns=("/a\x00b",)).problem.endswith(".")
+
+
+@pytest.mark.parametrize(
+    "told", [None, 3, "x", [], {}, {"mode": 7, "topics": "abc"}, {"mode": "some", "patterns": [1, None]}]
+)
+def test_whatever_settings_hold_is_read(told):
+    assert read_choice(told) == RecordingChoice()
+
+
+def test_choice_and_wish_come_back_as_they_were():
+    choice = RecordingChoice("pattern", ("/a",), ("/b/*",), ("/c",))
+    assert read_choice(plain_choice(choice)) == choice
+    wish = RingWish(is_on=True, seconds=90, size_gb=0.5)
+    assert read_wish(plain_wish(wish)) == wish
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        None,
+        {"is_on": "yes", "seconds": 0, "size_gb": -1},
+        {"is_on": 1, "seconds": 2**64 - 1, "size_gb": float("nan")},
+        {"seconds": True, "size_gb": "2"},
+    ],
+)
+def test_a_wish_that_can_not_be_is_as_at_first(told):
+    assert read_wish(told) == RingWish()
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"),
+    [
+        ("Friday, greeting with Aiko", "Friday, greeting with Aiko"),
+        ("../../etc/passwd", "etc passwd"),
+        ("a/b\\c:d*e?", "a b c d e"),
+        (" . ", ""),
+        ("", ""),
+        ("CON", "_CON"),
+        ("nul.mcap", "_nul.mcap"),
+        ("x" * 300, "x" * 80),
+        ("half \ud800 sign\x07", "half sign"),
+        ("perro café 犬", "perro café 犬"),
+    ],
+)
+def test_a_name_becomes_one_that_every_system_takes(name, stem):
+    assert file_stem(name) == stem
+
+
+def test_a_path_that_is_taken_gets_a_number(tmp_path: Path):
+    first = tmp_path / "a.mcap"
+    assert free_path(first) == first
+    first.touch()
+    (tmp_path / "a 2.mcap").touch()
+    assert free_path(first).name == "a 3.mcap"

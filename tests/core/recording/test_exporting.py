@@ -1,0 +1,61 @@
+"""An export beside the window: its files, its progress, and giving it up."""
+
+from __future__ import annotations
+
+import threading
+
+from app.core.recording import exporting as exporting_module
+from app.core.recording.exporting import RecordingExport
+from app.core.recording.folder import picture_in
+from nep.recordings.export import export
+from tests.nep.programs import eventually
+from tests.nep.recordings.messages import json_message, record
+
+
+def test_an_export_tells_what_it_made(tmp_path):
+    record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(250)]])
+    job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
+    eventually(lambda: job.is_over)
+    assert (job.words(), job.share) == ("Exported 1 file", 1.0)
+    (made,) = job.files
+    assert made.count == 250
+    assert len(made.path.read_text("utf-8").splitlines()) == 251
+
+
+def test_what_fails_is_a_sentence(tmp_path):
+    (tmp_path / "a.mcap").write_bytes(b"nothing of the kind")
+    job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
+    eventually(lambda: job.is_over)
+    assert job.words().startswith("It was not exported: ")
+    assert not job.files
+
+
+def test_who_gives_it_up_finds_no_half_file(tmp_path, monkeypatch):
+    record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(500)]])
+    has_begun, go_on = threading.Event(), threading.Event()
+
+    def slow(recording, kind, folder, *, progress):
+        def tell(done: int, total: int) -> None:
+            has_begun.set()
+            go_on.wait()
+            progress(done, total)
+
+        return export(recording, kind, folder, progress=tell)
+
+    monkeypatch.setattr(exporting_module, "export", slow)
+    job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
+    has_begun.wait()
+    assert job.words() == ""
+    job.cancel()
+    go_on.set()
+    eventually(lambda: job.is_over)
+    assert job.words() == "The export was cancelled"
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_without_pictures_there_is_none(tmp_path):
+    record(tmp_path / "a.mcap", [[json_message(1, topic="/odom")]])
+    assert picture_in(tmp_path / "a.mcap", (128, 96)) is None
+    assert picture_in(tmp_path / "gone.mcap", (128, 96)) is None
+    (tmp_path / "none.mcap").write_bytes(b"nothing of the kind")
+    assert picture_in(tmp_path / "none.mcap", (128, 96)) is None

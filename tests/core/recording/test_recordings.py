@@ -1,0 +1,175 @@
+"""A session's recordings: begun, ended, kept; by a person, an alarm, and again after the next start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime, timezone
+from pathlib import Path
+
+import pytest
+
+from app.core.alerts import Alerts
+from app.core.recording.choice import RecordingChoice, RingWish
+from app.core.recording.client import RecorderGone, RecorderSaid
+from app.core.recording.recordings import CHOOSE_FOLDER, NO_FOLDER, SessionRecordings, kept_file
+from app.core.storage.settings import Settings
+from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmEvent, AlarmRule
+from tests.core.recording.test_client import OrdersOnly, status
+
+NOW = datetime(2026, 11, 26, 22, 1, 5, tzinfo=timezone.utc)
+
+
+class Recorded:
+    """Recordings whose process does nothing but what a test says."""
+
+    def __init__(self, home: Path) -> None:
+        self.home, self.alerts, self.lines, self.now = home, Alerts(), list[OrdersOnly](), 100.0
+        self.made: list[tuple[str, str]] = []
+        self.recordings = self.again()
+
+    def again(self) -> SessionRecordings:
+        made = SessionRecordings(
+            Settings(self.home), self.alerts, "here:1", print,
+            start=self._start, clock=lambda: self.now, now=lambda: NOW,
+        )  # fmt: skip
+        made.on_made = lambda path, kind: self.made.append((path.name, kind))
+        return made
+
+    def _start(self, _number: int, _address: str, _post: Callable[[object], object]) -> OrdersOnly:
+        self.lines.append(OrdersOnly())
+        return self.lines[-1]
+
+    def say(self, event: str, **content: object) -> None:
+        self.recordings.on_event(RecorderSaid(len(self.lines), {"event": event, **content}))
+
+    def orders(self) -> list[object]:
+        return [order["op"] for line in self.lines for order in line.orders]
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch) -> Recorded:
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    return Recorded(tmp_path)
+
+
+def test_a_recording_begins_with_the_last_choice_and_ends(made):
+    recordings = made.recordings
+    recordings.choose(RecordingChoice("pattern", patterns=("/arm/*",), left_out=("/arm/raw",)))
+    assert recordings.record("../Aiko: greets", "second try") == ""
+    (order,) = made.lines[0].orders
+    assert order["path"] == str(made.home / "Recordings" / "Aiko greets.mcap")
+    assert (order["topics"], order["left_out"], order["note"]) == (["/arm/*"], ["/arm/raw"], "second try")
+    assert recordings.record() == "A recording goes on already."
+    made.say("recording")
+    made.now += 42.5
+    assert (recordings.is_recording, recordings.elapsed_s) == (True, 42.5)
+    recordings.stop()
+    assert made.made == []
+    made.say("ended", status=status())
+    assert made.made == [("Aiko greets.mcap", "recorded")]
+    assert (recordings.is_recording, recordings.elapsed_s) == (False, 0.0)
+
+
+def test_a_choice_for_one_time_is_not_kept(made):
+    only = RecordingChoice("chosen", ("/odom",))
+    assert made.recordings.record(choice=only) == ""
+    assert made.recordings.recorded == only
+    assert made.recordings.choice == RecordingChoice()
+    assert made.again().choice == RecordingChoice()
+
+
+def test_what_can_not_be_is_a_sentence_and_starts_nothing(made):
+    made.recordings.choose(RecordingChoice("chosen"))
+    assert made.recordings.record() == "No topic is chosen."
+    assert made.recordings.keep() == "The flight recorder is off."
+    assert made.lines == []
+
+
+def test_a_name_that_is_taken_gets_a_number_and_nothing_is_written_over(made):
+    folder = made.home / "Recordings"
+    folder.mkdir()
+    (folder / "a.mcap").write_bytes(b"precious")
+    made.recordings.record("a")
+    assert made.lines[0].orders[0]["path"] == str(folder / "a 2.mcap")
+
+
+def test_a_chosen_folder_that_is_away_is_not_made_anew_but_said(made):
+    away = made.home / "stick" / "films"
+    made.recordings.set_folder(away)
+    assert made.again().folder == away
+    assert made.recordings.record() == "The folder for recordings is not there."
+    (alert,) = made.alerts.active
+    assert (alert.id, alert.action) == (NO_FOLDER, CHOOSE_FOLDER)
+    assert not away.exists()
+    assert made.lines == []
+    away.mkdir(parents=True)
+    assert made.recordings.record() == ""
+    assert not made.alerts.active
+
+
+def test_a_folder_that_can_not_be_made_is_said(made):
+    (made.home / "Recordings").write_bytes(b"a file in its place")
+    assert made.recordings.record() == "The folder for recordings is not there."
+    assert made.alerts.has(NO_FOLDER)
+
+
+def test_the_flight_recorder_is_off_until_somebody_wants_it_and_comes_back_with_the_next_start(made):
+    made.recordings.start()
+    assert made.lines == []
+    made.recordings.set_wish(RingWish(is_on=True, seconds=30, size_gb=0.5))
+    assert made.lines[0].orders[0]["seconds"] == 30.0
+    assert made.lines[0].orders[0]["size_bytes"] == 500_000_000
+    made.recordings.close()
+    later = made.again()
+    later.start()
+    assert made.lines[1].orders[0]["op"] == "ring"
+    later.set_wish(replace(later.wish, is_on=False))
+    assert made.orders() == ["ring", "ring", "end_ring"]
+
+
+def alarm() -> tuple[AlarmEvent, AlarmAction]:
+    action = AlarmAction("keep", seconds=20.0)
+    rule = AlarmRule("r", AlarmCondition("silent", "/camera", for_s=2.0), (action,))
+    return AlarmEvent("on", rule, 1000.0), action
+
+
+def test_an_alarm_keeps_the_last_seconds_and_is_told_when_they_are_there(made):
+    told: list[tuple[bool, str]] = []
+    made.recordings.set_wish(RingWish(is_on=True))
+    made.say("ring")
+    made.recordings.carry(*alarm(), lambda well, words: told.append((well, words)))
+    order = made.lines[0].orders[-1]
+    assert (order["op"], order["seconds"]) == ("keep", 20.0)
+    assert "/camera" in order["note"]
+    assert told == []
+    made.say("kept", path=order["path"])
+    assert told == [(True, "kept alarm-2026-11-26-22-01-05.mcap")]
+    assert kept_file(told[0][1]) == "alarm-2026-11-26-22-01-05.mcap"
+    assert made.made == [("alarm-2026-11-26-22-01-05.mcap", "kept")]
+
+
+def test_an_alarm_is_told_why_nothing_was_kept(made):
+    told: list[tuple[bool, str]] = []
+
+    def done(well: bool, words: str) -> None:
+        told.append((well, words))
+
+    made.recordings.carry(*alarm(), done)
+    assert told == [(False, "nothing was kept: the flight recorder is off")]
+    made.recordings.set_wish(RingWish(is_on=True))
+    made.say("ring")
+    for _each in range(3):  # within one second: three names
+        made.recordings.carry(*alarm(), done)
+    paths = [order["path"] for order in made.lines[0].orders if order["op"] == "keep"]
+    assert len(set(paths)) == 3
+    made.say("problem", op="keep", path=paths[0], sentence="the disk is full")
+    made.recordings.on_event(RecorderGone(len(made.lines), "killed"))
+    assert told[1:] == [(False, "nothing was kept: see the alerts")] * 3
+    assert made.made == []
+    assert made.alerts.has("recorder:keep")
+
+
+@pytest.mark.parametrize("words", ["", "sound", "kept nothing", "mcap", ".mcapx"])
+def test_words_without_a_file_name_none(words):
+    assert kept_file(words) == ""

@@ -1,0 +1,260 @@
+"""The panel Recordings: what is in the folder, and what a person does with one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QFile, QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLabel, QMenu
+
+from app.core.recording.client import RecorderState
+from app.ui.panels.alarms import panel as alarms
+from app.ui.panels.recordings import PANEL
+from app.ui.panels.recordings import panel as panel_module
+from app.ui.panels.recordings.columns import badge_of
+from app.ui.panels.recordings.panel import RecordingsPanel
+from app.ui.panels.recordings.table import RecordingTable
+from app.ui.panels.topics import panel as topics
+from nep.programs.alarms.history import AlarmDeed, AlarmRecord
+from nep.recordings.writer import RecordingWriter
+from tests.nep.recordings.messages import TestClock, json_message, limits, picture, record
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window
+from tests.ui.test_accessible import unsaid
+
+pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Three recordings: numbers, pictures, and one that was cut off."""
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    made = tmp_path / "Recordings"
+    made.mkdir()
+    with RecordingWriter(made / "arm.mcap", note="first try", clock=TestClock(), limits=limits()) as writer:
+        writer.post([json_message(seq, topic="/odom") for seq in range(5)])
+    record(made / "camera.mcap", [[picture(1)]])
+    (made / "cut.mcap").write_bytes((made / "arm.mcap").read_bytes()[:-100])
+    return made
+
+
+@pytest.fixture
+def window(qapp, folder) -> Window:
+    return Window(Session())
+
+
+@pytest.fixture
+def panel(qtbot, window, folder) -> RecordingsPanel:
+    made = window.make(PANEL, (760, 560))
+    qtbot.addWidget(made)
+    for widget in made.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(made, RecordingsPanel)
+    yield made
+    made.shut()
+
+
+def names(panel: RecordingsPanel) -> list[str]:
+    rows = [panel.model.row_at(panel.model.index(row, 0)) for row in range(panel.model.rowCount())]
+    return sorted(each.path.stem for each in rows if each is not None and each.is_read)
+
+
+def seen(qtbot, panel: RecordingsPanel, *wanted: str) -> None:
+    def there() -> bool:
+        panel.refresh()
+        return names(panel) == sorted(wanted)
+
+    qtbot.waitUntil(there)
+
+
+def choose(panel: RecordingsPanel, folder: Path, name: str) -> RecordingTable:
+    table = panel.table
+    assert isinstance(table, RecordingTable)
+    table.choose(str(folder / f"{name}.mcap"))
+    table.setFocus()
+    return table
+
+
+def test_each_recording_with_its_words_and_badges(qtbot, panel, window, folder):
+    assert panel.empty.isVisible()
+    seen(qtbot, panel, "arm", "camera", "cut")
+    facts = {each.path.stem: each for each in panel._look.files}
+    assert [badge_of(facts[name], False) for name in ("arm", "cut")] == ["", "cut"]
+    assert badge_of(facts["arm"], True) == "recording"
+    assert panel.count.text().startswith("3 recordings, ")
+    row = panel.model.index_of(str(folder / "arm.mcap"))
+    cells = [panel.model.cell_at(row.row(), place) for place in range(panel.model.columnCount())]
+    assert cells[0].said == "arm, first try"
+    assert [cell.text for cell in cells[4:]] == ["5", "0"]
+    qtbot.waitUntil(lambda: panel._take_pictures() or bool(panel._pictures))
+    choose(panel, folder, "arm")
+    assert panel.details.counts.text() == "1 topic, 5 messages"
+    assert not list(unsaid(panel))
+
+
+def test_pictures_come_from_another_thread(qtbot, panel, folder):
+    seen(qtbot, panel, "arm", "camera", "cut")
+    (facts,) = (each for each in panel._look.files if each.path.stem == "camera")
+
+    def is_drawn() -> bool:
+        panel._take_pictures()
+        return panel._picture(facts) is not None
+
+    qtbot.waitUntil(is_drawn)
+    image = panel._picture(facts)
+    assert image is not None
+    assert (image.width(), image.height()) == (128, 96)
+
+
+def test_a_click_chooses_and_enter_opens(qtbot, panel, window, folder):
+    seen(qtbot, panel, "arm", "camera", "cut")
+    table = choose(panel, folder, "arm")
+    rect = table.visualRect(table.currentIndex())
+    QTest.mouseClick(table.viewport(), Qt.MouseButton.LeftButton, pos=rect.center())
+    assert window.commands == []
+    QTest.keyClick(table, Qt.Key.Key_Return)
+    assert window.commands == [f"recording.play:{folder / 'arm.mcap'}"]
+
+
+def test_f2_renames_in_the_row_and_nothing_is_written_over(qtbot, panel, window, folder):
+    (folder / "arm.mcap.bookmarks.json").write_text("[]")
+    seen(qtbot, panel, "arm", "camera", "cut")
+    table = choose(panel, folder, "arm")
+    QTest.keyClick(table, Qt.Key.Key_F2)
+    field = table.field
+    assert field is not None
+    field.setText("camera")
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert window.toasts == ["There is a recording “camera” already"]
+    field.setText("Arm: second/try")
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert table.field is None
+    assert sorted(each.name for each in folder.iterdir()) == [
+        "Arm second try.mcap", "Arm second try.mcap.bookmarks.json", "camera.mcap", "cut.mcap",
+    ]  # fmt: skip
+    seen(qtbot, panel, "Arm second try", "camera", "cut")
+    assert table.chosen_key() == str(folder / "Arm second try.mcap")
+    QTest.keyClick(table, Qt.Key.Key_F2)
+    QTest.keyClick(table.field, Qt.Key.Key_Escape)
+    assert table.field is None
+
+
+def test_delete_moves_to_the_bin_and_undo_brings_it_back(qtbot, panel, window, folder, tmp_path, monkeypatch):
+    place = tmp_path / "bin"
+    place.mkdir()
+
+    class Bin(QFile):
+        def moveToTrash(self) -> bool:
+            there = place / Path(self.fileName()).name
+            Path(self.fileName()).rename(there)
+            self.setFileName(str(there))
+            return True
+
+    monkeypatch.setattr(panel_module, "QFile", Bin)
+    seen(qtbot, panel, "arm", "camera", "cut")
+    before = (folder / "arm.mcap").read_bytes()
+    QTest.keyClick(choose(panel, folder, "arm"), Qt.Key.Key_Delete)
+    assert (names(panel), window.toasts) == (["camera", "cut"], ["Moved “arm” to the bin"])
+    (undo,) = (run for words, run in window.toast_buttons if words == "Undo")
+    assert undo is not None
+    undo()
+    assert (folder / "arm.mcap").read_bytes() == before
+    seen(qtbot, panel, "arm", "camera", "cut")
+
+
+def test_what_is_being_recorded_tells_its_figures_and_can_not_be_renamed(qtbot, panel, window, folder):
+    client = window.session.recordings.client
+    client.state = RecorderState(
+        "recording", folder / "arm.mcap", message_count=77, size_bytes=10**9, duration_s=61.0, lost=3
+    )
+    client.revision += 1
+
+    def is_shown() -> bool:
+        panel.refresh()
+        row = panel.model.index_of(str(folder / "arm.mcap"))
+        return row.isValid() and panel.model.cell_at(row.row(), 4).text == "77"
+
+    qtbot.waitUntil(is_shown)
+    row = panel.model.index_of(str(folder / "arm.mcap")).row()
+    assert [panel.model.cell_at(row, place).text for place in (2, 3, 5)] == ["1:01", "1.0 GB", "3"]
+    table = choose(panel, folder, "arm")
+    for key in (Qt.Key.Key_F2, Qt.Key.Key_Delete):
+        QTest.keyClick(table, key)
+    assert len(window.toasts) == 2
+    assert (folder / "arm.mcap").exists()
+    client.state = RecorderState()
+
+
+def test_an_export_goes_on_beside_and_says_what_it_made(qtbot, panel, window, folder):
+    seen(qtbot, panel, "arm", "camera", "cut")
+    choose(panel, folder, "arm")
+    panel.details.export.click()
+    assert panel.details.export.text() == "Cancel"
+
+    def is_over() -> bool:
+        panel.refresh()
+        return bool(window.toasts)
+
+    qtbot.waitUntil(is_over)
+    assert window.toasts == ["Exported 1 file"]
+    assert [each.name for each in (folder / "arm, CSV").iterdir()] == ["odom.csv"]
+    assert panel.details.export.text() == "Export"
+
+
+def test_the_filter_finds_names_notes_and_topics(qtbot, panel):
+    seen(qtbot, panel, "arm", "camera", "cut")
+    panel.filter.setText("FIRST")
+    assert "camera" not in names(panel)
+    panel.filter.setText("/camera")
+    assert names(panel) == ["camera"]
+    panel.filter.setText("nowhere")
+    assert panel.empty.isVisible()
+
+
+def test_an_empty_folder_and_one_that_is_away_say_what_to_do(qtbot, panel, window, folder, tmp_path):
+    seen(qtbot, panel, "arm", "camera", "cut")
+    window.session.recordings.set_folder(tmp_path / "stick")
+
+    def says(words: str) -> bool:
+        panel.refresh()
+        return any(words in each.text() for each in panel.empty.findChildren(QLabel))
+
+    qtbot.waitUntil(lambda: says("is not there"))
+    (tmp_path / "stick").mkdir()
+    qtbot.waitUntil(lambda: says("No recordings yet"))
+
+
+def test_what_an_alarm_kept_is_opened_from_its_history(qtbot, window, folder):
+    panel = window.make(alarms.PANEL, (752, 600))
+    qtbot.addWidget(panel)
+    for widget in panel.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(panel, alarms.AlarmsPanel)
+    kept = AlarmDeed("keep", "kept alarm-2026-11-26-22-01-05.mcap")
+    panel.alarms.history.add(AlarmRecord("r", "/camera is silent", panel.now_s(), deeds=[kept]))
+    panel.refresh()
+    index = panel.model.index(0, 0)
+    panel.table.menu_wanted.emit(
+        panel.model.key_of(panel.model.row_at(index)), panel.table.mapToGlobal(QPoint())
+    )
+    menu = QApplication.activePopupWidget()
+    assert isinstance(menu, QMenu)
+    (action,) = (each for each in menu.actions() if each.text() == "Open the recording")
+    menu.close()
+    action.trigger()
+    assert window.commands == [f"recording.play:{folder / 'alarm-2026-11-26-22-01-05.mcap'}"]
+    panel.shut()
+
+
+def test_a_topic_is_recorded_from_its_menu(qtbot, folder):
+    window = Window(Session.full())
+    panel = window.make(topics.PANEL)
+    qtbot.addWidget(panel)
+    for widget in panel.header_widgets():
+        qtbot.addWidget(widget)
+    (run,) = (each.run for each in panel.row_actions("/odom") if each.words == "Record this topic")
+    run()
+    assert window.commands == ["record.topic:/odom"]
+    panel.shut()

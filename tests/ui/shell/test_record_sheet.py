@@ -1,0 +1,220 @@
+"""Recording in the window: Ctrl+R, F9, the buttons of the tool bar, the status bar, and the sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.core.recording.choice import RecordingChoice, RingWish
+from app.core.recording.client import RecorderSaid
+from app.core.recording.recordings import SessionRecordings
+from app.ui.shell.commands import recording as commands_module
+from app.ui.shell.dialogs.record import RecordSheet
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
+from tests.core.recording.test_client import OrdersOnly, status
+from tests.pseudo import untranslated
+from tests.ui.clipping import clipped
+from tests.ui.fakes import Session
+from tests.ui.panels.test_words import said_by
+from tests.ui.shell_parts import PANELS, Answers
+from tests.ui.test_accessible import unsaid
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+
+
+class Recorder:
+    """Stands for the recorder's process: writes orders down, and tells what a test says."""
+
+    def __init__(self, session: Session) -> None:
+        self.line, self.session = OrdersOnly(), session
+        session.recordings = SessionRecordings(
+            session.settings, session.alerts, session.address, print,
+            start=self._start, clock=session.clock,
+        )  # fmt: skip
+
+    def _start(self, _number: int, _address: str, _post: Callable[[object], object]) -> OrdersOnly:
+        return self.line
+
+    def ops(self) -> list[object]:
+        return [order["op"] for order in self.line.orders]
+
+    def say(self, event: str, **content: object) -> None:
+        self.session.recordings.on_event(RecorderSaid(1, {"event": event, **content}))
+
+
+@pytest.fixture
+def recorder(home: Path) -> Recorder:
+    return Recorder(Session.full())
+
+
+@pytest.fixture
+def window(qtbot, theme: Theme, recorder: Recorder) -> MainWindow:
+    made = MainWindow(recorder.session, theme, PANELS, [], asks=Answers())
+    qtbot.addWidget(made)
+    theme.apply()
+    theme.set_motion("on")
+    made.resize(1440, 900)
+    made.show()
+    made.commands.run("layout.developer")
+    yield made
+    made.close()
+
+
+def sheet_of(window: MainWindow) -> RecordSheet:
+    (sheet,) = window.findChildren(RecordSheet)
+    sheet.show_state()
+    return sheet
+
+
+def shown(window: MainWindow) -> str:
+    window.tools.refresh()
+    window._show_facts()
+    return window.tools.record.text()
+
+
+def test_the_key_begins_and_ends_and_the_bars_tell(window, recorder):
+    assert window.commands.shortcuts.first("recording.toggle") == "Ctrl+R"
+    assert window.commands.shortcuts.first("recording.keep") == "F9"
+    assert shown(window) == "Record"
+    wide = window.tools.record.width()
+    window.commands.run("recording.toggle")
+    recorder.say("recording")
+    recorder.session.clock.now += 42.0
+    recorder.say("figures", recording=status(size_bytes=168_000_000), ring=None, free_bytes=10**12)
+    assert shown(window) == "0:42, 168 MB"
+    assert window.tools.record.width() == wide
+    assert "Recording 0:42, 168 MB, 2 lost" in window.status.words()
+    assert window.commands.actions.why_not("recording.stop") == ""
+    window.commands.run("layout.behaviour")
+    window._show_facts()
+    assert any(words.startswith("Recording 0:42") for words in window.status.words())
+    window.commands.run("recording.toggle")
+    recorder.say("ended", status=status(duration_s=42.0, size_bytes=168_000_000))
+    assert recorder.ops() == ["record", "stop"]
+    assert shown(window) == "Record"
+    assert not any(words.startswith("Recording") for words in window.status.words())
+    assert window.commands.actions.why_not("recording.stop") == "Nothing is recorded"
+    assert ": 0:42, 168 MB" in window.toast.accessibleName()
+
+
+def test_the_button_begins_and_opens_the_sheet_in_which_it_ends(window, recorder):
+    window.tools.record.click()
+    sheet = sheet_of(window)
+    assert sheet.isVisible()
+    recorder.say("recording")
+    sheet.show_state()
+    assert sheet.record.text() == "Stop recording"
+    assert not sheet.name.isEnabled()
+    sheet.bookmark.click()
+    sheet.record.click()
+    assert recorder.ops() == ["record", "note", "stop"]
+    recorder.say("ended", status=status())
+    sheet.show_state()
+    assert sheet.record.text() == "Record"
+    QTest.keyClick(sheet, Qt.Key.Key_Escape)
+    assert not sheet.isVisible()
+
+
+def test_what_is_chosen_is_what_is_recorded(window, recorder):
+    session = recorder.session
+    window.commands.run("recording.sheet")
+    sheet = sheet_of(window)
+    names = sorted(topic.name for topic in session.topics.live())
+    assert sheet.count.text().startswith(f"{len(names)} of {len(names)}")
+    sheet._choose_mode("chosen")
+    assert session.recordings.choice.topics == tuple(names)
+    sheet._toggle("/odom")
+    assert sheet.count.text().startswith(f"{len(names) - 1} of {len(names)}")
+    place = sheet.model.index_of("/odom").row()
+    assert [sheet.model.cell_at(place, column).said for column in (0,)] == ["left out"]
+    sheet._choose_mode("pattern")
+    sheet.patterns.setText("")
+    QTest.keyClicks(sheet.patterns, "/** not /odom")
+    assert session.recordings.choice.left_out == ("/odom",)
+    sheet.note.setText("second try")
+    sheet.record.click()
+    (order,) = recorder.line.orders
+    assert (order["topics"], order["left_out"], order["note"]) == (["/**"], ["/odom"], "second try")
+
+
+def test_a_pattern_that_can_be_none_says_so(window, recorder):
+    window.commands.run("recording.sheet")
+    sheet = sheet_of(window)
+    sheet._choose_mode("pattern")
+    sheet.patterns.setText("/a\x01")
+    sheet._take_patterns("/a\x01")
+    assert sheet.wrong.isVisible()
+    sheet.record.click()
+    assert recorder.ops() == []
+    sheet._take_patterns("/a")
+    assert not sheet.wrong.isVisible()
+
+
+def test_keeping_needs_the_flight_recorder_which_one_press_switches_on(window, recorder):
+    window.commands.run("recording.keep")
+    assert recorder.ops() == []
+    assert "flight recorder is off" in window.toast.accessibleName()
+    window.commands.recording._switch_on()
+    recorder.say("ring")
+    recorder.say("figures", recording=None, ring={"seconds": 41.0, "size_bytes": 10**9}, free_bytes=None)
+    window._show_facts()
+    assert "41 s can be kept" in window.status.words()
+    window.commands.run("recording.keep")
+    assert recorder.ops() == ["ring", "keep"]
+    window.commands.run("recording.sheet")
+    sheet = sheet_of(window)
+    assert sheet.ring.isChecked()
+    assert sheet.ring_words.text() == "41 s there, 1.0 GB of 2.0 GB"
+    sheet.seconds.setText("30")
+    sheet.seconds.editingFinished.emit()
+    assert recorder.session.recordings.wish == RingWish(is_on=True, seconds=30)
+    sheet.ring.click()
+    assert recorder.ops()[-1] == "end_ring"
+
+
+def test_one_topic_alone_and_none_of_another_network(window, recorder):
+    assert window.commands.run("record.topic:/odom")
+    assert recorder.line.orders[0]["topics"] == ["/odom"]
+    assert recorder.session.recordings.choice == RecordingChoice()
+    assert not window.commands.run("record.topic:ros2 /odom")
+
+
+def test_a_recording_is_opened_by_who_can_else_a_line_says_who(window, recorder, tmp_path, monkeypatch):
+    path = tmp_path / "a.mcap"
+    window.commands.run(f"recording.play:{path}")
+    assert "not there any more" in window.toast.accessibleName()
+    path.touch()
+    opened: list[tuple[str, str]] = []
+    monkeypatch.setattr(window.commands.recording, "_do_about", lambda *about: opened.append(about))
+    window.commands.run(f"recording.play:{path}")
+    assert opened == [("recording.open", str(path))]
+
+    def unknown(name: str, _argument: str) -> None:
+        raise commands_module.UnknownCommandError(name)
+
+    monkeypatch.setattr(window.commands.recording, "_do_about", unknown)
+    window.commands.run(f"recording.play:{path}")
+    assert f'nep play "{path}"' in window.toast.accessibleName()
+
+
+@pytest.mark.parametrize(("size", "percent"), [((1440, 900), 100), ((1024, 600), 200)])
+def test_the_words_of_the_sheet_are_translated_and_fit(qtbot, pseudo, window, recorder, theme, percent, size):
+    window.resize(*size)
+    theme.set_text_percent(percent)
+    window.commands.run("recording.sheet")
+    sheet = sheet_of(window)
+    sheet._choose_mode("pattern")
+    recorder.session.recordings.set_wish(RingWish(is_on=True))
+    recorder.say("ring")
+    sheet.show_state()
+    qtbot.wait(50)  # Qt lays out later
+    topics = [topic.name for topic in recorder.session.topics.live()]
+    assert [text for _where, text in said_by(sheet) if untranslated(text, "GB", *topics)] == []
+    assert clipped(sheet) == []
+    assert not list(unsaid(sheet))
