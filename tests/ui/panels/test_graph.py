@@ -327,7 +327,7 @@ def test_a_line_of_several_topics_has_a_menu_for_each(qtbot, panel: GraphPanel, 
     part = menu.actions()[0].menu()
     assert isinstance(part, QMenu)
     run_all(part)
-    assert window.commands == ["alarm.topic:/touch&go"]
+    assert window.commands == ["alarm.topic:/touch&go", "record.topic:/touch&go"]
 
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, 2.0**64, -1.0])
