@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -44,6 +45,7 @@ from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import NetworkEvent, Networks, by_network
 from app.core.networks.parameters import ParameterSetter
 from app.core.own_process import OwnProgram
+from app.core.replay.replay import Replay
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
@@ -70,8 +72,24 @@ LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """What the Console shows."""
 
 
+@dataclass(slots=True)
+class LiveNetwork:
+    """What is known of the live network, whatever is shown: robots, Stop, alarms and health go by it."""
+
+    topics: Topics
+    nodes: Nodes
+    networks: Networks
+    images: Images
+    series: SeriesFeed
+    graph: GraphView | None
+
+
 class Session:
-    """Everything that the panels show. One thread uses it (the window's); `close` ends its threads."""
+    """Everything that the panels show. One thread uses it (the window's); `close` ends its threads.
+
+    ``topics``, ``nodes``, ``networks``, ``images``, ``series`` and ``graph`` are those of the source that is
+    shown: of the live network (`live`), which goes on all the time, or of a recording (``replay``).
+    """
 
     def __init__(
         self,
@@ -92,6 +110,10 @@ class Session:
         self._clock, self._clock_ns = clock, clock_ns
         self._start_processes = start_processes
         self.settings = settings if settings is not None else Settings()
+        self.replay: Replay | None = None
+        self._live: LiveNetwork | None = None  # while a recording is shown
+        self.sources_shown = 0
+        """Grows when another source is shown."""
         self.alerts, self.console, self.topics = Alerts(), Console(), Topics()
         self._faults = FaultAlerts(self.alerts, clock)
         self.traffic = Traffic(self.topics)
@@ -140,10 +162,12 @@ class Session:
         self._reachable: tuple[StopTarget, ...] = ()
         self._tries_to_reach = False
         self._next_check = 0.0
+        self._closing_replays: list[Replay] = []
         self._learning = MasterChange()
 
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:
-        self.images.offer(messages, topic)
+        live = self._live
+        (self.images if live is None else live.images).offer(messages, topic)
 
     def _warn(self, topic: str, messages: Sequence[Message]) -> None:
         self.alarms.take(topic, messages)
@@ -154,6 +178,48 @@ class Session:
     def document(self) -> Document:
         """The behaviour whose tab shows."""
         return self.documents.current
+
+    @property
+    def live(self) -> LiveNetwork:
+        """The live network, whether it is shown or not."""
+        if self._live is not None:
+            return self._live
+        return LiveNetwork(self.topics, self.nodes, self.networks, self.images, self.series, self.graph)
+
+    @property
+    def shown_console(self) -> Console:
+        """What the programs of the source that is shown have said."""
+        return self.replay.console if self.replay is not None else self.console
+
+    def open_recording(self, path: Path) -> Replay:
+        """Show a recording in place of the live network, which goes on; it is read in a thread."""
+        live = self.live
+        self._end_replay()
+        self._live = live
+        self.replay = replay = Replay(path, self.settings, self.alerts, clock=self._clock)
+        self.topics, self.nodes, self.networks = replay.topics, replay.nodes, replay.networks
+        self.images, self.series, self.graph = replay.images, replay.series, None
+        self.sources_shown += 1
+        replay.start()
+        return replay
+
+    def back_to_live(self) -> None:
+        """Show the live network again, and close the recording."""
+        live = self._live
+        if live is None:
+            return
+        self.topics, self.nodes, self.networks = live.topics, live.nodes, live.networks
+        self.images, self.series, self.graph = live.images, live.series, live.graph
+        self._live = None
+        self.sources_shown += 1
+        self._end_replay()
+
+    def _end_replay(self) -> None:
+        if self.replay is not None:
+            replay, self.replay = self.replay, None
+            self._closing_replays = [each for each in self._closing_replays if not each.has_ended]
+            self._closing_replays.append(replay)
+            replay.end()
 
     @property
     def coming(self) -> tuple[str, ...]:
@@ -171,11 +237,15 @@ class Session:
             self.launcher.ensure_master()
 
     def watch(self, topic: str) -> Watch:
-        """Look at a topic until the watch is closed: its messages arrive in `Topics`.
+        """Look at a topic of the live network until the watch is closed: its messages arrive in `Topics`.
 
         Here and in `topic` and `mark_seen` it is named as among the topics of all networks (`key_of`).
         """
         return self._watches.open([topic])
+
+    def watch_shown(self, topic: str) -> Watch:
+        """The same of the source that is shown now; when another one is, it has to be asked for anew."""
+        return self.watch(topic) if self.replay is None else self.replay.watch(topic)
 
     def topic(self, key: str) -> Topic | None:
         """The topic of that name, of whichever network; None when it is not known."""
@@ -201,9 +271,14 @@ class Session:
                 self._on_event(event, now)
         self._on_messages(drained, now)
         with self.guarded(lazy("let topics and nodes age")):
-            self.topics.age(now, now_ns)
-            self.nodes.age(now)
-            self.networks.age(now, now_ns)
+            live = self.live
+            live.topics.age(now, now_ns)
+            live.nodes.age(now)
+            live.networks.age(now, now_ns)
+        if self.replay is not None:
+            with self.guarded(lazy("follow the recording")):
+                self.replay.tick(now)
+                self.graph = self.replay.graph
         with self.guarded(lazy("follow the robots")):
             self._follow_robots()
         with self.guarded(lazy("watch over the alarms")):
@@ -257,8 +332,15 @@ class Session:
             self._health.settings(self.settings.not_kept)
             self._health.program(self._program.fate())
 
+    def _close_replays(self) -> None:
+        self.back_to_live()
+        for replay in self._closing_replays:
+            replay.close()
+        self._closing_replays.clear()
+
     def close(self) -> None:
         """End the program, the threads and the processes that were started here, whatever one does."""
+        live = self.live
         ends: list[tuple[str, Callable[[], object]]] = [
             ("end the program", self.runs.close),
             ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
@@ -269,10 +351,11 @@ class Session:
             ("end the robots", self.fleet.close),
             ("keep the room", self.room.close),
             ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),
-            ("end the pictures", self.images.close),
+            ("end the pictures", live.images.close),
             ("end the doctor", self.doctor.close),
+            ("close the recording", self._close_replays),
             ("leave the network", self.source.close),
-            ("leave other networks", self.networks.close),
+            ("leave other networks", live.networks.close),
             ("end setting parameters", self.parameters.close),
             ("end what was started here", self.launcher.close),
             ("end the reach", self.remote_access.close),
@@ -285,19 +368,19 @@ class Session:
 
     def _begin_watch(self, topic: str) -> None:
         if split_key(topic)[0]:
-            self.networks.watch(topic)
+            self.live.networks.watch(topic)
             return
         self.source.watch(topic)
-        known = self.topics.get(topic)
+        known = self.live.topics.get(topic)
         if known is not None:
             known.watched = True
 
     def _end_watch(self, topic: str) -> None:
         if split_key(topic)[0]:
-            self.networks.unwatch(topic)
+            self.live.networks.unwatch(topic)
             return
         self.source.unwatch(topic)
-        self.topics.unwatch(topic)
+        self.live.topics.unwatch(topic)
         self.fleet.unwatched(topic)
 
     def _forget_watch(self, topic: str) -> None:
@@ -313,9 +396,9 @@ class Session:
                 self._on_batch(topic, batch, now)
         for key, batch in others.items():
             with self.guarded(lazy("take over messages of {topic}"), topic=key):
-                self.networks.add(key, batch, now)
+                self.live.networks.add(key, batch, now)
         with self.guarded(lazy("take over what is plotted")):
-            self.series.add(drained.batches)
+            self.live.series.add(drained.batches)
         with self.guarded(lazy("count messages")):
             self.traffic.add(batches, now)
         with self.guarded(lazy("take over what robots say")):
@@ -343,8 +426,9 @@ class Session:
         if topic in LOGS:
             self.console.take(batch.messages, batch.dropped)
         if self._watches.watched(topic):  # else the last of a subscription that has just ended
-            self.topics.add(topic, batch, now)
-            self.topics[topic].watched = True
+            topics = self.live.topics
+            topics.add(topic, batch, now)
+            topics[topic].watched = True
 
     def _on_event(self, event: object, now: float) -> None:
         match event:
@@ -387,22 +471,25 @@ class Session:
 
     def _on_network(self, event: RemoteAccessChanged | NetworkEvent, now: float) -> None:
         if isinstance(event, NetworkEvent):
-            self.networks.on_event(event, now)
+            self.live.networks.on_event(event, now)
         else:
             self.remote_access.changed(event)
 
     def _on_graph(self, view: GraphView, now: float) -> None:
         self.remote_access.follow(view)
-        if self._learning.still(self.graph, view, now):
+        if self._learning.still(self.live.graph, view, now):
             return
-        before = self.graph
+        live = self.live
+        before = live.graph
         if before is not None and (before.epoch, before.revision) != (view.epoch, view.revision):
             for line in arrivals(before, view):
                 self.console.add("info", "master", line)
-        self.graph = view
+        if self._live is None:
+            self.graph = view
+        live.graph = view
         self.alarms.see(view)
-        self.topics.update(view, now)
-        self.nodes.update(view, now)
+        live.topics.update(view, now)
+        live.nodes.update(view, now)
         self.fleet.update(view)
         self.room.update(view)
         for note in self.fleet.take_notes():
@@ -426,7 +513,7 @@ class Session:
                 button=_(ASK_DOCTOR),
                 action="help.doctor",
             )
-            self.topics.values_revision += 1
+            self.live.topics.values_revision += 1
 
     def _follow_robots(self) -> None:
         if self.fleet.revision != self._robots_seen:
@@ -437,9 +524,10 @@ class Session:
                 self.launcher.came(robot.name)
                 self.alerts.resolve(f"companion:{robot.name}")
         self._keep_within_reach()
-        if self.topics.revision != self._topics_seen:
-            self._topics_seen = self.topics.revision
-            self.documents.set_topics(sorted(topic.name for topic in self.topics.live()))
+        topics = self.live.topics
+        if topics.revision != self._topics_seen:
+            self._topics_seen = topics.revision
+            self.documents.set_topics(sorted(topic.name for topic in topics.live()))
 
     def _look_for_problems_of_stop(self) -> None:
         """Once a second: whom a stop can't reach is told, and tried again."""

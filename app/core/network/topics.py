@@ -297,6 +297,14 @@ class Topics:
             topic.last_received = None
             topic.watched = False
 
+    def rewind(self) -> None:
+        """The source is at another time: what was newest, and when, is told anew."""
+        for topic in self._topics.values():
+            topic.newest = topic.previous = None
+            topic.last_stamp_ns = topic.last_received = topic.age_s = None
+            topic.rates.clear()
+        self.values_revision += 1
+
     def _vanish(self, topic: Topic, now: float) -> None:
         topic.gone_since, topic.gone_s = now, 0.0
         topic.publishers, topic.publisher_nodes = 0, ()

@@ -101,6 +101,9 @@ class NodesPanel(NetworkTable[NodeRow]):
         session = self.session
         return session.nodes.revision, session.networks.revision, session.master.kind
 
+    def source_changed(self) -> None:
+        self._seen, self._values = (), -1
+
     def rebuild(self) -> None:
         nodes = [*self.session.nodes, *self.session.networks.nodes]
         self._seen = self._facts()

@@ -168,6 +168,17 @@ class PlotPanel(PanelWidget):
         self.canvas.cursor_moved.connect(self._put_cursor)
         self.canvas.field_dropped.connect(self.plot_field)
 
+    def source_changed(self) -> None:
+        """Plot the same of the other source."""
+        kept = self.save_state()
+        self.tools.add.shut()
+        self.curves.close()
+        self.curves = Curves(self.session.series, self._topic_names)
+        self.shown.clear()
+        self.canvas.cursors.clear()
+        self.cursors.setChecked(False)
+        self.restore_state(kept)
+
     def _topic_names(self) -> list[str]:
         topics = [*self.session.topics, *self.session.networks.topics]
         return [topic.key for topic in topics]

@@ -92,6 +92,9 @@ class TopicsPanel(NetworkTable["Topic"]):
         topics, networks = self.session.topics, self.session.networks
         return topics.revision, len(topics), networks.revision, self.session.master.kind
 
+    def source_changed(self) -> None:
+        self._seen = ()
+
     def rebuild(self) -> None:
         self._seen = self._facts()
         topics = [*self.session.topics, *self.session.networks.topics]

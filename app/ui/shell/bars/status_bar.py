@@ -55,7 +55,7 @@ class StatusFacts:
         if not links:
             coming = self._session.coming
             return "circle-dashed", connected_words((), coming) if coming else _("No robot"), "off"
-        topics, now = self._session.topics, time.monotonic()
+        topics, now = self._session.live.topics, time.monotonic()
         found = [(link, facts_of(link, topics, now, age_words)) for link in links]
         wrong = [fact.status for _link, facts in found for fact in facts if fact.to_look_at]
         if wrong:
@@ -92,7 +92,7 @@ class StatusFacts:
 
     def topics(self) -> Fact:
         """How many topics are live."""
-        live = sum(1 for topic in self._session.topics if topic.gone_s is None)
+        live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         return "", ngettext("{count} topic live", "{count} topics live", live).format(count=live), None
 
     def remote_access(self) -> Fact:
@@ -116,10 +116,10 @@ class StatusFacts:
 
     def traffic(self) -> Fact:
         """Nodes, topics and messages per second."""
-        graph = self._session.graph
+        graph = self._session.live.graph
         if graph is None:
             return NOTHING
-        live = sum(1 for topic in self._session.topics if topic.gone_s is None)
+        live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         nodes, rate = len(graph.nodes), self._session.traffic.messages_per_s
         facts = [
             ngettext("{count} node", "{count} nodes", nodes).format(count=nodes),

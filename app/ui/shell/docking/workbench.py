@@ -216,6 +216,11 @@ class Workbench(QMainWindow):
     def _is_open(self, key: str) -> bool:
         return key in self.docks and not self.docks[key].isHidden()
 
+    def source_changed(self) -> None:
+        """Tell all panels, also those that are closed, that another source is shown."""
+        for dock in (*self.docks.values(), *self._ahead.values()):
+            dock.panel.source_changed()
+
     def used(self, dock: Dock) -> None:
         """A panel has the keyboard now."""
         if self._used[-1:] != [dock.key]:
