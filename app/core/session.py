@@ -12,6 +12,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.core.alarms import SessionAlarms
 from app.core.alerts import Alerts
@@ -45,7 +46,6 @@ from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import NetworkEvent, Networks, by_network
 from app.core.networks.parameters import ParameterSetter
 from app.core.own_process import OwnProgram
-from app.core.replay.replay import Replay
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
@@ -65,6 +65,12 @@ from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.core.replay import replay as replay_module
+else:
+    replay_module = lazy_module("app.core.replay.replay")
 
 CHECK_S = 1.0
 NO_WATCH = lazy("can't watch over the robots: {error}")
@@ -91,6 +97,12 @@ class Session:
     shown: of the live network (`live`), which goes on all the time, or of a recording (``replay``).
     """
 
+    replay: replay_module.Replay | None = None
+    sources_shown = 0
+    """Grows when another source is shown."""
+    _live: LiveNetwork | None = None  # while a recording is shown
+    _closing_replays: list[replay_module.Replay]
+
     def __init__(
         self,
         settings: Settings | None = None,
@@ -110,10 +122,6 @@ class Session:
         self._clock, self._clock_ns = clock, clock_ns
         self._start_processes = start_processes
         self.settings = settings if settings is not None else Settings()
-        self.replay: Replay | None = None
-        self._live: LiveNetwork | None = None  # while a recording is shown
-        self.sources_shown = 0
-        """Grows when another source is shown."""
         self.alerts, self.console, self.topics = Alerts(), Console(), Topics()
         self._faults = FaultAlerts(self.alerts, clock)
         self.traffic = Traffic(self.topics)
@@ -161,8 +169,7 @@ class Session:
         self._robots_seen = self._topics_seen = -1
         self._reachable: tuple[StopTarget, ...] = ()
         self._tries_to_reach = False
-        self._next_check = 0.0
-        self._closing_replays: list[Replay] = []
+        self._next_check, self._closing_replays = 0.0, []
         self._learning = MasterChange()
 
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:
@@ -191,17 +198,17 @@ class Session:
         """What the programs of the source that is shown have said."""
         return self.replay.console if self.replay is not None else self.console
 
-    def open_recording(self, path: Path) -> Replay:
+    def open_recording(self, path: Path) -> replay_module.Replay:
         """Show a recording in place of the live network, which goes on; it is read in a thread."""
         live = self.live
         self._end_replay()
         self._live = live
-        self.replay = replay = Replay(path, self.settings, self.alerts, clock=self._clock)
-        self.topics, self.nodes, self.networks = replay.topics, replay.nodes, replay.networks
-        self.images, self.series, self.graph = replay.images, replay.series, None
+        self.replay = opened = replay_module.Replay(path, self.settings, self.alerts, clock=self._clock)
+        self.topics, self.nodes, self.networks = opened.topics, opened.nodes, opened.networks
+        self.images, self.series, self.graph = opened.images, opened.series, None
         self.sources_shown += 1
-        replay.start()
-        return replay
+        opened.start()
+        return opened
 
     def back_to_live(self) -> None:
         """Show the live network again, and close the recording."""
@@ -216,10 +223,10 @@ class Session:
 
     def _end_replay(self) -> None:
         if self.replay is not None:
-            replay, self.replay = self.replay, None
+            ended, self.replay = self.replay, None
             self._closing_replays = [each for each in self._closing_replays if not each.has_ended]
-            self._closing_replays.append(replay)
-            replay.end()
+            self._closing_replays.append(ended)
+            ended.end()
 
     @property
     def coming(self) -> tuple[str, ...]:
@@ -334,8 +341,8 @@ class Session:
 
     def _close_replays(self) -> None:
         self.back_to_live()
-        for replay in self._closing_replays:
-            replay.close()
+        for each in self._closing_replays:
+            each.close()
         self._closing_replays.clear()
 
     def close(self) -> None:

@@ -126,9 +126,7 @@ def records_of(file: BinaryIO, size: int, offset: int = len(MAGIC)) -> Iterator[
         offset += HEAD_BYTES + length
 
 
-def read_index(
-    file: BinaryIO, path: Path, progress: Callable[[int, int], object] | None = None
-) -> FileIndex:
+def read_index(file: BinaryIO, path: Path, progress: Callable[[int, int], object] | None = None) -> FileIndex:
     """The index of a recording. Raises `RecordingError` for what is none, `OSError`.
 
     `progress` is told how many bytes of how many are done, where they all have to be looked through.

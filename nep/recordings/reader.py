@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 import orjson
 
-from nep.errors import ClosedError, RecordingError
+from nep.errors import ClosedError
 from nep.messages.message import Message
 from nep.recordings.channels import ChannelDecoder, Role
 from nep.recordings.figures import TopicFigures, read_figures
@@ -126,7 +126,8 @@ class Recording:
         made: dict[str, RecordedTopic] = {}
         for number, decoder in self._decoders.items():
             if decoder.role is None and number in self._in_chunks:
-                count, publishers = counts.get(number, 0), (decoder.publisher,)
+                count = counts.get(number, 0)
+                publishers: tuple[int | None, ...] = (decoder.publisher,)
                 known = made.get(decoder.topic)
                 if known is not None:
                     msg_type, codec, count = known.msg_type, known.codec, count + known.message_count

@@ -186,7 +186,7 @@ class Images:
             self._arrived.notify()
 
     def rewind(self, topics: Collection[str] = ()) -> None:
-        """The source is at another time, and shows others of these topics: of the rest there is no picture."""
+        """The source is at another time, and shows others of these topics; of the rest there are none."""
         with self.lock:
             self._times += 1
             for topic, streams in self._streams.items():

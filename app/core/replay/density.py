@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from array import array
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from app.core.documents.background_worker import BackgroundWorker
 from nep.recordings.reader import Recording
 
-Counts = NDArray[np.uint32]
 MOST_MARKS = 2_000
 """Of one topic; what was lost later is counted with the last one."""
 
@@ -23,12 +20,12 @@ class Density:
     start_ns: int
     end_ns: int
     buckets: int
-    counts: Mapping[str, Counts]
+    counts: Mapping[str, Sequence[int]]
 
     def peak(self, topic: str) -> int:
         """The most messages of a topic in one part."""
         counts = self.counts.get(topic)
-        return int(counts.max()) if counts is not None and len(counts) else 0
+        return max(counts, default=0) if counts is not None else 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +79,7 @@ class Densities:
 def density_of(recording: Recording, start_ns: int, end_ns: int, buckets: int) -> Density:
     """Count the messages of each part, of the index alone."""
     found = recording.densities(start_ns, end_ns, buckets)
-    return Density(
-        start_ns, end_ns, buckets, {topic: np.array(counts, np.uint32) for topic, counts in found.items()}
-    )
+    return Density(start_ns, end_ns, buckets, {topic: array("L", counts) for topic, counts in found.items()})
 
 
 def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:

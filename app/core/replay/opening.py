@@ -1,4 +1,4 @@
-"""Opening a recording: its index is read, and one that was not ended, or is damaged, is repaired to a copy."""
+"""Opening a recording: its index is read, and one that was not ended is repaired to a copy."""
 
 from __future__ import annotations
 
@@ -60,23 +60,23 @@ def open_recording(path: Path, progress: Progress) -> OpenedRecording:
                 try:
                     report = repair(path, progress=repairing)
                     copy = report.path
-                except RecordingError as error:  # a full disk, say: it can be read all the same, if it has any
+                except (
+                    RecordingError
+                ) as error:  # a full disk, say: it can be read all the same, if it has any
                     why_not = error.reason
             if copy is not None:
                 recording.close()
                 recording = Recording(copy, progress=reading)
         if not recording.message_count:
             raise RecordingError(str(path), _("it holds no message that can be read"))
-        return OpenedRecording(
-            recording, Bookmarks(recording), recording.figures(), path, report, why_not
-        )
+        return OpenedRecording(recording, Bookmarks(recording), recording.figures(), path, report, why_not)
     except BaseException:
         recording.close()
         raise
 
 
 def _earlier_copy(path: Path) -> Path | None:
-    """The copy that was made when the same file was opened before; None when there is none, or it is older."""
+    """The copy that was made when the file was opened before; None when there is none, or it is older."""
     copy = path.with_name(f"{path.stem}.repaired.mcap")
     try:
         if copy.stat().st_mtime_ns < path.stat().st_mtime_ns:

@@ -1,4 +1,4 @@
-"""An open recording as the panels see it: topics, pictures, series and log, and what a person does with it."""
+"""An open recording as the panels see it: topics, pictures, series, log, and what a person does with it."""
 
 from __future__ import annotations
 
@@ -20,14 +20,19 @@ from app.core.replay.opening import OpenedRecording
 from app.core.replay.source import Handed, ReplayFigures, ReplaySource, ReplayStatus
 from app.core.series.feed import SeriesFeed
 from app.core.storage.settings import Settings
+from nep.i18n import _, ngettext
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from nep.recordings.bookmarks import Bookmark
 from nep.recordings.figures import TopicFigures
-from nep.recordings.player import SPEED_MAX, SPEED_MIN, PlayerStatus
+from nep.recordings.player import SPEED_MAX, SPEED_MIN, Playback, PlayerStatus
 from nep.recordings.reader import RecordedTopic
 
+FAILED, REPAIRED, DAMAGED = "recording:failed", "recording:repaired", "recording:damaged"
+"""The ids of what it tells in alerts."""
+SHOW_FILE = "recording.folder"
+"""The window's command, with the file's path, that shows where it is."""
 LOGS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
 STEP_NS = 1_000_000_000
 
@@ -62,7 +67,9 @@ class Replay:
         self.opened: OpenedRecording | None = None
         self.chosen = ""
         self._logs: list[Watch] = []
-        self._loop_edges: tuple[int | None, int | None] = (None, None)
+        self._alerts, self._has_failed, self._damaged = alerts, False, 0
+        for id in (FAILED, REPAIRED, DAMAGED):
+            alerts.resolve(id)
 
     def start(self) -> None:
         """Open the file, in a thread."""
@@ -185,8 +192,8 @@ class Replay:
         """How fast it is to be; the nearest that there is."""
         wanted = max(SPEED_MIN, min(SPEED_MAX, speed)) if speed == speed else 1.0  # noqa: PLR0124  a NaN is none
 
-        def change(playback: object) -> None:
-            playback.speed = wanted  # type: ignore[attr-defined]
+        def change(playback: Playback) -> None:
+            playback.speed = wanted
 
         self.source.order("speed", change)
 
@@ -250,6 +257,7 @@ class Replay:
         """Take over what the thread handed over since the last tick; ``now`` is a monotonic clock in s."""
         if self.opened is None and self.source.opened is not None and self.player is not None:
             self._opened(self.source.opened, now)
+        self._tell_problems()
         handed = self.source.take()
         if handed.jump is not None:
             self._take_jump(handed.jump, now)
@@ -276,6 +284,44 @@ class Replay:
             if topic in recording.topics:
                 self.source.set_deep(topic, CAPACITY)
                 self._logs.append(self.watch(topic))
+
+        self._tell_repaired(opened)
+
+    def _tell_problems(self) -> None:
+        status = self.status
+        if status.stage == "failed" and not self._has_failed:
+            self._has_failed = True
+            title = _("{name} can't be played.").format(name=self.name)
+            sentence = f"{status.sentence[:1].upper()}{status.sentence[1:]}."
+            action = f"{SHOW_FILE}:{self.path}"
+            self._alerts.put(FAILED, "error", title, sentence, button=_("Show the file"), action=action)
+        if status.damaged > self._damaged:
+            self._damaged = status.damaged
+            words = ngettext(
+                "{count} piece of {name} is damaged, and was passed over.",
+                "{count} pieces of {name} are damaged, and were passed over.",
+                status.damaged,
+            )
+            self._alerts.put(DAMAGED, "warn", words.format(count=status.damaged, name=self.name))
+
+    def _tell_repaired(self, opened: OpenedRecording) -> None:
+        """Say what became of a file that was not ended, or was cut off."""
+        report, name = opened.repaired, self.name
+        if opened.why_not_repaired:
+            title = _("{name} was not ended, and is played as far as it goes.").format(name=name)
+            self._alerts.put(REPAIRED, "warn", title, f"{opened.why_not_repaired}.")
+        elif report is not None and report.is_whole:
+            title = _("{name} was not ended. All of it is there, in {copy}.")
+            self._alerts.put(REPAIRED, "info", title.format(name=name, copy=report.path.name))
+        elif report is not None:
+            title = _("{name} was cut off, or damaged.").format(name=name)
+            detail = _("{recovered} s recovered, {lost} s lost; it is in {copy}.").format(
+                recovered=f"{report.duration_s:.1f}", lost=f"{report.lost_s:.1f}", copy=report.path.name
+            )
+            self._alerts.put(REPAIRED, "warn", title, detail)
+        elif opened.is_copy:
+            title = _("{name} was not ended; its repaired copy is played.").format(name=name)
+            self._alerts.put(REPAIRED, "info", title)
 
     def _take_jump(self, messages: Sequence[Message], now: float) -> None:
         self.topics.rewind()

@@ -144,7 +144,7 @@ class ReplaySource:
         self.order("choose", self._choose)
 
     def set_deep(self, topic: str, room: int | None) -> None:
-        """After a jump also what came before is wanted of it, and ``room`` messages at once; None: no more."""
+        """Also what came before a jump is wanted of it, and ``room`` messages at once; None: no more."""
         with self._changed:
             if room is None:
                 self._deep.pop(topic, None)
@@ -281,7 +281,10 @@ class ReplaySource:
         until_ns, began = at_ns + 1, self._clock()
         for back_s in HISTORY_S:
             from_ns = max(recording.start_ns, at_ns - round(back_s * 1e9))
-            if not self._read_back(recording, (from_ns, until_ns), found, began) or from_ns <= recording.start_ns:
+            if (
+                not self._read_back(recording, (from_ns, until_ns), found, began)
+                or from_ns <= recording.start_ns
+            ):
                 break
             until_ns = from_ns
         for topic, each in recording.newest(at_ns, [topic for topic in topics if not found[topic]]).items():
@@ -294,7 +297,7 @@ class ReplaySource:
     def _read_back(
         self, recording: Recording, span: tuple[int, int], found: dict[str, deque[Message]], began: float
     ) -> bool:
-        """Put what came in a span before what was found; False when there is no time, or no room, for more."""
+        """Put what came in a span before what was found; False when there is no time, or room, for more."""
         topics = [topic for topic, each in found.items() if len(each) < MOST_HISTORY]
         came: dict[str, deque[Message]] = {
             topic: deque(maxlen=MOST_HISTORY - len(found[topic])) for topic in topics

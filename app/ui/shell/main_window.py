@@ -99,6 +99,7 @@ class MainWindow(QMainWindow):
         self._ahead: dict[str, Workbench] = {}  # with panels, for layouts that nobody has gone to yet
         self._facts = StatusFacts(session)
         self._alerts_seen = -1
+        self._source_seen = session.sources_shown
         self._ticks = self._halves = 0
         self._twice = False  # the timer runs twice as often as the tick
         self._shut = False
@@ -367,6 +368,8 @@ class MainWindow(QMainWindow):
             what = "duplicate"
         if what:
             self._run(f"blocks.edit:{what}")
+        elif event.key() == Qt.Key.Key_Space and self.session.replay is not None and not event.modifiers():
+            self._run("replay.play")
         elif event.keyCombination() == MENU and (focus := QApplication.focusWidget()) is not None:
             # Qt itself knows only the key with a menu on it, which many keyboards lack.
             place = focus.rect().center()
@@ -393,6 +396,13 @@ class MainWindow(QMainWindow):
             self.bench.refresh(pictures=True)
         self.tools.follow()
 
+    def _follow_source(self) -> None:
+        """Let all panels begin anew when another source is shown."""
+        if self._source_seen != self.session.sources_shown:
+            self._source_seen = self.session.sources_shown
+            for bench in (*self.benches.values(), *self._ahead.values()):
+                bench.source_changed()
+
     def _follow_panels(self) -> None:
         """Let panels that nobody can see rest, and the timer run no faster than they need."""
         now = self._clock()
@@ -416,6 +426,8 @@ class MainWindow(QMainWindow):
             self.question.refresh()
         with guarded(lazy("make room for what is said")):
             self.room.follow()
+        with guarded(lazy("show another source")):
+            self._follow_source()
         with guarded(lazy("let panels rest")):
             self._follow_panels()
         with guarded(lazy("show the panels")):

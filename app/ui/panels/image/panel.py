@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, Qt, QUrl
-from PySide6.QtGui import QAction, QGuiApplication, QImage, QResizeEvent
+from PySide6.QtGui import QAction, QGuiApplication, QImage, QKeySequence, QResizeEvent
 
 from app.core.messages import snapshots
 from app.core.networks.networks import topic_words
@@ -107,6 +107,8 @@ class ImagePanel(PanelWidget):
         topic = self._topic
         self.shut()
         self._stream, self._revision = None, (-1, -1)
+        plays = self.session.replay is not None  # which Space does then
+        self.actions_of["freeze"].setShortcut(QKeySequence() if plays else QKeySequence(Qt.Key.Key_Space))
         if topic:
             self.show_topic(topic)
 

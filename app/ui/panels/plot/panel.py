@@ -444,7 +444,7 @@ class PlotPanel(PanelWidget):
             Qt.Key.Key_M: self.cursors.toggle,
             Qt.Key.Key_A: lambda: self._put_here("A"),
             Qt.Key.Key_B: lambda: self._put_here("B"),
-            Qt.Key.Key_Space: self.freeze.toggle,
+            Qt.Key.Key_Space: self._pause_or_go_on,
             Qt.Key.Key_Left: lambda: self._arrow(-far),
             Qt.Key.Key_Right: lambda: self._arrow(far),
             Qt.Key.Key_Plus: lambda: self._zoom(1 / 1.5, self._middle_s()),
@@ -456,6 +456,13 @@ class PlotPanel(PanelWidget):
             return False
         wanted()
         return True
+
+    def _pause_or_go_on(self) -> None:
+        """While a recording is shown, the key plays that."""
+        if self.session.replay is not None:
+            self.session.replay.toggle()
+        else:
+            self.freeze.toggle()
 
     def _middle_s(self) -> float:
         return (self.canvas.begin_s + self.canvas.end_s) / 2

@@ -12,6 +12,7 @@ from app.ui.shell.commands.behaviours import BehaviourCommands, bring_into_view
 from app.ui.shell.commands.editing import EditCommands
 from app.ui.shell.commands.menus import MenuLists
 from app.ui.shell.commands.palette_entries import PaletteEntries
+from app.ui.shell.commands.replay import ReplayCommands
 from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands
 from app.ui.shell.commands.shell import Shell
@@ -39,6 +40,8 @@ class Commands:
         self.view = ViewCommands(shell, session, self.files, keys)
         self.shortcuts = keys
         self.variables = VariableCommands(shell, session, self.files)
+        self.replay = ReplayCommands(shell, session, asks)
+        self.files.open_recording = self.replay.open
         self._do = Handlers(
             session,
             shell,
@@ -49,6 +52,7 @@ class Commands:
             self.view,
             EditCommands(shell),
             ReportCommands(shell, session, self.files, asks),
+            self.replay,
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.why_not, keys)

@@ -78,6 +78,13 @@ PICTURE = FileQuestion(
     endings=PICTURE_ENDINGS,
     icon="image",
 )
+RECORDING = FileQuestion(
+    lazy("Open a recording"),
+    lazy("Open"),
+    lazy("No recordings and no folders are in here."),
+    endings=(".mcap",),
+    icon="film",
+)
 FOLDER = FileQuestion(
     lazy("Folder for pictures"),
     lazy("Use this folder"),
@@ -263,6 +270,10 @@ class FileSheet(Overlay):
     def ask_picture(self, folder: Path, take: Callable[[Path], object]) -> None:
         """Which picture to take."""
         self._ask(PICTURE, folder, take)
+
+    def ask_recording(self, folder: Path, take: Callable[[Path], object]) -> None:
+        """Which recording to play."""
+        self._ask(RECORDING, folder, take)
 
     def ask_folder(self, folder: Path, take: Callable[[Path], object]) -> None:
         """Which folder to keep pictures in: the one that is chosen in the list, else the one that shows."""
@@ -580,6 +591,12 @@ class StudioDialogs:
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
         """Which picture to take."""
         self._made().ask_picture(Path(folder or pictures_folder()), take)
+
+    def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Which recording to play."""
+        wanted = Path(folder)
+        there = next((each for each in (wanted, *wanted.parents) if each.is_dir()), Path.home())
+        self._made().ask_recording(there, take)
 
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         """Which folder to keep pictures in."""
