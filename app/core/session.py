@@ -284,8 +284,11 @@ class Session:
             live.networks.age(now, now_ns)
         if self.replay is not None:
             with self.guarded(lazy("follow the recording")):
+                was_open = self.replay.opened is not None
                 self.replay.tick(now)
                 self.graph = self.replay.graph
+                if not was_open and self.replay.opened is not None:
+                    self.sources_shown += 1  # now it is known what is there, and from when on
         with self.guarded(lazy("follow the robots")):
             self._follow_robots()
         with self.guarded(lazy("watch over the alarms")):

@@ -55,6 +55,7 @@ class Replay:
     ) -> None:
         """Nothing is read before `start`."""
         self.path = path
+        self.opened: OpenedRecording | None = None
         self._watches = Watches(self._begin_watch, self._end_watch)
         self.topics, self.nodes = Topics(("", 0)), Nodes()
         self.networks = Networks(settings, (), lambda _event: None, alerts)
@@ -64,7 +65,6 @@ class Replay:
         self.console = Console(lambda: self._position_ns() / 1e9)
         self.graph: GraphView | None = None
         self.densities: Densities | None = None
-        self.opened: OpenedRecording | None = None
         self.chosen = ""
         self._logs: list[Watch] = []
         self._alerts, self._has_failed, self._damaged = alerts, False, 0

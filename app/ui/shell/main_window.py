@@ -23,7 +23,7 @@ from app.ui.shell.bars.banner import AlertBanner, BannerSpacer
 from app.ui.shell.bars.developer_tools import DeveloperTools
 from app.ui.shell.bars.question_card import QuestionCard
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
-from app.ui.shell.bars.status_bar import StatusBar, StatusFacts
+from app.ui.shell.bars.status_bar import Fact, StatusBar, StatusFacts
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.shell import START
@@ -469,8 +469,11 @@ class MainWindow(QMainWindow):
                 (facts.health(), facts.saved()), (facts.topics(), facts.remote_access_quietly())
             )
         elif self.showing == "developer":
-            left = (facts.master(), facts.remote_access(), facts.traffic(), facts.lost())
-            self.status.show_facts(left, (facts.shown(), facts.window()))
+            left: tuple[Fact, ...] = (facts.master(), facts.remote_access(), facts.traffic(), facts.lost())
+            right: tuple[Fact, ...] = (facts.shown(), facts.window())
+            if self.session.replay is not None:
+                left, right = facts.recording(), (facts.live_goes_on(), facts.master(), facts.window())
+            self.status.show_facts(left, right)
         title = (
             "NEP Studio"
             if self.showing == START

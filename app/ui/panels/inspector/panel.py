@@ -198,7 +198,8 @@ class InspectorPanel(PanelWidget):
         """What is said of a message stays as it was when it came, however long it is looked at."""
         if message is not self._facts_of[0]:
             kind = kind_named(split_key(self._topic)[0])
-            self._facts_of = (message, message_facts(message, self._since_ns, kind))
+            recorded = self.session.replay is not None
+            self._facts_of = (message, message_facts(message, self._since_ns, kind, recorded=recorded))
         return self._facts_of[1]
 
     def _show_value(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent, QObject
 
 from app.ui.shell.bars.run_bar import ToolBar
+from app.ui.shell.bars.source_switch import SourceSwitch
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.freeze import all_frozen, freezable
 from app.ui.shell.commands.shell import Shell
@@ -15,6 +16,8 @@ from nep.i18n import _
 FREEZE = "view.freeze"
 EVERY = 8  # half ticks
 ROOM_PX = 780  # what the whole bar needs at 100 % text
+SOURCE_ROOM_PX = 960  # ... and with the source, which the View menu has, too
+RECORDING_ROOM_PX = 1060  # ... and with the way back to the live network
 FREEZE_ROOM_PX = 520  # below that nothing of what a stop brought would be whole beside it
 
 
@@ -40,11 +43,18 @@ class DeveloperTools(QObject):
             bar.add_tool(tool, place)
         for button in (self.freeze, self.layout, self.panels):
             button.let_shrink()
+        self.source = SourceSwitch(theme, commands.session, self._actions)
+        for place, tool in enumerate((self.source, self.source.back), tools.index(self.freeze) + 1):
+            bar.add_tool(tool, place)
         bar.installEventFilter(self)
         theme.changed.connect(self._fit)
 
     def refresh(self) -> None:
         """Say what is so now."""
+        was_recording = self.source.is_recording
+        self.source.refresh()
+        if self.source.is_recording != was_recording:
+            self._fit()
         shell, frozen = self._shell, all_frozen(self._shell.bench)
         self._actions[FREEZE].setChecked(frozen)
         self.freeze.setChecked(frozen)
@@ -61,7 +71,10 @@ class DeveloperTools(QObject):
 
     def _fit(self) -> None:
         """Large text in a narrow window: layouts and panels, then Freeze, are in the View menu."""
-        room = self._bar.width() >= self._shell.theme.scaled(ROOM_PX)
+        scaled, recording = self._shell.theme.scaled, self.source.is_recording
+        paint.show_when(self.source, recording or self._bar.width() >= scaled(SOURCE_ROOM_PX))
+        paint.show_when(self.source.back, recording)
+        room = self._bar.width() >= scaled(RECORDING_ROOM_PX if recording else ROOM_PX)
         for tool in self._wide_only:
             paint.show_when(tool, room)
         paint.show_when(self.freeze, self._bar.width() >= self._shell.theme.scaled(FREEZE_ROOM_PX))

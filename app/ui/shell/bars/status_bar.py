@@ -10,11 +10,12 @@ from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.network.remote_access import access_words
+from app.core.replay.scale import clock_words, date_words
 from app.core.robots.health_facts import facts_of, has_told
 from app.core.robots.robot_link import STOPPING
 from app.core.run.view import connected_words
 from app.core.session import Session
-from app.ui.text.numbers import age_words, grouped
+from app.ui.text.numbers import age_words, grouped, size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, StatusItem, paint
 from nep.i18n import _, ngettext
@@ -136,6 +137,33 @@ class StatusFacts:
             return NOTHING
         words = ngettext("{count} lost in 30 s", "{count} lost in 30 s", lost)
         return "triangle-alert", words.format(count=grouped(lost)), "warn"
+
+    def recording(self) -> tuple[Fact, ...]:
+        """Which recording shows, from when to when, what is in it, and what was lost while it was made."""
+        replay = self._session.replay
+        if replay is None or replay.opened is None:
+            return ()
+        recorded = replay.opened.recording
+        name = _("{name}, {size}").format(name=replay.name, size=size_words(recorded.size_bytes))
+        begin, end = (clock_words(each, digits=0) for each in (replay.start_ns, replay.end_ns))
+        when = _("{date}, {begin} to {end}").format(date=date_words(replay.start_ns), begin=begin, end=end)
+        count, messages = len(recorded.topics), recorded.message_count
+        topics = ngettext("{count} topic", "{count} topics", count).format(count=grouped(count))
+        said = ngettext("{count} message", "{count} messages", messages).format(count=grouped(messages))
+        lost: Fact = NOTHING
+        if replay.lost:
+            words = ngettext("{count} lost while recording", "{count} lost while recording", replay.lost)
+            lost = ("triangle-alert", words.format(count=grouped(replay.lost)), "warn")
+        return (
+            ("history", name, None),
+            ("", when, None),
+            ("", _("{topics}, {messages}").format(topics=topics, messages=said), None),
+            lost,
+        )
+
+    def live_goes_on(self) -> Fact:
+        """That a recording does not hide from robots, Stop and alarms what happens now."""
+        return "radio-tower", _("Live network goes on"), None
 
     def shown(self) -> Fact:
         """How many messages of the topics that are looked at were shown; nothing when all were."""

@@ -31,6 +31,7 @@ class Commands:
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         keys = Shortcuts(session.settings, shell.complain, COMMANDS)
+        self.session = session
         self.files = DocumentController(
             session, asks, shell.say, partial(bring_into_view, shell), shell.editor
         )
