@@ -13,6 +13,7 @@ from PySide6.QtGui import (
     QColor,
     QHelpEvent,
     QImage,
+    QKeyEvent,
     QMouseEvent,
     QPainter,
     QPaintEvent,
@@ -448,6 +449,10 @@ class TimelineCanvas(QAbstractScrollArea):
         topic = self.topic_at(event.position().y())
         if topic and event.position().x() < self._plot().left():
             self.opened.emit(topic)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """All keys are the panel's; a scroll area would take the arrows."""
+        event.ignore()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Over the time it zooms; over the names it scrolls."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import log10
+from math import exp, log, log10
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
@@ -118,7 +118,7 @@ class Transport(QWidget):
 
 def speed_of(step: int) -> float:
     """The speed of a step of the slider: 0.1 at its left end, 1 in the middle, 10 at its right end."""
-    return round(SPEED_MIN * pow(SPEED_MAX / SPEED_MIN, step / SPEED_STEPS), 2)
+    return round(SPEED_MIN * exp(log(SPEED_MAX / SPEED_MIN) * step / SPEED_STEPS), 2)
 
 
 def step_of(speed: float) -> int:
