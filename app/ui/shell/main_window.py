@@ -57,6 +57,7 @@ BLOCK_KEYS = {
 }
 MENU = QKeyCombination(Qt.KeyboardModifier.ShiftModifier, Qt.Key.Key_F10)
 DUPLICATE = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_D)
+BOOKMARK = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_B)
 SOON_WORDS = {"behaviour": lazy("Getting the blocks ready.")}
 OTHER_SOON_WORDS = lazy("Getting the panels ready.")
 
@@ -370,6 +371,8 @@ class MainWindow(QMainWindow):
             self._run(f"blocks.edit:{what}")
         elif event.key() == Qt.Key.Key_Space and self.session.replay is not None and not event.modifiers():
             self._run("replay.play")
+        elif event.keyCombination() == BOOKMARK and self.session.replay is not None:
+            self._run("replay.bookmark")
         elif event.keyCombination() == MENU and (focus := QApplication.focusWidget()) is not None:
             # Qt itself knows only the key with a menu on it, which many keyboards lack.
             place = focus.rect().center()

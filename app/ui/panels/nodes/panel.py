@@ -34,6 +34,7 @@ WORDS = TableWords(
     filter=lazy("Filter nodes"),
     nothing_fits=lazy("No node has these words"),
     clear_the_filter=lazy("Clear the filter to see all nodes."),
+    not_recorded=lazy("A recording does not tell which programs there were"),
 )
 SORT_EVERY = 30  # refreshes of 30 a second: what moves is sorted once a second
 LIVELY = frozenset({"cpu"})

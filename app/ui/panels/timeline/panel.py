@@ -13,7 +13,7 @@ from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.timeline.canvas import TimelineCanvas
 from app.ui.panels.timeline.transport import Transport
 from app.ui.widgets import Chip, EmptyAction, EmptyState, Segments, Separator
-from nep.i18n import _
+from nep.i18n import _, pgettext
 
 START, CLOCK = "start", "clock"
 ZOOM = 1.5
@@ -65,7 +65,7 @@ class TimelinePanel(PanelWidget):
         if replay is not self._shown:
             self._shown, self._state = replay, ()
             self.set_title(_("Timeline"), replay.name)
-            self.chip.set(_("recorded"), "info", "")
+            self.chip.set(pgettext("message", "recorded"), "info", "")
             self.canvas.show_replay(replay)
             self.pages.setCurrentIndex(1)
             self.ruler.setVisible(True)

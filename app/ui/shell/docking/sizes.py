@@ -44,6 +44,7 @@ def fit(
     gap: int,
     scale: float = 1.0,
     folded: Container[str] = (),
+    *,
     below: int = 0,
 ) -> None:
     """Give every column and every panel in it the size of the layout, in the room that there is now.

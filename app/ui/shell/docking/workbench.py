@@ -142,7 +142,7 @@ class Workbench(QMainWindow):
         if self._arranged and not self._moved and not self._fold_timer.isActive():
             gap, scale = self._theme.size("gap", self._layout.density), self._theme.scaled(1)
             below = self._size_below(scale)
-            fit(self, self._layout, self.docks, gap, scale, self._behind(), below + gap if below else 0)
+            fit(self, self._layout, self.docks, gap, scale, self._behind(), below=below + gap if below else 0)
 
     def _size_below(self, scale: float) -> int:
         """Give what stands below all others its height, which is told."""
