@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from app.core.alerts import Alerts
@@ -17,7 +16,7 @@ from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import Networks
 from app.core.replay.density import Densities
 from app.core.replay.opening import OpenedRecording
-from app.core.replay.source import Handed, ReplayFigures, ReplaySource, ReplayStatus
+from app.core.replay.source import Handed, ReplaySource, ReplayStatus
 from app.core.series.feed import SeriesFeed
 from app.core.storage.settings import Settings
 from nep.i18n import _, ngettext
@@ -267,9 +266,8 @@ class Replay:
                 self.console.take(batch.messages, batch.dropped)
             self._add(topic, batch, now)
         self.series.add(handed.drained.batches)
-        if handed.figures is not None and self.graph is not None:
-            self.graph = with_figures(self.graph, handed.figures)
-            self.topics.update(self.graph, now)
+        if handed.figures:
+            self.topics.set_figures({name: (x.rate_hz, x.newest_ns) for name, x in handed.figures.items()})
         self.topics.age(now, self._position_ns())
 
     def _opened(self, opened: OpenedRecording, now: float) -> None:
@@ -369,16 +367,3 @@ def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicFig
         ratio = lost / sent if lost is not None and sent else None
         made[name] = TopicInfo(name, topic.msg_type, topic.codec, publishers, lost=lost, loss_ratio=ratio)
     return GraphView(1, 1, topics=made)
-
-
-def with_figures(view: GraphView, figures: ReplayFigures) -> GraphView:
-    """The same graph with what the topics did at the playhead."""
-    topics = {
-        name: replace(
-            info,
-            rate_hz=figures.rates_hz.get(name, 0.0),
-            last_stamp_ns=figures.newest_ns.get(name),
-        )
-        for name, info in view.topics.items()
-    }
-    return replace(view, topics=topics)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -25,6 +25,7 @@ from nep.recordings.reader import Recording
 
 RATE_S = 2.0
 FIGURES_EVERY_S = 0.5
+TOPICS_AT_ONCE = 100
 FIGURES_SHARE = 10.0
 """Figures are read no more often than this many times the time that they take."""
 HISTORY_S = (5.0, 20.0, 60.0, 180.0)
@@ -65,10 +66,13 @@ class ReplayStatus:
 
 @dataclass(frozen=True, slots=True)
 class ReplayFigures:
-    """Of all topics at the playhead: messages a second before it, and when the newest one came (ns)."""
+    """Of a topic at the playhead: messages a second before it, and when the newest one came (ns).
 
-    rates_hz: Mapping[str, float]
-    newest_ns: Mapping[str, int]
+    None is not known, and that there was none.
+    """
+
+    rate_hz: float | None
+    newest_ns: int | None
 
 
 @dataclass(slots=True)
@@ -82,7 +86,7 @@ class Handed:
     jump: Sequence[Message] | None = None
     history: dict[str, Sequence[Message]] = field(default_factory=dict)
     drained: Drained = field(default_factory=lambda: Drained({}, [], 0))
-    figures: ReplayFigures | None = None
+    figures: dict[str, ReplayFigures] = field(default_factory=dict)
 
 
 class ReplaySource:
@@ -105,7 +109,8 @@ class ReplaySource:
         self._status = ReplayStatus("reading")
         self._closing = False
         self._playback: Playback | None = None
-        self._next_figures = 0.0
+        self._figures: list[tuple[int, list[str]]] = []
+        self._next_figures = self._figures_s = 0.0
         self._thread = threading.Thread(target=self._run, name="studio-replay", daemon=True)
 
     # -- what the window calls -------------------------------------------------------------------------------
@@ -234,9 +239,11 @@ class ReplaySource:
         else:
             self._hand(due.messages)
             self._tell(playback)
-        if due.is_jump or (due.messages and self._clock() >= self._next_figures):
-            self._tell_figures(playback)
-        return due.wait_s
+        is_due = playback.status().is_playing and not self._figures and self._clock() >= self._next_figures
+        if due.is_jump or is_due:
+            self._begin_figures(playback)
+        self._tell_figures()
+        return 0.0 if self._figures else due.wait_s
 
     def _tell(self, playback: Playback) -> None:
         damaged = self.opened.recording.damaged_chunks if self.opened is not None else 0
@@ -312,20 +319,33 @@ class ReplaySource:
 
     # -- figures ---------------------------------------------------------------------------------------------
 
-    def _tell_figures(self, playback: Playback) -> None:
+    def _begin_figures(self, playback: Playback) -> None:
+        """Tell the figures of the playhead, of some topics with each turn, so that no order waits for all."""
         if self.opened is None:
             return
-        began = self._clock()
-        recording, at_ns = self.opened.recording, playback.status().position_ns
+        names, at_ns = list(self.opened.recording.topics), playback.status().position_ns
+        self._figures = [(at_ns, names[k : k + TOPICS_AT_ONCE]) for k in range(0, len(names), TOPICS_AT_ONCE)]
+        self._next_figures = self._clock() + max(FIGURES_EVERY_S, FIGURES_SHARE * self._figures_s)
+        self._figures_s = 0.0
+
+    def _tell_figures(self) -> None:
+        if not self._figures or self.opened is None:
+            return
+        began, recording = self._clock(), self.opened.recording
+        at_ns, topics = self._figures.pop(0)
         from_ns = max(recording.start_ns, at_ns - round(RATE_S * 1e9))
-        counts = recording.densities(from_ns, at_ns + 1, 1)
         passed_s = (at_ns - from_ns) / 1e9
-        rates = {topic: each[0] / passed_s for topic, each in counts.items()} if passed_s > 0 else {}
-        figures = ReplayFigures(rates, recording.newest_times(at_ns))
+        counts = recording.densities(from_ns, at_ns + 1, 1, topics) if passed_s > 0 else {}
+        newest_ns = recording.newest_times(at_ns, topics)
+        figures = {
+            topic: ReplayFigures(
+                counts.get(topic, (0,))[0] / passed_s if passed_s > 0 else None, newest_ns.get(topic)
+            )
+            for topic in topics
+        }
         with self._changed:
-            self._handed.figures = figures
-        now = self._clock()
-        self._next_figures = now + max(FIGURES_EVERY_S, FIGURES_SHARE * (now - began))
+            self._handed.figures.update(figures)
+        self._figures_s += self._clock() - began
 
 
 class _ClosingError(Exception):

@@ -264,10 +264,11 @@ def test_who_plots_gets_what_was_before_the_playhead(replay, whole):
 def test_figures_are_those_of_the_playhead(replay, whole):
     played = replay()
     handed = played.do(lambda playback: playback.seek(whole[59][0]))
-    assert handed.figures.newest_ns["/rare"] == whole[20][0]
-    assert handed.figures.rates_hz["/rare"] == pytest.approx(1 / ((whole[59][0] - whole[0][0]) / 1e9))
+    assert handed.figures["/rare"].newest_ns == whole[20][0]
+    assert handed.figures["/rare"].rate_hz == pytest.approx(1 / ((whole[59][0] - whole[0][0]) / 1e9))
     handed = played.do(lambda playback: playback.seek(whole[5][0]))
-    assert "/rare" not in handed.figures.newest_ns
+    assert handed.figures["/rare"].newest_ns is None
+    assert handed.figures["/rare"].rate_hz == 0.0
 
 
 def test_a_recording_without_an_end_is_repaired_to_a_copy_which_is_used_again(tmp_path, path, whole):
