@@ -40,7 +40,7 @@ ReplayStage = Literal["reading", "repairing", "there", "failed"]
 Order = Callable[[Playback], object]
 
 
-class Pictures(Protocol):
+class PictureSink(Protocol):
     """What shows pictures: told in the replay's thread, as it decodes in its own."""
 
     def offer(self, messages: Sequence[Message]) -> None:
@@ -93,7 +93,7 @@ class ReplaySource:
     """One recording. `start` and `close` begin and end its thread; everything else returns at once."""
 
     def __init__(
-        self, path: Path, pictures: Pictures, *, clock: Callable[[], float] = time.monotonic
+        self, path: Path, pictures: PictureSink, *, clock: Callable[[], float] = time.monotonic
     ) -> None:
         """Nothing is read before `start`, or `open` and `turn`, which are what the thread does."""
         self.path = path

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.core.replay.replay import STEP_NS, Replay
 from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.timeline.canvas import TimelineCanvas
-from app.ui.panels.timeline.transport import Transport
+from app.ui.panels.timeline.transport import TransportRow
 from app.ui.widgets import Chip, EmptyAction, EmptyState, Segments, Separator
 from nep.i18n import _, pgettext
 
@@ -27,7 +27,7 @@ class TimelinePanel(PanelWidget):
         theme = self.theme
         self._shown: Replay | None = None
         self._state: tuple[object, ...] = ()
-        self.transport, self.canvas = Transport(theme), TimelineCanvas(theme)
+        self.transport, self.canvas = TransportRow(theme), TimelineCanvas(theme)
         self.ruler = Segments(
             theme,
             ((START, _("From start"), None), (CLOCK, _("Clock"), None)),

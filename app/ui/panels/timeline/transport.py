@@ -23,7 +23,7 @@ SLOW = 0.97
 """Below this share of the speed that is asked for it is said."""
 
 
-class Transport(QWidget):
+class TransportRow(QWidget):
     """Shows a replay's state and tells it what a person wants; `bookmark_wanted` is the window's."""
 
     bookmark_wanted = Signal()

@@ -1,16 +1,21 @@
-"""The left end of the tool bar: freeze what shows, which layout this is, and its panels."""
+"""The left end of the tool bar: freeze what shows, its source, which layout this is, and its panels."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject
+from PySide6.QtGui import QColor
 
+from app.core.replay.scale import span_words
+from app.core.session import Session
+from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.run_bar import ToolBar
-from app.ui.shell.bars.source_switch import SourceSwitch
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.freeze import all_frozen, freezable
 from app.ui.shell.commands.shell import Shell
 from app.ui.text import plain
-from app.ui.widgets import MenuButton, Separator, ToggleButton, paint
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, MenuButton, Separator, ToggleButton, paint
+from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
 FREEZE = "view.freeze"
@@ -19,6 +24,49 @@ ROOM_PX = 780  # what the whole bar needs at 100 % text
 SOURCE_ROOM_PX = 960  # ... and with the source, which the View menu has, too
 RECORDING_ROOM_PX = 1060  # ... and with the way back to the live network
 FREEZE_ROOM_PX = 520  # below that nothing of what a stop brought would be whole beside it
+
+LIVE_ICON, RECORDING_ICON = "radio-tower", "history"
+
+
+class SourceSwitch(MenuButton):
+    """Says what shows, and lets a person choose; `back` stands beside it while a recording shows."""
+
+    def __init__(self, theme: Theme, session: Session, actions: Actions) -> None:
+        super().__init__(theme, _("Live network"), LIVE_ICON, size="small")
+        self._session, self._actions = session, actions
+        self._is_recording = False
+        self.back = Button(theme, _("Back to live"), LIVE_ICON, size="small")
+        for button in (self, self.back):
+            button.let_shrink()
+        actions.bind(self.back, "replay.live")
+        self.clicked.connect(self._drop)
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a recording shows."""
+        return self._is_recording
+
+    def refresh(self) -> None:
+        """Say what is so now."""
+        replay = self._session.replay
+        self._is_recording = replay is not None
+        if replay is None:
+            self.set_word(_("Live network"), LIVE_ICON)
+            return
+        there = replay.opened is not None
+        length = span_words(replay.end_ns - replay.start_ns, digits=0) if there else ""
+        self.set_word(f"{replay.name}  {length}".strip(), RECORDING_ICON)
+
+    def _drop(self) -> None:
+        menu = Menu(self._theme, self)
+        menu.addActions([self._actions["replay.open"], self._actions["replay.live"]])
+        drop_below(menu, self)
+
+    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+        if self._is_recording and self.isEnabled():
+            colour = self._theme.colour
+            return colour("accentTint"), colour("accent"), colour("accentText")
+        return super()._look()
 
 
 class DeveloperTools(QObject):
