@@ -439,12 +439,13 @@ class PlotPanel(PanelWidget):
         if event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier):
             return False
         far = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
+        replay = self.session.replay  # while a recording shows, Space plays that
         does: dict[int, Callable[[], object]] = {
             Qt.Key.Key_C: self.focus_filter,
             Qt.Key.Key_M: self.cursors.toggle,
             Qt.Key.Key_A: lambda: self._put_here("A"),
             Qt.Key.Key_B: lambda: self._put_here("B"),
-            Qt.Key.Key_Space: self._pause_or_go_on,
+            Qt.Key.Key_Space: self.freeze.toggle if replay is None else replay.toggle,
             Qt.Key.Key_Left: lambda: self._arrow(-far),
             Qt.Key.Key_Right: lambda: self._arrow(far),
             Qt.Key.Key_Plus: lambda: self._zoom(1 / 1.5, self._middle_s()),
@@ -456,13 +457,6 @@ class PlotPanel(PanelWidget):
             return False
         wanted()
         return True
-
-    def _pause_or_go_on(self) -> None:
-        """While a recording is shown, the key plays that."""
-        if self.session.replay is not None:
-            self.session.replay.toggle()
-        else:
-            self.freeze.toggle()
 
     def _middle_s(self) -> float:
         return (self.canvas.begin_s + self.canvas.end_s) / 2
