@@ -38,9 +38,9 @@ class TransportRow(QWidget):
             label("", "body", role="textSecondary"),
         )
         self.previous = IconButton(theme, "skip-back", _("Previous mark"), "Ctrl+Left")
-        self.back = IconButton(theme, "step-back", _("Previous message of the chosen topic"), "Left")
+        self.back = IconButton(theme, "step-back", _("Previous message of the chosen topic"))
         self.play = Button(theme, _("Play"), "play", kind="primary")
-        self.on = IconButton(theme, "step-forward", _("Next message of the chosen topic"), "Right")
+        self.on = IconButton(theme, "step-forward", _("Next message of the chosen topic"))
         self.next = IconButton(theme, "skip-forward", _("Next mark"), "Ctrl+Right")
         self.speed = Track(theme, SPEED_STEPS)
         self.speed.setAccessibleName(_("Speed"))
