@@ -68,9 +68,9 @@ from nep.protocol.graph_view import GraphView
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    from app.core.replay import replay as replay_module
+    from app.core.recording.replay import replay as replay_module
 else:
-    replay_module = lazy_module("app.core.replay.replay")
+    replay_module = lazy_module("app.core.recording.replay.replay")
 
 CHECK_S = 1.0
 NO_WATCH = lazy("can't watch over the robots: {error}")

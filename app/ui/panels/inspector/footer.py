@@ -10,7 +10,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.replay.scale import clock_words
+from app.core.recording.replay.scale import clock_words
 from app.ui.text import plain
 from app.ui.text.numbers import age_words, grouped, latency_words, size_words
 from app.ui.theme.theme import Theme

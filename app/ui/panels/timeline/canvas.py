@@ -25,8 +25,8 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QAbstractScrollArea, QToolTip
 
-from app.core.replay.replay import Replay
-from app.core.replay.scale import TimeScale, clock_words, span_words
+from app.core.recording.replay.replay import Replay
+from app.core.recording.replay.scale import TimeScale, clock_words, span_words
 from app.ui.text import plain
 from app.ui.text.numbers import grouped
 from app.ui.theme.icons import paint_icon

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.core.replay.replay import STEP_NS, Replay
+from app.core.recording.replay.replay import STEP_NS, Replay
 from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.timeline.canvas import TimelineCanvas
 from app.ui.panels.timeline.transport import TransportRow

@@ -8,8 +8,8 @@ from math import exp, log, log10
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from app.core.replay.replay import Replay
-from app.core.replay.scale import clock_words, date_words, span_words
+from app.core.recording.replay.replay import Replay
+from app.core.recording.replay.scale import clock_words, date_words, span_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, ToggleButton, label
 from app.ui.widgets.flow_layout import Flow

@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent, QObject
 from PySide6.QtGui import QColor
 
-from app.core.replay.scale import span_words
+from app.core.recording.replay.scale import span_words
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.run_bar import ToolBar

@@ -7,7 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import QUrl
 
 from app.core.recording.folder import usual_folder
-from app.core.replay.replay import Replay
+from app.core.recording.replay.replay import Replay
 from app.core.session import Session
 from app.ui.other_programs import open_outside
 from app.ui.shell.commands.shell import Shell

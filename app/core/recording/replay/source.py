@@ -17,7 +17,7 @@ from typing import Literal, Protocol
 
 from app.core.faults import error_words
 from app.core.network.mailbox import Drained, Mailbox
-from app.core.replay.opening import OpenedRecording, Stage, open_recording
+from app.core.recording.replay.opening import OpenedRecording, Stage, open_recording
 from nep.errors import NepError
 from nep.messages.message import Message, new_message
 from nep.recordings.player import Playback, PlayerStatus

@@ -14,9 +14,9 @@ from app.core.network.nodes import Nodes
 from app.core.network.topics import Topics
 from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import Networks
-from app.core.replay.density import Densities
-from app.core.replay.opening import OpenedRecording
-from app.core.replay.source import Handed, ReplaySource, ReplayStatus
+from app.core.recording.replay.density import Densities
+from app.core.recording.replay.opening import OpenedRecording
+from app.core.recording.replay.source import Handed, ReplaySource, ReplayStatus
 from app.core.series.feed import SeriesFeed
 from app.core.storage.settings import Settings
 from nep.i18n import _, ngettext

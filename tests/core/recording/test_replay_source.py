@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.core.network.mailbox import MESSAGES_PER_TOPIC
-from app.core.replay.source import Handed, ReplaySource
+from app.core.recording.replay.source import Handed, ReplaySource
 from nep.errors import RecordingError
 from nep.messages.message import Message
 from nep.recordings.player import Playback

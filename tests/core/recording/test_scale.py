@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from app.core.replay.scale import LEAST_SPAN_NS, TimeScale, clock_words, span_words
+from app.core.recording.replay.scale import LEAST_SPAN_NS, TimeScale, clock_words, span_words
 
 S = 1_000_000_000
 WHOLE = TimeScale.whole(100 * S, 860 * S)

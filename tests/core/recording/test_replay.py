@@ -9,7 +9,7 @@ import pytest
 
 from app.core.alerts import Alerts
 from app.core.network.mailbox import Batch
-from app.core.replay.replay import Replay, graph_of
+from app.core.recording.replay.replay import Replay, graph_of
 from app.core.storage.settings import Settings
 from nep.messages.message import Message
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
