@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QUrl
 
-from app.core.recording.folder import usual_folder
-from app.core.recording.replay.replay import Replay
 from app.core.session import Session
 from app.ui.other_programs import open_outside
 from app.ui.shell.commands.shell import Shell
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.errors import RecordingError
 from nep.i18n import _
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.core.recording import folder
+    from app.core.recording.replay.replay import Replay
+else:
+    folder = lazy_module("app.core.recording.folder")
 
 TIMELINE = "timeline"
 
@@ -27,8 +33,8 @@ class ReplayCommands:
     def ask_open(self) -> None:
         """Let a person choose a recording, and open it."""
         replay = self._session.replay
-        folder = replay.path.parent if replay is not None else usual_folder()
-        self._asks.open_recording(str(folder), self.open)
+        place = replay.path.parent if replay is not None else folder.usual_folder()
+        self._asks.open_recording(str(place), self.open)
 
     def open(self, path: Path) -> None:
         """Show a recording, with its time line; what is wrong with it becomes an alert."""
