@@ -89,6 +89,11 @@ class Console:
         self._unread = 0
         self.revision += 1
 
+    def rewind(self) -> None:
+        """Forget all: the source is at another time, and says again what it said."""
+        self._errors = log_handler.ShownErrors()
+        self.clear()
+
     def _put(self, lines: Sequence[ConsoleRecord | Message]) -> None:
         self._lines.extend(lines)
         self._unread = min(self._unread + len(lines), len(self._lines))

@@ -9,8 +9,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.core.alarms import SessionAlarms
 from app.core.alerts import Alerts
@@ -65,6 +67,12 @@ from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.core.recording.replay import replay as replay_module
+else:
+    replay_module = lazy_module("app.core.recording.replay.replay")
 
 CHECK_S = 1.0
 NO_WATCH = lazy("can't watch over the robots: {error}")
@@ -72,8 +80,30 @@ LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """What the Console shows."""
 
 
+@dataclass(slots=True)
+class LiveNetwork:
+    """What is known of the live network, whatever is shown: robots, Stop, alarms and health go by it."""
+
+    topics: Topics
+    nodes: Nodes
+    networks: Networks
+    images: Images
+    series: SeriesFeed
+    graph: GraphView | None
+
+
 class Session:
-    """Everything that the panels show. One thread uses it (the window's); `close` ends its threads."""
+    """Everything that the panels show. One thread uses it (the window's); `close` ends its threads.
+
+    ``topics``, ``nodes``, ``networks``, ``images``, ``series`` and ``graph`` are those of the source that is
+    shown: of the live network (`live`), which goes on all the time, or of a recording (``replay``).
+    """
+
+    replay: replay_module.Replay | None = None
+    sources_shown = 0
+    """Grows when another source is shown."""
+    _live: LiveNetwork | None = None  # while a recording is shown
+    _closing_replays: list[replay_module.Replay]
 
     def __init__(
         self,
@@ -146,11 +176,13 @@ class Session:
         self._program, self.tick_ms = OwnProgram(), 0.0
         self._robots_seen = self._topics_seen = -1
         self._reachable: tuple[StopTarget, ...] = ()
-        self._tries_to_reach, self._next_check = False, 0.0
+        self._tries_to_reach = False
+        self._next_check, self._closing_replays = 0.0, []
         self._learning = MasterChange()
 
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:
-        self.images.offer(messages, topic)
+        live = self._live
+        (self.images if live is None else live.images).offer(messages, topic)
 
     def _warn(self, topic: str, messages: Sequence[Message]) -> None:
         self.alarms.take(topic, messages)
@@ -161,6 +193,48 @@ class Session:
     def document(self) -> Document:
         """The behaviour whose tab shows."""
         return self.documents.current
+
+    @property
+    def live(self) -> LiveNetwork:
+        """The live network, whether it is shown or not."""
+        if self._live is not None:
+            return self._live
+        return LiveNetwork(self.topics, self.nodes, self.networks, self.images, self.series, self.graph)
+
+    @property
+    def shown_console(self) -> Console:
+        """What the programs of the source that is shown have said."""
+        return self.replay.console if self.replay is not None else self.console
+
+    def open_recording(self, path: Path) -> replay_module.Replay:
+        """Show a recording in place of the live network, which goes on; it is read in a thread."""
+        live = self.live
+        self._end_replay()
+        self._live = live
+        self.replay = opened = replay_module.Replay(path, self.settings, self.alerts, clock=self._clock)
+        self.topics, self.nodes, self.networks = opened.topics, opened.nodes, opened.networks
+        self.images, self.series, self.graph = opened.images, opened.series, None
+        self.sources_shown += 1
+        opened.start()
+        return opened
+
+    def back_to_live(self) -> None:
+        """Show the live network again, and close the recording."""
+        live = self._live
+        if live is None:
+            return
+        self.topics, self.nodes, self.networks = live.topics, live.nodes, live.networks
+        self.images, self.series, self.graph = live.images, live.series, live.graph
+        self._live = None
+        self.sources_shown += 1
+        self._end_replay()
+
+    def _end_replay(self) -> None:
+        if self.replay is not None:
+            ended, self.replay = self.replay, None
+            self._closing_replays = [each for each in self._closing_replays if not each.has_ended]
+            self._closing_replays.append(ended)
+            ended.end()
 
     @property
     def coming(self) -> tuple[str, ...]:
@@ -179,11 +253,15 @@ class Session:
             self.launcher.ensure_master()
 
     def watch(self, topic: str) -> Watch:
-        """Look at a topic until the watch is closed: its messages arrive in `Topics`.
+        """Look at a topic of the live network until the watch is closed: its messages arrive in `Topics`.
 
         Here and in `topic` and `mark_seen` it is named as among the topics of all networks (`key_of`).
         """
         return self._watches.open([topic])
+
+    def watch_shown(self, topic: str) -> Watch:
+        """The same of the source that is shown now; when another one is, it has to be asked for anew."""
+        return self.watch(topic) if self.replay is None else self.replay.watch(topic)
 
     def topic(self, key: str) -> Topic | None:
         """The topic of that name, of whichever network; None when it is not known."""
@@ -209,9 +287,17 @@ class Session:
                 self._on_event(event, now)
         self._on_messages(drained, now)
         with self.guarded(lazy("let topics and nodes age")):
-            self.topics.age(now, now_ns)
-            self.nodes.age(now)
-            self.networks.age(now, now_ns)
+            live = self.live
+            live.topics.age(now, now_ns)
+            live.nodes.age(now)
+            live.networks.age(now, now_ns)
+        if self.replay is not None:
+            with self.guarded(lazy("follow the recording")):
+                was_open = self.replay.opened is not None
+                self.replay.tick(now)
+                self.graph = self.replay.graph
+                if not was_open and self.replay.opened is not None:
+                    self.sources_shown += 1  # now it is known what is there, and from when on
         with self.guarded(lazy("follow the robots")):
             self._follow_robots()
         with self.guarded(lazy("watch over the alarms")):
@@ -267,8 +353,15 @@ class Session:
             self._health.settings(self.settings.not_kept)
             self._health.program(self._program.fate())
 
+    def _close_replays(self) -> None:
+        self.back_to_live()
+        for each in self._closing_replays:
+            each.close()
+        self._closing_replays.clear()
+
     def close(self) -> None:
         """End the program, the threads and the processes that were started here, whatever one does."""
+        live = self.live
         ends: list[tuple[str, Callable[[], object]]] = [
             ("end the program", self.runs.close),
             ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
@@ -279,11 +372,12 @@ class Session:
             ("end the robots", self.fleet.close),
             ("keep the room", self.room.close),
             ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),
-            ("end the pictures", self.images.close),
+            ("end the pictures", live.images.close),
             ("end the doctor", self.doctor.close),
             ("end the recorder", self.recordings.close),  # before the master goes that it may need
+            ("close the recording", self._close_replays),
             ("leave the network", self.source.close),
-            ("leave other networks", self.networks.close),
+            ("leave other networks", live.networks.close),
             ("end setting parameters", self.parameters.close),
             ("end what was started here", self.launcher.close),
             ("end the reach", self.remote_access.close),
@@ -296,19 +390,19 @@ class Session:
 
     def _begin_watch(self, topic: str) -> None:
         if split_key(topic)[0]:
-            self.networks.watch(topic)
+            self.live.networks.watch(topic)
             return
         self.source.watch(topic)
-        known = self.topics.get(topic)
+        known = self.live.topics.get(topic)
         if known is not None:
             known.watched = True
 
     def _end_watch(self, topic: str) -> None:
         if split_key(topic)[0]:
-            self.networks.unwatch(topic)
+            self.live.networks.unwatch(topic)
             return
         self.source.unwatch(topic)
-        self.topics.unwatch(topic)
+        self.live.topics.unwatch(topic)
         self.fleet.unwatched(topic)
 
     def _forget_watch(self, topic: str) -> None:
@@ -324,9 +418,9 @@ class Session:
                 self._on_batch(topic, batch, now)
         for key, batch in others.items():
             with self.guarded(lazy("take over messages of {topic}"), topic=key):
-                self.networks.add(key, batch, now)
+                self.live.networks.add(key, batch, now)
         with self.guarded(lazy("take over what is plotted")):
-            self.series.add(drained.batches)
+            self.live.series.add(drained.batches)
         with self.guarded(lazy("count messages")):
             self.traffic.add(batches, now)
         with self.guarded(lazy("take over what robots say")):
@@ -354,8 +448,9 @@ class Session:
         if topic in LOGS:
             self.console.take(batch.messages, batch.dropped)
         if self._watches.watched(topic):  # else the last of a subscription that has just ended
-            self.topics.add(topic, batch, now)
-            self.topics[topic].watched = True
+            topics = self.live.topics
+            topics.add(topic, batch, now)
+            topics[topic].watched = True
 
     def _on_event(self, event: object, now: float) -> None:
         match event:
@@ -400,7 +495,7 @@ class Session:
         self, event: RemoteAccessChanged | NetworkEvent | RecorderSaid | RecorderGone, now: float
     ) -> None:
         if isinstance(event, NetworkEvent):
-            self.networks.on_event(event, now)
+            self.live.networks.on_event(event, now)
         elif isinstance(event, RemoteAccessChanged):
             self.remote_access.changed(event)
         else:
@@ -408,16 +503,19 @@ class Session:
 
     def _on_graph(self, view: GraphView, now: float) -> None:
         self.remote_access.follow(view)
-        if self._learning.still(self.graph, view, now):
+        if self._learning.still(self.live.graph, view, now):
             return
-        before = self.graph
+        live = self.live
+        before = live.graph
         if before is not None and (before.epoch, before.revision) != (view.epoch, view.revision):
             for line in arrivals(before, view):
                 self.console.add("info", "master", line)
-        self.graph = view
+        if self._live is None:
+            self.graph = view
+        live.graph = view
         self.alarms.see(view)
-        self.topics.update(view, now)
-        self.nodes.update(view, now)
+        live.topics.update(view, now)
+        live.nodes.update(view, now)
         self.fleet.update(view)
         self.room.update(view)
         for note in self.fleet.take_notes():
@@ -441,7 +539,7 @@ class Session:
                 button=_(ASK_DOCTOR),
                 action="help.doctor",
             )
-            self.topics.values_revision += 1
+            self.live.topics.values_revision += 1
 
     def _follow_robots(self) -> None:
         if self.fleet.revision != self._robots_seen:
@@ -452,9 +550,10 @@ class Session:
                 self.launcher.came(robot.name)
                 self.alerts.resolve(f"companion:{robot.name}")
         self._keep_within_reach()
-        if self.topics.revision != self._topics_seen:
-            self._topics_seen = self.topics.revision
-            self.documents.set_topics(sorted(topic.name for topic in self.topics.live()))
+        topics = self.live.topics
+        if topics.revision != self._topics_seen:
+            self._topics_seen = topics.revision
+            self.documents.set_topics(sorted(topic.name for topic in topics.live()))
 
     def _look_for_problems_of_stop(self) -> None:
         """Once a second: whom a stop can't reach is told, and tried again."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -126,13 +126,16 @@ def records_of(file: BinaryIO, size: int, offset: int = len(MAGIC)) -> Iterator[
         offset += HEAD_BYTES + length
 
 
-def read_index(file: BinaryIO, path: Path) -> FileIndex:
-    """The index of a recording. Raises `RecordingError` for what is none, `OSError`."""
+def read_index(file: BinaryIO, path: Path, progress: Callable[[int, int], object] | None = None) -> FileIndex:
+    """The index of a recording. Raises `RecordingError` for what is none, `OSError`.
+
+    `progress` is told how many bytes of how many are done, where they all have to be looked through.
+    """
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
     if file.read(len(MAGIC)) != MAGIC:
         raise RecordingError(str(path), _("it is no MCAP file"))
-    return _of_summary(file, size) or _of_records(file, size)
+    return _of_summary(file, size) or _of_records(file, size, progress)
 
 
 # ---- by the summary
@@ -215,12 +218,14 @@ def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
 # ---- by the records
 
 
-def _of_records(file: BinaryIO, size: int) -> FileIndex:
+def _of_records(file: BinaryIO, size: int, progress: Callable[[int, int], object] | None) -> FileIndex:
     index = FileIndex(is_complete=False, end=len(MAGIC))
     scanned = _Scan(file, index)
     for place in records_of(file, size):
         scanned.add(place)
         index.end = place.offset + HEAD_BYTES + place.length
+        if progress is not None:
+            progress(index.end, size)
         if place.opcode == Opcode.DATA_END:
             break
     scanned.end_chunk()

@@ -83,6 +83,9 @@ class Playback:
         self._anchor = (clock(), self._position_ns)
         self._measured: deque[tuple[float, int]] = deque()
         self._jump: list[Message] | None = None
+        self._shown_ns = recording.start_ns
+        self._from_ns = recording.start_ns
+        """Nothing of this time, or later, was given out."""
         self._coming: Iterator[RecordedMessage] = iter(())
         self._next: RecordedMessage | None = None
         self._read_from(recording.start_ns)
@@ -110,7 +113,7 @@ class Playback:
 
     def _show_and_read_from(self, shown_ns: int, at_ns: int) -> None:
         """Go to a time; due at once is what was there at `shown_ns`, and what came later comes as it came."""
-        self._position_ns = at_ns
+        self._position_ns, self._shown_ns = at_ns, shown_ns
         newest = self._recording.newest(shown_ns, self._topics)
         self._jump = [self._renamed(each.message) for each in sorted(newest.values(), key=_log_ns)]
         self._read_from(shown_ns + 1)
@@ -125,6 +128,21 @@ class Playback:
             return False
         self.seek(found.log_ns)
         return True
+
+    def choose(self, topics: Collection[str]) -> Sequence[Message]:
+        """Play these topics from here on, and no others.
+
+        Gives the newest message up to here of each that was not played before; where a jump is due, that
+        brings it.
+        """
+        new = set(topics) if self._topics is None else set(topics).difference(self._topics)
+        self._topics = frozenset(topics)
+        if self._jump is not None:
+            self._show_and_read_from(self._shown_ns, self._position_ns)
+            return ()
+        self._read_from(self._from_ns)
+        newest = self._recording.newest(self._from_ns - 1, new) if new else {}
+        return [self._renamed(each.message) for each in sorted(newest.values(), key=_log_ns)]
 
     @property
     def speed(self) -> float:
@@ -219,6 +237,11 @@ class Playback:
         while self._next is not None and self._next.log_ns <= until_ns and len(due) < _MOST_AT_ONCE:
             due.append(self._next)
             self._next = next(self._coming, None)
+        if self._next is None or self._next.log_ns > until_ns:
+            given_ns = until_ns
+        else:  # those of one time are not told apart: where it is cut between them, some come twice
+            given_ns = due[-1].log_ns - (self._next.log_ns == due[-1].log_ns)
+        self._from_ns = max(self._from_ns, given_ns + 1)
         return due
 
     def _come_to_end(self) -> None:
@@ -248,6 +271,7 @@ class Playback:
         )
 
     def _read_from(self, at_ns: int) -> None:
+        self._from_ns = at_ns
         self._coming = self._recording.read(at_ns, None, self._topics)
         self._next = next(self._coming, None)
 

@@ -7,14 +7,14 @@ import threading
 from array import array
 from bisect import bisect_left, bisect_right
 from collections import OrderedDict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 import orjson
 
-from nep.errors import ClosedError, RecordingError
+from nep.errors import ClosedError
 from nep.messages.message import Message
 from nep.recordings.channels import ChannelDecoder, Role
 from nep.recordings.figures import TopicFigures, read_figures
@@ -41,12 +41,16 @@ class RecordedMessage(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordedTopic:
-    """A topic of a recording. `codec` and `msg_type` are those of its first channel."""
+    """A topic of a recording. `codec` and `msg_type` are those of its first channel.
+
+    `publishers`: their numbers, None where one has none.
+    """
 
     name: str
     msg_type: str
     codec: str
     message_count: int
+    publishers: tuple[int | None, ...] = ()
 
 
 class Recording:
@@ -57,9 +61,16 @@ class Recording:
     `topics`: by name. `damaged_chunks`: pieces of the file that were wanted and could not be read so far.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *, cache_bytes: int = _CACHE_BYTES) -> None:
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        cache_bytes: int = _CACHE_BYTES,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> None:
         """Open it: by its summary at once, else by a look at the head of each record.
 
+        `progress` is told then how many bytes of how many are done; what it raises ends it, and comes out.
         Raises `RecordingError` for what is no recording.
         """
         check_packages()
@@ -74,13 +85,13 @@ class Recording:
         except OSError as error:
             raise disk_sentence(self.path, error) from error
         try:
-            self._index: FileIndex = read_index(self._file, self.path)
-        except RecordingError:
-            self._file.close()
-            raise
+            self._index: FileIndex = read_index(self._file, self.path, progress)
         except OSError as error:
             self._file.close()
             raise disk_sentence(self.path, error) from error
+        except BaseException:
+            self._file.close()
+            raise
         self.is_complete = self._index.is_complete
         self._decoders = {
             number: ChannelDecoder(each) for number, each in self._index.definitions.channels.items()
@@ -116,12 +127,14 @@ class Recording:
         for number, decoder in self._decoders.items():
             if decoder.role is None and number in self._in_chunks:
                 count = counts.get(number, 0)
+                publishers: tuple[int | None, ...] = (decoder.publisher,)
                 known = made.get(decoder.topic)
                 if known is not None:
                     msg_type, codec, count = known.msg_type, known.codec, count + known.message_count
+                    publishers = tuple(dict.fromkeys((*known.publishers, *publishers)))
                 else:
                     msg_type, codec = decoder.msg_type, decoder.codec
-                made[decoder.topic] = RecordedTopic(decoder.topic, msg_type, codec, count)
+                made[decoder.topic] = RecordedTopic(decoder.topic, msg_type, codec, count, publishers)
         return dict(sorted(made.items()))
 
     # ---- what it is
@@ -255,6 +268,16 @@ class Recording:
             message = self._message_at(number, offset, channel)
             if message is not None:
                 made[topic] = RecordedMessage(log_ns, message)
+        return made
+
+    def newest_times(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, int]:
+        """When the newest message of each topic came that came at `at_ns` or before; of the indexes alone."""
+        made: dict[str, int] = {}
+        for channel in self._channels(topics):
+            place = self._last_before(channel, at_ns)
+            if place is not None:
+                topic = self._decoders[channel].topic
+                made[topic] = max(place[0], made.get(topic, 0))
         return made
 
     def before(self, at_ns: int, topic: str) -> RecordedMessage | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 from app.core.messages.picture import Picture, Size, decode, once_more
@@ -151,6 +151,7 @@ class Images:
         self._arrived = threading.Condition(self.lock)
         self._streams: dict[str, list[ImageStream]] = {}
         self._closing = False
+        self._times = 0
         self._thread: threading.Thread | None = None
 
     def stream(self, topic: str) -> ImageStream:
@@ -183,6 +184,20 @@ class Images:
                         stream.waiting = (message, now)
                     stream.arriving.add(now)
             self._arrived.notify()
+
+    def rewind(self, topics: Collection[str] = ()) -> None:
+        """The source is at another time, and shows others of these topics; of the rest there are none."""
+        with self.lock:
+            self._times += 1
+            for topic, streams in self._streams.items():
+                for stream in streams:
+                    if stream.held:
+                        continue
+                    stream.waiting = None
+                    stream.arriving = Rate()
+                    if topic not in topics:
+                        stream.picture = stream.error = None
+                        stream.awaits_picture = True
 
     def forget(self, stream: ImageStream) -> None:
         """A stream was closed, or rests."""
@@ -241,7 +256,7 @@ class Images:
     def decode_waiting(self) -> None:
         """Decode the newest picture of each stream that waits for one; its own thread does it."""
         with self.lock:
-            work = self._take_waiting()
+            work, times = self._take_waiting(), self._times
         for streams, message, arrived_s, size in work:
             try:
                 picture, error = once_more(streams[0].picture, message, arrived_s, size), None
@@ -255,7 +270,7 @@ class Images:
                     ),
                 )
             with self.lock:
-                for stream in streams:
+                for stream in streams if times == self._times else ():
                     _give(stream, message, picture, error)
 
     def _any_waiting(self) -> bool:

@@ -102,6 +102,11 @@ class Mailbox:
                 ring.size_bytes -= ring.messages.popleft().size_bytes
                 ring.dropped += 1
 
+    def forget(self, topic: str) -> None:
+        """Nobody wants any more what waits of a topic; it is not counted as dropped."""
+        with self._lock:
+            self._rings.pop(topic, None)
+
     def post_event(self, event: object) -> None:
         """Hand over one event.
 

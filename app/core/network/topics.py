@@ -297,6 +297,24 @@ class Topics:
             topic.last_received = None
             topic.watched = False
 
+    def set_figures(self, figures: Mapping[str, tuple[float | None, int | None]]) -> None:
+        """By topic the messages a second, and when the newest came (ns), where no publishers tell it."""
+        for name, (rate_hz, newest_ns) in figures.items():
+            topic = self._topics.get(name)
+            if topic is not None:
+                topic.rate_hz, topic.last_stamp_ns = rate_hz, newest_ns
+                if rate_hz is not None:
+                    topic.rates.append(rate_hz)
+        self.values_revision += 1
+
+    def rewind(self) -> None:
+        """The source is at another time: what was newest, and when, is told anew."""
+        for topic in self._topics.values():
+            topic.newest = topic.previous = None
+            topic.last_stamp_ns = topic.last_received = topic.age_s = None
+            topic.rates.clear()
+        self.values_revision += 1
+
     def _vanish(self, topic: Topic, now: float) -> None:
         topic.gone_since, topic.gone_s = now, 0.0
         topic.publishers, topic.publisher_nodes = 0, ()

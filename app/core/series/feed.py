@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol
 
 from app.core.network.mailbox import Batch
@@ -17,6 +17,9 @@ class SeriesTaker(Protocol):
 
     def take(self, batch: Batch, now_ns: int) -> None:
         """Take over a batch; ``now_ns`` is this computer's time, for messages that carry none."""
+
+    def rewind(self) -> None:
+        """What comes next is of another time: nothing that was there counts any more, and nothing is lost."""
 
 
 class SeriesFeed:
@@ -67,6 +70,12 @@ class SeriesFeed:
             del self._takers[topic]
             self._watching.pop(topic).close()
             self._set_room(topic, None)
+
+    def rewind(self, topics: Iterable[str] | None = None) -> None:
+        """The source is at another time: what these topics (None: all) had is forgotten."""
+        for topic in list(self._takers) if topics is None else topics:
+            for taker in self._takers.get(topic, ()):
+                taker.rewind()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Hand over what arrived since the last tick, by topic."""

@@ -79,6 +79,13 @@ class FieldSeries:
         if number_gap:
             self.numbers.break_line()
 
+    def rewind(self) -> None:
+        """Begin anew."""
+        self.numbers.clear()
+        self.states.clear()
+        self.last = MISSING
+        self.missing = 0
+
     def _no_state(self, time_s: float) -> None:
         if len(self.states):
             self.states.add(time_s, None)
@@ -148,6 +155,15 @@ class TopicSeries:
         self.lost += lost + max(batch.dropped, first_jumps)
         for field in self.fields:
             field.take(times, payloads, gaps)
+
+    def rewind(self) -> None:
+        """Forget what came: the next message is of another time."""
+        self._seqs.clear()
+        self._gap, self._last_s, self._usual_s, self._silences = False, None, None, 0
+        self.received = self.lost = self.unread = self.unplaced = 0
+        self.payload = MISSING
+        for field in self.fields:
+            field.rewind()
 
     def _missed(self, message: Message) -> int:
         """How many messages of its publisher are missing right before this one."""

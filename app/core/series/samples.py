@@ -210,7 +210,7 @@ class Samples:
     def clear(self) -> None:
         """Begin anew."""
         self.truncate(-np.inf)
-        self.begun = 0
+        self.begun = self.undone = 0
 
     def _rewrite(self, place: int, time_s: float) -> None:
         for level in self._levels:

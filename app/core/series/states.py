@@ -62,6 +62,13 @@ class States:
             del self._begins[:drop], self._words[:drop]
             self.forgotten += drop
 
+    def clear(self) -> None:
+        """Begin anew."""
+        self._begins.clear()
+        self._words.clear()
+        self.last_s = None
+        self.forgotten = self.undone = 0
+
     def _truncate(self, time_s: float) -> None:
         place = bisect_left(self._begins, time_s)
         self.undone += len(self._begins) - place

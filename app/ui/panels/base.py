@@ -185,6 +185,9 @@ class PanelWidget(QWidget):
         """The height of a row in its density, grown with the text."""
         return round(self.theme.scaled(self.theme.size("row", self.density)))
 
+    def source_changed(self) -> None:
+        """The session shows another source, a recording or the live network: begin anew with that."""
+
     def show_topic(self, name: str) -> None:
         """Show this topic, if the panel accepts topics."""
 

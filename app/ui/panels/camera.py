@@ -73,7 +73,7 @@ class CameraPanel(OneRobotPanel):
 
     def show_robot(self, link: RobotLink) -> None:
         self._topic = _topic_of(link)
-        self._stream = self.session.images.stream(self._topic)
+        self._stream = self.session.live.images.stream(self._topic)
         self.view.clear()
         self._rates.clear()
         self.set_title(_("Camera"), self._topic)

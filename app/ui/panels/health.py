@@ -124,7 +124,7 @@ class HealthPanel(OneRobotPanel):
             self.chip.set("")
             self._no_robot.tell(self.session.coming)
             return
-        facts = facts_of(link, self.session.topics, time.monotonic(), _whole_age)
+        facts = facts_of(link, self.session.live.topics, time.monotonic(), _whole_age)
         if facts != self._facts:
             self._facts = facts
             self._show(facts, link)

@@ -32,6 +32,8 @@ class TableWords:
     filter: str
     nothing_fits: str
     clear_the_filter: str
+    not_recorded: str = ""
+    """... and why a recording shows none; "" for what is not of the source that shows."""
 
 
 class TablePanel(PanelWidget, Generic[Row]):
@@ -115,6 +117,10 @@ class TablePanel(PanelWidget, Generic[Row]):
             words = self._words
             self.empty.say(_(words.nothing_fits), _(words.clear_the_filter), "search")
             self.empty.set_actions([EmptyAction(_("Clear the filter"), self.filter.clear, "x")])
+        elif self.session.replay is not None and self._words.not_recorded:
+            self.doctor.hide()
+            self.empty.say(_(self._words.not_recorded), "", "film")
+            self.empty.set_actions([])
         elif self.session.master.kind == "none":
             said = _("A master lets programs find each other.")
             self.empty.say(_("No master is running"), said, "radio-tower")

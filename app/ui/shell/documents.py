@@ -22,6 +22,7 @@ from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
 
 LONGEST_FLUSH_MS = 500
+RECORDINGS = ".mcap"
 
 
 @runtime_checkable
@@ -65,6 +66,8 @@ class DocumentController:
         self._session, self.asks, self._say, self._shown = session, asks, say, shown
         self._documents = session.documents
         self._editor, self._clock = editor, clock
+        self.open_recording: Callable[[Path], object] = lambda _path: None
+        """What opens a recording that came from outside."""
 
     def new(self) -> None:
         """Begin an empty behaviour in a tab of its own."""
@@ -88,13 +91,16 @@ class DocumentController:
     def open_all(self, paths: Sequence[Path]) -> None:
         """Open files that came from outside: the command line, a drop, another start.
 
-        Those that are no behaviours become one alert, the others open.
+        Those that are neither behaviours nor recordings become one alert, the others open.
         """
         self._session.alerts.resolve("strange")
-        strange = [path for path in paths if path.suffix.lower() != SUFFIX]
+        recordings = [path for path in paths if path.suffix.lower() == RECORDINGS]
+        strange = [path for path in paths if path.suffix.lower() not in {SUFFIX, RECORDINGS}]
         for path in paths:
-            if path not in strange:
+            if path not in strange and path not in recordings:
                 self.open(path)
+        for path in recordings[-1:]:  # one at a time is shown
+            self.open_recording(path)
         if strange:
             self._complain(strange_words(strange), "file.open", _("Open another file"), alert="strange")
 

@@ -23,7 +23,7 @@ from app.ui.shell.bars.banner import AlertBanner, BannerSpacer
 from app.ui.shell.bars.developer_tools import DeveloperTools
 from app.ui.shell.bars.question_card import QuestionCard
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
-from app.ui.shell.bars.status_bar import StatusBar, StatusFacts
+from app.ui.shell.bars.status_bar import Fact, StatusBar, StatusFacts
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.shell import START
@@ -57,6 +57,7 @@ BLOCK_KEYS = {
 }
 MENU = QKeyCombination(Qt.KeyboardModifier.ShiftModifier, Qt.Key.Key_F10)
 DUPLICATE = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_D)
+BOOKMARK = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_B)
 SOON_WORDS = {"behaviour": lazy("Getting the blocks ready.")}
 OTHER_SOON_WORDS = lazy("Getting the panels ready.")
 
@@ -99,6 +100,7 @@ class MainWindow(QMainWindow):
         self._ahead: dict[str, Workbench] = {}  # with panels, for layouts that nobody has gone to yet
         self._facts = StatusFacts(session)
         self._alerts_seen = -1
+        self._source_seen = session.sources_shown
         self._ticks = self._halves = 0
         self._twice = False  # the timer runs twice as often as the tick
         self._shut = False
@@ -367,6 +369,10 @@ class MainWindow(QMainWindow):
             what = "duplicate"
         if what:
             self._run(f"blocks.edit:{what}")
+        elif event.key() == Qt.Key.Key_Space and self.session.replay is not None and not event.modifiers():
+            self._run("replay.play")
+        elif event.keyCombination() == BOOKMARK and self.session.replay is not None:
+            self._run("replay.bookmark")
         elif event.keyCombination() == MENU and (focus := QApplication.focusWidget()) is not None:
             # Qt itself knows only the key with a menu on it, which many keyboards lack.
             place = focus.rect().center()
@@ -393,6 +399,13 @@ class MainWindow(QMainWindow):
             self.bench.refresh(pictures=True)
         self.tools.follow()
 
+    def _follow_source(self) -> None:
+        """Let all panels begin anew when another source is shown."""
+        if self._source_seen != self.session.sources_shown:
+            self._source_seen = self.session.sources_shown
+            for bench in (*self.benches.values(), *self._ahead.values()):
+                bench.source_changed()
+
     def _follow_panels(self) -> None:
         """Let panels that nobody can see rest, and the timer run no faster than they need."""
         now = self._clock()
@@ -416,6 +429,8 @@ class MainWindow(QMainWindow):
             self.question.refresh()
         with guarded(lazy("make room for what is said")):
             self.room.follow()
+        with guarded(lazy("show another source")):
+            self._follow_source()
         with guarded(lazy("let panels rest")):
             self._follow_panels()
         with guarded(lazy("show the panels")):
@@ -458,8 +473,17 @@ class MainWindow(QMainWindow):
                 (facts.recording(), facts.topics(), facts.remote_access_quietly()),
             )
         elif self.showing == "developer":
-            left = (facts.master(), facts.remote_access(), facts.traffic(), facts.lost())
-            right = (facts.recording(), facts.ring(), facts.shown(), facts.window())
+            left: tuple[Fact, ...] = (facts.master(), facts.remote_access(), facts.traffic(), facts.lost())
+            right: tuple[Fact, ...] = (facts.recording(), facts.ring(), facts.shown(), facts.window())
+            if self.session.replay is not None:
+                left = facts.replayed()
+                right = (
+                    facts.recording(),
+                    facts.ring(),
+                    facts.live_goes_on(),
+                    facts.master(),
+                    facts.window(),
+                )
             self.status.show_facts(left, right)
         title = (
             "NEP Studio"

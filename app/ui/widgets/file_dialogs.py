@@ -52,6 +52,9 @@ class FileDialogs(Protocol):
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
         """Which picture; "" for the folder where this computer keeps pictures."""
 
+    def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Which recording to play."""
+
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         """Which folder."""
 
@@ -66,6 +69,7 @@ def pictures_folder() -> str:
 
 
 BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
+RECORDINGS = (lazy("Recordings"), "*.mcap")
 PICTURES = (lazy("Pictures"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
 """What a dialog offers, in words, and the patterns of the names."""
 
@@ -115,6 +119,11 @@ class SystemDialogs:
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog(_("Choose a picture"), folder or pictures_folder(), take, PICTURES)
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.show()
+
+    def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Open a recording"), folder, take, RECORDINGS)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 

@@ -161,7 +161,7 @@ class AlarmsPanel(PanelWidget):
 
     def refresh(self) -> None:
         self._ticks += 1
-        facts = (self.alarms.alarms.revision, self.session.topics.revision)
+        facts = (self.alarms.alarms.revision, self.session.live.topics.revision)
         if facts != self._seen:
             self._seen = facts
             self._show_rules()
@@ -200,7 +200,7 @@ class AlarmsPanel(PanelWidget):
         return row
 
     def _icon(self, rule: AlarmRule) -> str:
-        topic = self.session.topics.get(rule.condition.name)
+        topic = self.session.live.topics.get(rule.condition.name)
         return ICONS.get(topic.codec, "box") if topic is not None else "radio-tower"
 
     def _show_states(self) -> None:
@@ -335,9 +335,9 @@ class AlarmsPanel(PanelWidget):
             return ()
         match part.role:
             case "subject" if rule.condition.is_about_node:
-                return sorted({node.name for node in self.session.nodes})[:MOST_OFFERED]
+                return sorted({node.name for node in self.session.live.nodes})[:MOST_OFFERED]
             case "subject":
-                return sorted(topic.name for topic in self.session.topics.live())[:MOST_OFFERED]
+                return sorted(topic.name for topic in self.session.live.topics.live())[:MOST_OFFERED]
             case "value":
                 return self._paths(rule.condition.name)
             case "time":
@@ -348,7 +348,7 @@ class AlarmsPanel(PanelWidget):
                 return ()
 
     def _paths(self, name: str) -> list[str]:
-        topic = self.session.topics.get(name)
+        topic = self.session.live.topics.get(name)
         newest = topic.newest if topic is not None else None
         if newest is None or newest.size_bytes > 256 * 1024:
             return []
@@ -359,9 +359,9 @@ class AlarmsPanel(PanelWidget):
 
     def _names(self, kind: str) -> list[str]:
         if kind == "call":
-            return sorted(self.session.graph.services) if self.session.graph is not None else []
+            return sorted(self.session.live.graph.services) if self.session.live.graph is not None else []
         if kind == "send":
-            return sorted(topic.name for topic in self.session.topics.live())[:MOST_OFFERED]
+            return sorted(topic.name for topic in self.session.live.topics.live())[:MOST_OFFERED]
         titles = [self.session.documents.title(document) for document in self.session.documents]
         return list(dict.fromkeys([*titles, *(file.name for file in self.session.settings.recent)]))
 

@@ -105,8 +105,12 @@ class ConsolePanel(PanelWidget):
 
     # ---- showing
 
+    def source_changed(self) -> None:
+        self._seen = -1
+        self.model.show_all((), self._wanted())
+
     def refresh(self) -> None:
-        console = self.session.console
+        console = self.session.shown_console
         choice = (self.level, self.node, self.words.text())
         if (console.revision, choice) == (self._seen, self._choice):
             return
@@ -193,7 +197,7 @@ class ConsolePanel(PanelWidget):
 
     def clear(self) -> None:
         """Forget all lines."""
-        self.session.console.clear()
+        self.session.shown_console.clear()
         self.refresh()
 
     def _name_filter(self) -> None:
@@ -206,7 +210,7 @@ class ConsolePanel(PanelWidget):
         menu = Menu(self.theme, self)
         for level, words in FROM.items():
             self._offer(menu, _(words), level == self.level, partial(self.set_level, level))
-        nodes = sorted({record.origin for record in self.session.console.records} | {self.node} - {""})
+        nodes = sorted({record.origin for record in self.session.shown_console.records} | {self.node} - {""})
         if nodes:
             menu.addSeparator()
             self._offer(menu, _("Of everybody"), not self.node, partial(self.set_node, ""))

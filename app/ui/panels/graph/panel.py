@@ -171,6 +171,9 @@ class GraphPanel(PanelWidget):
 
     # -- what it shows ---------------------------------------------------------------------------------------
 
+    def source_changed(self) -> None:
+        self._seen = ()
+
     def refresh(self) -> None:
         self._ticks += 1
         if self._ticks % QUIET_EVERY == 1:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, Qt, QUrl
-from PySide6.QtGui import QAction, QGuiApplication, QImage, QResizeEvent
+from PySide6.QtGui import QAction, QGuiApplication, QImage, QKeySequence, QResizeEvent
 
 from app.core.messages import snapshots
 from app.core.networks.networks import topic_words
@@ -103,6 +103,15 @@ class ImagePanel(PanelWidget):
             self.session.mark_seen(name)
         self._say_nothing()
 
+    def source_changed(self) -> None:
+        topic = self._topic
+        self.shut()
+        self._stream, self._revision = None, (-1, -1)
+        plays = self.session.replay is not None  # which Space does then
+        self.actions_of["freeze"].setShortcut(QKeySequence() if plays else QKeySequence(Qt.Key.Key_Space))
+        if topic:
+            self.show_topic(topic)
+
     def _show_place_of(self, topic: str) -> None:
         """How a person looked, zoomed and turned, belongs to a topic: it comes back with it."""
         if len(self._places) >= MOST_PLACES:
@@ -129,9 +138,13 @@ class ImagePanel(PanelWidget):
             self.empty.say(_("This can't be shown as a picture"), f"{self._stream.error}.", "circle-x")
             look = EmptyAction(_("Look at the message"), self._inspect, "list-tree")
             self.empty.set_actions([look])
+        elif self.session.replay is not None and self._there:  # before the topic's first picture
+            self.view.clear()
+            self._say_nothing()
 
     def _look_at_robot(self) -> None:
-        link = owner_of(self.session, self._topic)
+        is_live = self.session.replay is None  # what a robot sees now has no place in what it saw then
+        link = owner_of(self.session, self._topic) if is_live else None
         name = link.name if link is not None else ""
         if name != self._watched_robot:
             self._leave_robot()

@@ -10,6 +10,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.core.recording.replay.scale import clock_words
 from app.ui.text import plain
 from app.ui.text.numbers import age_words, grouped, latency_words, size_words
 from app.ui.theme.theme import Theme
@@ -25,20 +26,24 @@ _SHOWN_S = 0.0001
 """Less than the last digit is not shown as nothing."""
 
 
-def message_facts(message: Message, since_ns: int = 0, network: NetworkKind | None = None) -> str:
+def message_facts(
+    message: Message, since_ns: int = 0, network: NetworkKind | None = None, *, recorded: bool = False
+) -> str:
     """``seq 18 204   412 B   latency 0.6 ms``, just when it came; what is not known is left out.
 
     Of another computer's message ``latency 3.2 ms ± 0.4 ms``, corrected by how the clocks differ. Another
     ``network`` than Studio's own is named when it does not tell what is missing.
 
     A latched message from before ``since_ns``, when somebody began to look, took no time on its way: it says
-    how long ago it was sent.
+    how long ago it was sent. One of a recording has the time of day when it was.
     """
     facts = [size_words(message.size_bytes)]
     if message.seq is not None:
         facts.insert(0, _("seq {number}").format(number=grouped(message.seq)))
     if message.stamp_ns is not None:
-        if message.is_latched and message.stamp_ns < since_ns:
+        if recorded:
+            facts.append(_("sent {clock}").format(clock=clock_words(min(message.stamp_ns, 2**62))))
+        elif message.is_latched and message.stamp_ns < since_ns:
             age_s = (time.time_ns() - message.stamp_ns) / 1e9
             facts.append(_("latched, sent {age} ago").format(age=age_words(age_s)))
         else:

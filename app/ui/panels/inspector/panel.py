@@ -113,18 +113,25 @@ class InspectorPanel(PanelWidget):
         self.set_title(_("Inspector"), topic_words(name))
         if name:
             self._since_ns = time.time_ns()
-            self._watch = self.session.watch(name)
+            self._watch = self.session.watch_shown(name)
             self.session.mark_seen(name)
         self._say_nothing()
+
+    def source_changed(self) -> None:
+        topic = self._topic
+        self.show_topic("")
+        self.show_topic(topic)
 
     def refresh(self) -> None:
         if not self._topic:
             return
-        topic = self.session.topic(self._topic)
-        self.live.set(*chip_words(topic, self.frozen))
+        topic, recorded = self.session.topic(self._topic), self.session.replay is not None
+        self.live.set(*chip_words(topic, self.frozen, recorded=recorded))
         newest = topic.newest if topic is not None and topic.gone_s is None else None
         if topic is not None and newest is not None and newest is not self._shown and not self.frozen:
             self._take(newest)
+        elif recorded and newest is None and self._shown is not None and not self.frozen:
+            self._show_none_yet()
         if self.body.page == NOTHING:
             self._say_waiting(topic)
         done = self.reader.take()
@@ -133,6 +140,15 @@ class InspectorPanel(PanelWidget):
         self.foot.show_next_facts(self.clock())
         if self.body.page == TREE and self.tree.fading():
             self.tree.viewport().update()
+
+    def _show_none_yet(self) -> None:
+        """The playhead is before the topic's first message."""
+        self.reader.forget()
+        self._shown = self._allowed = self._reading = None
+        self._value, self._before = None, OFF
+        self.model.clear()
+        self.foot.clear()
+        self._page(NOTHING)
 
     def _say_waiting(self, topic: Topic | None) -> None:
         unread = self.session.networks.unread(self._topic)
@@ -183,7 +199,8 @@ class InspectorPanel(PanelWidget):
         """What is said of a message stays as it was when it came, however long it is looked at."""
         if message is not self._facts_of[0]:
             kind = kind_named(split_key(self._topic)[0])
-            self._facts_of = (message, message_facts(message, self._since_ns, kind))
+            recorded = self.session.replay is not None
+            self._facts_of = (message, message_facts(message, self._since_ns, kind, recorded=recorded))
         return self._facts_of[1]
 
     def _show_value(self) -> None:
@@ -333,10 +350,12 @@ class InspectorPanel(PanelWidget):
         self.reader.close()
 
 
-def chip_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
+def chip_words(topic: Topic | None, frozen: bool, *, recorded: bool = False) -> tuple[str, str, str]:
     """The words, status and icon of the chip that says whether what is shown is still coming."""
     if frozen:
         return pgettext("message", "frozen"), "off", "snowflake"
+    if recorded:
+        return pgettext("message", "recorded"), "info", ""
     if topic is None:
         return pgettext("topic", "gone"), "off", ""
     if topic.stale and not (topic.counted is not None and topic.counted[0] > 0):  # nothing comes any more

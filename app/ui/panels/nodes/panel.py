@@ -35,6 +35,7 @@ WORDS = TableWords(
     filter=lazy("Filter nodes"),
     nothing_fits=lazy("No node has these words"),
     clear_the_filter=lazy("Clear the filter to see all nodes."),
+    not_recorded=lazy("A recording does not tell which programs there were"),
 )
 SORT_EVERY = 30  # refreshes of 30 a second: what moves is sorted once a second
 LIVELY = frozenset({"cpu"})
@@ -101,6 +102,9 @@ class NodesPanel(NetworkTable[NodeRow]):
     def _facts(self) -> tuple[object, ...]:
         session = self.session
         return session.nodes.revision, session.networks.revision, session.master.kind
+
+    def source_changed(self) -> None:
+        self._seen, self._values = (), -1
 
     def rebuild(self) -> None:
         nodes = [*self.session.nodes, *self.session.networks.nodes]

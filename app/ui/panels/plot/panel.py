@@ -168,6 +168,17 @@ class PlotPanel(PanelWidget):
         self.canvas.cursor_moved.connect(self._put_cursor)
         self.canvas.field_dropped.connect(self.plot_field)
 
+    def source_changed(self) -> None:
+        """Plot the same of the other source."""
+        kept = self.save_state()
+        self.tools.add.shut()
+        self.curves.close()
+        self.curves = Curves(self.session.series, self._topic_names)
+        self.shown.clear()
+        self.canvas.cursors.clear()
+        self.cursors.setChecked(False)
+        self.restore_state(kept)
+
     def _topic_names(self) -> list[str]:
         topics = [*self.session.topics, *self.session.networks.topics]
         return [topic.key for topic in topics]
@@ -428,12 +439,13 @@ class PlotPanel(PanelWidget):
         if event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier):
             return False
         far = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
+        replay = self.session.replay  # while a recording shows, Space plays that
         does: dict[int, Callable[[], object]] = {
             Qt.Key.Key_C: self.focus_filter,
             Qt.Key.Key_M: self.cursors.toggle,
             Qt.Key.Key_A: lambda: self._put_here("A"),
             Qt.Key.Key_B: lambda: self._put_here("B"),
-            Qt.Key.Key_Space: self.freeze.toggle,
+            Qt.Key.Key_Space: self.freeze.toggle if replay is None else replay.toggle,
             Qt.Key.Key_Left: lambda: self._arrow(-far),
             Qt.Key.Key_Right: lambda: self._arrow(far),
             Qt.Key.Key_Plus: lambda: self._zoom(1 / 1.5, self._middle_s()),

@@ -50,7 +50,7 @@ class FieldOffers:
         """Look at the topics that can be plotted."""
         for topic in self._some():
             if topic.key not in self._watches:
-                self._watches[topic.key] = self._session.watch(topic.key)
+                self._watches[topic.key] = self._session.watch_shown(topic.key)
 
     def close(self) -> None:
         """Look no more."""

@@ -84,11 +84,13 @@ class SessionPictures:
 
     def topics(self) -> Sequence[str]:
         """The picture topics that there are now."""
-        return sorted(t.name for t in self._session.topics if t.codec == PICTURE_CODEC and t.gone_s is None)
+        return sorted(
+            t.name for t in self._session.live.topics if t.codec == PICTURE_CODEC and t.gone_s is None
+        )
 
     def stream(self, topic: str) -> ImageStream:
         """Look at one until it is closed."""
-        made = self._session.images.stream(topic)
+        made = self._session.live.images.stream(topic)
         self._opened = [*self.streams, made]
         return made
 

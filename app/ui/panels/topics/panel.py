@@ -30,11 +30,13 @@ FOOT_OF_NETWORKS = lazy(
     "Rates come from the publishers; on {networks} nobody tells rates or losses, and what you look at is"
     " counted here"
 )
+RECORDED_FOOT = lazy("As recorded; an age is how long before the playhead")
 WORDS = TableWords(
     title=lazy("Topics"),
     filter=lazy("Filter topics"),
     nothing_fits=lazy("No topic has these words"),
     clear_the_filter=lazy("Clear the filter to see all topics."),
+    not_recorded=lazy("There are no topics in the recording yet"),
 )
 FIGURES_EVERY = 3  # refreshes of 30 a second: figures are renewed ten times a second
 SORT_EVERY = 30
@@ -87,6 +89,9 @@ class TopicsPanel(NetworkTable["Topic"]):
         topics, networks = self.session.topics, self.session.networks
         return topics.revision, len(topics), networks.revision, self.session.master.kind
 
+    def source_changed(self) -> None:
+        self._seen = ()
+
     def rebuild(self) -> None:
         self._seen = self._facts()
         topics = [*self.session.topics, *self.session.networks.topics]
@@ -99,7 +104,9 @@ class TopicsPanel(NetworkTable["Topic"]):
         self._say_counts(len(topics), len(rows) if words else None)
         self.show_table(bool(rows), bool(words))
         self.show_networks()
-        self.foot.setText(_foot([network.kind for network in self.session.networks.chosen]))
+        recorded = self.session.replay is not None
+        kinds = [network.kind for network in self.session.networks.chosen]
+        self.foot.setText(_(RECORDED_FOOT) if recorded else _foot(kinds))
         self.foot.setVisible(bool(rows))
         self.line.setVisible(bool(rows))
 

@@ -1,4 +1,4 @@
-"""The left end of the tool bar: record, keep, freeze what shows, which layout this is, and its panels."""
+"""The left end of the tool bar: record, keep, freeze, which source and layout this is, and its panels."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from PySide6.QtCore import QEvent, QObject, QSize
 from PySide6.QtGui import QColor
 
 from app.core.recording.recordings import SessionRecordings
+from app.core.recording.replay.scale import span_words
 from app.core.session import Session
+from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.run_bar import ToolBar
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.freeze import all_frozen, freezable
@@ -15,16 +17,19 @@ from app.ui.text import plain
 from app.ui.text.numbers import length_words, size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, MenuButton, Separator, ToggleButton, name_command, paint
+from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
 FREEZE, RECORD, KEEP = "view.freeze", "recording.toggle", "recording.keep"
 EVERY = 8  # half ticks
 RECORD_PX = 146  # of the button in both states, so that nothing moves when it begins
-KEEP_ROOM_PX = 1180  # what the whole bar needs at 100 % text
+KEEP_ROOM_PX = 1340  # what the whole bar needs at 100 % text
 ROOM_PX = 940  # without Keep, which has a key
 WORDS_ROOM_PX = 680  # below that the button to record is its dot alone
 FREEZE_ROOM_PX = 548
 RECORD_ROOM_PX = 520  # below that nothing of what a stop brought would be whole beside it
+SOURCE_ROOM_PX = 1120  # with the source that shows, which the File menu has, too
+RECORDING_ROOM_PX = 1240  # ... and with the way back to the live network
 
 
 class RecordButton(Button):
@@ -70,6 +75,50 @@ class RecordButton(Button):
         return super()._look()
 
 
+LIVE_ICON, RECORDING_ICON = "radio-tower", "history"
+
+
+class SourceSwitch(MenuButton):
+    """Says what shows, and lets a person choose; `back` stands beside it while a recording shows."""
+
+    def __init__(self, theme: Theme, session: Session, actions: Actions) -> None:
+        super().__init__(theme, _("Live network"), LIVE_ICON, size="small")
+        self._session, self._actions = session, actions
+        self._is_recording = False
+        self.back = Button(theme, _("Back to live"), LIVE_ICON, size="small")
+        for button in (self, self.back):
+            button.let_shrink()
+        actions.bind(self.back, "replay.live")
+        self.clicked.connect(self._drop)
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a recording shows."""
+        return self._is_recording
+
+    def refresh(self) -> None:
+        """Say what is so now."""
+        replay = self._session.replay
+        self._is_recording = replay is not None
+        if replay is None:
+            self.set_word(_("Live network"), LIVE_ICON)
+            return
+        there = replay.opened is not None
+        length = span_words(replay.end_ns - replay.start_ns, digits=0) if there else ""
+        self.set_word(f"{replay.name}  {length}".strip(), RECORDING_ICON)
+
+    def _drop(self) -> None:
+        menu = Menu(self._theme, self)
+        menu.addActions([self._actions["replay.open"], self._actions["replay.live"]])
+        drop_below(menu, self)
+
+    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+        if self._is_recording and self.isEnabled():
+            colour = self._theme.colour
+            return colour("accentTint"), colour("accent"), colour("accentText")
+        return super()._look()
+
+
 class DeveloperTools(QObject):
     """Puts the tools into the tool bar; `follow` keeps them true."""
 
@@ -98,11 +147,18 @@ class DeveloperTools(QObject):
             bar.add_tool(tool, place)
         for button in (self.record, self.keep, self.freeze, self.layout, self.panels):
             button.let_shrink()
+        self.source = SourceSwitch(theme, commands.session, self._actions)
+        for place, tool in enumerate((self.source, self.source.back), tools.index(self.freeze) + 1):
+            bar.add_tool(tool, place)
         bar.installEventFilter(self)
         theme.changed.connect(self._fit)
 
     def refresh(self) -> None:
         """Say what is so now."""
+        was_recording = self.source.is_recording
+        self.source.refresh()
+        if self.source.is_recording != was_recording:
+            self._fit()
         shell, frozen = self._shell, all_frozen(self._shell.bench)
         self._actions[FREEZE].setChecked(frozen)
         self.freeze.setChecked(frozen)
@@ -120,11 +176,13 @@ class DeveloperTools(QObject):
         return False
 
     def _fit(self) -> None:
-        """Large text in a narrow window: Keep, layouts and panels, Freeze, Record are in the View menu."""
-        width, scaled = self._bar.width(), self._shell.theme.scaled
+        """Large text in a narrow window: Keep, the source, layouts, Freeze, Record are in menus."""
+        width, scaled, recording = self._bar.width(), self._shell.theme.scaled, self.source.is_recording
+        paint.show_when(self.source, recording or width >= scaled(SOURCE_ROOM_PX))
+        paint.show_when(self.source.back, recording)
         for tool in self._wide_only:
-            paint.show_when(tool, width >= scaled(ROOM_PX))
-        paint.show_when(self.keep, width >= scaled(KEEP_ROOM_PX))
+            paint.show_when(tool, width >= scaled(RECORDING_ROOM_PX if recording else ROOM_PX))
+        paint.show_when(self.keep, width >= scaled(KEEP_ROOM_PX) and not recording)
         self.record.set_bare(width < scaled(WORDS_ROOM_PX))
         paint.show_when(self.freeze, width >= scaled(FREEZE_ROOM_PX))
         paint.show_when(self.record, width >= scaled(RECORD_ROOM_PX))

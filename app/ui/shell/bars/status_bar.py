@@ -10,6 +10,7 @@ from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.network.remote_access import access_words
+from app.core.recording.replay.scale import clock_words, date_words
 from app.core.robots.health_facts import facts_of, has_told
 from app.core.robots.robot_link import STOPPING
 from app.core.run.view import connected_words
@@ -55,7 +56,7 @@ class StatusFacts:
         if not links:
             coming = self._session.coming
             return "circle-dashed", connected_words((), coming) if coming else _("No robot"), "off"
-        topics, now = self._session.topics, time.monotonic()
+        topics, now = self._session.live.topics, time.monotonic()
         found = [(link, facts_of(link, topics, now, age_words)) for link in links]
         wrong = [fact.status for _link, facts in found for fact in facts if fact.to_look_at]
         if wrong:
@@ -92,7 +93,7 @@ class StatusFacts:
 
     def topics(self) -> Fact:
         """How many topics are live."""
-        live = sum(1 for topic in self._session.topics if topic.gone_s is None)
+        live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         return "", ngettext("{count} topic live", "{count} topics live", live).format(count=live), None
 
     def remote_access(self) -> Fact:
@@ -116,10 +117,10 @@ class StatusFacts:
 
     def traffic(self) -> Fact:
         """Nodes, topics and messages per second."""
-        graph = self._session.graph
+        graph = self._session.live.graph
         if graph is None:
             return NOTHING
-        live = sum(1 for topic in self._session.topics if topic.gone_s is None)
+        live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         nodes, rate = len(graph.nodes), self._session.traffic.messages_per_s
         facts = [
             ngettext("{count} node", "{count} nodes", nodes).format(count=nodes),
@@ -160,6 +161,33 @@ class StatusFacts:
         if seconds is None:
             return NOTHING
         return "history", _("{count} s can be kept").format(count=round(seconds)), None
+
+    def replayed(self) -> tuple[Fact, ...]:
+        """Which recording shows, from when to when, what is in it, and what was lost while it was made."""
+        replay = self._session.replay
+        if replay is None or replay.opened is None:
+            return ()
+        recorded = replay.opened.recording
+        name = _("{name}, {size}").format(name=replay.name, size=size_words(recorded.size_bytes))
+        begin, end = (clock_words(each, digits=0) for each in (replay.start_ns, replay.end_ns))
+        when = _("{date}, {begin} to {end}").format(date=date_words(replay.start_ns), begin=begin, end=end)
+        count, messages = len(recorded.topics), recorded.message_count
+        topics = ngettext("{count} topic", "{count} topics", count).format(count=grouped(count))
+        said = ngettext("{count} message", "{count} messages", messages).format(count=grouped(messages))
+        lost: Fact = NOTHING
+        if replay.lost:
+            words = ngettext("{count} lost while recording", "{count} lost while recording", replay.lost)
+            lost = ("triangle-alert", words.format(count=grouped(replay.lost)), "warn")
+        return (
+            ("history", name, None),
+            ("", when, None),
+            ("", _("{topics}, {messages}").format(topics=topics, messages=said), None),
+            lost,
+        )
+
+    def live_goes_on(self) -> Fact:
+        """That a recording does not hide from robots, Stop and alarms what happens now."""
+        return "radio-tower", _("Live network goes on"), None
 
     def shown(self) -> Fact:
         """How many messages of the topics that are looked at were shown; nothing when all were."""

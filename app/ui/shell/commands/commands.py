@@ -13,6 +13,7 @@ from app.ui.shell.commands.editing import EditCommands
 from app.ui.shell.commands.menus import MenuLists
 from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.recording import RecordCommands
+from app.ui.shell.commands.replay import ReplayCommands
 from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands
 from app.ui.shell.commands.shell import Shell
@@ -31,6 +32,7 @@ class Commands:
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         keys = Shortcuts(session.settings, shell.complain, COMMANDS)
+        self.session = session
         self.files = DocumentController(
             session, asks, shell.say, partial(bring_into_view, shell), shell.editor
         )
@@ -41,6 +43,8 @@ class Commands:
         self.shortcuts = keys
         self.recording = RecordCommands(shell, session, asks, self.do_about)
         self.variables = VariableCommands(shell, session, self.files)
+        self.replay = ReplayCommands(shell, session, asks)
+        self.files.open_recording = self.replay.open
         self._do = Handlers(
             session,
             shell,
@@ -52,6 +56,7 @@ class Commands:
             EditCommands(shell),
             ReportCommands(shell, session, self.files, asks),
             self.recording,
+            self.replay,
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.why_not, keys)

@@ -159,7 +159,7 @@ class RobotCommands:
         """Show which other networks are looked at, and let the person choose."""
         if self._other_networks is None:
             self._other_networks = OtherNetworksSheet(
-                self._shell.theme, self._shell.surface, self._session.networks
+                self._shell.theme, self._shell.surface, self._session.live.networks
             )
         self._other_networks.open()
 

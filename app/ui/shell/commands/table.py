@@ -17,6 +17,7 @@ from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPlac
 from app.ui.shell.commands.editing import Edit, EditCommands
 from app.ui.shell.commands.freeze import freezable
 from app.ui.shell.commands.recording import RecordCommands
+from app.ui.shell.commands.replay import ReplayCommands
 from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
 from app.ui.shell.commands.shell import START, Shell
@@ -52,6 +53,7 @@ class Handlers:
     editing: EditCommands
     reports: ReportCommands
     recording: RecordCommands
+    replay: ReplayCommands
 
 
 # ---- why a command can't be done now: menus grey it, the palette says the sentence ------------------
@@ -106,6 +108,16 @@ def _nothing_to_freeze(do: Handlers) -> str:
 
 def _no_recent(do: Handlers) -> str:
     return "" if do.session.settings.recent_known else _("The list is empty")
+
+
+def _no_recording(do: Handlers) -> str:
+    return "" if do.session.replay is not None else _("No recording is open")
+
+
+def _not_there_yet(do: Handlers) -> str:
+    if do.session.replay is None:
+        return _no_recording(do)
+    return "" if do.session.replay.player is not None else _("The recording is not open yet")
 
 
 def _no_room(do: Handlers) -> str:
@@ -174,6 +186,7 @@ def releases(page: str) -> tuple[C, ...]:
 COMMANDS: tuple[C, ...] = (
     C("file.new", lazy("New behaviour"), lambda do: do.files.new(), "File", ("Ctrl+N",), "file-plus"),
     C("file.open", lazy("Open a file"), lambda do: do.files.ask_open(), "File", ("Ctrl+O",), "folder-open"),
+    C("replay.open", lazy("Open a recording"), lambda do: do.replay.ask_open(), "File", icon="film"),
     C("file.save", lazy("Save"), lambda do: do.files.save(), "File", ("Ctrl+S",), "save", above=True),
     C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",),
       "save-pen"),
@@ -242,6 +255,12 @@ COMMANDS: tuple[C, ...] = (
     C("view.freeze", lazy("Freeze what shows"), lambda do: do.view.freeze(), "View", icon="snowflake",
       tip=lazy("Holds the Inspector and the pictures as they are"), check=True, above=True,
       why_not=_nothing_to_freeze),
+    C("replay.live", lazy("Back to live"), lambda do: do.replay.back_to_live(), "View", icon="radio-tower",
+      tip=lazy("Closes the recording and shows the live network"), above=True, why_not=_no_recording),
+    C("replay.play", lazy("Play the recording, or hold it"), lambda do: do.replay.play(), icon="play",
+      why_not=_not_there_yet),
+    C("replay.bookmark", lazy("Make a bookmark"), lambda do: do.replay.bookmark(), icon="bookmark",
+      why_not=_not_there_yet),
     C("theme.light", lazy("Light"), lambda do: do.view.set_theme("light"), "View", icon="sun", group="theme",
       under=LOOK),
     C("theme.dark", lazy("Dark"), lambda do: do.view.set_theme("dark"), "View", icon="moon", group="theme",
@@ -346,6 +365,8 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _about("alarm.value", read_value, lambda do, about: do.view.alarm_on_value(about)),
     _about("recording.play", Path, lambda do, path: do.recording.play(path)),
     _about("record.topic", str, lambda do, topic: do.recording.record_topic(topic)),
+    _about("recording.open", Path, lambda do, path: do.replay.open(path)),
+    _about("recording.folder", Path, lambda do, path: do.replay.show_folder(path)),
     _about("key", str, lambda do, key: do.view.press(key)),
     _about("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
     _about("try", read_stack, lambda do, stack: do.behaviours.try_stack(stack)),

@@ -72,19 +72,14 @@ class FileQuestion:
 OPEN = FileQuestion(lazy("Open a behaviour"), lazy("Open"), lazy("No behaviours and no folders are in here."))
 SAVE = FileQuestion(lazy("Save the behaviour"), lazy("Save"), lazy("Nothing is in here yet."), saves=True)
 PICTURE = FileQuestion(
-    lazy("Choose a picture"),
-    lazy("Choose"),
-    lazy("No pictures and no folders are in here."),
-    endings=PICTURE_ENDINGS,
-    icon="image",
-)
-FOLDER = FileQuestion(
-    lazy("Choose a folder"),
-    lazy("Use this folder"),
-    "",
-    endings=(),
-    wants_folder=True,
-)
+    lazy("Choose a picture"), lazy("Choose"), lazy("No pictures and no folders are in here."),
+    endings=PICTURE_ENDINGS, icon="image",
+)  # fmt: skip
+RECORDING = FileQuestion(
+    lazy("Open a recording"), lazy("Open"), lazy("No recordings and no folders are in here."),
+    endings=(".mcap",), icon="film",
+)  # fmt: skip
+FOLDER = FileQuestion(lazy("Choose a folder"), lazy("Use this folder"), "", endings=(), wants_folder=True)
 
 
 @dataclass(frozen=True)
@@ -256,9 +251,9 @@ class FileSheet(Overlay):
 
     # -- asking -----------------------------------------------------------------------------------
 
-    def ask_open(self, folder: Path, take: Callable[[Path], object]) -> None:
-        """Which behaviour to open."""
-        self._ask(OPEN, folder, take)
+    def ask_open(self, folder: Path, take: Callable[[Path], object], question: FileQuestion = OPEN) -> None:
+        """Which behaviour, or whatever the question is about, to open."""
+        self._ask(question, folder, take)
 
     def ask_picture(self, folder: Path, take: Callable[[Path], object]) -> None:
         """Which picture to take."""
@@ -581,11 +576,13 @@ class StudioDialogs:
         """Which picture to take."""
         self._made().ask_picture(Path(folder or pictures_folder()), take)
 
+    def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Which recording to play."""
+        self._made().ask_open(_nearest(folder), take, RECORDING)
+
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         """Which folder to keep pictures in."""
-        wanted = Path(folder)
-        there = next((each for each in (wanted, *wanted.parents) if each.is_dir()), Path.home())
-        self._made().ask_folder(there, take)
+        self._made().ask_folder(_nearest(folder), take)
 
     def _made(self) -> FileSheet:
         if self._sheet is None:
@@ -595,3 +592,9 @@ class StudioDialogs:
     def _places(self) -> tuple[FolderPlace, ...]:
         recent: list[RecentFile] = self._settings.recent
         return known_places(home() / "kept", [file.path for file in recent])
+
+
+def _nearest(folder: str) -> Path:
+    """The folder, or the nearest one above it that there is."""
+    wanted = Path(folder)
+    return next((each for each in (wanted, *wanted.parents) if each.is_dir()), Path.home())

@@ -45,7 +45,8 @@ class Layout:
 
     ``title`` is marked with `lazy`. ``homes`` tells beside which panel another one opens, as a tab; the rest
     open beside the last panel. ``brings`` tells which panel comes with another one when that is opened; it is
-    ``later``: at first its row is not there. ``taller`` is the least height of the place of a panel while it
+    ``later``: at first its row is not there. ``below`` has panels that open below all others, as wide as the
+    window, with their heights. ``taller`` is the least height of the place of a panel while it
     is open.
     """
 
@@ -58,6 +59,7 @@ class Layout:
     homes: Mapping[str, str]
     brings: Mapping[str, str] = field(default_factory=dict)
     taller: Mapping[str, int] = field(default_factory=dict)
+    below: Mapping[str, int] = field(default_factory=lambda: {"timeline": 324})
 
     @property
     def at_first(self) -> tuple[str, ...]:

@@ -44,10 +44,13 @@ def fit(
     gap: int,
     scale: float = 1.0,
     folded: Container[str] = (),
+    *,
+    below: int = 0,
 ) -> None:
     """Give every column and every panel in it the size of the layout, in the room that there is now.
 
-    ``scale`` is that of the text; the panels in ``folded`` stand in the place of another column.
+    ``scale`` is that of the text; the panels in ``folded`` stand in the place of another column. ``below``
+    px at the bottom belong to a panel that is as wide as the window.
     """
     columns = []
     before: list[QDockWidget] = []
@@ -70,7 +73,7 @@ def fit(
         return
     margins = bench.contentsMargins()
     wide = bench.width() - margins.left() - margins.right() - gap * (len(columns) - 1)
-    high = bench.height() - margins.top() - margins.bottom()
+    high = bench.height() - margins.top() - margins.bottom() - below
     wanted = [
         round(min(max(column.width * scale, column.share * wide), column.most * wide))
         if column.width

@@ -20,6 +20,9 @@ from nep.i18n import _
 ACROSS = Qt.Orientation.Horizontal
 DOWN = Qt.Orientation.Vertical
 AREA = Qt.DockWidgetArea.LeftDockWidgetArea
+BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
+MOST_BELOW = 0.42
+"""Of the window's height."""
 STATE_VERSION = 1  # with another one, app.core.storage.settings.FORMAT is another one, too
 MOST_OF_A_KIND = 8
 
@@ -138,7 +141,19 @@ class Workbench(QMainWindow):
             self.resizeDocks(halves, [1, 1], way)
         if self._arranged and not self._moved and not self._fold_timer.isActive():
             gap, scale = self._theme.size("gap", self._layout.density), self._theme.scaled(1)
-            fit(self, self._layout, self.docks, gap, scale, self._behind())
+            below = self._size_below(scale)
+            fit(self, self._layout, self.docks, gap, scale, self._behind(), below=below + gap if below else 0)
+
+    def _size_below(self, scale: float) -> int:
+        """Give what stands below all others its height, which is told."""
+        for name, height in self._layout.below.items():
+            dock = self.docks.get(name)
+            if dock is None or dock.isHidden() or dock.isFloating() or self.dockWidgetArea(dock) != BELOW:
+                continue
+            high = round(min(height * scale, MOST_BELOW * self.height()))
+            self.resizeDocks([dock], [high], DOWN)
+            return high
+        return 0
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
@@ -215,6 +230,11 @@ class Workbench(QMainWindow):
 
     def _is_open(self, key: str) -> bool:
         return key in self.docks and not self.docks[key].isHidden()
+
+    def source_changed(self) -> None:
+        """Tell all panels, also those that are closed, that another source is shown."""
+        for dock in (*self.docks.values(), *self._ahead.values()):
+            dock.panel.source_changed()
 
     def used(self, dock: Dock) -> None:
         """A panel has the keyboard now."""
@@ -478,6 +498,9 @@ def join(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Do
         and not other.isFloating()
         and bench.dockWidgetArea(other) != Qt.DockWidgetArea.NoDockWidgetArea
     }
+    if name in layout.below:
+        bench.addDockWidget(BELOW, dock)
+        return
     above = _above(layout, name)
     home = name if dock.number > 1 else layout.homes.get(name, "")
     if above in placed and not placed[above].isHidden() and not bench.tabifiedDockWidgets(placed[above]):

@@ -1,0 +1,101 @@
+"""How full a recording is, and where something was lost: read in a thread, for who paints a time line."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from app.core.documents.background_worker import BackgroundWorker
+from nep.recordings.reader import Recording
+
+MOST_MARKS = 2_000
+"""Of one topic; what was lost later is counted with the last one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Density:
+    """The messages of each topic in each of so many equal parts of [``start_ns``, ``end_ns``)."""
+
+    start_ns: int
+    end_ns: int
+    buckets: int
+    counts: Mapping[str, Sequence[int]]
+
+    def peak(self, topic: str) -> int:
+        """The most messages of a topic in one part."""
+        counts = self.counts.get(topic)
+        return max(counts, default=0) if counts is not None else 0
+
+
+@dataclass(frozen=True, slots=True)
+class LossMark:
+    """So many messages were lost, or were not kept, in the second that ended then."""
+
+    at_ns: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    density: Density | None = None
+    losses: Mapping[str, tuple[LossMark, ...]] | None = None
+
+
+class Densities:
+    """Of one recording. One thread uses it (the window's); what it asks for is there some ticks later."""
+
+    def __init__(self, recording: Recording) -> None:
+        """Look for losses at once."""
+        self._recording = recording
+        self._worker: BackgroundWorker[_Made] = BackgroundWorker("studio-density")
+        self.newest: Density | None = None
+        self.losses: Mapping[str, tuple[LossMark, ...]] = {}
+        self._wanted: tuple[int, int, int] | None = None
+        self._worker.ask("losses", lambda: _Made(losses=losses_of(recording)))
+
+    def want(self, start_ns: int, end_ns: int, buckets: int) -> None:
+        """This part is shown; asked again and again it is read once."""
+        wanted = (start_ns, end_ns, buckets)
+        if wanted == self._wanted or buckets < 1 or end_ns <= start_ns:
+            return
+        self._wanted = wanted
+        self._worker.ask("density", lambda: _Made(density=density_of(self._recording, *wanted)))
+
+    def take(self) -> bool:
+        """Take over what is ready; whether something is new. Raises what the reading raised."""
+        density, losses = self._worker.take("density"), self._worker.take("losses")
+        if density is not None:
+            self.newest = density.density
+        if losses is not None:
+            self.losses = losses.losses or {}
+        return density is not None or losses is not None
+
+    def close(self) -> None:
+        """End."""
+        self._worker.close()
+
+
+def density_of(recording: Recording, start_ns: int, end_ns: int, buckets: int) -> Density:
+    """Count the messages of each part, of the index alone."""
+    found = recording.densities(start_ns, end_ns, buckets)
+    return Density(start_ns, end_ns, buckets, {topic: array("L", counts) for topic, counts in found.items()})
+
+
+def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
+    """Where the recorder's figures of each topic grew: there something was lost, or was not kept."""
+    found: dict[str, list[LossMark]] = {}
+    before: dict[str, int] = {}
+    for at_ns, figures in recording.figures_over_time():
+        for topic, each in figures.items():
+            missing = (each.lost or 0) + each.unkept
+            grown = missing - before.get(topic, 0)
+            before[topic] = missing
+            if grown <= 0:
+                continue
+            marks = found.setdefault(topic, [])
+            if len(marks) < MOST_MARKS:
+                marks.append(LossMark(at_ns, grown))
+            else:
+                marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + grown)
+    return {topic: tuple(marks) for topic, marks in found.items()}

@@ -1,0 +1,369 @@
+"""An open recording as the panels see it: topics, pictures, series, log, and what a person does with it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from app.core.alerts import Alerts
+from app.core.console import CAPACITY, Console
+from app.core.messages.image_streams import Images
+from app.core.network.mailbox import Batch
+from app.core.network.nodes import Nodes
+from app.core.network.topics import Topics
+from app.core.network.watches import Watch, Watches
+from app.core.networks.networks import Networks
+from app.core.recording.replay.density import Densities
+from app.core.recording.replay.opening import OpenedRecording
+from app.core.recording.replay.source import Handed, ReplaySource, ReplayStatus
+from app.core.series.feed import SeriesFeed
+from app.core.storage.settings import Settings
+from nep.i18n import _, ngettext
+from nep.messages.message import Message
+from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
+from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
+from nep.recordings.bookmarks import Bookmark
+from nep.recordings.figures import TopicFigures
+from nep.recordings.player import SPEED_MAX, SPEED_MIN, Playback, PlayerStatus
+from nep.recordings.reader import RecordedTopic
+
+FAILED, REPAIRED, DAMAGED = "recording:failed", "recording:repaired", "recording:damaged"
+"""The ids of what it tells in alerts."""
+SHOW_FILE = "recording.folder"
+"""The window's command, with the file's path, that shows where it is."""
+LOGS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
+STEP_NS = 1_000_000_000
+
+
+class Replay:
+    """One recording that is open. One thread uses it (the window's); `close` ends its threads.
+
+    ``topics``, ``nodes``, ``networks``, ``images``, ``series``, ``console`` and ``graph`` are what a session
+    has of the live network. A recording knows no nodes, and no other networks. ``chosen`` is the topic whose
+    messages are stepped through.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        settings: Settings,
+        alerts: Alerts,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Nothing is read before `start`."""
+        self.path = path
+        self.opened: OpenedRecording | None = None
+        self._watches = Watches(self._begin_watch, self._end_watch)
+        self.topics, self.nodes = Topics(("", 0)), Nodes()
+        self.networks = Networks(settings, (), lambda _event: None, alerts)
+        self.images = Images(self.watch, clock)
+        self.source = ReplaySource(path, self.images, clock=clock)
+        self.series = SeriesFeed(self.watch, self._position_ns, self.source.set_deep)
+        self.console = Console(lambda: self._position_ns() / 1e9)
+        self.graph: GraphView | None = None
+        self.densities: Densities | None = None
+        self.chosen = ""
+        self._logs: list[Watch] = []
+        self._alerts, self._has_failed, self._damaged = alerts, False, 0
+        for id in (FAILED, REPAIRED, DAMAGED):
+            alerts.resolve(id)
+
+    def start(self) -> None:
+        """Open the file, in a thread."""
+        self.source.start()
+
+    def watch(self, topic: str) -> Watch:
+        """Look at a topic until the watch is closed: its messages arrive in ``topics``."""
+        return self._watches.open([topic])
+
+    def end(self) -> None:
+        """Let its threads end, and wait for nothing; `close` waits."""
+        self.source.end()
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether its thread plays no more; what is left of it then ends at once."""
+        if self.source.has_ended:
+            self.close()
+        return self.source.has_ended
+
+    def close(self) -> None:
+        """End; returns when its threads have. May be called twice."""
+        self.source.close()
+        if self.densities is not None:
+            self.densities.close()
+        self.images.close()
+
+    # -- how it is -------------------------------------------------------------------------------------------
+
+    @property
+    def status(self) -> ReplayStatus:
+        """How far it is, and where."""
+        return self.source.status
+
+    @property
+    def player(self) -> PlayerStatus | None:
+        """Where it is; None until it is open, and when it has failed."""
+        return self.source.status.player
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+        return self.path.name
+
+    @property
+    def start_ns(self) -> int:
+        """When the first message came; 0 until it is known."""
+        return self.opened.recording.start_ns if self.opened is not None else 0
+
+    @property
+    def end_ns(self) -> int:
+        """When the last message came; 0 until it is known."""
+        return self.opened.recording.end_ns if self.opened is not None else 0
+
+    @property
+    def recorded(self) -> Mapping[str, RecordedTopic]:
+        """The topics that are in the file."""
+        return self.opened.recording.topics if self.opened is not None else {}
+
+    @property
+    def figures(self) -> Mapping[str, TopicFigures]:
+        """What became of each topic's messages while it was recorded, as far as that is known."""
+        return self.opened.figures if self.opened is not None else {}
+
+    @property
+    def lost(self) -> int:
+        """How many messages did not get into the recording, of all topics of which that is known."""
+        return sum((each.lost or 0) + each.unkept for each in self.figures.values())
+
+    @property
+    def bookmarks(self) -> Sequence[Bookmark]:
+        """Its bookmarks, the earliest first."""
+        return self.opened.bookmarks.all if self.opened is not None else ()
+
+    def _position_ns(self) -> int:
+        player = self.source.status.player
+        return player.position_ns if player is not None else self.start_ns
+
+    # -- what a person does ----------------------------------------------------------------------------------
+
+    def play(self) -> None:
+        """Go on; from the beginning, of what is played, when it is at its end."""
+        player = self.player
+        if player is not None and player.is_at_end:
+            self.seek(player.loop[0] if player.loop is not None else self.start_ns)
+        self.source.order("play", lambda playback: playback.play())
+
+    def pause(self) -> None:
+        """Stay where it is."""
+        self.source.order("play", lambda playback: playback.pause())
+
+    def toggle(self) -> None:
+        """Play or pause."""
+        if self.player is not None and self.player.is_playing:
+            self.pause()
+        else:
+            self.play()
+
+    def seek(self, at_ns: int) -> None:
+        """Go to a time; beyond its ends to those."""
+        at_ns = max(self.start_ns, min(at_ns, self.end_ns))
+        self.source.order("seek", lambda playback: playback.seek(at_ns))
+
+    def move(self, by_ns: int) -> None:
+        """Go on or back by some time."""
+        self.source.order("move", lambda playback: playback.seek(playback.status().position_ns + by_ns))
+
+    def step(self, *, forward: bool) -> None:
+        """Go to the next or previous message of the chosen topic, and pause."""
+        topic = self.chosen
+        if topic in self.recorded:
+            self.source.order("step", lambda playback: playback.step(topic, forward=forward))
+
+    def choose(self, topic: str) -> None:
+        """Step through this topic's messages from now on."""
+        if topic in self.recorded:
+            self.chosen = topic
+
+    def set_speed(self, speed: float) -> None:
+        """How fast it is to be; the nearest that there is."""
+        wanted = max(SPEED_MIN, min(SPEED_MAX, speed)) if speed == speed else 1.0  # noqa: PLR0124  a NaN is none
+
+        def change(playback: Playback) -> None:
+            playback.speed = wanted
+
+        self.source.order("speed", change)
+
+    def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
+        """Play a part again and again, or all of it; one without a length changes nothing."""
+        if start_ns is not None and end_ns is not None:
+            start_ns, end_ns = max(start_ns, self.start_ns), min(end_ns, self.end_ns)
+            if start_ns >= end_ns:
+                return
+        self.source.order("loop", lambda playback: playback.loop(start_ns, end_ns))
+
+    def end_loop(self) -> None:
+        """Play on beyond the part's end, and once."""
+        self.source.order("loop", lambda playback: playback.end_loop())
+
+    def toggle_loop(self) -> None:
+        """Loop all of it, or what was chosen; or no more."""
+        player = self.player
+        if player is not None and player.is_looping:
+            self.end_loop()
+        else:
+            self.loop()
+
+    def set_loop_edge(self, *, is_start: bool) -> None:
+        """Begin or end the part that is played again and again at the playhead."""
+        player = self.player
+        if player is None:
+            return
+        start_ns, end_ns = player.loop or (self.start_ns, self.end_ns)
+        at_ns = player.position_ns
+        if is_start:
+            self.loop(at_ns, end_ns if end_ns > at_ns else self.end_ns)
+        else:
+            self.loop(start_ns if start_ns < at_ns else self.start_ns, at_ns)
+
+    def skip(self, *, forward: bool) -> None:
+        """Go to the next or previous mark: a bookmark, else the end or the beginning."""
+        if self.opened is None:
+            return
+        at_ns, marks = self._position_ns(), self.opened.bookmarks
+        mark = marks.after(at_ns) if forward else marks.before(at_ns)
+        self.seek(mark.at_ns if mark is not None else self.end_ns if forward else self.start_ns)
+
+    def bookmark(self, name: str = "") -> Bookmark | None:
+        """Make a bookmark at the playhead. Raises `RecordingError` when it can't be kept."""
+        return self.opened.bookmarks.add(self._position_ns(), name) if self.opened is not None else None
+
+    def rename_bookmark(self, bookmark: Bookmark, name: str) -> None:
+        """Give one another name. Raises `RecordingError`, and `ValueError` for a note of the recording."""
+        if self.opened is not None:
+            self.opened.bookmarks.rename(bookmark, name)
+
+    def remove_bookmark(self, bookmark: Bookmark) -> None:
+        """Take one away. Raises as `rename_bookmark` does."""
+        if self.opened is not None:
+            self.opened.bookmarks.remove(bookmark)
+
+    # -- the tick --------------------------------------------------------------------------------------------
+
+    def tick(self, now: float) -> None:
+        """Take over what the thread handed over since the last tick; ``now`` is a monotonic clock in s."""
+        if self.opened is None and self.source.opened is not None and self.player is not None:
+            self._opened(self.source.opened, now)
+        self._tell_problems()
+        handed = self.source.take()
+        if handed.jump is not None:
+            self._take_jump(handed.jump, now)
+        self._take_history(handed, now)
+        for topic, batch in handed.drained.batches.items():
+            if topic in LOGS:
+                self.console.take(batch.messages, batch.dropped)
+            self._add(topic, batch, now)
+        self.series.add(handed.drained.batches)
+        if handed.figures:
+            self.topics.set_figures({name: (x.rate_hz, x.newest_ns) for name, x in handed.figures.items()})
+        self.topics.age(now, self._position_ns())
+
+    def _opened(self, opened: OpenedRecording, now: float) -> None:
+        self.opened = opened
+        recording = opened.recording
+        self.series.origin_ns = recording.start_ns
+        self.graph = graph_of(recording.topics, opened.figures)
+        self.topics.update(self.graph, now)
+        self.chosen = next(iter(recording.topics), "")
+        self.densities = Densities(recording)
+        for topic in LOGS:
+            if topic in recording.topics:
+                self.source.set_deep(topic, CAPACITY)
+                self._logs.append(self.watch(topic))
+
+        self._tell_repaired(opened)
+
+    def _tell_problems(self) -> None:
+        status = self.status
+        if status.stage == "failed" and not self._has_failed:
+            self._has_failed = True
+            title = _("{name} can't be played.").format(name=self.name)
+            sentence = f"{status.sentence[:1].upper()}{status.sentence[1:]}."
+            action = f"{SHOW_FILE}:{self.path}"
+            self._alerts.put(FAILED, "error", title, sentence, button=_("Show the file"), action=action)
+        if status.damaged > self._damaged:
+            self._damaged = status.damaged
+            words = ngettext(
+                "{count} piece of {name} is damaged, and was passed over.",
+                "{count} pieces of {name} are damaged, and were passed over.",
+                status.damaged,
+            )
+            self._alerts.put(DAMAGED, "warn", words.format(count=status.damaged, name=self.name))
+
+    def _tell_repaired(self, opened: OpenedRecording) -> None:
+        """Say what became of a file that was not ended, or was cut off."""
+        report, name = opened.repaired, self.name
+        if opened.why_not_repaired:
+            title = _("{name} was not ended, and is played as far as it goes.").format(name=name)
+            self._alerts.put(REPAIRED, "warn", title, f"{opened.why_not_repaired}.")
+        elif report is not None and report.is_whole:
+            title = _("{name} was not ended. All of it is there, in {copy}.")
+            self._alerts.put(REPAIRED, "info", title.format(name=name, copy=report.path.name))
+        elif report is not None:
+            title = _("{name} was cut off, or damaged.").format(name=name)
+            detail = _("{recovered} s recovered, {lost} s lost; it is in {copy}.").format(
+                recovered=f"{report.duration_s:.1f}", lost=f"{report.lost_s:.1f}", copy=report.path.name
+            )
+            self._alerts.put(REPAIRED, "warn", title, detail)
+        elif opened.is_copy:
+            title = _("{name} was not ended; its repaired copy is played.").format(name=name)
+            self._alerts.put(REPAIRED, "info", title)
+
+    def _take_jump(self, messages: Sequence[Message], now: float) -> None:
+        self.topics.rewind()
+        self.series.rewind()
+        self.console.rewind()
+        for message in messages:
+            self._add(message.topic, Batch([message]), now)
+
+    def _take_history(self, handed: Handed, now: float) -> None:
+        said = [message for topic in LOGS for message in handed.history.get(topic, ())]
+        self.console.take(sorted(said, key=lambda message: message.stamp_ns or 0))
+        for topic, messages in handed.history.items():
+            batch = Batch(list(messages))
+            self._add(topic, Batch(batch.messages[-2:]), now)
+            self.series.rewind([topic])
+            self.series.add({topic: batch})
+
+    def _add(self, topic: str, batch: Batch, now: float) -> None:
+        if self._watches.watched(topic):
+            self.topics.add(topic, batch, now)
+            self.topics[topic].watched = True
+
+    def _begin_watch(self, topic: str) -> None:
+        self.source.watch(topic)
+        known = self.topics.get(topic)
+        if known is not None:
+            known.watched = True
+
+    def _end_watch(self, topic: str) -> None:
+        self.source.unwatch(topic)
+        self.topics.unwatch(topic)
+
+
+def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicFigures]) -> GraphView:
+    """What a recording knows of who was there: its topics, how many published each, and what was lost."""
+    made = {}
+    for name, topic in topics.items():
+        known = figures.get(name)
+        publishers = tuple(
+            PublisherInfo(number or 0, "", (), False, topic.message_count, 0, 0, None, None, None)
+            for number in topic.publishers or (None,)
+        )
+        lost = known.lost if known is not None else None
+        sent = known.received + lost if known is not None and lost is not None else 0
+        ratio = lost / sent if lost is not None and sent else None
+        made[name] = TopicInfo(name, topic.msg_type, topic.codec, publishers, lost=lost, loss_ratio=ratio)
+    return GraphView(1, 1, topics=made)

@@ -1,0 +1,112 @@
+"""The part of a recording's time that a time line shows, and how its times are written. Pure."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import ceil
+
+LEAST_SPAN_NS = 1_000_000
+STEPS_S = (
+    0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 120.0, 300.0,
+    600.0, 900.0, 1800.0, 3600.0, 7200.0, 21_600.0, 43_200.0, 86_400.0,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class TimeScale:
+    """A time line shows [``begin_ns``, ``end_ns``] of a recording from ``first_ns`` to ``last_ns``."""
+
+    first_ns: int
+    last_ns: int
+    begin_ns: int
+    end_ns: int
+
+    @classmethod
+    def whole(cls, first_ns: int, last_ns: int) -> TimeScale:
+        """All of a recording, at least a millisecond."""
+        last_ns = max(last_ns, first_ns + LEAST_SPAN_NS)
+        return cls(first_ns, last_ns, first_ns, last_ns)
+
+    @property
+    def span_ns(self) -> int:
+        """How long the part is."""
+        return self.end_ns - self.begin_ns
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all of it is shown."""
+        return (self.begin_ns, self.end_ns) == (self.first_ns, self.last_ns)
+
+    def share(self, at_ns: int) -> float:
+        """Where a time is: 0 at the left edge, 1 at the right one."""
+        return (at_ns - self.begin_ns) / self.span_ns
+
+    def time(self, share: float) -> int:
+        """The time there, within the recording."""
+        at_ns = self.begin_ns + round(share * self.span_ns)
+        return max(self.first_ns, min(self.last_ns, at_ns))
+
+    def zoomed(self, factor: float, at_ns: int) -> TimeScale:
+        """More time (a factor above 1) or less, with that time where it was."""
+        whole = self.last_ns - self.first_ns
+        span = max(LEAST_SPAN_NS, min(whole, round(self.span_ns * factor)))
+        return self._placed(at_ns - round(self.share(at_ns) * span), span)
+
+    def moved(self, by_ns: int) -> TimeScale:
+        """A later or earlier part of the same length."""
+        return self._placed(self.begin_ns + by_ns, self.span_ns)
+
+    def with_time(self, at_ns: int) -> TimeScale:
+        """A part of the same length in which that time can be seen."""
+        if self.begin_ns <= at_ns <= self.end_ns:
+            return self
+        return self._placed(at_ns - self.span_ns // 8, self.span_ns)
+
+    def _placed(self, begin_ns: int, span: int) -> TimeScale:
+        begin_ns = max(self.first_ns, min(begin_ns, self.last_ns - span))
+        return replace(self, begin_ns=begin_ns, end_ns=begin_ns + span)
+
+    def step_s(self, most: int) -> float:
+        """How far apart the marks of a ruler are when there may be so many."""
+        least = self.span_ns / 1e9 / max(1, most)
+        return next((step for step in STEPS_S if step >= least), 86_400.0 * ceil(least / 86_400.0))
+
+    def marks(self, most: int, *, by_clock: bool = False) -> Iterator[int]:
+        """The times of a ruler's marks, counted from the recording's beginning, or by the clock."""
+        step_ns = round(self.step_s(most) * 1e9)
+        origin_ns = offset_ns(self.first_ns) if by_clock else self.first_ns
+        number = -((origin_ns - self.begin_ns) // step_ns)
+        while (at_ns := origin_ns + number * step_ns) <= self.end_ns:
+            yield at_ns
+            number += 1
+
+
+def offset_ns(at_ns: int) -> int:
+    """A time whose distance to full hours of this place's clock is that of full hours from 1970."""
+    return -(time.localtime(at_ns // 1_000_000_000).tm_gmtoff or 0) * 1_000_000_000
+
+
+def span_words(ns: int, *, digits: int = 3) -> str:
+    """A length of time: "7:26.412", "0:00", "1:02:03"."""
+    sign, ns = ("-", -ns) if ns < 0 else ("", ns)
+    unit = 10 ** (9 - digits)
+    whole, rest = divmod(ns // unit, 10**digits)
+    minutes, seconds = divmod(whole, 60)
+    hours, minutes = divmod(minutes, 60)
+    words = f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
+    return f"{sign}{words}.{rest:0{digits}d}" if digits else f"{sign}{words}"
+
+
+def clock_words(at_ns: int, *, digits: int = 3) -> str:
+    """A time of day here: "15:09:37.412"."""
+    seconds, rest = divmod(at_ns, 1_000_000_000)
+    then = time.localtime(seconds)
+    words = f"{then.tm_hour}:{then.tm_min:02d}:{then.tm_sec:02d}"
+    return f"{words}.{rest // 10 ** (9 - digits):0{digits}d}" if digits else words
+
+
+def date_words(at_ns: int) -> str:
+    """The day here: "2026-11-17"."""
+    return time.strftime("%Y-%m-%d", time.localtime(at_ns // 1_000_000_000))

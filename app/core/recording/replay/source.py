@@ -1,0 +1,367 @@
+"""The thread that plays a recording: it reads, and hands over what is due of the topics that are looked at.
+
+The window gives orders and takes what came; neither waits for the disk. Nothing here knows a node: what is
+played goes to the panels and nowhere else.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+from typing import Literal, Protocol
+
+from app.core.faults import error_words
+from app.core.network.mailbox import Drained, Mailbox
+from app.core.recording.replay.opening import OpenedRecording, Stage, open_recording
+from nep.errors import NepError
+from nep.messages.message import Message, new_message
+from nep.recordings.player import Playback, PlayerStatus
+from nep.recordings.reader import Recording
+
+RATE_S = 2.0
+FIGURES_EVERY_S = 0.5
+TOPICS_AT_ONCE = 100
+FIGURES_SHARE = 10.0
+"""Figures are read no more often than this many times the time that they take."""
+HISTORY_S = (5.0, 20.0, 60.0, 180.0)
+"""How far before the playhead what came is read for who needs more than the newest, the near part first."""
+HISTORY_MOST_S = 0.25
+"""... as long as reading it takes no longer."""
+MOST_HISTORY = 8192
+OWN_BYTES = 65_536
+"""A smaller message is copied: else it would keep the whole megabyte of the file that it was read with."""
+
+ReplayStage = Literal["reading", "repairing", "there", "failed"]
+Order = Callable[[Playback], object]
+
+
+class PictureSink(Protocol):
+    """What shows pictures: told in the replay's thread, as it decodes in its own."""
+
+    def offer(self, messages: Sequence[Message]) -> None:
+        """These came, oldest first."""
+
+    def rewind(self, topics: Sequence[str]) -> None:
+        """It is another time: the pictures of all other topics are gone."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayStatus:
+    """How far it is. ``progress`` is 0 to 1 while it is opened, ``sentence`` says why it ``failed``.
+
+    ``player`` is where it is, once it is there.
+    """
+
+    stage: ReplayStage
+    progress: float = 0.0
+    sentence: str = ""
+    player: PlayerStatus | None = None
+    damaged: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayFigures:
+    """Of a topic at the playhead: messages a second before it, and when the newest one came (ns).
+
+    None is not known, and that there was none.
+    """
+
+    rate_hz: float | None
+    newest_ns: int | None
+
+
+@dataclass(slots=True)
+class Handed:
+    """What came since the last time, in this order.
+
+    ``jump``: it went to another time, and these were the newest there (None: it did not). ``history``: by
+    topic what came before that, for those that want more than the newest. ``drained``: what came then.
+    """
+
+    jump: Sequence[Message] | None = None
+    history: dict[str, Sequence[Message]] = field(default_factory=dict)
+    drained: Drained = field(default_factory=lambda: Drained({}, [], 0))
+    figures: dict[str, ReplayFigures] = field(default_factory=dict)
+
+
+class ReplaySource:
+    """One recording. `start` and `close` begin and end its thread; everything else returns at once."""
+
+    def __init__(
+        self, path: Path, pictures: PictureSink, *, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Nothing is read before `start`, or `open` and `turn`, which are what the thread does."""
+        self.path = path
+        self.opened: OpenedRecording | None = None
+        self._pictures, self._clock = pictures, clock
+        self._changed = threading.Condition()
+        self._orders: list[tuple[str, Order]] = []
+        self._watched: set[str] = set()
+        self._deep: dict[str, int] = {}
+        self._chosen: frozenset[str] = frozenset()
+        self._mailbox = Mailbox()
+        self._handed = Handed()
+        self._status = ReplayStatus("reading")
+        self._closing = False
+        self._playback: Playback | None = None
+        self._figures: list[tuple[int, list[str]]] = []
+        self._next_figures = self._figures_s = 0.0
+        self._thread = threading.Thread(target=self._run, name="studio-replay", daemon=True)
+
+    # -- what the window calls -------------------------------------------------------------------------------
+
+    @property
+    def status(self) -> ReplayStatus:
+        """How it was after its last turn."""
+        return self._status
+
+    def start(self) -> None:
+        """Open it, and play as it is ordered."""
+        self._thread.start()
+
+    def order(self, kind: str, change: Order) -> None:
+        """Let something be done to the playback. It takes the place of an order of that kind that waits.
+
+        So a playhead that is dragged goes where it is now, not everywhere that it was.
+        """
+        with self._changed:
+            if self._orders and self._orders[-1][0] == kind:
+                self._orders[-1] = (kind, change)
+            else:
+                self._orders.append((kind, change))
+            self._changed.notify_all()
+
+    def watch(self, topic: str) -> None:
+        """Its messages are wanted."""
+        with self._changed:
+            self._watched.add(topic)
+        self.order("choose", self._choose)
+
+    def unwatch(self, topic: str) -> None:
+        """Its messages are not wanted any more."""
+        with self._changed:
+            self._watched.discard(topic)
+        self.order("choose", self._choose)
+
+    def set_deep(self, topic: str, room: int | None) -> None:
+        """Also what came before a jump is wanted of it, and ``room`` messages at once; None: no more."""
+        with self._changed:
+            if room is None:
+                self._deep.pop(topic, None)
+            else:
+                self._deep[topic] = room
+            self._mailbox.set_room(topic, room)
+            is_watched = topic in self._watched
+        if room is not None and is_watched:  # else it has its history when it is watched
+            self.order(f"history {topic}", lambda playback: self._look_back(playback, [topic]))
+
+    def take(self) -> Handed:
+        """What came since the last time."""
+        with self._changed:
+            handed, self._handed = self._handed, Handed()
+            handed.drained = self._mailbox.drain()
+        return handed
+
+    def end(self) -> None:
+        """Let the thread end, and wait for nothing."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether its thread runs no more."""
+        return not self._thread.is_alive()
+
+    def close(self, timeout_s: float = 5.0) -> None:
+        """End the thread and close the file. May be called twice."""
+        self.end()
+        if self._thread.is_alive():
+            self._thread.join(timeout_s)
+        elif self.opened is not None:
+            self.opened.recording.close()
+
+    # -- its thread ------------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            self.open()
+            while True:
+                wait_s = self.turn()
+                with self._changed:
+                    if not self._closing and not self._orders:
+                        self._changed.wait(wait_s)
+                    if self._closing:
+                        return
+        except _ClosingError:
+            return
+        except NepError as error:
+            self._status = ReplayStatus("failed", sentence=str(error))
+        except Exception as error:  # noqa: BLE001  a file may do anything; the window says so and lives on
+            self._status = ReplayStatus("failed", sentence=error_words(error))
+        finally:
+            if self.opened is not None:
+                self.opened.recording.close()
+
+    def open(self) -> None:
+        """Read the index; the playhead is at the first message then. Raises `RecordingError`."""
+        self.opened = opened = open_recording(self.path, self._tell_progress)
+        self._playback = playback = Playback(opened.recording, clock=self._clock, topics=frozenset())
+        playback.seek(opened.recording.start_ns)
+        self._tell(playback)
+
+    def _tell_progress(self, stage: Stage, progress: float) -> None:
+        if self._closing:
+            raise _ClosingError
+        self._status = ReplayStatus(stage, progress)
+
+    def turn(self) -> float | None:
+        """Do what was ordered and what is due; in how many seconds there is more, None when nothing is."""
+        playback = self._playback
+        if playback is None:
+            return None
+        with self._changed:
+            orders, self._orders = self._orders, []
+        for _kind, change in orders:
+            change(playback)
+        due = playback.advance()
+        if due.is_jump:
+            self._jump(due.messages)
+            self._tell(playback)
+            with self._changed:
+                deep = frozenset(self._deep)
+            self._look_back(playback, deep & self._chosen)
+        else:
+            self._hand(due.messages)
+            self._tell(playback)
+        is_due = playback.status().is_playing and not self._figures and self._clock() >= self._next_figures
+        if due.is_jump or is_due:
+            self._begin_figures(playback)
+        self._tell_figures()
+        return 0.0 if self._figures else due.wait_s
+
+    def _tell(self, playback: Playback) -> None:
+        damaged = self.opened.recording.damaged_chunks if self.opened is not None else 0
+        self._status = ReplayStatus("there", 1.0, player=playback.status(), damaged=damaged)
+
+    def _choose(self, playback: Playback) -> None:
+        with self._changed:
+            wanted, deep = frozenset(self._watched), frozenset(self._deep)
+        new = (wanted - self._chosen) & deep
+        self._chosen = wanted
+        self._hand([each for each in playback.choose(wanted) if each.topic not in new])
+        self._look_back(playback, new)
+
+    def _hand(self, messages: Sequence[Message]) -> None:
+        if not messages:
+            return
+        own = [_own(message) for message in messages]
+        self._pictures.offer([each for each in own if each.codec == "image"])
+        with self._changed:
+            for topic, some in groupby(sorted(own, key=_topic), key=_topic):
+                self._mailbox.post(topic, list(some))
+
+    def _jump(self, messages: Sequence[Message]) -> None:
+        own = [_own(message) for message in messages]
+        pictures = [each for each in own if each.codec == "image"]
+        self._pictures.rewind([each.topic for each in pictures])
+        self._pictures.offer(pictures)
+        with self._changed:
+            self._mailbox = Mailbox()
+            for topic, room in self._deep.items():
+                self._mailbox.set_room(topic, room)
+            self._handed = Handed(jump=own)
+
+    # -- what came before ------------------------------------------------------------------------------------
+
+    def _look_back(self, playback: Playback, topics: Collection[str]) -> None:
+        """Hand over what came before the playhead, of topics of which more than the newest is wanted."""
+        if not topics or self.opened is None:
+            return
+        recording, at_ns = self.opened.recording, playback.status().position_ns
+        found: dict[str, deque[Message]] = {topic: deque() for topic in topics}
+        until_ns, began = at_ns + 1, self._clock()
+        for back_s in HISTORY_S:
+            from_ns = max(recording.start_ns, at_ns - round(back_s * 1e9))
+            if (
+                not self._read_back(recording, (from_ns, until_ns), found, began)
+                or from_ns <= recording.start_ns
+            ):
+                break
+            until_ns = from_ns
+        for topic, each in recording.newest(at_ns, [topic for topic in topics if not found[topic]]).items():
+            found[topic].append(_own(each.message))
+        with self._changed:
+            self._handed.history.update({topic: list(messages) for topic, messages in found.items()})
+            for topic in topics:  # it has all of what waited, too
+                self._mailbox.forget(topic)
+
+    def _read_back(
+        self, recording: Recording, span: tuple[int, int], found: dict[str, deque[Message]], began: float
+    ) -> bool:
+        """Put what came in a span before what was found; False when there is no time, or room, for more."""
+        topics = [topic for topic, each in found.items() if len(each) < MOST_HISTORY]
+        came: dict[str, deque[Message]] = {
+            topic: deque(maxlen=MOST_HISTORY - len(found[topic])) for topic in topics
+        }
+        for number, each in enumerate(recording.read(span[0], span[1], topics)):
+            came[each.message.topic].append(_own(each.message))
+            if number % 64 == 0 and (self._orders or self._clock() - began > HISTORY_MOST_S):
+                return False  # a part without its end would be a gap: it is left out
+        for topic, messages in came.items():
+            found[topic].extendleft(reversed(messages))
+        return bool(topics) and self._clock() - began <= HISTORY_MOST_S
+
+    # -- figures ---------------------------------------------------------------------------------------------
+
+    def _begin_figures(self, playback: Playback) -> None:
+        """Tell the figures of the playhead, of some topics with each turn, so that no order waits for all."""
+        if self.opened is None:
+            return
+        names, at_ns = list(self.opened.recording.topics), playback.status().position_ns
+        self._figures = [(at_ns, names[k : k + TOPICS_AT_ONCE]) for k in range(0, len(names), TOPICS_AT_ONCE)]
+        self._next_figures = self._clock() + max(FIGURES_EVERY_S, FIGURES_SHARE * self._figures_s)
+        self._figures_s = 0.0
+
+    def _tell_figures(self) -> None:
+        if not self._figures or self.opened is None:
+            return
+        began, recording = self._clock(), self.opened.recording
+        at_ns, topics = self._figures.pop(0)
+        from_ns = max(recording.start_ns, at_ns - round(RATE_S * 1e9))
+        passed_s = (at_ns - from_ns) / 1e9
+        counts = recording.densities(from_ns, at_ns + 1, 1, topics) if passed_s > 0 else {}
+        newest_ns = recording.newest_times(at_ns, topics)
+        figures = {
+            topic: ReplayFigures(
+                counts.get(topic, (0,))[0] / passed_s if passed_s > 0 else None, newest_ns.get(topic)
+            )
+            for topic in topics
+        }
+        with self._changed:
+            self._handed.figures.update(figures)
+        self._figures_s += self._clock() - began
+
+
+class _ClosingError(Exception):
+    """It is closed while it is opened."""
+
+
+def _topic(message: Message) -> str:
+    return message.topic
+
+
+def _own(message: Message) -> Message:
+    """The message with its bytes for itself, where they are few."""
+    if isinstance(message.raw, bytes) or message.size_bytes > OWN_BYTES:
+        return message
+    made = new_message(Message)
+    made.kind, made.raw = message.kind, bytes(message.raw)
+    made.stamp_ns, made.seq, made.publisher = message.stamp_ns, message.seq, message.publisher
+    made.extension, made.decoded = message.extension, message.decoded
+    return made

@@ -1,0 +1,506 @@
+"""The ruler and the lanes of a recording: bookmarks, and for each topic how much came and what was lost.
+
+The lanes are painted once into a picture; while it plays only the playhead moves over that.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QHelpEvent,
+    QImage,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QPixmap,
+    QPolygonF,
+    QResizeEvent,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QAbstractScrollArea, QToolTip
+
+from app.core.recording.replay.replay import Replay
+from app.core.recording.replay.scale import TimeScale, clock_words, span_words
+from app.ui.text import plain
+from app.ui.text.numbers import grouped
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from nep.i18n import _, ngettext
+
+NAMES, FIGURES = 200, 140
+NARROW_NAMES, NARROW_FIGURES, NARROW = 120, 76, 560
+RULER, MARKS, ROW = 26, 24, 22
+DENSITY, TICK = 10, 2
+FAINT, FULL = 0.14, 0.76
+RARE = 8
+"""Where fewer than one of so many pixels has messages they are ticks."""
+MARK_PX = 78
+MOST_BUCKETS = 4000
+GRIP = 6
+ICONS = {"image": "image", "json": "braces", "string": "type", "msgpack": "braces"}
+WHEEL = 1.0015
+
+
+class TimelineCanvas(QAbstractScrollArea):
+    """One replay's time. `chosen` names a topic that was pressed, `opened` one that was pressed twice."""
+
+    chosen = Signal(str)
+    opened = Signal(str)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.by_clock = False
+        self.scale: TimeScale | None = None
+        self._replay: Replay | None = None
+        self._topics: Sequence[str] = ()
+        self._lanes: QPixmap | None = None
+        self._held = ""  # what the mouse moves: "playhead", "start", "end"
+        self._position_ns = 0
+        self._loop: tuple[int, int] | None = None
+        self._follows = True
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName(_("Time line"))
+        self.setFrameShape(QAbstractScrollArea.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.verticalScrollBar().valueChanged.connect(lambda _value: self.renew())
+        self.viewport().setMouseTracking(True)
+        theme.changed.connect(self._restyle)
+
+    # -- what it shows ---------------------------------------------------------------------------------------
+
+    def show_replay(self, replay: Replay | None) -> None:
+        """Show another recording, all of it."""
+        self._replay = replay
+        self._topics = tuple(replay.recorded) if replay is not None else ()
+        there = replay is not None and replay.opened is not None
+        self.scale = TimeScale.whole(replay.start_ns, replay.end_ns) if replay is not None and there else None
+        self._position_ns, self._loop, self._follows = 0, None, True
+        self._fit()
+
+    def move_to(self, position_ns: int, loop: tuple[int, int] | None) -> None:
+        """The playhead is there now; where it left what is shown, that follows."""
+        if (position_ns, loop) == (self._position_ns, self._loop):
+            return
+        self._position_ns, self._loop = position_ns, loop
+        if self.scale is not None and self._follows and not self._held:
+            self.set_scale(self.scale.with_time(position_ns))
+        self.viewport().update()
+
+    def set_scale(self, scale: TimeScale) -> None:
+        """Show another part."""
+        if scale != self.scale:
+            self.scale = scale
+            self.renew()
+
+    def zoom(self, factor: float, at_ns: int | None = None) -> None:
+        """More time, or less, around a time, or the playhead."""
+        if self.scale is not None:
+            self.set_scale(self.scale.zoomed(factor, self._position_ns if at_ns is None else at_ns))
+
+    def show_all(self) -> None:
+        """Show all of it."""
+        if self.scale is not None:
+            self.set_scale(TimeScale.whole(self.scale.first_ns, self.scale.last_ns))
+
+    def renew(self) -> None:
+        """Paint the lanes anew; what they need is asked for."""
+        self._lanes = None
+        self.want()
+        self.viewport().update()
+
+    def want(self) -> None:
+        """Ask for the figures of the part that is shown."""
+        replay, scale = self._replay, self.scale
+        if replay is not None and replay.densities is not None and scale is not None:
+            buckets = max(1, min(MOST_BUCKETS, round(self._plot().width())))
+            replay.densities.want(scale.begin_ns, scale.end_ns + 1, buckets)
+
+    # -- where things are ------------------------------------------------------------------------------------
+
+    def _row(self) -> float:
+        return max(float(ROW), self._theme.scaled(ROW))
+
+    def _top(self) -> float:
+        """Where the lanes of topics begin."""
+        return self._theme.scaled(RULER) + self._theme.scaled(MARKS)
+
+    def _plot(self) -> QRectF:
+        """Where time is, below and including the ruler."""
+        view = self.viewport()
+        narrow = view.width() < self._theme.scaled(NARROW)
+        left = self._theme.scaled(NARROW_NAMES if narrow else NAMES)
+        right = self._theme.scaled(NARROW_FIGURES if narrow else FIGURES)
+        return QRectF(left, 0, max(20.0, view.width() - left - right), view.height())
+
+    def x_of(self, at_ns: int) -> float:
+        """Where a time is."""
+        plot = self._plot()
+        share = self.scale.share(at_ns) if self.scale is not None else 0.0
+        return plot.left() + max(-1.0, min(2.0, share)) * plot.width()
+
+    def time_at(self, x: float) -> int:
+        """The time there."""
+        plot = self._plot()
+        return self.scale.time((x - plot.left()) / plot.width()) if self.scale is not None else 0
+
+    def topic_at(self, y: float) -> str:
+        """The topic whose lane is there; "" where there is none."""
+        if y < self._top():
+            return ""
+        place = int((y - self._top() + self.verticalScrollBar().value()) / self._row())
+        return self._topics[place] if 0 <= place < len(self._topics) else ""
+
+    def show_topic(self, topic: str) -> None:
+        """Scroll to a topic's lane."""
+        if topic in self._topics:
+            top, bar = round(self._topics.index(topic) * self._row()), self.verticalScrollBar()
+            if not bar.value() <= top <= bar.value() + bar.pageStep() - self._row():
+                bar.setValue(top)
+        self.renew()
+
+    def _fit(self) -> None:
+        bar, room = self.verticalScrollBar(), self.viewport().height() - self._top()
+        bar.setRange(0, max(0, round(len(self._topics) * self._row() - room)))
+        bar.setPageStep(max(1, round(room)))
+        bar.setSingleStep(round(self._row()))
+        self.renew()
+
+    def _restyle(self) -> None:
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def sizeHint(self) -> QSize:
+        return QSize(900, 260)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(160, 60)
+
+    # -- painting --------------------------------------------------------------------------------------------
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self.viewport())
+        painter.fillRect(self.viewport().rect(), self._theme.colour("panel"))
+        if self._replay is not None and self.scale is not None:
+            if self._lanes is None:
+                self._lanes = self._painted()
+            painter.drawPixmap(0, 0, self._lanes)
+            self._paint_loop(painter)
+            self._paint_playhead(painter)
+        painter.end()
+
+    def _painted(self) -> QPixmap:
+        ratio = self.viewport().devicePixelRatioF()
+        made = QPixmap(self.viewport().size() * ratio)
+        made.setDevicePixelRatio(ratio)
+        made.fill(self._theme.colour("panel"))
+        painter = QPainter(made)
+        plot = self._plot()
+        painter.save()
+        painter.setClipRect(QRectF(0, self._top(), self.viewport().width(), self.viewport().height()))
+        first = int(self.verticalScrollBar().value() / self._row())
+        shown = int((self.viewport().height() - self._top()) / self._row()) + 2
+        for place in range(first, min(len(self._topics), first + shown)):
+            self._paint_topic(painter, plot, place)
+        painter.restore()
+        self._paint_ruler(painter, plot)
+        self._paint_bookmarks(painter, plot)
+        painter.end()
+        return made
+
+    def _paint_ruler(self, painter: QPainter, plot: QRectF) -> None:
+        theme, scale = self._theme, self.scale
+        if scale is None:
+            return
+        high = theme.scaled(RULER)
+        most = max(2, int(plot.width() / theme.scaled(MARK_PX)))
+        digits = 0 if scale.step_s(most) >= 1 else 3
+        font, ink = theme.font("small"), theme.colour("textSecondary")
+        painter.setPen(QPen(theme.colour("border"), 1))
+        for at_ns in scale.marks(most, by_clock=self.by_clock):
+            x = self.x_of(at_ns)
+            painter.setPen(QPen(theme.colour("controlBorder"), 1))
+            painter.drawLine(QPointF(x, high - 6), QPointF(x, high))
+            from_start = span_words(at_ns - scale.first_ns, digits=digits)
+            words = clock_words(at_ns, digits=digits) if self.by_clock else from_start
+            paint.words(painter, QRectF(x + 3, 0, theme.scaled(MARK_PX), high - 4), words, font, ink)
+        paint.hairline(
+            painter, QRectF(0, 0, self.viewport().width(), high), Qt.Edge.BottomEdge, theme.colour("border")
+        )
+        right = QRectF(plot.right(), 0, self.viewport().width() - plot.right() - 10, high)
+        tertiary = theme.colour("textTertiary")
+        if right.width() > theme.scaled(FIGURES) - 12:
+            half = QRectF(right.left(), 0, right.width() / 2, high)
+            paint.words(painter, half, _("Messages"), font, tertiary, paint.RIGHT)
+        paint.words(painter, right, _("Lost"), font, tertiary, paint.RIGHT)
+
+    def _paint_bookmarks(self, painter: QPainter, plot: QRectF) -> None:
+        theme, replay = self._theme, self._replay
+        if replay is None:
+            return
+        top, high = theme.scaled(RULER), theme.scaled(MARKS)
+        font = theme.font("small")
+        self._paint_name(
+            painter, QRectF(0, top, plot.left(), high), "bookmark", _("Bookmarks"), "textSecondary"
+        )
+        marks = replay.bookmarks
+        if not marks:
+            ink = theme.colour("textTertiary")
+            paint.words(
+                painter, QRectF(plot.left() + 8, top, plot.width() - 8, high), _("B makes one"), font, ink
+            )
+        painter.save()
+        painter.setClipRect(QRectF(plot.left(), top, plot.width(), high))
+        ink = theme.colour("accentText")
+        free = plot.left() - 1.0
+        for mark in marks:
+            x = self.x_of(mark.at_ns)
+            if not plot.left() - 1 <= x <= plot.right() + 1:
+                continue
+            painter.setPen(QPen(ink, 1.5))
+            painter.drawLine(QPointF(x, top + 3), QPointF(x, top + high - 3))
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(ink)
+            flag = QRectF(x, top + 4, 8, 7)
+            painter.drawRect(flag)
+            if x >= free and mark.name:
+                wide = min(paint.width_of(font, mark.name), theme.scaled(160))
+                paint.words(painter, QRectF(x + 12, top, wide, high), mark.name, font, theme.colour("text"))
+                free = x + 16 + wide
+        painter.restore()
+        whole = QRectF(0, 0, self.viewport().width(), top + high)
+        paint.hairline(painter, whole, Qt.Edge.BottomEdge, theme.colour("border"))
+
+    def _paint_name(self, painter: QPainter, box: QRectF, icon: str, words: str, role: str) -> None:
+        theme = self._theme
+        side = theme.scaled(14)
+        square = QRectF(12, box.center().y() - side / 2, side, side)
+        paint_icon(painter, square, icon, theme.colour("textTertiary"))
+        rest = box.adjusted(18 + side, 0, -6, 0)
+        font = theme.font("code" if role in {"text", "selectedText"} else "body")
+        paint.words(painter, rest, words, font, theme.colour(role))
+
+    def _paint_topic(self, painter: QPainter, plot: QRectF, place: int) -> None:
+        theme, replay, topic = self._theme, self._replay, self._topics[place]
+        if replay is None:
+            return
+        top = self._top() + place * self._row() - self.verticalScrollBar().value()
+        whole = QRectF(0, top, self.viewport().width(), self._row())
+        is_chosen = topic == replay.chosen
+        if is_chosen:
+            painter.fillRect(whole, theme.colour("selected"))
+        known = replay.recorded[topic]
+        role = "selectedText" if is_chosen else "text"
+        icon = ICONS.get(known.codec, "binary")
+        self._paint_name(painter, QRectF(0, top, plot.left(), self._row()), icon, topic, role)
+        self._paint_density(painter, plot, top, topic, is_chosen=is_chosen)
+        self._paint_losses(painter, plot, top, topic)
+        self._paint_figures(
+            painter, QRectF(plot.right(), top, whole.right() - plot.right() - 10, self._row()), topic
+        )
+
+    def _paint_density(
+        self, painter: QPainter, plot: QRectF, top: float, topic: str, *, is_chosen: bool
+    ) -> None:
+        replay, scale = self._replay, self.scale
+        density = replay.densities.newest if replay is not None and replay.densities is not None else None
+        if density is None or scale is None or topic not in density.counts:
+            return
+        counts = density.counts[topic]
+        filled = sum(1 for count in counts if count)
+        peak = density.peak(topic)
+        colour = self._theme.colour("accentText" if is_chosen else "textTertiary")
+        left, right = self.x_of(density.start_ns), self.x_of(density.end_ns)
+        box = QRectF(left, top + (self._row() - DENSITY) / 2, right - left, DENSITY)
+        painter.save()
+        painter.setClipRect(
+            QRectF(plot.left(), top, plot.width(), self._row()), Qt.ClipOperation.IntersectClip
+        )
+        if filled * RARE < density.buckets:
+            per_px = box.width() / density.buckets
+            for place, count in enumerate(counts):
+                if count:
+                    painter.fillRect(QRectF(left + place * per_px, box.top(), TICK, DENSITY), colour)
+        elif peak:
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, False)
+            painter.drawImage(box, shades(counts, peak, colour))
+        painter.restore()
+
+    def _paint_losses(self, painter: QPainter, plot: QRectF, top: float, topic: str) -> None:
+        replay = self._replay
+        if replay is None or replay.densities is None:
+            return
+        ink = self._theme.colour("warn")
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(ink)
+        painted = plot.left() - 4
+        for mark in replay.densities.losses.get(topic, ()):
+            x = self.x_of(mark.at_ns)
+            if plot.left() <= x <= plot.right() and x >= painted + 3:
+                painted = x
+                middle = top + self._row() / 2
+                painter.fillRect(QRectF(x - 1, middle - 8, 2, 16), ink)
+                notch = [QPointF(x - 4, middle - 8), QPointF(x + 4, middle - 8), QPointF(x, middle - 3)]
+                painter.drawPolygon(QPolygonF(notch))
+
+    def _paint_figures(self, painter: QPainter, box: QRectF, topic: str) -> None:
+        theme, replay = self._theme, self._replay
+        if replay is None:
+            return
+        font, count = theme.font("code"), replay.recorded[topic].message_count
+        known = replay.figures.get(topic)
+        lost = None if known is None or known.lost is None else known.lost + known.unkept
+        if box.width() > theme.scaled(FIGURES) - 12:
+            half = QRectF(box.left(), box.top(), box.width() / 2, box.height())
+            paint.words(painter, half, grouped(count), font, theme.colour("textSecondary"), paint.RIGHT)
+        if lost is not None:
+            words, role = grouped(lost), "warn" if lost else "textTertiary"
+            paint.words(painter, box, words, font, theme.colour(role), paint.RIGHT)
+            if lost:
+                side = theme.scaled(13)
+                left = box.right() - paint.width_of(font, words) - side - 4
+                square = QRectF(left, box.center().y() - side / 2, side, side)
+                paint_icon(painter, square, "triangle-alert", theme.colour("warn"))
+
+    def _paint_loop(self, painter: QPainter) -> None:
+        if self._loop is None:
+            return
+        plot, accent = self._plot(), self._theme.colour("accent")
+        left, right = (self.x_of(each) for each in self._loop)
+        painter.save()
+        painter.setClipRect(plot)
+        tint = QColor(accent)
+        tint.setAlphaF(0.1)
+        painter.fillRect(QRectF(left, 0, right - left, plot.height()), tint)
+        for x in (left, right):
+            painter.fillRect(QRectF(x - 1, 0, 2, plot.height()), accent)
+        high = self._theme.scaled(RULER)
+        for x in (left - 8, right):
+            paint.box(painter, QRectF(x, 5, 8, high - 10), 2, accent)
+        painter.restore()
+
+    def _paint_playhead(self, painter: QPainter) -> None:
+        plot, theme = self._plot(), self._theme
+        x = self.x_of(self._position_ns)
+        if self.scale is None or not plot.left() - 1 <= x <= plot.right() + 1:
+            return
+        painter.fillRect(QRectF(x - 0.75, 0, 1.5, plot.height()), theme.colour("text"))
+        font = theme.font("small")
+        first_ns = self.scale.first_ns
+        words = clock_words(self._position_ns) if self.by_clock else span_words(self._position_ns - first_ns)
+        wide = paint.width_of(font, words) + 12
+        left = max(plot.left(), min(plot.right() - wide, x - wide / 2))
+        flag = QRectF(left, 3, wide, theme.scaled(RULER) - 7)
+        paint.box(painter, flag, theme.radius("small"), theme.colour("tooltip"))
+        paint.words(painter, flag, words, font, theme.colour("tooltipText"), paint.CENTRE)
+
+    # -- the mouse -------------------------------------------------------------------------------------------
+
+    def _grip(self, at: QPointF) -> str:
+        """What a press there would move."""
+        plot = self._plot()
+        if not plot.left() - GRIP <= at.x() <= plot.right() + GRIP or self.scale is None:
+            return ""
+        if self._loop is not None and at.y() < self._theme.scaled(RULER):
+            for name, edge in zip(("start", "end"), self._loop, strict=True):
+                outer = self.x_of(edge) + (-4 if name == "start" else 4)
+                if abs(at.x() - outer) <= GRIP:
+                    return name
+        return "playhead"
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() != Qt.MouseButton.LeftButton or self._replay is None:
+            return
+        self._held = self._grip(event.position())
+        topic = self.topic_at(event.position().y())
+        if topic:
+            self.chosen.emit(topic)
+        if self._held == "playhead":
+            self._replay.seek(self.time_at(event.position().x()))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        held = self._held or self._grip(event.position())
+        self.viewport().setCursor(
+            Qt.CursorShape.SplitHCursor if held in {"start", "end"} else Qt.CursorShape.ArrowCursor
+        )
+        if not self._held or self._replay is None:
+            return
+        at_ns = self.time_at(event.position().x())
+        if self._held == "playhead":
+            self._replay.seek(at_ns)
+        elif self._loop is not None:
+            start_ns, end_ns = self._loop
+            self._replay.loop(*((at_ns, end_ns) if self._held == "start" else (start_ns, at_ns)))
+
+    def mouseReleaseEvent(self, _event: QMouseEvent) -> None:
+        self._held = ""
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        topic = self.topic_at(event.position().y())
+        if topic and event.position().x() < self._plot().left():
+            self.opened.emit(topic)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """All keys are the panel's; a scroll area would take the arrows."""
+        event.ignore()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Over the time it zooms; over the names it scrolls."""
+        x, delta = event.position().x(), event.angleDelta()
+        if x < self._plot().left() or self.scale is None:
+            super().wheelEvent(event)
+        elif delta.x() and not delta.y():
+            self.set_scale(self.scale.moved(-round(delta.x() / 1200 * self.scale.span_ns)))
+        else:
+            self.zoom(WHEEL ** -delta.y(), self.time_at(x))
+        event.accept()
+
+    def viewportEvent(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
+            words = self._tip(QPointF(event.pos()))
+            QToolTip.showText(event.globalPos(), plain.tip(words) if words else "", self.viewport())
+            return True
+        return super().viewportEvent(event)
+
+    def _tip(self, at: QPointF) -> str:
+        """What a lane's mark, or a long name, is."""
+        replay, topic = self._replay, self.topic_at(at.y())
+        if replay is None or self.scale is None:
+            return ""
+        if not topic:
+            near = (each for each in replay.bookmarks if abs(self.x_of(each.at_ns) - at.x()) <= GRIP)
+            mark = next(near, None) if at.y() >= self._theme.scaled(RULER) else None
+            return mark.name if mark is not None else ""
+        losses = replay.densities.losses.get(topic, ()) if replay.densities is not None else ()
+        lost = sum(each.count for each in losses if abs(self.x_of(each.at_ns) - at.x()) <= GRIP)
+        if at.x() >= self._plot().left() and lost:
+            words = ngettext(
+                "{count} message of {topic} was lost here", "{count} messages of {topic} were lost here", lost
+            )
+            return words.format(count=grouped(lost), topic=topic)
+        return topic
+
+
+def shades(counts: Sequence[int], peak: int, colour: QColor) -> QImage:
+    """A line of pixels, one for each part: the more came in it, the stronger the colour."""
+    levels = []
+    for level in range(256):
+        alpha = 0.0 if level == 0 else FAINT + (FULL - FAINT) * level / 255
+        rgb = (round(each * alpha) for each in (colour.red(), colour.green(), colour.blue()))
+        red, green, blue = rgb
+        levels.append(round(alpha * 255) << 24 | red << 16 | green << 8 | blue)
+    pixels = array("I", [levels[0 if not count else max(1, count * 255 // peak)] for count in counts])
+    made = QImage(
+        pixels.tobytes(), len(counts), 1, 4 * len(counts), QImage.Format.Format_ARGB32_Premultiplied
+    )
+    return made.copy()  # the bytes are gone with this function

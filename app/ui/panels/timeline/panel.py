@@ -1,0 +1,200 @@
+"""Timeline: the transport row, the ruler, and a lane for each topic of the recording that is open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeyEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.core.recording.replay.replay import STEP_NS, Replay
+from app.ui.panels.base import PanelContext, PanelWidget
+from app.ui.panels.timeline.canvas import TimelineCanvas
+from app.ui.panels.timeline.transport import TransportRow
+from app.ui.widgets import Chip, EmptyAction, EmptyState, Segments, Separator
+from nep.i18n import _, pgettext
+
+START, CLOCK = "start", "clock"
+ZOOM = 1.5
+
+
+class TimelinePanel(PanelWidget):
+    """One recording's time; without one it says how to open one."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, _("Timeline"))
+        theme = self.theme
+        self._shown: Replay | None = None
+        self._state: tuple[object, ...] = ()
+        self.transport, self.canvas = TransportRow(theme), TimelineCanvas(theme)
+        self.ruler = Segments(
+            theme,
+            ((START, _("From start"), None), (CLOCK, _("Clock"), None)),
+            START,
+            size="small",
+            name=_("Ruler"),
+        )
+        self.chip = Chip(theme, "", "info", "")
+        self.chips, self.header = [self.chip], [self.ruler]
+        self.empty = EmptyState(theme, "film", "", "")
+        body = QWidget()
+        column = QVBoxLayout(body)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.transport)
+        column.addWidget(Separator(theme))
+        column.addWidget(self.canvas, 1)
+        self.pages = self.show_one_of(self.empty, body)
+        self.setFocusProxy(self.canvas)
+        self.ruler.changed.connect(self._choose_ruler)
+        self.canvas.chosen.connect(self._choose)
+        self.canvas.opened.connect(self.context.open_topic)
+        self.transport.bookmark_wanted.connect(self._bookmark)
+        self._say()
+
+    # -- what it shows ---------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        replay = self.session.replay
+        player = replay.player if replay is not None else None
+        if replay is None or player is None or replay.opened is None:
+            self._shown = None
+            self._say()
+            return
+        if replay is not self._shown:
+            self._shown, self._state = replay, ()
+            self.set_title(_("Timeline"), replay.name)
+            self.chip.set(pgettext("message", "recorded"), "info", "")
+            self.canvas.show_replay(replay)
+            self.pages.setCurrentIndex(1)
+            self.ruler.setVisible(True)
+        is_new = replay.densities is not None and replay.densities.take()
+        state = (replay.chosen, tuple(replay.bookmarks))
+        if is_new or state != self._state:
+            self._state = state
+            self.canvas.renew()
+        self.transport.show_replay(replay, player)
+        self.canvas.move_to(player.position_ns, player.loop if player.is_looping else None)
+
+    def _say(self) -> None:
+        """Say how far the opening is, why it failed, or how to open one."""
+        replay = self.session.replay
+        status = replay.status if replay is not None else None
+        words: tuple[object, ...]
+        if replay is None or status is None:
+            words = (_("No recording is open"), _("Open one, or drop it here."), True)
+        elif status.stage == "failed":
+            words = (_("{name} can't be played.").format(name=replay.name), f"{status.sentence}.", True)
+        else:
+            percent = round(100 * status.progress)
+            said = (
+                _("Reading the index, {percent} %")
+                if status.stage != "repairing"
+                else _("Repairing it, {percent} %")
+            )
+            words = (replay.name, said.format(percent=percent), False)
+        if words == self._state and self.pages.currentIndex() == 0:
+            return
+        self._state = words
+        title, sentence, offers = words
+        self.empty.say(str(title), str(sentence), "film")
+        action = EmptyAction(
+            _("Open a recording"), lambda: self.context.run("replay.open"), "folder-open", primary=True
+        )
+        self.empty.set_actions([action] if offers else [])
+        self.pages.setCurrentIndex(0)
+        self.set_title(_("Timeline"), "")
+        self.chip.set("")
+        self.ruler.setVisible(False)
+
+    def source_changed(self) -> None:
+        self._shown = None
+        self.canvas.show_replay(None)
+
+    def theme_changed(self) -> None:
+        self.canvas.renew()
+
+    # -- what a person does ----------------------------------------------------------------------------------
+
+    def show_topic(self, name: str) -> None:
+        """Step through this topic's messages."""
+        self._choose(name)
+        self.canvas.show_topic(name)
+
+    def _choose(self, topic: str) -> None:
+        if self._shown is not None:
+            self._shown.choose(topic)
+
+    def _choose_ruler(self, which: str) -> None:
+        self.canvas.by_clock = which == CLOCK
+        self.canvas.renew()
+
+    def _bookmark(self) -> None:
+        self.context.run("replay.bookmark")
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if self._shown is None or not self._key(event, self._shown):
+            super().keyPressEvent(event)
+
+    def _key(self, event: QKeyEvent, replay: Replay) -> bool:
+        held = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+        does: dict[tuple[Qt.KeyboardModifier, int], Callable[[], object]] = {
+            (NONE, Qt.Key.Key_Space): replay.toggle,
+            (NONE, Qt.Key.Key_Left): lambda: replay.step(forward=False),
+            (NONE, Qt.Key.Key_Right): lambda: replay.step(forward=True),
+            (SHIFT, Qt.Key.Key_Left): lambda: replay.move(-STEP_NS),
+            (SHIFT, Qt.Key.Key_Right): lambda: replay.move(STEP_NS),
+            (CONTROL, Qt.Key.Key_Left): lambda: replay.skip(forward=False),
+            (CONTROL, Qt.Key.Key_Right): lambda: replay.skip(forward=True),
+            (NONE, Qt.Key.Key_Home): lambda: replay.seek(replay.start_ns),
+            (NONE, Qt.Key.Key_End): lambda: replay.seek(replay.end_ns),
+            (NONE, Qt.Key.Key_BracketLeft): lambda: replay.set_loop_edge(is_start=True),
+            (NONE, Qt.Key.Key_BracketRight): lambda: replay.set_loop_edge(is_start=False),
+            (NONE, Qt.Key.Key_L): replay.toggle_loop,
+            (NONE, Qt.Key.Key_B): self._bookmark,
+            (NONE, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM),
+            (SHIFT, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM),
+            (NONE, Qt.Key.Key_Minus): lambda: self.canvas.zoom(ZOOM),
+            (NONE, Qt.Key.Key_0): self.canvas.show_all,
+            (NONE, Qt.Key.Key_Up): lambda: self._next_topic(-1),
+            (NONE, Qt.Key.Key_Down): lambda: self._next_topic(1),
+        }
+        wanted = does.get((held, event.key()))
+        if wanted is None and event.text() in {"[", "]"}:  # with AltGr on many keyboards
+            wanted = does[(NONE, Qt.Key.Key_BracketLeft if event.text() == "[" else Qt.Key.Key_BracketRight)]
+        if wanted is None:
+            return False
+        wanted()
+        return True
+
+    def _next_topic(self, by: int) -> None:
+        """Choose the topic above or below."""
+        replay = self._shown
+        if replay is not None and (topics := list(replay.recorded)):
+            place = topics.index(replay.chosen) if replay.chosen in topics else 0
+            self.show_topic(topics[max(0, min(len(topics) - 1, place + by))])
+
+    def more_actions(self) -> list[QAction]:
+        made = []
+        rows = (
+            (_("Open a recording"), "folder-open", "replay.open"),
+            (_("Back to live"), "radio-tower", "replay.live"),
+        )
+        for words, icon, command in rows:
+            action = QAction(self.theme.icon(icon), words, self)
+            action.triggered.connect(lambda _on=False, command=command: self.context.run(command))
+            made.append(action)
+        for old in self._listed:
+            old.deleteLater()
+        self._listed = made
+        return made
+
+    _listed: Sequence[QAction] = ()
+
+
+NONE, SHIFT, CONTROL = (
+    Qt.KeyboardModifier.NoModifier,
+    Qt.KeyboardModifier.ShiftModifier,
+    Qt.KeyboardModifier.ControlModifier,
+)

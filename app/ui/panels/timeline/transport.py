@@ -1,0 +1,128 @@
+"""The row above the time line: where it is, play and step, how fast, again and again, a bookmark."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import exp, log, log10
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
+
+from app.core.recording.replay.replay import Replay
+from app.core.recording.replay.scale import clock_words, date_words, span_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, IconButton, ToggleButton, label
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.slider import Track
+from app.ui.widgets.labels import set_role
+from nep.i18n import _
+from nep.recordings.player import SPEED_MAX, SPEED_MIN, PlayerStatus
+
+SPEED_STEPS = 40
+SLOW = 0.97
+"""Below this share of the speed that is asked for it is said."""
+
+
+class TransportRow(QWidget):
+    """Shows a replay's state and tells it what a person wants; `bookmark_wanted` is the window's."""
+
+    bookmark_wanted = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._replay: Replay | None = None
+        self.time, self.length, self.date = (
+            label("", "code"),
+            label("", "body", role="textSecondary"),
+            label("", "body", role="textSecondary"),
+        )
+        self.previous = IconButton(theme, "skip-back", _("Previous mark"), "Ctrl+Left")
+        self.back = IconButton(theme, "step-back", _("Previous message of the chosen topic"))
+        self.play = Button(theme, _("Play"), "play", kind="primary")
+        self.on = IconButton(theme, "step-forward", _("Next message of the chosen topic"))
+        self.next = IconButton(theme, "skip-forward", _("Next mark"), "Ctrl+Right")
+        self.speed = Track(theme, SPEED_STEPS)
+        self.speed.setAccessibleName(_("Speed"))
+        self.speed.setValue(SPEED_STEPS // 2)
+        self.speed.setMaximumWidth(110)
+        self.said = label("", "code", role="textSecondary")
+        self.loop = ToggleButton(theme, _("Loop"), "repeat")
+        self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="small")
+        self._build()
+        self._connect()
+
+    def _build(self) -> None:
+        flow = Flow(self, gap=8, row_gap=4)
+        flow.setContentsMargins(12, 6, 12, 6)
+        for widget in (
+            self.time, self.length, self.date, self.previous, self.back, self.play, self.on, self.next,
+            self.speed, self.said, self.loop, self.bookmark,
+        ):  # fmt: skip
+            flow.addWidget(widget)
+
+    def _connect(self) -> None:
+        self.previous.clicked.connect(lambda: self._do(lambda replay: replay.skip(forward=False)))
+        self.next.clicked.connect(lambda: self._do(lambda replay: replay.skip(forward=True)))
+        self.back.clicked.connect(lambda: self._do(lambda replay: replay.step(forward=False)))
+        self.on.clicked.connect(lambda: self._do(lambda replay: replay.step(forward=True)))
+        self.play.clicked.connect(lambda: self._do(Replay.toggle))
+        self.loop.clicked.connect(lambda: self._do(Replay.toggle_loop))
+        self.bookmark.clicked.connect(self.bookmark_wanted)
+        self.speed.valueChanged.connect(
+            lambda step: self._do(lambda replay: replay.set_speed(speed_of(step)))
+        )
+        self.speed.reset.connect(lambda: self.speed.setValue(SPEED_STEPS // 2))
+
+    def _do(self, what: Callable[[Replay], object]) -> None:
+        if self._replay is not None:
+            what(self._replay)
+
+    def show_replay(self, replay: Replay, player: PlayerStatus) -> None:
+        """Show where it is now."""
+        if replay is not self._replay:
+            self._replay = replay
+            self.speed.blockSignals(True)
+            self.speed.setValue(step_of(player.speed))
+            self.speed.blockSignals(False)
+        self.time.setText(span_words(player.position_ns - replay.start_ns))
+        self.length.setText(
+            _("of {length}").format(length=span_words(replay.end_ns - replay.start_ns, digits=0))
+        )
+        at_ns = player.position_ns
+        self.date.setText(f"{date_words(at_ns)}, {clock_words(at_ns)}")
+        word, icon = (_("Pause"), "pause") if player.is_playing else (_("Play"), "play")
+        self.play.set_word(word, icon)
+        self.play.set_kind("plain" if player.is_playing else "primary")
+        self.loop.setChecked(player.is_looping)
+        self.loop.set_word(self._loop_words(replay, player))
+        self._say_speed(player)
+
+    def _loop_words(self, replay: Replay, player: PlayerStatus) -> str:
+        if player.loop is None or not player.is_looping:
+            return _("Loop")
+        begin, end = (span_words(each - replay.start_ns, digits=0) for each in player.loop)
+        return _("Loop {begin} to {end}").format(begin=begin, end=end)
+
+    def _say_speed(self, player: PlayerStatus) -> None:
+        asked, true = player.speed, player.true_speed
+        is_slow = player.is_playing and true is not None and true < SLOW * asked
+        if is_slow:
+            words = _("asked {asked}, is {true}\u2009\u00d7").format(asked=f"{asked:.3g}", true=f"{true:.2g}")
+        else:
+            words = f"{asked:.1f}\u2009\u00d7" if asked >= 1 else f"{asked:.2g}\u2009\u00d7"
+        if words != self.said.text():
+            self.said.setText(words)
+            set_role(self.said, "warn" if is_slow else "textSecondary")
+
+
+def speed_of(step: int) -> float:
+    """The speed of a step of the slider: 0.1 at its left end, 1 in the middle, 10 at its right end."""
+    return round(SPEED_MIN * exp(log(SPEED_MAX / SPEED_MIN) * step / SPEED_STEPS), 2)
+
+
+def step_of(speed: float) -> int:
+    """The step of the slider that is nearest to a speed."""
+    return round(
+        log10(max(SPEED_MIN, min(SPEED_MAX, speed)) / SPEED_MIN) / log10(SPEED_MAX / SPEED_MIN) * SPEED_STEPS
+    )

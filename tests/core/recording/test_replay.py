@@ -1,0 +1,253 @@
+"""An open recording as panels see it: topics, series, log, figures; and what a person does with it."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import pytest
+
+from app.core.alerts import Alerts
+from app.core.network.mailbox import Batch
+from app.core.recording.replay.replay import Replay, graph_of
+from app.core.storage.settings import Settings
+from nep.messages.message import Message
+from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
+from nep.recordings.reader import Recording
+from tests.nep.recordings.messages import START_NS, STEP_NS, json_message, kept, record
+
+COUNT = 60
+LOST = 6 + 2
+
+
+def line(seq: int) -> Message:
+    """A line of a program's log."""
+    said = {"level": "warn", "node": "arm", "text": f"line {seq}", "pid": 1}
+    data = json.dumps(said).encode()
+    return Message(LOG_TOPIC, data, "json", LOG_TYPE, stamp_ns=START_NS + seq, seq=seq // 10, publisher=5)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """/a 10 ms apart, and every tenth a line of the log; so of /a's numbers eight are missing."""
+    path = tmp_path_factory.mktemp("recordings") / "a.mcap"
+    messages = [
+        line(seq) if seq % 10 == 5 else json_message(seq + 2 * (seq > 30), "/a") for seq in range(COUNT)
+    ]
+    record(path, [messages[:30], messages[30:]])
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(path):
+    with Recording(path) as recording:
+        return [(log_ns, message) for log_ns, message in recording.read()]
+
+
+class Shown:
+    """A replay without its thread: a tick does what the thread does first."""
+
+    def __init__(self, path) -> None:
+        self.now, self.alerts = 10.0, Alerts()
+        self.replay = Replay(path, Settings(), self.alerts, clock=lambda: self.now)
+        self.replay.source.open()
+        self.tick(), self.tick()
+
+    def tick(self, passed_s: float = 0.03) -> None:
+        self.now += passed_s
+        self.replay.source.turn()
+        self.replay.tick(self.now)
+
+    def seek(self, at_ns: int) -> None:
+        self.replay.seek(at_ns)
+        self.tick()
+
+    def lines(self) -> list[str]:
+        return [record.text for record in self.replay.console.records]
+
+
+@pytest.fixture
+def shown(path):
+    made = Shown(path)
+    yield made
+    made.replay.close()
+
+
+class Taker:
+    """Takes a series, as a plot does."""
+
+    def __init__(self) -> None:
+        self.seqs: list[int | None] = []
+
+    def take(self, batch: Batch, now_ns: int) -> None:
+        self.seqs += [message.seq for message in batch.messages]
+
+    def rewind(self) -> None:
+        self.seqs.clear()
+
+
+def test_topics_are_those_of_the_file_and_the_newest_message_is_that_of_the_playhead(shown, whole):
+    topics = shown.replay.topics
+    assert [topic.name for topic in topics] == ["/a", LOG_TOPIC]
+    assert not any(topic.new for topic in topics)
+    with shown.replay.watch("/a"):
+        for place in (40, 3, 25):
+            shown.seek(whole[place][0])
+            expected = [message for log_ns, message in whole[: place + 1] if message.topic == "/a"][-1]
+            assert kept(topics["/a"].newest) == kept(expected)
+            assert topics["/a"].age_s is not None
+    assert topics["/a"].newest is None
+
+
+def test_before_its_first_message_a_topic_has_none(shown, whole):
+    with shown.replay.watch(LOG_TOPIC):
+        shown.seek(whole[30][0])
+        assert shown.replay.topics[LOG_TOPIC].newest is not None
+        shown.seek(whole[0][0])
+        assert shown.replay.topics[LOG_TOPIC].newest is None
+
+
+def test_the_log_is_that_up_to_the_playhead_also_after_going_back(shown, whole):
+    shown.seek(whole[39][0])
+    assert shown.lines() == ["line 5", "line 15", "line 25", "line 35"]
+    shown.seek(whole[20][0])
+    assert shown.lines() == ["line 5", "line 15"]
+    shown.replay.play()
+    for _ in range(8):
+        shown.tick()
+    assert shown.lines()[:3] == ["line 5", "line 15", "line 25"]
+
+
+def test_a_series_has_what_was_before_the_playhead_and_goes_on_without_doubles(shown, whole):
+    taker = Taker()
+    shown.seek(whole[30][0])
+    shown.replay.series.join("/a", taker)
+    shown.tick()
+    seqs = [message.seq for _ns, message in whole if message.topic == "/a"]
+    assert taker.seqs == [seq for seq in seqs if seq <= 30]
+    shown.replay.play()
+    for _ in range(30):
+        shown.tick()
+    assert taker.seqs == seqs
+    shown.seek(whole[10][0])
+    assert taker.seqs == [seq for seq in seqs if seq <= 10]
+
+
+def test_figures_say_what_was_lost_and_how_often_a_topic_came(shown, whole):
+    shown.seek(whole[-1][0])
+    topic = shown.replay.topics["/a"]
+    assert topic.lost == LOST
+    assert shown.replay.lost == LOST
+    passed_s = (whole[-1][0] - whole[0][0]) / 1e9
+    assert topic.rate_hz == pytest.approx(54 / passed_s)
+    assert topic.publishers == 1
+
+
+def test_losses_and_density_are_read_in_a_thread(shown, whole):
+    densities = shown.replay.densities
+    densities.want(whole[0][0], whole[-1][0] + 1, COUNT)
+    end = time.monotonic() + 60
+    while densities.newest is None or not densities.losses:
+        densities.take()
+        assert time.monotonic() < end
+    assert sum(densities.newest.counts["/a"]) == 54
+    assert sum(mark.count for mark in densities.losses["/a"]) == LOST
+    assert densities.newest.peak("/nowhere") == 0
+
+
+def test_a_person_skips_to_bookmarks_and_to_the_ends(shown, whole):
+    replay = shown.replay
+    shown.seek(whole[20][0])
+    made = replay.bookmark("here")
+    assert made.at_ns == whole[20][0]
+    shown.seek(whole[40][0])
+    replay.skip(forward=False)
+    shown.tick()
+    assert replay.player.position_ns == whole[20][0]
+    replay.skip(forward=True)
+    shown.tick()
+    assert replay.player.position_ns == replay.end_ns
+    replay.rename_bookmark(made, "there")
+    assert [each.name for each in replay.bookmarks] == ["there"]
+    replay.remove_bookmark(replay.bookmarks[0])
+    assert replay.bookmarks == ()
+
+
+def test_a_part_is_chosen_by_its_edges(shown, whole):
+    replay = shown.replay
+    shown.seek(whole[20][0])
+    replay.set_loop_edge(is_start=True)
+    shown.tick()
+    shown.seek(whole[40][0])
+    replay.set_loop_edge(is_start=False)
+    shown.tick()
+    assert replay.player.loop == (whole[20][0], whole[40][0])
+    replay.loop(whole[30][0], whole[30][0])  # no length
+    shown.tick()
+    assert replay.player.loop == (whole[20][0], whole[40][0])
+    replay.toggle_loop()
+    shown.tick()
+    assert (replay.player.is_looping, replay.player.loop) == (False, None)
+
+
+@pytest.mark.parametrize(
+    ("asked", "given"), [(0.0, 0.1), (-1.0, 0.1), (1e9, 10.0), (float("nan"), 1.0), (2.5, 2.5)]
+)
+def test_a_speed_that_there_is_not_becomes_the_nearest(shown, asked, given):
+    shown.replay.set_speed(asked)
+    shown.tick()
+    assert shown.replay.player.speed == given
+
+
+def test_play_at_the_end_begins_again(shown, whole):
+    shown.seek(2**64 - 1)
+    shown.replay.toggle()
+    shown.tick(0.0)
+    assert shown.replay.player.position_ns == whole[0][0]
+    assert shown.replay.player.is_playing
+
+
+def test_stepping_through_a_topic_that_is_not_there_does_nothing(shown):
+    shown.replay.choose("/nowhere")
+    assert shown.replay.chosen == "/a"
+    shown.replay.chosen = "/nowhere"
+    before = shown.replay.player.position_ns
+    shown.replay.step(forward=True)
+    shown.tick()
+    assert shown.replay.player.position_ns == before
+
+
+def test_what_cannot_be_played_is_an_alert_and_ends_the_thread(tmp_path):
+    path = tmp_path / "broken.mcap"
+    path.write_bytes(b"no recording")
+    alerts = Alerts()
+    replay = Replay(path, Settings(), alerts)
+    replay.start()
+    end = time.monotonic() + 60
+    while not replay.has_ended:
+        assert time.monotonic() < end
+    replay.tick(1.0)
+    assert replay.status.stage == "failed"
+    assert [alert.severity for alert in alerts.active] == ["error"]
+    replay.close()
+
+
+def test_what_was_cut_off_is_told(tmp_path, path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(path.read_bytes()[:-3000])
+    made = Shown(cut)
+    assert [alert.id for alert in made.alerts.active] == ["recording:repaired"]
+    made.replay.close()
+
+
+def test_a_topic_whose_publisher_has_no_number_is_there_too(tmp_path):
+    path = tmp_path / "original.mcap"
+    record(path, [[Message("/original", b"{}", "json", "json")]])
+    with Recording(path) as recording:
+        view = graph_of(recording.topics, recording.figures())
+    assert len(view.topics["/original"].publishers) == 1
+    assert view.topics["/original"].lost is None
+
+
+def test_time_between_messages_is_that_of_the_recording(whole):
+    assert whole[1][0] - whole[0][0] == STEP_NS

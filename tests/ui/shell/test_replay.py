@@ -1,0 +1,281 @@
+"""A recording in the real window: its panels show what was said then, and live goes on beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QColor, QImage, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from app.core.recording.replay.replay import Replay
+from app.core.session import Session
+from app.ui.panels.base import Panel, PanelWidget
+from app.ui.panels.registry import PanelRegistry
+from app.ui.panels.timeline.canvas import shades
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
+from nep.messages.message import Message
+from nep.recordings.reader import Recording
+from tests.nep.recordings.messages import json_message, picture, record
+from tests.ui.shell_parts import Answers
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+COUNT = 90
+BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory) -> Path:
+    """/a 10 ms apart, every tenth a picture."""
+    path = tmp_path_factory.mktemp("recordings") / "Tour.mcap"
+    messages = [picture(seq) if seq % 10 == 5 else json_message(seq, "/a") for seq in range(COUNT)]
+    record(path, [messages[:30], messages[30:60], messages[60:]])
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(path) -> list[tuple[int, Message]]:
+    with Recording(path) as recording:
+        return [(log_ns, message) for log_ns, message in recording.read()]
+
+
+@pytest.fixture
+def window(qtbot, theme: Theme, session: Session, answers: Answers) -> Iterator[MainWindow]:
+    made = MainWindow(session, theme, {**PanelRegistry(), "behaviour": BLOCKS}, [], asks=answers)
+    qtbot.addWidget(made)
+    theme.apply()
+    made.resize(1440, 900)
+    made.show()
+    yield made
+    made.close()
+
+
+def until(qtbot, window: MainWindow, true: Callable[[], object]) -> None:
+    """Tick as the timer does until something is so."""
+
+    def tick() -> bool:
+        window.tick()
+        return bool(true())
+
+    qtbot.waitUntil(tick, timeout=60_000)
+
+
+def opened(qtbot, window: MainWindow, path: Path) -> Replay:
+    """The recording is open, and its first message is there."""
+    window.commands.run(f"recording.open:{path}")
+    replay = window.session.replay
+    assert replay is not None
+    until(qtbot, window, lambda: replay.opened is not None)
+    window.tick()
+    return replay
+
+
+def inspected(window: MainWindow):
+    return window.bench.docks["inspector"].panel
+
+
+def go_to(qtbot, window: MainWindow, at_ns: int) -> None:
+    replay = window.session.replay
+    replay.seek(at_ns)
+    until(qtbot, window, lambda: replay.player.position_ns == at_ns)
+
+
+def live(session: Session, seq: int) -> Message:
+    """A message of today on the topic that the recording has, too."""
+    message = json_message(seq, "/a")
+    session._mailbox.post("/a", [message])
+    return message
+
+
+def test_the_inspector_shows_exactly_the_message_of_the_playhead_and_then_live_again(
+    qtbot, window, session, path, whole
+):
+    window.show_layout("developer")
+    window.open_topic("/a")
+    window.tick()
+    before = live(session, 1000)
+    window.tick()
+    assert inspected(window)._shown is before
+    opened(qtbot, window, path)
+    for place in (70, 12, 41):
+        at_ns, _message = whole[place]
+        go_to(qtbot, window, at_ns)
+        expected = [message for log_ns, message in whole if log_ns <= at_ns and message.topic == "/a"][-1]
+        until(qtbot, window, lambda seq=expected.seq: inspected(window)._shown.seq == seq)
+        assert bytes(inspected(window)._shown.data) == bytes(expected.data)
+        assert inspected(window).model.value() == expected.payload
+        assert inspected(window).live.text == "recorded"
+    live(session, 1001)
+    window.tick()
+    assert inspected(window)._shown.seq == expected.seq
+    window.commands.run("replay.live")
+    window.tick()
+    assert session.replay is None
+    assert inspected(window).live.text == "live"
+    after = live(session, 1002)
+    window.tick()
+    assert inspected(window)._shown is after
+    assert "timeline" not in window.bench.open_names()
+
+
+def test_robots_and_alarms_go_by_the_live_network_meanwhile(qtbot, window, session, path):
+    watch = session.watch("/a")
+    opened(qtbot, window, path)
+    said = live(session, 2000)
+    window.tick()
+    assert session.live.topics["/a"].newest is said
+    assert session.topics["/a"].newest is not said
+    watch.close()
+
+
+def test_nothing_is_sent(qtbot, window, session, path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(session.source, "submit", lambda what, job: asked.append(what))
+    monkeypatch.setattr(session.source, "watch", asked.append)
+    replay = opened(qtbot, window, path)
+    asked.clear()
+    window.open_topic("/a")
+    replay.play()
+    until(qtbot, window, lambda: replay.player.is_at_end)
+    assert asked == []
+
+
+def test_a_recording_is_opened_by_the_menu_a_drop_and_another_one(
+    qtbot, window, session, answers, path, tmp_path
+):
+    answers.path = path
+    window.commands.run("replay.open")
+    first = session.replay
+    assert first.path == path
+    assert answers.asked[0].startswith("recording ")
+    other = tmp_path / "other.mcap"
+    other.write_bytes(path.read_bytes())
+    window.commands.files.open_all([other])
+    assert session.replay.path == other
+    until(qtbot, window, lambda: session.replay.opened is not None)
+    assert [topic.name for topic in session.topics] == ["/a", "/camera"]
+    until(qtbot, window, lambda: first.has_ended)
+
+
+def test_a_file_that_is_no_recording_is_said_and_leads_back(qtbot, window, session, tmp_path):
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(b"no recording")
+    window.commands.run(f"recording.open:{broken}")
+    until(qtbot, window, lambda: session.replay.status.stage == "failed")
+    window.tick()
+    assert [alert.action for alert in session.alerts.active] == [f"recording.folder:{broken}"]
+    timeline = window.bench.docks["timeline"].panel
+    assert timeline.pages.currentIndex() == 0
+    window.commands.run("replay.live")
+    window.tick()
+    assert session.replay is None
+
+
+def test_the_tool_bar_and_the_status_bar_say_which_source_shows(qtbot, window, session, path):
+    window.show_layout("developer")
+    source = window.tools.source
+    window.tools.refresh()
+    assert (source.text(), source.back.isVisible()) == ("Live network", False)
+    opened(qtbot, window, path)
+    window.tools.refresh()
+    assert source.text() == "Tour.mcap  0:00"
+    window._show_facts()
+    assert window.status.words()[0].startswith("Tour.mcap, ")
+    assert "Live network goes on" in window.status.words()
+    QTest.mouseClick(source.back, Qt.MouseButton.LeftButton)
+    window.tools.refresh()
+    assert (source.text(), source.back.isVisible()) == ("Live network", False)
+
+
+def test_keys_play_step_mark_and_zoom(qtbot, window, session, path, whole):
+    replay = opened(qtbot, window, path)
+    panel = window.bench.docks["timeline"].panel
+    window.tick()
+    canvas = panel.canvas
+
+    def press(key: Qt.Key, held: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+        QTest.keyClick(canvas, key, held)
+
+    press(Qt.Key.Key_End)
+    until(qtbot, window, lambda: replay.player.position_ns == replay.end_ns)
+    press(Qt.Key.Key_Home)
+    until(qtbot, window, lambda: replay.player.position_ns == replay.start_ns)
+    press(Qt.Key.Key_Right)
+    until(qtbot, window, lambda: replay.player.position_ns == whole[1][0])
+    press(Qt.Key.Key_B)
+    assert [mark.at_ns for mark in replay.bookmarks] == [whole[1][0]]
+    press(Qt.Key.Key_BracketLeft)
+    until(qtbot, window, lambda: replay.player.is_looping)
+    assert replay.player.loop == (whole[1][0], replay.end_ns)
+    press(Qt.Key.Key_L)
+    until(qtbot, window, lambda: not replay.player.is_looping)
+    press(Qt.Key.Key_Plus)
+    assert not canvas.scale.is_whole
+    press(Qt.Key.Key_0)
+    assert canvas.scale.is_whole
+    press(Qt.Key.Key_Down)
+    assert replay.chosen == "/camera"
+    press(Qt.Key.Key_Space)
+    until(qtbot, window, lambda: replay.player.is_at_end and not replay.player.is_playing)
+    replay.remove_bookmark(replay.bookmarks[0])
+
+
+def test_the_mouse_seeks_chooses_and_zooms(qtbot, window, session, path, whole):
+    replay = opened(qtbot, window, path)
+    canvas = window.bench.docks["timeline"].panel.canvas
+    until(qtbot, window, lambda: replay.densities.newest is not None)
+    x = round(canvas.x_of(whole[50][0]))
+    QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(x, 10))
+    at_ns = canvas.time_at(x)
+    until(qtbot, window, lambda: replay.player.position_ns == at_ns)
+    y = round(canvas._top() + 1.5 * canvas._row())
+    QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(20, y))
+    assert replay.chosen == "/camera"
+    assert replay.player.position_ns == at_ns
+    x = canvas.x_of(at_ns)  # the dock may have got its size meanwhile
+    place = QPointF(x, 60)
+    turned = QWheelEvent(
+        place, canvas.viewport().mapToGlobal(place), QPoint(), QPoint(0, 240), Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    before = canvas.scale
+    QApplication.sendEvent(canvas.viewport(), turned)
+    assert canvas.scale.span_ns < before.span_ns
+    assert abs(canvas.x_of(at_ns) - x) <= 1.5
+
+
+def test_lanes_are_darker_where_more_came():
+    made = shades([0, 1, 2, 4], 4, QColor("#ffffff"))
+    alphas = [made.pixelColor(x, 0).alphaF() for x in range(4)]
+    assert made.format() == QImage.Format.Format_ARGB32_Premultiplied
+    assert alphas[0] == 0.0
+    assert alphas[1] < alphas[2] < alphas[3] == pytest.approx(0.76, abs=0.01)
+
+
+def test_a_plot_has_what_was_before_the_playhead_and_begins_anew_live(qtbot, window, session, path, whole):
+    opened(qtbot, window, path)
+    window.plot("/a", "x")
+    plot = window.bench.docks["plot"].panel
+    go_to(qtbot, window, whole[40][0])
+    wanted = [message.seq for log_ns, message in whole[:41] if message.topic == "/a"]
+    until(qtbot, window, lambda: list(plot.shown[0].curve.samples.values) == wanted)
+    go_to(qtbot, window, whole[20][0])
+    until(qtbot, window, lambda: list(plot.shown[0].curve.samples.values) == [w for w in wanted if w <= 20])
+    window.commands.run("replay.live")
+    window.tick()
+    assert [each.name for each in plot.shown] == ["/a.x"]
+    assert len(plot.shown[0].curve.samples) == 0
+
+
+def test_pictures_are_those_of_the_playhead(qtbot, window, session, path, whole):
+    opened(qtbot, window, path)
+    image = window.bench.docks["image"].panel
+    go_to(qtbot, window, whole[40][0])
+    until(qtbot, window, lambda: image._message() is not None and image._message().seq == 35)
+    go_to(qtbot, window, whole[2][0])  # before the first
+    until(qtbot, window, lambda: image._stream.picture is None and image.pages.currentIndex() == 0)
