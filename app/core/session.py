@@ -176,8 +176,7 @@ class Session:
         self._program, self.tick_ms = OwnProgram(), 0.0
         self._robots_seen = self._topics_seen = -1
         self._reachable: tuple[StopTarget, ...] = ()
-        self._tries_to_reach = False
-        self._next_check, self._closing_replays = 0.0, []
+        self._tries_to_reach, self._next_check, self._closing_replays = False, 0.0, []
         self._learning = MasterChange()
 
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:

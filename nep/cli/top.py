@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
     from rich.live import Live
 
-__all__ = ["Order", "node_rows", "top", "topic_rows"]
+__all__ = ["TopicOrder", "node_rows", "top", "topic_rows"]
 
 _SLICE_S = 0.1
 _NAMES_MOST = 40
@@ -53,7 +53,7 @@ _NODES_PART = 3
 """Nodes have a third of the room, and what topics leave."""
 
 
-class Order(str, enum.Enum):
+class TopicOrder(str, enum.Enum):
     """What stands first: the largest of it, or the first by its name."""
 
     RATE = "rate"
@@ -92,8 +92,8 @@ def top(
         ),
     ] = "",
     order: Annotated[
-        Order, typer.Option("--sort", help=_("What stands first."), case_sensitive=False)
-    ] = Order.RATE,
+        TopicOrder, typer.Option("--sort", help=_("What stands first."), case_sensitive=False)
+    ] = TopicOrder.RATE,
     every_s: Annotated[
         float,
         typer.Option(
@@ -172,16 +172,16 @@ def _matches(name: str, pattern: str) -> bool:
     return glob_matches(pattern, name) if is_glob(pattern) else pattern.casefold() in name.casefold()
 
 
-def topic_rows(graph: GraphView, pattern: str = "", order: Order = Order.RATE) -> list[TopicInfo]:
+def topic_rows(graph: GraphView, pattern: str = "", order: TopicOrder = TopicOrder.RATE) -> list[TopicInfo]:
     """The topics that match, in this order; those with equal figures by their names."""
     found = sorted(
         (topic for topic in graph.topics.values() if _matches(topic.name, pattern)),
         key=lambda each: each.name,
     )
-    figures: Mapping[Order, Callable[[TopicInfo], float | None]] = {
-        Order.RATE: lambda each: each.rate_hz,
-        Order.BANDWIDTH: lambda each: each.bandwidth_Bps,
-        Order.LOST: lambda each: each.lost,
+    figures: Mapping[TopicOrder, Callable[[TopicInfo], float | None]] = {
+        TopicOrder.RATE: lambda each: each.rate_hz,
+        TopicOrder.BANDWIDTH: lambda each: each.bandwidth_Bps,
+        TopicOrder.LOST: lambda each: each.lost,
     }
     if order in figures:
         found.sort(key=lambda each: _sortable(figures[order](each)), reverse=True)
@@ -204,7 +204,7 @@ class _Shown:
     """Which part of a graph is shown, and how."""
 
     pattern: str
-    order: Order
+    order: TopicOrder
 
     def show_json(self, graph: GraphView, trouble: str) -> None:
         """One line of JSON; nothing new is no line, and said beside."""
@@ -244,7 +244,7 @@ class _Shown:
             ngettext("{count} topic", "{count} topics", len(graph.topics)).format(count=len(graph.topics)),
             rate(sum(rates) if rates else None),
             size(sum(bytes_s) if bytes_s else None, "/s"),
-            _("{count} lost").format(count=sum(lost)) if lost else "",
+            ngettext("{count} lost", "{count} lost", sum(lost)).format(count=sum(lost)) if lost else "",
         ]
         return " · ".join(part for part in parts if part)
 

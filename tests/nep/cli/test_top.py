@@ -13,7 +13,7 @@ from rich.live import Live
 
 import nep
 from nep.cli import top
-from nep.cli.top import Order, node_rows, topic_rows
+from nep.cli.top import TopicOrder, node_rows, topic_rows
 from nep.masters.master import Master
 from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
@@ -36,8 +36,13 @@ def graph(*topics: TopicInfo) -> GraphView:
 def test_the_largest_is_first_and_what_is_not_known_last() -> None:
     found = graph(topic("/none"), topic("/slow", 1.0, 9), topic("/nan", math.nan), topic("/fast", 100.0, 0))
     assert [each.name for each in topic_rows(found)] == ["/fast", "/slow", "/nan", "/none"]
-    assert topic_rows(found, order=Order.LOST)[0].name == "/slow"
-    assert [each.name for each in topic_rows(found, order=Order.NAME)] == ["/fast", "/nan", "/none", "/slow"]
+    assert topic_rows(found, order=TopicOrder.LOST)[0].name == "/slow"
+    assert [each.name for each in topic_rows(found, order=TopicOrder.NAME)] == [
+        "/fast",
+        "/nan",
+        "/none",
+        "/slow",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -115,7 +120,7 @@ def test_in_a_terminal_it_fits_says_what_is_left_out_and_marks_new_losses(
     out = io.StringIO()
     screen = Console(file=out, force_terminal=True, width=100, height=20, color_system="standard")
     live = Live(console=screen, auto_refresh=False)
-    shown = top._Live(top._Shown("", Order.NAME), live)
+    shown = top._Live(top._Shown("", TopicOrder.NAME), live)
     many = [topic(f"/t{number:02}", 1.0, 0) for number in range(50)]
     with live:
         shown.show(graph(*many), "")

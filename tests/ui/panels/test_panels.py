@@ -27,6 +27,7 @@ BASES = {
     "one_robot_panel",
     "table_panel",
     "no_robot",
+    "row_actions",
 }  # no panels themselves
 NAMES = sorted({module.name for module in pkgutil.iter_modules(app.ui.panels.__path__)} - BASES)
 
@@ -96,6 +97,7 @@ def test_everything_that_can_be_pressed_or_typed_into_has_a_name(qtbot, qapp, na
             for control in controls:
                 if control.isVisibleTo(place):
                     assert control.accessibleName(), control
+    panel.shut()
 
 
 @pytest.mark.parametrize(
@@ -111,6 +113,7 @@ def test_a_panel_with_nothing_says_what_to_do_next(qtbot, qapp, name) -> None:
         qtbot.addWidget(widget)
     said = " ".join(shown.text() for shown in panel.findChildren(QLabel) if shown.isVisible())
     assert len(said.split()) >= 5
+    panel.shut()
 
 
 def imported_panels(folder: Path) -> Iterator[tuple[str, str]]:

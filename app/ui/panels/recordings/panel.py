@@ -168,7 +168,8 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         folder = self._recordings.folder
         is_own = bool(self.session.settings.get(FOLDER_KEY, ""))
         if not self._has_looked:
-            self.empty.say(_("Looking into the folder"), str(folder), "folder-open")
+            said = _("Its recordings appear here in a moment.")
+            self.empty.say(_("Looking into the folder"), said, "folder-open")
             self.empty.set_actions([])
         elif self._look.problem and is_own:
             said = _("{folder}: {reason}.").format(folder=folder, reason=self._look.problem)
