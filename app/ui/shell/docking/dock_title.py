@@ -162,7 +162,10 @@ class DockTitle(QWidget):
         self._row.addWidget(self.more)
 
     def sizeHint(self) -> QSize:
-        return QSize(120, self._shared_height() + max(self._least, self._row.sizeHint().height()))
+        return QSize(120, self._height())
+
+    def _height(self) -> int:
+        return self._shared_height() + max(self._least, self._row.sizeHint().height())
 
     def _shared_height(self) -> int:
         if self._whole is None or not self._tabs:
@@ -170,7 +173,7 @@ class DockTitle(QWidget):
         return max(self._least, self._shared_row.sizeHint().height())
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(80, self.sizeHint().height())
+        return QSize(80, self._height())  # asked as often as the other: not by way of it
 
     def show_title(self) -> None:
         """Take the panel's name and what it shows."""
