@@ -54,7 +54,7 @@ def test_a_value_brings_an_alarm_on_which_calls_and_sends(session: Session) -> N
         assert {deed.kind: deed.words for deed in record.deeds} == {
             "call": "restart answered",
             "send": "sent to /say",
-            "keep": "nothing was kept: nothing is being recorded",
+            "keep": "nothing was kept: the flight recorder is off",
             "run": "“Greeting” was not run: there is no window",
         }
         said = alert(session, rule)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 
-from PySide6.QtCore import QMimeData, QPoint, Qt
-from PySide6.QtGui import QDrag, QPixmap
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QEvent, QMimeData, QObject, QPoint, Qt, QTimer
+from PySide6.QtGui import QDrag, QKeyEvent, QKeySequence, QPixmap
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.ui.widgets.labels import label
 
 MIME = "application/x-nep-field"
+MODIFIERS = {Qt.Key.Key_Shift, Qt.Key.Key_Control, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr}
+"""They choose what a drop means, and are no keys of commands."""
 
 
 def field_in_hand(topic: str, path: str) -> QMimeData:
@@ -34,14 +37,53 @@ def dropped_field(data: QMimeData) -> tuple[str, str] | None:
     return None
 
 
-def drag_field(source: QWidget, topic: str, path: str) -> None:
-    """Let a person drag a field away; returns when it is dropped."""
+class DragKeys(QObject):
+    """While something is dragged Qt takes all keys: any but Esc lets go of it, and does what it is for.
+
+    So Stop works also with a field in the hand.
+    """
+
+    def __init__(self, press: Callable[[str], object]) -> None:
+        """``press`` does what the key of that name, such as "F12", is for."""
+        super().__init__()
+        self._press = press
+
+    def begin(self) -> None:
+        """Look at keys before Qt's own drag does: call it when that has begun."""
+        application = QApplication.instance()
+        if application is not None:
+            application.installEventFilter(self)
+
+    def end(self) -> None:
+        """Look at keys no more."""
+        application = QApplication.instance()
+        if application is not None:
+            application.removeEventFilter(self)
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        if event.type() != QEvent.Type.KeyPress or not isinstance(event, QKeyEvent):
+            return False
+        if event.key() in {Qt.Key.Key_Escape, *MODIFIERS}:
+            return False
+        name = QKeySequence(event.keyCombination()).toString(QKeySequence.SequenceFormat.PortableText)
+        QDrag.cancel()
+        QTimer.singleShot(0, lambda: self._press(name))  # when the drag has ended
+        return True
+
+
+def drag_field(source: QWidget, topic: str, path: str, *, press: Callable[[str], object]) -> None:
+    """Let a person drag a field away; returns when it is dropped. ``press``: see `DragKeys`."""
+    keys = DragKeys(press)
+    QTimer.singleShot(0, keys.begin)  # in the drag's own loop, after its filter
     drag = QDrag(source)
     data = field_in_hand(topic, path)
     drag.setMimeData(data)
     drag.setPixmap(_words(data.text()))
     drag.setHotSpot(QPoint(-12, -4))
-    drag.exec(Qt.DropAction.CopyAction)
+    try:
+        drag.exec(Qt.DropAction.CopyAction)
+    finally:
+        keys.end()
 
 
 def _words(text: str) -> QPixmap:

@@ -91,6 +91,9 @@ def test_a_server_that_is_stopped_while_it_is_called_is_replaced_by_another(
             eventually(lambda: not master.view().services["/x"].servers)
         other.new_server("/x", lambda request: ["other", request], threads=1)
         eventually(lambda: len(master.view().services["/x"].servers) == 1)  # it was unlisted
+        # ... and the client was told: what it sends before goes to the old one, which may only be suspended.
+        (server,) = master.view().services["/x"].servers
+        eventually(lambda: set(client._transport._servers.values()) == set(server.endpoints[:1]))
         assert client.call(1) == ["other", 1]
         with pytest.raises(nep.ServerGoneError):  # nobody can know any more
             waiting.result(LONG_S)

@@ -592,7 +592,7 @@ def test_a_value_is_plotted_by_its_menu_its_key_the_foot_and_by_dragging_it(
     dragged: list[tuple[str, str]] = []
     monkeypatch.setattr(panel, "context", replace(panel.context, plot=lambda *field: plotted.append(field)))
     monkeypatch.setattr(
-        "app.ui.panels.inspector.panel.drag_field", lambda _tree, *field: dragged.append(field)
+        "app.ui.panels.inspector.panel.drag_field", lambda _tree, *field, press: dragged.append(field)
     )
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {**blackboard(), "a b.c": [1, 2]})

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QContextMenuEvent, QGuiApplication
+from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
+from PySide6.QtGui import QContextMenuEvent, QDrag, QGuiApplication, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMenu
 
@@ -16,6 +16,7 @@ import app.ui
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.file_sheet import StudioDialogs
 from app.ui.shell.main_window import MainWindow
+from app.ui.widgets.field_drag import drag_field
 from app.ui.widgets.inputs.combo_box import ComboBox
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -184,5 +185,34 @@ def test_nothing_in_the_window_is_modal() -> None:
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(node, ast.Attribute) and node.attr in MODAL
     ]
-    # the speaker's loop is that of its own thread
-    assert sorted(found) == ["application.py: application.exec", "speaker.py: desk.loop.exec"]
+    # the speaker's loop is that of its own thread, and a drag's lasts until its button or a key is pressed
+    assert sorted(found) == [
+        "application.py: application.exec",
+        "field_drag.py: drag.exec",
+        "speaker.py: desk.loop.exec",
+    ]
+
+
+@pytest.mark.parametrize("key", KEYS, ids=["F12", "Ctrl+."])
+def test_stop_works_with_a_field_in_the_hand(
+    qtbot, window: MainWindow, commands: Commands, stops: list[str], monkeypatch, key
+) -> None:
+    """Qt's loop of a drag stands still until it is cancelled; what it does with keys is its own."""
+    ended: list[str] = []
+
+    def drag(_drag: QDrag, _action: Qt.DropAction) -> None:
+        def type_it() -> None:
+            code, modifiers = key
+            for press in (Qt.Key.Key_Shift, code):
+                QApplication.sendEvent(window, QKeyEvent(QEvent.Type.KeyPress, press, modifiers))
+
+        QTimer.singleShot(0, type_it)
+        qtbot.waitUntil(lambda: bool(ended))
+
+    monkeypatch.setattr(QDrag, "exec", drag)
+    monkeypatch.setattr(QDrag, "cancel", staticmethod(lambda: ended.append("cancelled")))
+    drag_field(window, "/odom", "speed", press=lambda name: commands.run(f"key:{name}"))
+    qtbot.waitUntil(lambda: stops == ["stop"])
+    assert ended == ["cancelled"]
+    QTest.keyClick(window, Qt.Key.Key_A)  # its filter has gone
+    assert ended == ["cancelled"]

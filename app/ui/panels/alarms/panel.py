@@ -34,6 +34,7 @@ from app.ui.panels.alarms.phrases import (
 from app.ui.panels.alarms.row import AlarmRow
 from app.ui.panels.alarms.slots import SlotField
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.text import plain
 from app.ui.widgets import Button, Chip, ElidedLabel, EmptyAction, EmptyState, Separator, label
 from app.ui.widgets.buttons import LinkButton
 from app.ui.widgets.file_dialogs import FileKind
@@ -139,7 +140,7 @@ class AlarmsPanel(PanelWidget):
         hint = ElidedLabel("small", "textTertiary")
         hint.setText(_("A right click on any value, topic or node makes an alarm"))
         self.line = LinkButton(self.theme, _("nep watch"))
-        self.line.setToolTip(_("Copies the line that watches over them without a window"))
+        self.line.setToolTip(plain.tip(_("Copies the line that watches over them without a window")))
         self.line.setAccessibleName(_("Copy the line for a terminal: nep watch"))
         self.line.clicked.connect(self._copy_line)
         foot.addWidget(hint, 1)

@@ -288,7 +288,7 @@ class InspectorPanel(PanelWidget):
         """A value leaves the tree in a person's hand."""
         path = field_of(node)
         if path:
-            drag_field(self.tree, self._topic, path)
+            drag_field(self.tree, self._topic, path, press=lambda key: self.context.run(f"key:{key}"))
 
     def _looked_through(self) -> tuple[object, JsonIndex | None]:
         return self.model.value(), self._reading.index if self._reading is not None else None

@@ -18,6 +18,7 @@ from app.core.series.field_path import FieldFound, completed, fields_of
 from app.core.series.formula import FUNCTIONS, WINDOWED, FieldSource
 from app.ui.panels.plot.shown_curve import value_words
 from app.ui.panels.plot.time_view import SPANS
+from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import MenuButton, Segments, ToggleButton, label, paint
 from app.ui.widgets.flow_layout import Flow
@@ -351,7 +352,7 @@ class PlotTools(QWidget):
         self.states = ToggleButton(theme, _("States"), "rows-3")
         self.states.setChecked(True)
         self.across = ToggleButton(theme, _("X and Y"), "chart-spline")
-        self.across.setToolTip(_("Draw the second curve over the first"))
+        self.across.setToolTip(plain.tip(_("Draw the second curve over the first")))
         self.across.setProperty("tip", True)
         self.export = MenuButton(theme, _("Export"), "download", size="small")
         row = Flow(self, gap=8, row_gap=6)
