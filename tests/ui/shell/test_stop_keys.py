@@ -16,7 +16,7 @@ import app.ui
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.file_sheet import StudioDialogs
 from app.ui.shell.main_window import MainWindow
-from app.ui.widgets.field_drag import drag_field
+from app.ui.widgets.field_drag import DragKeys, drag_field
 from app.ui.widgets.inputs.combo_box import ComboBox
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -202,9 +202,7 @@ def test_stop_works_with_a_field_in_the_hand(
 
     def drag(_drag: QDrag, _action: Qt.DropAction) -> None:
         def type_it() -> None:
-            code, modifiers = key
-            for press in (Qt.Key.Key_Shift, code):
-                QApplication.sendEvent(window, QKeyEvent(QEvent.Type.KeyPress, press, modifiers))
+            QApplication.sendEvent(window.windowHandle(), QKeyEvent(QEvent.Type.KeyPress, *key))
 
         QTimer.singleShot(0, type_it)
         qtbot.waitUntil(lambda: bool(ended))
@@ -216,3 +214,12 @@ def test_stop_works_with_a_field_in_the_hand(
     assert ended == ["cancelled"]
     QTest.keyClick(window, Qt.Key.Key_A)  # its filter has gone
     assert ended == ["cancelled"]
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Escape, Qt.Key.Key_Shift, Qt.Key.Key_Control])
+def test_keys_of_the_drag_itself_are_left_to_it(window: MainWindow, monkeypatch, key: Qt.Key) -> None:
+    ended: list[str] = []
+    monkeypatch.setattr(QDrag, "cancel", staticmethod(lambda: ended.append("cancelled")))
+    keys = DragKeys(ended.append)
+    assert not keys.eventFilter(window, QKeyEvent(QEvent.Type.KeyPress, key, Qt.KeyboardModifier.NoModifier))
+    assert ended == []
