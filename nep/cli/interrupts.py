@@ -17,6 +17,7 @@ from nep.cli import INTERRUPTED
 
 __all__ = ["ask_first", "call_first", "end_at_once"]
 
+AGAIN_S = 0.02
 GRACE_S = 3.0
 """So long may a command take to end that was asked to: nodes say goodbye within 2 s."""
 
@@ -55,13 +56,33 @@ def _end(_signal: int, _frame: FrameType | None) -> None:
     os._exit(INTERRUPTED)
 
 
-def _ask(_signal: int, _frame: FrameType | None) -> None:
+def _ask(_signal: int, frame: FrameType | None) -> None:
+    if _is_in_finalizer(frame):  # what is raised there is printed as ignored, and is lost
+        with suppress(RuntimeError):
+            _thread.start_new_thread(_interrupt_again, ())
+        return
     end_at_once()
     with suppress(
         RuntimeError
     ):  # no thread can be had; `Thread` has locks that whoever was interrupted may hold
         _thread.start_new_thread(_end_later, ())
     raise KeyboardInterrupt
+
+
+def _is_in_finalizer(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_name == "__del__":
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _interrupt_again() -> None:
+    threading.Event().wait(AGAIN_S)
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)  # also where it waits
+    else:
+        _thread.interrupt_main()
 
 
 def _end_later() -> None:

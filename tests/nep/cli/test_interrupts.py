@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import ast
 import os
+import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 
 import nep
 from nep import public
+from nep.cli import interrupts
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 LONG_S = 60
@@ -160,3 +163,25 @@ def test_all_is_there_at_the_end_of_python_where_nothing_can_be_imported():
 def test_a_package_that_is_missing_is_named():
     done = python("import sys; sys.modules['zmq'] = None\nimport nep\nnep.node")
     assert b"ModuleNotFoundError: " in done.stderr
+
+
+def test_an_interrupt_in_the_middle_of_a_finalizer_comes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python prints what a finalizer raises, and goes on: the command would not end."""
+
+    class Interrupted:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGINT)
+
+    def work() -> None:
+        made = Interrupted()
+        del made
+        threading.Event().wait(60.0)
+
+    monkeypatch.setattr(interrupts, "_end_later", lambda: None)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        interrupts.ask_first()
+        with pytest.raises(KeyboardInterrupt):
+            work()
+    finally:
+        signal.signal(signal.SIGINT, before)
