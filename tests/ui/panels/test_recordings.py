@@ -115,7 +115,7 @@ def test_a_click_chooses_and_enter_opens(qtbot, panel, window, folder):
     QTest.mouseClick(table.viewport(), Qt.MouseButton.LeftButton, pos=rect.center())
     assert window.commands == []
     QTest.keyClick(table, Qt.Key.Key_Return)
-    assert window.commands == [f"recording.play:{folder / 'arm.mcap'}"]
+    assert window.commands == [f"recording.open:{folder / 'arm.mcap'}"]
 
 
 def test_f2_renames_in_the_row_and_nothing_is_written_over(qtbot, panel, window, folder):
@@ -244,7 +244,7 @@ def test_what_an_alarm_kept_is_opened_from_its_history(qtbot, window, folder):
     (action,) = (each for each in menu.actions() if each.text() == "Open the recording")
     menu.close()
     action.trigger()
-    assert window.commands == [f"recording.play:{folder / 'alarm-2026-11-26-22-01-05.mcap'}"]
+    assert window.commands == [f"recording.open:{folder / 'alarm-2026-11-26-22-01-05.mcap'}"]
     panel.shut()
 
 

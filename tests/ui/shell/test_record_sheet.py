@@ -12,7 +12,6 @@ from PySide6.QtTest import QTest
 from app.core.recording.choice import RecordingChoice, RingWish
 from app.core.recording.client import RecorderSaid
 from app.core.recording.recordings import SessionRecordings
-from app.ui.shell.commands import recording as commands_module
 from app.ui.shell.dialogs.record import RecordSheet
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
@@ -185,22 +184,16 @@ def test_one_topic_alone_and_none_of_another_network(window, recorder):
     assert not window.commands.run("record.topic:ros2 /odom")
 
 
-def test_a_recording_is_opened_by_who_can_else_a_line_says_who(window, recorder, tmp_path, monkeypatch):
+def test_a_recording_that_has_gone_is_said_and_what_shows_stays(window, recorder, tmp_path, monkeypatch):
     path = tmp_path / "a.mcap"
-    window.commands.run(f"recording.play:{path}")
+    opened: list[Path] = []
+    monkeypatch.setattr(recorder.session, "open_recording", opened.append)
+    window.commands.run(f"recording.open:{path}")
     assert "not there any more" in window.toast.accessibleName()
+    assert opened == []
     path.touch()
-    opened: list[tuple[str, str]] = []
-    monkeypatch.setattr(window.commands.recording, "_do_about", lambda *about: opened.append(about))
-    window.commands.run(f"recording.play:{path}")
-    assert opened == [("recording.open", str(path))]
-
-    def unknown(name: str, _argument: str) -> None:
-        raise commands_module.UnknownCommandError(name)
-
-    monkeypatch.setattr(window.commands.recording, "_do_about", unknown)
-    window.commands.run(f"recording.play:{path}")
-    assert f'nep play "{path}"' in window.toast.accessibleName()
+    window.commands.run(f"recording.open:{path}")
+    assert opened == [path]
 
 
 @pytest.mark.parametrize(("size", "percent"), [((1440, 900), 100), ((1024, 600), 200)])

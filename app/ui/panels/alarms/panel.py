@@ -506,7 +506,7 @@ class AlarmsPanel(PanelWidget):
         menu.addAction(self.theme.icon("bell"), _("Show the alarm"), partial(self._open_record, key))
         for name in filter(None, kept):
             path = self.session.recordings.folder / name
-            run = partial(self.context.run, f"recording.play:{path}")
+            run = partial(self.context.run, f"recording.open:{path}")
             menu.addAction(self.theme.icon("history"), _("Open the recording"), run)
         menu.popup(at)
 

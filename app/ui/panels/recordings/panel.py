@@ -229,7 +229,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             do(str(facts.path))
 
     def open_row(self, key: str) -> None:
-        self.context.run(f"recording.play:{key}")
+        self.context.run(f"recording.open:{key}")
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
         return (

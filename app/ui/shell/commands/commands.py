@@ -41,7 +41,7 @@ class Commands:
         self.robots = RobotCommands(shell, session, self.files, self.behaviours.undo)
         self.view = ViewCommands(shell, session, self.files, keys)
         self.shortcuts = keys
-        self.recording = RecordCommands(shell, session, asks, self.do_about)
+        self.recording = RecordCommands(shell, session, asks)
         self.variables = VariableCommands(shell, session, self.files)
         self.replay = ReplayCommands(shell, session, asks)
         self.files.open_recording = self.replay.open
@@ -75,10 +75,6 @@ class Commands:
         id, colon, argument = name.partition(":")
         if not colon:
             return self.actions.run(id)
-        return self.do_about(id, argument)
-
-    def do_about(self, id: str, argument: str) -> bool:
-        """Do a command about one thing; False when there is none. Raises UnknownCommandError."""
         command = _ABOUT.get(id)
         if command is None:
             raise UnknownCommandError(id)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from app.core.network.topics import split_key
 from app.core.recording.choice import RecordingChoice
 from app.core.session import Session
-from app.ui.shell.actions.command import UnknownCommandError
 from app.ui.shell.commands.shell import Shell
 from app.ui.text.numbers import length_words, size_words
 from app.ui.widgets.file_dialogs import FileDialogs
@@ -21,9 +19,6 @@ if TYPE_CHECKING:
     from app.ui.shell.dialogs import record as record_sheet
 else:
     record_sheet = lazy_module("app.ui.shell.dialogs.record")
-
-OPEN = "recording.open"
-"""The command that shows a recording in the panels, about its path; not every Studio has it."""
 
 
 @runtime_checkable
@@ -37,11 +32,8 @@ class SupportsRecordings(Protocol):
 class RecordCommands:
     """Recording as a person does it: by keys, menus, the tool bar and the sheet."""
 
-    def __init__(
-        self, shell: Shell, session: Session, asks: FileDialogs, do_about: Callable[[str, str], object]
-    ) -> None:
-        """``do_about`` does a command of the window about something; UnknownCommandError without it."""
-        self._shell, self._session, self._asks, self._do_about = shell, session, asks, do_about
+    def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
+        self._shell, self._session, self._asks = shell, session, asks
         self._recordings = session.recordings
         self._recordings.on_made = self._made
         self._sheet: record_sheet.RecordSheet | None = None
@@ -127,17 +119,6 @@ class RecordCommands:
         if dock is not None and path is not None and isinstance(dock.panel, SupportsRecordings):
             dock.panel.choose_file(path)
         self._shell.panel_focus.give(dock)
-
-    def play(self, path: Path) -> None:
-        """Open a recording; where this Studio can't, say what can."""
-        if not path.is_file():
-            self._shell.say(_("{file} is not there any more").format(file=path.name))
-            return
-        try:
-            self._do_about(OPEN, str(path))
-        except UnknownCommandError:
-            words = _("In a terminal this plays it: {line}")
-            self._shell.say(words.format(line=f'nep play "{path}" --all'))
 
     def choose_folder(self) -> None:
         """Ask where recordings are to go."""

@@ -38,6 +38,9 @@ class ReplayCommands:
 
     def open(self, path: Path) -> None:
         """Show a recording, with its time line; what is wrong with it becomes an alert."""
+        if not path.is_file():
+            self._shell.say(_("{file} is not there any more").format(file=path.name))
+            return
         self._shell.show_layout("developer")
         self._session.open_recording(path)
         self._shell.open_panel(TIMELINE)

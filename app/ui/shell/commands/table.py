@@ -363,7 +363,6 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     ),
     _about("alarm.node", str, lambda do, node: do.view.new_alarm(AlarmCondition("leaves", node))),
     _about("alarm.value", read_value, lambda do, about: do.view.alarm_on_value(about)),
-    _about("recording.play", Path, lambda do, path: do.recording.play(path)),
     _about("record.topic", str, lambda do, topic: do.recording.record_topic(topic)),
     _about("recording.open", Path, lambda do, path: do.replay.open(path)),
     _about("recording.folder", Path, lambda do, path: do.replay.show_folder(path)),
