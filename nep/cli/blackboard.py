@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import os
-import signal
-import sys
 from collections.abc import Mapping, Sequence
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nep.cli import interrupts
 from nep.cli.complete import complete_topic
 from nep.cli.options import JsonOption, MasterOption, checked_time
 from nep.cli.screen import UNKNOWN, TextColumn, duration, say, show_json, show_table
@@ -115,7 +113,7 @@ def run(
 
     It tells changes on /blackboard/changes, and has the services blackboard/get, set and keys.
     """
-    signal.signal(signal.SIGTERM, _end)
+    interrupts.leave_when_told()
     with (
         Node(name.strip("/").replace("/", "-"), master=master) as node,
         boards.Blackboard(node, max_keys=boards.MAX_KEYS if max_keys is None else max_keys) as board,
@@ -209,8 +207,3 @@ def _row(entry: Mapping[str, object]) -> tuple[str, ...]:
 
 def _age(age_s: float) -> str:
     return f"{age_s:.1f} s" if age_s < 10 else duration(age_s)
-
-
-def _end(_signal: int, _frame: FrameType | None) -> None:
-    """A polite request to end: leave through the `with` that closes the node."""
-    sys.exit(0)

@@ -6,7 +6,6 @@ import itertools
 import logging
 import os
 import shutil
-import signal
 import sys
 import threading
 import time
@@ -14,11 +13,11 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from nep.cli import interrupts
 from nep.cli.options import JsonOption
 from nep.cli.screen import UNKNOWN, cells, console, padded, rate, say, show_json, write
 from nep.errors import NepError
@@ -106,7 +105,7 @@ def bridge(
         check_installed(configuration)
         _say_right(configuration)
         return
-    signal.signal(signal.SIGTERM, _end)
+    interrupts.leave_when_told()
     with _warnings() as notes, Bridge(configuration) as running, _published(running):
         report = _report_for(running, notes, as_json=as_json)
         if not as_json:
@@ -161,11 +160,6 @@ def _say_right(configuration: BridgeConfiguration) -> None:
         write(escaped(ends) + (f"  ≤ {topic.max_rate_hz:g} /s" if topic.max_rate_hz else "") + "\n")
     said = _("the file is right: {name} joins {a} and {b}")
     say(said.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network))
-
-
-def _end(_signal: int, _frame: FrameType | None) -> None:
-    """A polite request to end: leave through the bridge's close."""
-    sys.exit(0)
 
 
 # ---- what is said beside the table

@@ -8,6 +8,7 @@ from __future__ import annotations
 import _thread
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -15,7 +16,7 @@ from types import FrameType
 
 from nep.cli import INTERRUPTED
 
-__all__ = ["ask_first", "call_first", "end_at_once"]
+__all__ = ["ask_first", "call_first", "end_at_once", "leave_when_told"]
 
 AGAIN_S = 0.02
 GRACE_S = 3.0
@@ -50,6 +51,15 @@ def call_first(action: Callable[[], object]) -> None:
 
 
 _callers: set[signal._HANDLER] = set()
+
+
+def leave_when_told() -> None:
+    """From now on SIGTERM, a polite request to end, leaves with 0, through what closes nodes."""
+    signal.signal(signal.SIGTERM, _leave)
+
+
+def _leave(_signal: int, _frame: FrameType | None) -> None:
+    sys.exit(0)
 
 
 def _end(_signal: int, _frame: FrameType | None) -> None:

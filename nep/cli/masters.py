@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-import signal
 import sys
 from collections.abc import Sequence
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nep.cli import interrupts
 from nep.cli.alert_printer import AlertLog, AlertPrinter
 from nep.cli.options import MasterOption
 from nep.cli.screen import console, say
@@ -92,7 +91,7 @@ def master(
                     terminal,
                 )
             _warn_of_others(running.address, listen or (), terminal)
-            signal.signal(signal.SIGTERM, _end)
+            interrupts.leave_when_told()
             running.wait()
         finally:
             running.close()
@@ -155,8 +154,3 @@ def _warn_of_others(address: str, hosts: Sequence[str], terminal: Terminal) -> N
         out.print(
             _("  whoever is in that network can read and command everything: no password"), style="yellow"
         )
-
-
-def _end(_signal: int, _frame: FrameType | None) -> None:
-    """A polite request to end: leave through the `finally` that closes the master."""
-    sys.exit(0)

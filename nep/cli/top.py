@@ -6,18 +6,17 @@ import enum
 import itertools
 import math
 import shutil
-import signal
 import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nep.cli import interrupts
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import (
     UNKNOWN,
@@ -150,14 +149,10 @@ def _screen(*, as_json: bool) -> AbstractContextManager[Live | None]:
         return nullcontext(None)
     from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
 
-    signal.signal(signal.SIGTERM, _end)  # the terminal gets back what stood there
+    interrupts.leave_when_told()  # the terminal gets back what stood there
     out: Console = console()
     out.soft_wrap = False
     return Live(console=out, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
-
-
-def _end(_signal: int, _frame: FrameType | None) -> None:
-    sys.exit(0)
 
 
 # ---- what is shown

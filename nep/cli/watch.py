@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from datetime import datetime, timezone
 from pathlib import Path
-from types import FrameType
 from typing import Annotated
 
 import typer
 
+from nep.cli import interrupts
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, say, show_json, write
 from nep.cli.values import cleaned
@@ -79,7 +78,7 @@ def watch(
         return
     if not any(rule.is_on for rule in rules):
         raise NepError(_("no alarm of '{file}' is switched on").format(file=file))
-    signal.signal(signal.SIGTERM, _end)
+    interrupts.leave_when_told()
     with ExitStack() as opened:
         node = opened.enter_context(Node(f"nep-watch-{os.getpid()}", master=master))
         watching = _Watching(node, rules, _JsonLines() if as_json else _Lines())
@@ -87,11 +86,6 @@ def watch(
         if not as_json:
             watching.say_begin()
         watching.run(count)
-
-
-def _end(_signal: int, _frame: FrameType | None) -> None:
-    """A polite request to end: leave through the `with` that closes the node."""
-    sys.exit(0)
 
 
 # ---- what is shown
