@@ -126,7 +126,7 @@ def _main(given: Sequence[str]) -> int:
         return end_process(self_test(options.selftest, web=options.web))
     if not options.web:
         parser.error(_("--no-web belongs to --selftest"))
-    gc.disable()  # a tenth of the time to start; the window enables it again (`app.ui.startup.interpreter`)
+    gc.disable()  # a tenth of the time to start; the window collects by itself (`app.ui.startup.interpreter`)
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")
     allow_many()

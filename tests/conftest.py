@@ -14,6 +14,7 @@ import pytest
 from _pytest.faulthandler import fault_handler_stderr_fd_key
 from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
+from xdist.workermanage import WorkerController
 
 from nep.masters.master import Master
 from nep.text import escaped
@@ -76,11 +77,35 @@ class ByFile(LoadScopeScheduling):
     def _split_scope(self, nodeid: str) -> str:
         return "ports" if nodeid.startswith(WITH_FIXED_PORTS) else nodeid.partition("::")[0]
 
-    def _assign_work_unit(self, node: object) -> None:
+    def _assign_work_unit(self, node: WorkerController) -> None:
         """Give a process the file that takes longest of those that are left."""
         longest = max(self.workqueue, key=self._seconds)
         self.workqueue.move_to_end(longest, last=False)
         super()._assign_work_unit(node)
+
+    def _reschedule(self, node: WorkerController) -> None:
+        """Give a process more than it has in hand: it begins a test only when it knows the one after it."""
+        while not node.shutting_down and self._pending_of(self.assigned_work[node]) <= 2:
+            super()._reschedule(node)  # gives it a file, or tells it that there is no other
+
+    def remove_node(self, node: WorkerController) -> str | None:
+        """Give what a process that crashed had not done to the others, but for the test that it died of.
+
+        pytest-xdist gives that test away once more, and with it all files that were done: a process that
+        gets one of those has nothing to do or to report, is never given another, and the run never ends.
+        """
+        had = self.assigned_work.pop(node)
+        left = [
+            (scope, test) for scope, tests in had.items() for test, is_done in tests.items() if not is_done
+        ]
+        if not left:
+            return None
+        (its_scope, crashed), *_others = left
+        had[its_scope][crashed] = True
+        self.workqueue.update({scope: tests for scope, tests in had.items() if not all(tests.values())})
+        for other in self.nodes:
+            self._reschedule(other)
+        return crashed
 
     def _seconds(self, scope: str) -> float:
         each = USUAL_OF_STUDIO_S if scope.startswith("tests/e2e/") else USUAL_S

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from tools.check import Check, Outcome, checks, run, run_all, summary
+from tools.check import ROOT, Check, Outcome, checks, run, run_all, summary
 
 
 def test_the_cheapest_mistakes_are_found_first_and_tests_are_last() -> None:
@@ -61,3 +64,31 @@ def test_the_summary_names_what_failed() -> None:
     lines = summary([Outcome("mypy", True, 1.25), Outcome("pytest", False, 60.0)]).splitlines()
     assert lines[0].split() == ["mypy", "ok", "1.2", "s"]
     assert lines[1].split() == ["pytest", "FAILED", "60.0", "s"]
+
+
+def test_a_process_of_tests_that_crashes_fails_one_test_and_the_others_run_to_their_end(
+    tmp_path: Path,
+) -> None:
+    """Each process had done some files by then, and the one that comes for it gets files of one test."""
+    harmless = "".join(f"def test_{number}() -> None: ...\n" for number in range(3))
+    for number in range(6):
+        (tmp_path / f"test_first_{number}.py").write_text(harmless, encoding="utf-8")
+    crash = "import os\n\ndef test_crash() -> None:\n    os._exit(1)\n\ndef test_after() -> None: ...\n"
+    (tmp_path / "test_second_crash.py").write_text(crash, encoding="utf-8")
+    for number in range(4):
+        text = "def test_alone() -> None: ...\n"
+        (tmp_path / f"test_third_{number}.py").write_text(text, encoding="utf-8")
+    hook = "from tests.conftest import pytest_xdist_make_scheduler\n"
+    (tmp_path / "conftest.py").write_text(hook, encoding="utf-8")
+    command = (sys.executable, "-m", "pytest", "-q", "-n2", "--dist", "loadfile", "-p", "no:cacheprovider")
+    done = subprocess.run(
+        command,
+        check=False,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert "crashed while running 'test_second_crash.py::test_crash'" in done.stdout
+    assert "1 failed, 23 passed" in done.stdout.splitlines()[-1]

@@ -39,7 +39,7 @@ from app.ui.shell.keyboard import PanelFocus
 from app.ui.shell.start_page.open_work import open_work
 from app.ui.shell.start_page.page import Example, StartPage
 from app.ui.shell.window_state import WindowState
-from app.ui.startup.interpreter import GcFreezeTimer
+from app.ui.startup.interpreter import GcFreezeTimer, GcTimer
 from app.ui.startup.portal import has_system_dialogs
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
@@ -519,6 +519,7 @@ class MainWindow(QMainWindow):
         """Start the session and the tick."""
         self.session.start()
         self.timer.start()
+        GcTimer(self).start()
         self.gc_freeze.start()
         self.bench_made.connect(self.gc_freeze.start)
 

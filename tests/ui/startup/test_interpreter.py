@@ -9,10 +9,13 @@ import gc
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 
 import pytest
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtGui import QAction
+from pytestqt.qtbot import QtBot
 
 from app.ui.startup import interpreter
 
@@ -51,14 +54,60 @@ def test_what_stands_is_put_aside_and_later_garbage_is_collected() -> None:
     standing = [[n] for n in range(1000)]
     gc.disable()
     interpreter.freeze_garbage()
-    assert gc.isenabled()
     assert gc.get_freeze_count() > 1000
-    assert gc.get_threshold()[0] == interpreter.NEW_OBJECTS
     assert not any(each is standing for each in gc.get_objects())
     circle: list[object] = []
     circle.append(circle)
     del circle
     assert gc.collect() >= 1
+
+
+class Deleted:
+    """Where things of Qt's that stood in circles were deleted."""
+
+    def __init__(self) -> None:
+        self.by: list[int] = []
+
+    def make(self, circles: int) -> None:
+        for _circle in range(circles):
+            item = QAction()
+            item.destroyed.connect(lambda: self.by.append(threading.get_ident()), Qt.DirectConnection)
+            item.me = item  # type: ignore[attr-defined]
+
+
+def test_things_of_qt_are_deleted_in_the_thread_of_the_window_however_busy_others_are(qtbot: QtBot) -> None:
+    deleted, made = Deleted(), 300
+    owner = QObject()
+    gc.collect()
+    timer = interpreter.GcTimer(owner)
+    timer.setInterval(5)
+    timer.start()
+    deleted.make(made)
+
+    def busy() -> None:
+        for _round in range(50):
+            _kept = [[n] for n in range(2 * interpreter.NEW_OBJECTS)]
+
+    threads = [threading.Thread(target=busy) for _thread in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not deleted.by
+    _kept = [[n] for n in range(2 * interpreter.NEW_OBJECTS)]
+    qtbot.waitUntil(lambda: len(deleted.by) == made, timeout=60_000)
+    assert set(deleted.by) == {threading.get_ident()}
+
+
+def test_the_older_are_looked_at_less_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    monkeypatch.setattr(gc, "collect", asked.append)
+    few, many = interpreter.COLLECTIONS, interpreter.COLLECTIONS + 1
+    made = interpreter.NEW_OBJECTS + 1
+    for counts in ((made - 1, many, many), (made, few, many), (made, many, few), (made, many, many)):
+        monkeypatch.setattr(gc, "get_count", lambda counts=counts: counts)
+        interpreter.collect_garbage()
+    assert asked == [0, 1, 2]
 
 
 def test_it_settles_a_while_after_the_last_start(qtbot: object, qapp: object) -> None:
