@@ -159,6 +159,12 @@ def test_a_bad_description_is_an_error_with_all_sentences():
     assert "the description of 'Pepper' can't be used" in str(caught.value)
 
 
+def test_a_word_that_is_nothing_but_a_control_character_is_told_at_once():
+    document = copy.deepcopy(model("pepper"))
+    document["properties"]["sees_ball"]["rb:block"]["category"] = "\x08"
+    assert validate(document) == ("properties.sees_ball.rb:block.category must not be empty",)
+
+
 # ---- whatever comes from the network, it is a robot or a sentence ----------------------------------
 
 json_values = st.recursive(

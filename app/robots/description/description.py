@@ -15,10 +15,9 @@ from app.robots.description.inputs import Choice, Parameter, pretty_unit
 from app.robots.description.json_access import as_part, part, text
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
 from app.robots.description.parser import read
-from app.robots.description.validate import validate
+from app.robots.description.validate import cleaned, validate
 from nep.i18n import _, number
 from nep.messages.message import Message
-from nep.text import harmless
 
 __all__ = [
     "Action", "Choice", "DataField", "Event", "Parameter", "Robot", "RobotTopics", "SafeStop", "Sensor",
@@ -27,10 +26,6 @@ __all__ = [
 
 LARGEST_BYTES = 1_000_000
 """A description that is larger is refused before it is decoded."""
-_BLOCK = "rb:block"
-_WORDS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
-"""Members of a description that are shown, or hold what is."""
-_VALUES = frozenset({"default", "enum", "const"})
 _NOT_IN_TOPICS = re.compile(r"[^\w.-]")
 
 
@@ -45,29 +40,8 @@ def parse(document: Mapping[str, object]) -> Robot:
     if problems:
         title = as_part(document).get("title")
         raise DescriptionError(title if isinstance(title, str) else _("a robot"), problems)
-    cleaned = _cleaned(document)
-    if cleaned != document:
-        return parse(cleaned)
+    document = cleaned(document)
     return read(document, default_topics(str(document["title"])))
-
-
-def _cleaned(document: Mapping[str, object]) -> dict[str, object]:
-    """The document with words that do nothing but say something; the name is right already.
-
-    One letter that turns the direction of writing, in an action's title, would turn ours behind it as well:
-    the question whether the robot may move, say.
-    """
-
-    def clean(value: object, place: str) -> object:
-        if place in _VALUES:
-            return value
-        if isinstance(value, Mapping):
-            return {key: clean(item, place if place == _BLOCK else key) for key, item in value.items()}
-        if isinstance(value, (list, tuple)):
-            return [clean(item, "") for item in value]
-        return harmless(value) if isinstance(value, str) and place in _WORDS else value
-
-    return {key: clean(item, "" if key == "title" else key) for key, item in document.items()}
 
 
 def announced(message: Message) -> Robot:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import deque
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from itertools import count, islice
@@ -16,7 +17,7 @@ from app import resources
 from app.robots.description.inputs import parameter_of, wrong_value
 from app.robots.description.json_access import as_part, names, part
 from nep.i18n import _, lazy, listed
-from nep.text import control_in
+from nep.text import control_in, harmless
 
 if TYPE_CHECKING:
     from jsonschema import Draft7Validator
@@ -27,7 +28,13 @@ _MOST_PROBLEMS = 20
 _DEEPEST = 40
 MOST_VALUES = 20_000
 """A description with more values is not looked at further: each takes some 0.05 ms. Pepper has 900."""
+_BLOCK = "rb:block"
+_WORDS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
+"""Members of a description that are shown, or hold what is."""
+_VALUES = frozenset({"default", "enum", "const"})
 _LARGEST = 1e15
+_accepted: deque[str] = deque(maxlen=8)
+"""What the schema had nothing to say to: a robot tells the same description again and again."""
 _RESERVED = {"description", "command", "answer", "state", "world"}
 
 
@@ -48,7 +55,11 @@ def validate(model: object) -> tuple[str, ...]:
     strange = _not_json(model, count(1))
     if strange is not None:
         return (strange,)
-    problems = [_sentence(error) for error in islice(_validator().iter_errors(model), _MOST_PROBLEMS)]
+    text, problems = json.dumps(model), []
+    if text not in _accepted:
+        problems = [_sentence(error) for error in islice(_validator().iter_errors(model), _MOST_PROBLEMS)]
+        if not problems:
+            _accepted.append(text)
     control = control_in(str(model.get("title")))
     if control:
         problems.append(
@@ -58,7 +69,28 @@ def validate(model: object) -> tuple[str, ...]:
         )
     if not problems:
         problems = list(_contradictions(model))
+    if not problems and (harmless_model := cleaned(model)) != model:
+        return validate(harmless_model)  # a word may be nothing without what must not be in it
     return tuple(dict.fromkeys(problems))[:_MOST_PROBLEMS]
+
+
+def cleaned(document: Mapping[str, object]) -> dict[str, object]:
+    """The document with words that do nothing but say something; the name is right already.
+
+    One letter that turns the direction of writing, in an action's title, would turn ours behind it as well:
+    the question whether the robot may move, say.
+    """
+
+    def clean(value: object, place: str) -> object:
+        if place in _VALUES:
+            return value
+        if isinstance(value, Mapping):
+            return {key: clean(item, place if place == _BLOCK else key) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [clean(item, "") for item in value]
+        return harmless(value) if isinstance(value, str) and place in _WORDS else value
+
+    return {key: clean(item, "" if key == "title" else key) for key, item in document.items()}
 
 
 def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0) -> str | None:
