@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import faulthandler
+import gc
 import importlib.util
 import os
 import signal
@@ -131,6 +132,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return
     config.hook.pytest_deselected(items=[each for each in items if each.get_closest_marker("long")])
     items[:] = [each for each in items if each.get_closest_marker("long") is None]
+
+
+def pytest_collection_finish() -> None:
+    """What stands now, modules and tests, stands to the end: no collection of garbage looks at it again."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:

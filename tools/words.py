@@ -19,6 +19,7 @@ import os
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -84,9 +85,7 @@ def template(root: Path = ROOT) -> Catalog:
         for path in sorted((root / folder).rglob(pattern)):
             if "node_modules" in path.parts or path == root / "nep" / "i18n.py":
                 continue
-            for _line, found, comments, context in extract_from_file(
-                method, path, keywords=KEYWORDS, comment_tags=("Translators:",), strip_comment_tags=True
-            ):
+            for found, comments, context in _marked(method, path, path.stat().st_mtime_ns):
                 ids = tuple(found) if isinstance(found, (list, tuple)) else (found,)
                 place = path.relative_to(root).as_posix()
                 made.add(_id(ids), locations=[(place, 0)], auto_comments=comments, context=context)
@@ -99,6 +98,17 @@ def template(root: Path = ROOT) -> Catalog:
     for context, english, place in (*sentences_of_blocks(), *sentences_of_examples()):
         made.add(english, locations=[(place, 0)], context=context)
     return made
+
+
+@cache
+def _marked(
+    method: str, path: Path, _changed_ns: int
+) -> list[tuple[str | tuple[str, ...], list[str], str | None]]:
+    """(Words, a translator's comments, context) of what is marked in a file, which is read once."""
+    found = extract_from_file(
+        method, path, keywords=KEYWORDS, comment_tags=("Translators:",), strip_comment_tags=True
+    )
+    return [(words, comments, context) for _line, words, comments, context in found]
 
 
 def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:

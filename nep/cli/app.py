@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from inspect import cleandoc
 from typing import Annotated
 
 import typer
+from typer.main import get_command
 from typer.models import CommandInfo
 
 from nep.cli import (
@@ -117,10 +119,16 @@ def run() -> int:
     return code if problem is None else code or 1
 
 
+@cache
+def _built() -> Callable[[list[str]], object]:
+    """The commands as click runs them: each parameter is looked at once."""
+    return get_command(app)
+
+
 def _code() -> int:
     """The exit code that typer leaves with."""
     try:
-        app(words_given())
+        _built()(words_given())
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else 0 if ended.code is None else 1
     return 0
