@@ -10,6 +10,7 @@
     ├── BackpackError        a backpack that can't be read or kept
     ├── ReportError          a report of a problem that can't be written
     ├── CurveError           what was typed is no curve that can be plotted
+    ├── QueryError           what was typed is no query that a message can be asked
     ├── DescriptionError     a robot's description that can't be understood
     │   └── DeclarationError one that a driver's Python declares
     ├── RobotInputError      an action's input that the robot would refuse
@@ -98,6 +99,10 @@ class ReportError(AppError):
 
 class CurveError(AppError):
     """What was typed is no curve that can be plotted."""
+
+
+class QueryError(AppError):
+    """What was typed is no query that a message can be asked."""
 
 
 class DescriptionError(AppError):

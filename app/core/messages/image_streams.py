@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 from app.core.messages.picture import Picture, Size, decode, once_more
+from app.core.messages.picture_look import PLAIN, PictureLook
 from app.core.network.watches import Watching
 from nep.i18n import _
 from nep.messages.message import Message
@@ -64,6 +65,8 @@ class ImageStream:
     awaits_picture: bool = True
     wish: Size | None = None
     """What `Images` keeps here and reads under its lock: the size that is wanted, ..."""
+    look: PictureLook = PLAIN
+    """... how its pictures are shown, ..."""
     waiting: tuple[Message, float] | None = None
     """... the newest message that is not decoded yet, and when it arrived, ..."""
     arriving: Rate = field(default_factory=Rate)
@@ -108,6 +111,10 @@ class ImageStream:
         The picture that is there is decoded again when it was decoded smaller.
         """
         self._images.want(self, size)
+
+    def show_as(self, look: PictureLook) -> None:
+        """Show its pictures so from now on; the one that is there is decoded again, also a held one."""
+        self._images.show_as(self, look)
 
     def hold(self, held: bool) -> None:
         """Keep the picture as it is, or let the newest one come again."""
@@ -223,6 +230,17 @@ class Images:
                 stream.waiting = (picture.message, picture.received_s)
                 self._arrived.notify()
 
+    def show_as(self, stream: ImageStream, look: PictureLook) -> None:
+        """See `ImageStream.show_as`."""
+        with self.lock:
+            if stream.look == look:
+                return
+            stream.look = look
+            picture = stream.picture
+            if picture is not None and picture.message is not None and stream.waiting is None:
+                stream.waiting = (picture.message, picture.received_s)
+                self._arrived.notify()
+
     def hold(self, stream: ImageStream, held: bool) -> None:
         """See `ImageStream.hold`."""
         with self.lock:
@@ -257,11 +275,11 @@ class Images:
         """Decode the newest picture of each stream that waits for one; its own thread does it."""
         with self.lock:
             work, times = self._take_waiting(), self._times
-        for streams, message, arrived_s, size in work:
+        for streams, message, arrived_s, size, look in work:
             try:
-                picture, error = once_more(streams[0].picture, message, arrived_s, size), None
+                picture, error = once_more(streams[0].picture, message, arrived_s, size, look), None
                 if picture is None:
-                    picture, error = decode(message, arrived_s, size)
+                    picture, error = decode(message, arrived_s, size, look)
             except Exception as problem:  # noqa: BLE001  one message must not end the pictures of all
                 picture, error = (
                     None,
@@ -277,18 +295,19 @@ class Images:
         every = (stream for streams in self._streams.values() for stream in streams)
         return any(stream.waiting is not None for stream in every)
 
-    def _take_waiting(self) -> list[tuple[list[ImageStream], Message, float, Size | None]]:
+    def _take_waiting(self) -> list[tuple[list[ImageStream], Message, float, Size | None, PictureLook]]:
         work = []
         for streams in self._streams.values():
             waiting = [stream for stream in streams if stream.waiting is not None]
             if not waiting:
                 continue
-            of_message: dict[int, list[ImageStream]] = {}
+            of_message: dict[tuple[int, PictureLook], list[ImageStream]] = {}
             for stream in waiting:  # one held back decodes its own picture again
-                of_message.setdefault(id(stream.waiting[0]), []).append(stream)  # type: ignore[index]
+                asked = (id(stream.waiting[0]), stream.look)  # type: ignore[index]
+                of_message.setdefault(asked, []).append(stream)
             for together in of_message.values():
                 message, arrived_s = together[0].waiting  # type: ignore[misc]
-                work.append((together, message, arrived_s, _largest(together)))
+                work.append((together, message, arrived_s, _largest(together), together[0].look))
             for stream in waiting:
                 stream.waiting = None
         return work
@@ -302,6 +321,8 @@ def _give(stream: ImageStream, message: Message, picture: Picture | None, error:
         return  # decoded while a person froze the picture before
     stream.error = error
     if picture is not None:
+        if picture.look != stream.look and stream.waiting is None:  # changed while it was decoded
+            stream.waiting = (message, picture.received_s)
         stream.picture = picture
         stream.awaits_picture = stream.awaits_picture and before is not None and before.message is message
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from app.core.messages.picture_look import PLAIN, ColourScale, PictureLook, in_colours, scaled, toned
 from nep.errors import EncodeError, NepError
 from nep.i18n import _
 from nep.messages import image_codec
@@ -19,7 +20,6 @@ Size = tuple[int, int]
 Pixel = int | float | tuple[int, int, int]
 REDUCED = (8, 4, 2)
 PNG_NUMBERS = ("uint8", "uint16")
-STRIP_ROWS = 64
 COMPARED_FIRST = 4096
 AVERAGED = ("uint8", "uint16")
 """Numbers whose mean says the same as they do; of others, which may be none at all (NaN), some are taken."""
@@ -43,6 +43,12 @@ class Picture:
     received_s: float
     message: Message | None = None
     numbers: NDArray[Any] | None = None
+    look: PictureLook = PLAIN
+    """How it was asked to be shown, ..."""
+    scale: ColourScale | None = None
+    """... and what its colours mean, where they stand for numbers."""
+    one_channel: bool = False
+    """Whether each pixel is one number, also where `numbers` were not kept."""
 
     @property
     def whole(self) -> bool:
@@ -60,17 +66,19 @@ class Picture:
         return red, green, blue
 
 
-def decode(message: Message, received_s: float, fit: Size | None = None) -> tuple[Picture | None, str | None]:
+def decode(
+    message: Message, received_s: float, fit: Size | None = None, look: PictureLook = PLAIN
+) -> tuple[Picture | None, str | None]:
     """A message as a picture, or the sentence that says why it is none.
 
     ``fit`` is how large it is shown (width, height in pixels of the screen): a picture of twice that and more
-    is decoded smaller. None decodes all of it.
+    is decoded smaller. None decodes all of it. ``look`` is how it is to be shown.
     """
     import cv2  # noqa: PLC0415  150 MB: loaded when the first picture arrives, not at start
 
     try:
         frame, size = _frame(message, fit)
-        found = _bgra(frame)
+        found = _bgra(frame, look)
     except NepError as error:
         return None, str(error)
     except (cv2.error, MemoryError) as error:
@@ -81,18 +89,22 @@ def decode(message: Message, received_s: float, fit: Size | None = None) -> tupl
         return None, _("“{topic}” has pictures of {shape} {dtype}; they can't be shown").format(
             topic=message.topic, shape=frame.shape, dtype=frame.dtype
         )
-    bgra, numbers = found
+    bgra, numbers, scale = found
+    one = numbers is not None
     if (bgra.shape[1], bgra.shape[0]) != size:
         numbers = None
-    return Picture(bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers), None
+    made = Picture(bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers, look, scale, one)
+    return made, None
 
 
-def once_more(shown: Picture | None, message: Message, received_s: float, fit: Size | None) -> Picture | None:
+def once_more(
+    shown: Picture | None, message: Message, received_s: float, fit: Size | None, look: PictureLook = PLAIN
+) -> Picture | None:
     """The picture that is shown as that of a message with the same bytes: its very pixels, nothing decoded.
 
-    None when the message says something else, or is wanted in another size (``fit``, see `decode`).
+    None when the message says something else, or is wanted in another size or look (see `decode`).
     """
-    if shown is None or shown.message is None or shown.message is message:
+    if shown is None or shown.message is None or shown.message is message or shown.look != look:
         return None
     of, factor = shown.message, _factor((shown.width, shown.height), fit)
     if abs(shown.bgra.shape[0] * factor - shown.height) >= factor:  # it is rounded up or down
@@ -180,8 +192,10 @@ def _factor(size: Size, fit: Size | None) -> int:
     return next((factor for factor in REDUCED if shrink >= factor), 1)
 
 
-def _bgra(frame: NDArray[Any]) -> tuple[Any, NDArray[Any] | None] | None:
-    """As QImage reads it, and the numbers of one channel; None for what is no picture."""
+def _bgra(
+    frame: NDArray[Any], look: PictureLook
+) -> tuple[Any, NDArray[Any] | None, ColourScale | None] | None:
+    """As QImage reads it, the numbers of one channel, what their colours mean; None for what is none."""
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
 
@@ -190,29 +204,18 @@ def _bgra(frame: NDArray[Any]) -> tuple[Any, NDArray[Any] | None] | None:
         return None
     if channels == 1:
         grey = frame.reshape(frame.shape[:2])
-        if frame.dtype == np.uint8:
-            return cv2.cvtColor(grey, cv2.COLOR_GRAY2BGRA), grey
-        return _coloured(grey), grey
+        if frame.dtype == np.uint8 and (look.colours, look.low, look.high) == ("", None, None):
+            return cv2.cvtColor(toned(look, grey), cv2.COLOR_GRAY2BGRA), grey, None
+        bgra, scale = in_colours(look, grey)
+        return bgra, grey, scale
     if frame.dtype != np.uint8:
         frame = _eight_bits(frame)
     if channels == 2:  # such as a field of vectors: as blue and green
         frame = np.dstack([frame, np.zeros(frame.shape[:2], np.uint8)])
+    frame = toned(look, frame)
     if channels == 4:
-        return np.ascontiguousarray(frame), None
-    return cv2.cvtColor(np.ascontiguousarray(frame), cv2.COLOR_BGR2BGRA), None
-
-
-def _coloured(grey: NDArray[Any]) -> NDArray[np.uint8]:
-    """One channel of many values in false colours, from the smallest to the largest; black where is none."""
-    import cv2  # noqa: PLC0415
-    import numpy as np  # noqa: PLC0415
-
-    known = np.isfinite(grey)
-    shown = _scaled(grey, known)
-    bgra = cv2.cvtColor(cv2.applyColorMap(shown, cv2.COLORMAP_VIRIDIS), cv2.COLOR_BGR2BGRA)
-    if not known.all():
-        bgra[~known] = (0, 0, 0, 255)
-    return np.asarray(bgra, np.uint8)
+        return np.ascontiguousarray(frame), None, None
+    return cv2.cvtColor(np.ascontiguousarray(frame), cv2.COLOR_BGR2BGRA), None, None
 
 
 def _eight_bits(frame: NDArray[Any]) -> NDArray[np.uint8]:
@@ -225,23 +228,6 @@ def _eight_bits(frame: NDArray[Any]) -> NDArray[np.uint8]:
     values = frame[known]
     if frame.dtype.kind == "f" and values.size and values.min() >= 0 and values.max() <= 1:
         return np.asarray(np.where(known, frame, 0) * 255 + 0.5, np.uint8)
-    return _scaled(frame, known)
-
-
-def _scaled(frame: NDArray[Any], known: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Its values from 0, the smallest, to 255, the largest; 0 where a value is not known."""
-    import numpy as np  # noqa: PLC0415
-
-    values = frame[known]
     if not values.size:
         return np.zeros(frame.shape, np.uint8)
-    low, high = float(values.min()), float(values.max())
-    shown = np.zeros(frame.shape, np.uint8)
-    span = high / 2 - low / 2  # halves: the distance of two floats may be no float any more
-    if span <= 0:
-        return shown
-    for start in range(0, len(frame), STRIP_ROWS):  # double precision takes eight bytes for each
-        rows = slice(start, start + STRIP_ROWS)
-        strip = np.where(known[rows], frame[rows], low).astype(np.float64)
-        shown[rows] = np.clip((strip / 2 - low / 2) * (255 / span), 0, 255).astype(np.uint8)
-    return shown
+    return scaled(frame, known, float(values.min()), float(values.max()))

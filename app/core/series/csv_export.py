@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
@@ -13,9 +11,9 @@ import numpy as np
 
 from app.core.series.curves import Curve
 from app.core.series.samples import Floats
+from app.core.storage.csv_text import csv_text, harmless
 
 ROWS_AT_ONCE = 5000
-_START = ("=", "+", "-", "@", "\t", "\r")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +47,7 @@ def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
 
     Times are nanoseconds since 1970 and ISO 8601 in UTC; a state stands where it begins.
     """
-    yield _lines([["stamp_ns", "time_utc", *(_harmless(column.name) for column in columns)]])
+    yield csv_text([["stamp_ns", "time_utc", *(harmless(column.name) for column in columns)]])
     states = [np.array([time_s for time_s, _word in column.states]) for column in columns]
     times = np.unique(np.concatenate([np.empty(0), *states, *(column.times for column in columns)]))
     for begin in range(0, len(times), ROWS_AT_ONCE):
@@ -62,7 +60,7 @@ def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
         for time_s in part.tolist():
             stamp_ns = origin_ns + round(time_s * 1e9)
             rows.append([str(stamp_ns), _iso(stamp_ns), *(each.get(time_s, "") for each in cells)])
-        yield _lines(rows)
+        yield csv_text(rows)
 
 
 def _cells_of(column: CsvColumn, states: Floats, begin_s: float, end_s: float) -> dict[float, str]:
@@ -71,7 +69,7 @@ def _cells_of(column: CsvColumn, states: Floats, begin_s: float, end_s: float) -
     numbers = zip(column.times[first:last].tolist(), column.values[first:last].tolist(), strict=True)
     cells = {time_s: repr(value) for time_s, value in numbers}
     first, last = _places(states, begin_s, end_s)
-    return cells | {time_s: _harmless(word) for time_s, word in column.states[first:last]}
+    return cells | {time_s: harmless(word) for time_s, word in column.states[first:last]}
 
 
 def _places(times: Floats, begin_s: float, end_s: float) -> tuple[int, int]:
@@ -85,14 +83,3 @@ def _iso(stamp_ns: int) -> str:
     except (OverflowError, ValueError, OSError):
         return ""
     return f"{at:%Y-%m-%dT%H:%M:%S}.{stamp_ns % 10**9:09d}Z"
-
-
-def _harmless(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: one that begins like one gets an apostrophe."""
-    return f"'{text}" if text.startswith(_START) else text
-
-
-def _lines(rows: Sequence[Sequence[str]]) -> str:
-    out = io.StringIO(newline="")
-    csv.writer(out).writerows(rows)
-    return out.getvalue()

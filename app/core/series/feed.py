@@ -41,6 +41,7 @@ class SeriesFeed:
         """
         self._watch, self._clock_ns, self._set_room = watch, clock_ns, set_room
         self._takers: dict[str, list[SeriesTaker]] = {}
+        self._deep: dict[str, list[SeriesTaker]] = {}
         self._watching: dict[str, Watching] = {}
         self.origin_ns = clock_ns()
 
@@ -53,23 +54,33 @@ class SeriesFeed:
         """This computer's time in the seconds of all series."""
         return (self._clock_ns() - self.origin_ns) / 1e9
 
-    def join(self, topic: str, taker: SeriesTaker) -> None:
-        """Give ``taker`` all messages of a topic from now on."""
-        takers = self._takers.setdefault(topic, [])
-        takers.append(taker)
+    def join(self, topic: str, taker: SeriesTaker, *, deep: bool = True) -> None:
+        """Give ``taker`` the messages of a topic from now on.
+
+        Who is not ``deep`` gets along without those that a late window drops, and without a recording's past.
+        """
+        self._takers.setdefault(topic, []).append(taker)
+        if deep:
+            deep_ones = self._deep.setdefault(topic, [])
+            deep_ones.append(taker)
+            if len(deep_ones) == 1:
+                self._set_room(topic, BETWEEN_TICKS)
         if topic not in self._watching:
-            self._set_room(topic, BETWEEN_TICKS)
             self._watching[topic] = self._watch(topic)
 
     def leave(self, topic: str, taker: SeriesTaker) -> None:
         """Give it nothing more; said twice it does nothing."""
-        takers = self._takers.get(topic, [])
+        takers, deep = self._takers.get(topic, []), self._deep.get(topic, [])
         if taker in takers:
             takers.remove(taker)
         if not takers and topic in self._watching:
             del self._takers[topic]
             self._watching.pop(topic).close()
-            self._set_room(topic, None)
+        if taker in deep:
+            deep.remove(taker)
+            if not deep:
+                del self._deep[topic]
+                self._set_room(topic, None)
 
     def rewind(self, topics: Iterable[str] | None = None) -> None:
         """The source is at another time: what these topics (None: all) had is forgotten."""

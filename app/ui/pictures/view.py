@@ -10,6 +10,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from app.ui.pictures.annotations import paint_colour_bar, paint_drawn
 from app.ui.pictures.boxes import DetectionBox, paint_box
 from app.ui.pictures.placement import PicturePlace
 from app.ui.text.numbers import age_words
@@ -19,6 +20,7 @@ from app.ui.widgets import paint
 from nep.i18n import _
 
 if TYPE_CHECKING:
+    from app.core.messages.annotations import Drawn
     from app.core.messages.image_streams import ImageStream
     from app.core.messages.picture import Picture, Pixel
 
@@ -91,6 +93,7 @@ class PictureView(QWidget):
         self._image: QImage | None = None
         self._grey: QImage | None = None  # of the last picture, when no new one comes
         self._boxes: tuple[DetectionBox, ...] = ()
+        self._drawn: tuple[Drawn, ...] = ()
         self._rate = self._state = self._age = ""
         self._rates = RateWords()
         self._silent = False  # the last picture is shown, and no new one comes
@@ -120,6 +123,11 @@ class PictureView(QWidget):
         return self._boxes
 
     @property
+    def drawn(self) -> tuple[Drawn, ...]:
+        """What messages draw on it now."""
+        return self._drawn
+
+    @property
     def picture(self) -> Picture | None:
         """What is shown."""
         return self._picture
@@ -127,15 +135,20 @@ class PictureView(QWidget):
     def clear(self) -> None:
         """Show nothing."""
         self._picture = self._image = self._grey = None
-        self._boxes = ()
+        self._boxes, self._drawn = (), ()
         self._rate = self._state = self._age = ""
         self._rates.clear()
         self._silent = False
         self.update()
 
-    def take(self, stream: ImageStream, boxes: tuple[DetectionBox, ...] = ()) -> None:
-        """Show what the stream has now."""
-        before = (self.words, self._boxes)
+    def take(
+        self,
+        stream: ImageStream,
+        boxes: tuple[DetectionBox, ...] = (),
+        drawn: Callable[[int, int], tuple[Drawn, ...]] | None = None,
+    ) -> None:
+        """Show what the stream has now; ``drawn`` is asked what lies on a picture of so many pixels."""
+        before = (self.words, self._boxes, self._drawn)
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
         self._takes += 1
         self._rate = self._rates.of(stream)
@@ -162,8 +175,10 @@ class PictureView(QWidget):
                 stream.shown()
         if not stream.held or picture is not shown:
             self._boxes = boxes  # those on a frozen picture are frozen, too
+            shown = self._picture
+            self._drawn = drawn(shown.width, shown.height) if drawn is not None and shown is not None else ()
         stream.want(self._wish())
-        if (self.words, self._boxes) != before:
+        if (self.words, self._boxes, self._drawn) != before:
             self.setAccessibleDescription(self.words)
             self.update()
 
@@ -228,6 +243,12 @@ class PictureView(QWidget):
             shares = self.place.to_view(area)
             for box in self._boxes:
                 paint_box(painter, self._theme, shares.mapRect(box.place), box)
+            if self._drawn:
+                paint_drawn(
+                    painter, self._theme, shares, self.scale() / self.devicePixelRatioF(), self._drawn
+                )
+        if self._labelled and self._picture is not None and self._picture.scale is not None:
+            paint_colour_bar(painter, self._theme, view, self._picture.scale)
         if self._labelled and self.words:
             self._paint_label(painter)
         painter.end()

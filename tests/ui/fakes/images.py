@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from app.core.messages import image_streams as images_module
 from app.core.messages.picture import Picture
+from app.core.messages.picture_look import PictureLook
 from app.core.network.watches import Watches
 from nep.messages.message import Message
 
@@ -68,6 +69,10 @@ class Images(images_module.Images):
 
     def want(self, stream: images_module.ImageStream, size: tuple[int, int] | None) -> None:
         super().want(stream, size)
+        self.decode_waiting()
+
+    def show_as(self, stream: images_module.ImageStream, look: PictureLook) -> None:
+        super().show_as(stream, look)
         self.decode_waiting()
 
     def _begin_decoding(self) -> None:

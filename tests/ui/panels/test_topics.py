@@ -284,3 +284,95 @@ def test_a_right_click_on_a_topic_does_whatever_can_be_done_with_it(panel, windo
     assert window.plotted == [("/blackboard", "")]
     assert window.commands == ["alarm.topic:/blackboard", "record.topic:/blackboard"]
     assert QGuiApplication.clipboard().text() == "/blackboard"
+
+
+def shown(panel: TopicsPanel) -> list[str]:
+    rows = (panel.model.index(place, 0) for place in range(panel.model.rowCount()))
+    return [panel.model.data(index, CELL_ROLE).text for index in rows]  # type: ignore[union-attr]
+
+
+def as_tree(panel: TopicsPanel, window: Window) -> None:
+    press(panel.as_tree)
+    ticks(window, panel)
+
+
+def test_as_a_tree_topics_stand_in_folders_with_the_sums_of_their_rates(panel, window) -> None:
+    session = window.session
+    session.put(Topic("/arm/left/speed", rate_hz=40.0, bandwidth_Bps=400.0, age_s=0.5, lost=0))
+    session.put(Topic("/arm/right/speed", rate_hz=2.5, bandwidth_Bps=100.0, age_s=0.1, lost=3))
+    panel.filter.setText("/arm/*")
+    as_tree(panel, window)
+    assert shown(panel) == ["arm/", "left/", "speed", "right/", "speed"]
+    figures = ("topic", "type", "rate", "bandwidth", "age", "loss")
+    assert row(panel, "/arm/*", figures) == ["arm/", "2 topics", "42.5", "500 B/s", "0.1 s", "3"]
+    cell = panel.model.data(panel.model.index_of("/arm/left/speed"), CELL_ROLE)
+    assert cell.indent > panel.model.data(panel.model.index_of("/arm/*"), CELL_ROLE).indent
+    session.topics["/arm/left/speed"].rate_hz = 50.0
+    ticks(window, panel, 3)
+    assert row(panel, "/arm/*", ("rate",)) == ["52.5"]
+    assert panel.count.text() == "2 of 15 topics, 7 nodes"
+    press(panel.as_tree)
+    assert shown(panel) == ["/arm/left/speed", "/arm/right/speed"]
+
+
+def test_the_keyboard_opens_and_closes_folders_and_goes_up(panel, window) -> None:
+    as_tree(panel, window)
+    whole = panel.model.rowCount()
+    panel.table.setFocus(Qt.FocusReason.TabFocusReason)
+    panel.table.choose("/robot/depth")
+    QTest.keyClick(panel.table, Qt.Key.Key_Left)
+    assert panel.table.chosen_key() == "/robot/*"
+    QTest.keyClick(panel.table, Qt.Key.Key_Left)
+    assert "depth" not in shown(panel)
+    QTest.keyClick(panel.table, Qt.Key.Key_Right)
+    assert panel.model.rowCount() == whole
+    QTest.keyClick(panel.table, Qt.Key.Key_Return)
+    assert panel.model.rowCount() < whole
+    assert window.opened == []
+    panel.show_topic("/robot/depth")  # what is asked for is never in a closed folder
+    assert panel.table.chosen_key() == "/robot/depth"
+    QTest.keyClick(panel.table, Qt.Key.Key_Return)
+    assert window.opened == ["/robot/depth"]
+
+
+def test_what_a_filter_finds_is_in_no_closed_folder_and_types_and_patterns_are_found(panel, window) -> None:
+    as_tree(panel, window)
+    panel.table.opened.emit("/robot/*")
+    assert "depth" not in shown(panel)
+    panel.filter.setText("/robot/* image")
+    found = [name for name in shown(panel) if not name.endswith("/")]
+    assert "depth" in found
+    assert {window.session.topics[f"/robot/{name}"].msg_type for name in found} == {"image"}
+    panel.filter.clear()
+    assert "depth" not in shown(panel)
+
+
+def test_a_closed_folder_says_that_something_in_it_is_new(panel, window) -> None:
+    as_tree(panel, window)
+    assert panel.model.data(panel.model.index_of("/speech/*"), CELL_ROLE).chip is None
+    panel.table.opened.emit("/speech/*")
+    assert panel.model.data(panel.model.index_of("/speech/*"), CELL_ROLE).chip == "new"
+
+
+def test_the_tree_and_its_closed_folders_come_back_with_the_layout(qtbot, panel, window) -> None:
+    as_tree(panel, window)
+    panel.table.opened.emit("/robot/*")
+    again = window.make(PANEL)
+    qtbot.addWidget(again)
+    assert isinstance(again, TopicsPanel)
+    again.restore_state(panel.save_state())
+    assert shown(again) == shown(panel)
+    again.restore_state({"tree": "yes", "closed": [7, None]})
+    assert not again.as_tree.isChecked()
+
+
+def test_the_menu_of_a_folder_opens_and_closes_all_and_copies_its_pattern(panel, window) -> None:
+    as_tree(panel, window)
+    whole = shown(panel)
+    by_words = {action.text(): action for action in panel.menu_of("/robot/*").actions()}
+    by_words["Close all folders"].trigger()
+    assert len(shown(panel)) < len(whole)
+    by_words["Copy its name"].trigger()
+    assert QGuiApplication.clipboard().text() == "/robot/*"
+    by_words["Open all folders"].trigger()
+    assert shown(panel) == whole

@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, Qt, QUrl
 from PySide6.QtGui import QAction, QGuiApplication, QImage, QKeySequence, QResizeEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.messages import snapshots
+from app.core.messages.picture_look import PLAIN, PictureLook, restored
 from app.core.networks.networks import topic_words
 from app.ui.other_programs import open_outside
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.image.actions import PictureActions
+from app.ui.panels.image.look_bar import LookBar
+from app.ui.panels.image.overlays import Overlays
 from app.ui.panels.image.snapshot import SnapshotJob
 from app.ui.pictures.boxes import boxes_on, owner_of
 from app.ui.pictures.placement import PicturePlace
@@ -45,6 +49,8 @@ class ImagePanel(PanelWidget):
         self._watch: Watch | None = None
         self._watched_robot = ""
         self._places: dict[str, PicturePlace] = {}
+        self._looks: dict[str, PictureLook] = {}
+        self.overlays = Overlays(self.session)
         self._revision = (-1, -1)
         self._there: bool | None = None
         self.choose = IconButton(self.theme, "chevron-down", _("Choose a picture topic"), size=26)
@@ -57,9 +63,29 @@ class ImagePanel(PanelWidget):
         self.view.customContextMenuRequested.connect(self._show_actions)
         self._make_actions()
         self.empty = EmptyState(self.theme, "image", "", "")
-        self.pages = self.show_one_of(self.empty, self.view)
+        self.pages = self.show_one_of(self.empty, self._with_look_bar())
         self.setFocusProxy(self.view)
         self._say_nothing()
+
+    def _with_look_bar(self) -> QWidget:
+        """The picture with the bar below it."""
+        self.look_bar = LookBar(self.theme, lambda: self.view.picture)
+        self.look_bar.changed.connect(self._set_look)
+        self.look_bar.hide()
+        self.tune.toggled.connect(self.look_bar.setVisible)
+        self.shown = QWidget()
+        column = QVBoxLayout(self.shown)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.view, 1)
+        column.addWidget(self.look_bar)
+        return self.shown
+
+    def _set_look(self, look: object) -> None:
+        if isinstance(look, PictureLook):
+            self._looks[self._topic] = look
+            if self._stream is not None:
+                self._stream.show_as(look)
 
     def _make_actions(self) -> None:
         own = {"freeze": self._freeze_or_not, "save": self.save_picture, "copy": self.copy_picture}
@@ -80,7 +106,11 @@ class ImagePanel(PanelWidget):
         self.fit.clicked.connect(self.view.show_whole)
         self.freeze.toggled.connect(self._hold)
         self.keep.clicked.connect(self.save_picture)
-        self.header = [self.fit, self.freeze, self.keep]
+        tune = _("Brightness, contrast and colours")
+        self.tune = IconButton(self.theme, "sliders-horizontal", tune, checkable=True, size=26)
+        self.layers = IconButton(self.theme, "layers", _("What messages draw on it"), size=26)
+        self.layers.clicked.connect(self._show_layers)
+        self.header = [self.fit, self.tune, self.layers, self.freeze, self.keep]
 
     def topics(self) -> list[str]:
         """The picture topics that there are now; those of other networks last."""
@@ -91,7 +121,7 @@ class ImagePanel(PanelWidget):
         """Look at another topic."""
         if name == self._topic and self._stream is not None:
             return
-        self.shut()
+        self._leave_stream()
         if name != self._topic:
             self._show_place_of(name)
         self._topic = name
@@ -100,13 +130,16 @@ class ImagePanel(PanelWidget):
         self.set_title(_("Image"), topic_words(name))
         if name:
             self._stream = self.session.images.stream(name)
+            self._stream.show_as(self._looks.get(name, PLAIN))
+            self.look_bar.show_look(self._looks.get(name, PLAIN))
             self.session.mark_seen(name)
         self._say_nothing()
 
     def source_changed(self) -> None:
         topic = self._topic
-        self.shut()
+        self._leave_stream()
         self._stream, self._revision = None, (-1, -1)
+        self.overlays.begin_anew()
         plays = self.session.replay is not None  # which Space does then
         self.actions_of["freeze"].setShortcut(QKeySequence() if plays else QKeySequence(Qt.Key.Key_Space))
         if topic:
@@ -116,6 +149,7 @@ class ImagePanel(PanelWidget):
         """How a person looked, zoomed and turned, belongs to a topic: it comes back with it."""
         if len(self._places) >= MOST_PLACES:
             self._places.clear()
+            self._looks.clear()
         self.view.place = self._places.setdefault(topic, PicturePlace())
         self.actions_of.show_checks()
 
@@ -131,7 +165,9 @@ class ImagePanel(PanelWidget):
             return
         self._look_at_robot()
         link = self.session.fleet.link(self._watched_robot) if self._watched_robot else None
-        self.view.take(self._stream, boxes_on(link, self._topic) if link is not None else ())
+        boxes = boxes_on(link, self._topic) if link is not None else ()
+        self.view.take(self._stream, boxes, self.overlays.on)
+        self.look_bar.refresh()
         if self._stream.picture is not None:
             self._page(there=True)
         elif self._stream.error:
@@ -168,13 +204,14 @@ class ImagePanel(PanelWidget):
         if self._there is there:
             return
         self._there = there
-        self.pages.setCurrentWidget(self.view if there else self.empty)
+        self.pages.setCurrentWidget(self.shown if there else self.empty)
         self.actions_of.set_enabled(there)
         self._fit_title()
 
     def _fit_title(self) -> None:
         """A narrow title keeps its name: what is left out is in "more"."""
-        self.freeze.setVisible(self._there is True)
+        for button in (self.freeze, self.tune, self.layers):
+            button.setVisible(self._there is True)
         for button in (self.fit, self.keep):
             button.setVisible(self._there is True and self.width() >= self.theme.scaled(ROOMY))
 
@@ -234,6 +271,18 @@ class ImagePanel(PanelWidget):
     def _inspect(self) -> None:
         self.context.run(f"inspect:{self._topic}")
 
+    def _show_layers(self) -> None:
+        menu = Menu(self.theme, self)
+        for name in self.overlays.choices():
+            action = menu.addAction(plain.entry(topic_words(name)))
+            action.setCheckable(True)
+            action.setChecked(name in self.overlays.chosen)
+            action.toggled.connect(lambda on, name=name: self.overlays.choose(name, on))
+        if menu.isEmpty():
+            menu.addAction(_("No topic draws on pictures now")).setEnabled(False)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        drop_below(menu, self.layers)
+
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
         for name in self.topics():
@@ -251,7 +300,13 @@ class ImagePanel(PanelWidget):
         return [*self.actions_of.listed(), self._line, self._look_inside]
 
     def save_state(self) -> dict[str, object]:
-        return {"topic": self._topic, "place": self.view.place.saved()}
+        return {
+            "topic": self._topic,
+            "place": self.view.place.saved(),
+            "look": self.look_bar.look.saved(),
+            "tune": self.tune.isChecked(),
+            "layers": list(self.overlays.chosen),
+        }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         topic = state.get("topic")
@@ -259,6 +314,13 @@ class ImagePanel(PanelWidget):
             self.show_topic(topic)
         self.view.place.restore(state.get("place"))
         self.actions_of.show_checks()
+        self._set_look(look := restored(state.get("look")))
+        self.look_bar.show_look(look)
+        self.tune.setChecked(state.get("tune") is True)
+        layers = state.get("layers")
+        for name in layers if isinstance(layers, list) else ():
+            if isinstance(name, str):
+                self.overlays.choose(name, shown=True)
 
     def _leave_robot(self) -> None:
         if self._watch is not None:
@@ -266,9 +328,13 @@ class ImagePanel(PanelWidget):
         self._watch, self._watched_robot = None, ""
 
     def looks(self) -> Iterable[Suspendable | None]:
-        return (self._stream, self._watch)
+        return (self._stream, self._watch, *self.overlays.looks())
 
     def shut(self) -> None:
+        self._leave_stream()
+        self.overlays.close()
+
+    def _leave_stream(self) -> None:
         self.job.wait()
         self._leave_robot()
         if self._stream is not None:

@@ -34,17 +34,18 @@ class InspectorActions(QObject):
         panel: QWidget,
         body: InspectorBody,
         shown: Callable[[], Message | None],
+        value: Callable[[], object],
         *,
         find: Callable[[], object],
         toast: Callable[[str], None],
         plot: Callable[[str], None],
     ) -> None:
-        """Keys work in ``panel``; ``shown`` is its message, ``find`` goes to its field.
+        """Keys work in ``panel``; ``shown`` is its message, ``value`` that decoded.
 
-        ``plot`` plots a field by its path.
+        ``find`` goes to its field, ``plot`` plots a field by its path.
         """
         super().__init__(panel)
-        self._body, self._shown, self._toast, self._plot = body, shown, toast, plot
+        self._body, self._shown, self._value, self._toast, self._plot = body, shown, value, toast, plot
         rows: tuple[tuple[str, str, str, Callable[[], object]], ...] = (
             (_("Copy value"), "Ctrl+C", "copy", self.copy_value),
             (_("Copy path"), "Ctrl+Shift+C", "link", self.copy_path),
@@ -53,6 +54,8 @@ class InspectorActions(QObject):
             (_("Find a key or value"), "Ctrl+F", "search", find),
             (_("Next one"), "F3", "", lambda: body.finder.step(1)),
             (_("Previous one"), "Shift+F3", "", lambda: body.finder.step(-1)),
+            (_("Message before"), "Alt+Left", "step-back", lambda: body.history.step(-1)),
+            (_("Message after"), "Alt+Right", "step-forward", lambda: body.history.step(1)),
         )
         self._find = find
         panel.installEventFilter(self)
@@ -116,7 +119,7 @@ class InspectorActions(QObject):
         if message.codec == "json":
             text = str(message.data, "utf-8", "replace")
         else:
-            text = plain_words(self._body.model.value())
+            text = plain_words(self._value())
         self._copied(text, _("Copied the message of {topic}").format(topic=message.topic))
 
     def _chosen(self) -> TreeNode | None:

@@ -12,6 +12,9 @@ from app.ui.panels.inspector.diff import Counts, changes_words
 from app.ui.panels.inspector.find import FindBar
 from app.ui.panels.inspector.footer import Footer
 from app.ui.panels.inspector.hex_view import HexView
+from app.ui.panels.inspector.history import HistoryStrip
+from app.ui.panels.inspector.objects import ObjectsView
+from app.ui.panels.inspector.query import QueryStrip
 from app.ui.panels.inspector.tree_model import TreeModel
 from app.ui.panels.inspector.tree_view import TreeView
 from app.ui.text.numbers import size_words
@@ -22,7 +25,9 @@ from nep.i18n import _
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
 
-NOTHING, LARGE, TREE, RAW = range(4)
+NOTHING, LARGE, TREE, RAW, TABLE = range(5)
+MODES = {TREE: "tree", TABLE: "table", RAW: "raw"}
+"""The pages that show a message, and their names."""
 
 
 class CompareStrip(QWidget):
@@ -53,8 +58,13 @@ class CompareStrip(QWidget):
 class InspectorBody(QWidget):
     """The parts below the title."""
 
-    def __init__(self, theme: Theme, looked_through: Callable[[], tuple[object, JsonIndex | None]]) -> None:
-        """``looked_through`` gives what the find bar looks through."""
+    def __init__(
+        self,
+        theme: Theme,
+        looked_through: Callable[[], tuple[object, JsonIndex | None]],
+        toast: Callable[[str], None],
+    ) -> None:
+        """``looked_through`` gives what the find bar looks through, ``toast`` says what was just done."""
         super().__init__()
         self._waiting = ""
         self.model = TreeModel()
@@ -62,19 +72,21 @@ class InspectorBody(QWidget):
         self.tree.setAccessibleName(_("Newest message"))
         self.tree.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.finder = FindBar(theme, looked_through)
-        self.finder.found.connect(self._reveal)
+        self.finder.found.connect(self.reveal)
         self.finder.field.leave.connect(lambda: self.tree.setFocus(Qt.FocusReason.ShortcutFocusReason))
-        self.mode = Segments(
-            theme, [("tree", _("Tree"), None), ("raw", _("Raw"), None)], size="small", name=_("Show as")
-        )
+        modes = [("tree", _("Tree"), None), ("table", _("Table"), None), ("raw", _("Raw"), None)]
+        self.mode = Segments(theme, modes, size="small", name=_("Show as"))
         compare = _("Compare with the message before")
         self.compare = IconButton(theme, "equal", compare, checkable=True, size=26)
         self.strip = CompareStrip(theme)
+        self.query = QueryStrip()
         self.sentence = label("", "small", role="warn", wrap=True)
         self.sentence.setContentsMargins(12, 6, 12, 6)
         self.bytes = HexView(theme)
+        self.objects = ObjectsView(theme, toast)
         self.empty = EmptyState(theme, "list-tree", "", "")
         self.large = EmptyState(theme, "database", "", "")
+        self.history = HistoryStrip(theme)
         self.foot = Footer(theme)
         self.foot.show_path("")
         self._arrange(theme)
@@ -89,14 +101,15 @@ class InspectorBody(QWidget):
         bar.addWidget(self.mode)
         self.line = Separator(theme)
         self.pages = QStackedWidget()
-        for page in (self.empty, self.large, self.tree, self.bytes):
+        for page in (self.empty, self.large, self.tree, self.bytes, self.objects):
             self.pages.addWidget(page)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget in (self.bar, self.line, self.strip, self.sentence):
+        for widget in (self.bar, self.line, self.query, self.strip, self.sentence):
             column.addWidget(widget)
         column.addWidget(self.pages, 1)
+        column.addWidget(self.history)
         column.addWidget(self.foot)
 
     @property
@@ -111,11 +124,12 @@ class InspectorBody(QWidget):
         self.sentence.setVisible(bool(sentence))
         self.pages.setCurrentIndex(page)
         for widget in (self.bar, self.line, self.foot):
-            widget.setVisible(page in {TREE, RAW})
+            widget.setVisible(page in MODES)
+        self.query.show_on(tree=page in {TREE, TABLE})
         self.strip.setVisible(page == TREE and comparing)
         self.foot.legend.setVisible(page == TREE)
-        if page in {TREE, RAW}:
-            self.mode.set_value("tree" if page == TREE else "raw")
+        if page in MODES:
+            self.mode.set_value(MODES[page])
 
     def say_waiting(self, topic: str, published: bool) -> None:
         """There is no message of this topic yet, and perhaps nobody publishes it."""
@@ -155,7 +169,8 @@ class InspectorBody(QWidget):
             action = EmptyAction(_("Read the newest one"), read, "list-tree", primary=True)
             self.large.set_actions([action])
 
-    def _reveal(self, path: object) -> None:
+    def reveal(self, path: object) -> None:
+        """Choose a value in the tree, and scroll to it."""
         index = self.model.reveal(path)  # type: ignore[arg-type]
         self.tree.setCurrentIndex(index)
         self.tree.scrollTo(index)

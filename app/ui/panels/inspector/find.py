@@ -41,7 +41,7 @@ class FindField(SearchField):
     leave = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, _("Find a key or value"))
+        super().__init__(theme, _("Find a key or value, or $ and a path"))
         self._count = ""
 
     @property
@@ -87,6 +87,8 @@ class FindBar(QWidget):
     """
 
     found = Signal(object)
+    queried = Signal(str)
+    """What was typed begins with ``$``: it is a query; "" when it is none any more."""
 
     def __init__(self, theme: Theme, source: Callable[[], tuple[object, JsonIndex | None]]) -> None:
         """``source`` gives the message that is shown, and the index of a large one."""
@@ -118,11 +120,19 @@ class FindBar(QWidget):
         return self._matches or []
 
     def look(self, words: str) -> None:
-        """Look for these words and go to the first place."""
+        """Look for these words and go to the first place; what begins with ``$`` is a query."""
         self._place = -1
-        self._search(words)
+        self._matches = []
+        is_query = self.is_query
         for button in (self.before, self.after):
-            button.setVisible(bool(words))
+            button.setVisible(bool(words) and not is_query)
+        if is_query:
+            self.field.show_count("")
+            self.mark(wrong=False)
+        self.queried.emit(words if is_query else "")
+        if is_query:
+            return
+        self._search(words)
         self._say(wrong=bool(words) and not self.matches)
         if self.matches:
             self.step(1)
@@ -131,10 +141,15 @@ class FindBar(QWidget):
         """Another message is shown."""
         self._matches = None
 
+    @property
+    def is_query(self) -> bool:
+        """Whether what is typed is a query."""
+        return self.field.text().startswith("$")
+
     def step(self, by: int) -> None:
         """Go on to the next one, or back."""
         words = self.field.text()
-        if not words:
+        if not words or self.is_query:
             return
         if self._matches is None:
             last = self._place
@@ -165,6 +180,10 @@ class FindBar(QWidget):
         words = _("{place} of {total}") if self.matches else pgettext("found", "none")
         words = words.format(place=self._place + 1, total=total)
         self.field.show_count(words if self.field.text() else "")
+        self.mark(wrong=wrong)
+
+    def mark(self, *, wrong: bool) -> None:
+        """Show whether what is typed leads to nothing."""
         self.field.setProperty("wrong", "true" if wrong else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)

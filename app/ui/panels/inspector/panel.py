@@ -14,9 +14,10 @@ from app.core.messages.reader import LARGE_BYTES, Reader, Reading
 from app.core.network.topics import split_key
 from app.core.networks.kinds import kind_named
 from app.core.networks.networks import topic_words
+from app.core.recording.replay.scale import clock_words
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
 from app.ui.panels.inspector.actions import InspectorActions
-from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE, InspectorBody
+from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TABLE, TREE, InspectorBody
 from app.ui.panels.inspector.diff import OFF, count_changes
 from app.ui.panels.inspector.footer import message_facts
 from app.ui.panels.inspector.tree_model import TreeNode, field_of, steps_of
@@ -29,6 +30,7 @@ from nep.messages.fields import path_text
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
+    from app.core.messages.query import QueryAnswer
     from app.core.network.topics import Topic
     from app.core.network.watches import Suspendable, Watch
     from nep.messages.message import Message
@@ -48,14 +50,15 @@ class InspectorPanel(PanelWidget):
         self._shown: Message | None = None
         self._allowed: Message | None = None  # a large message that a person wants to read
         self._reading: Reading | None = None  # what the tree shows
-        self._raw_wanted = False
+        self._raw_wanted = self._table_wanted = False
         self._since_ns = 0  # when the panel began to look
         self._facts_of: tuple[Message | None, str] = (None, "")
         self._value: object = None
         self._before: object = OFF  # what stood here before, of the same topic
         self._pinned: object = OFF
+        self._pinned_words = ""
         self.reader = Reader()
-        self.body = InspectorBody(self.theme, self._looked_through)
+        self.body = InspectorBody(self.theme, self._looked_through, context.toast)
         self._make_header()
         self._make_body()
         self._say_nothing()
@@ -76,8 +79,11 @@ class InspectorPanel(PanelWidget):
         body = self.body
         self.model, self.tree, self.finder = body.model, body.tree, body.finder
         self.mode, self.strip, self.foot, self.bytes = body.mode, body.strip, body.foot, body.bytes
+        self.query, self.history = body.query, body.history
+        self.history.moved.connect(self._moved)
+        self.finder.queried.connect(self._queried)
         self.own = InspectorActions(
-            self.theme, self, body, lambda: self._shown,
+            self.theme, self, body, lambda: self._shown, self._whole,
             find=self.focus_filter, toast=self.context.toast,
             plot=lambda path: self.context.plot(self._topic, path),
         )  # fmt: skip
@@ -85,6 +91,7 @@ class InspectorPanel(PanelWidget):
         self.foot.copy_path.clicked.connect(self.own.copy_path)
         self.foot.plot.clicked.connect(self.own.plot)
         self.tree.dragged.connect(self._drag)
+        body.objects.revealed.connect(self._reveal)
         self.tree.selectionModel().currentChanged.connect(self._chosen)
         self.tree.customContextMenuRequested.connect(self._show_menu)
         self.mode.changed.connect(self._set_mode)
@@ -102,11 +109,14 @@ class InspectorPanel(PanelWidget):
         if name == self._topic:
             return
         self._leave()
+        self.history.forget()
         self._topic = name
         self._shown = self._allowed = self._reading = None
         self._value, self._before, self._pinned = None, OFF, OFF
         self._raw_wanted = False
         self.model.clear()
+        self.query.forget()
+        self.body.objects.begin_anew()
         self.foot.clear()
         for button in (self.freeze, self.pin):
             button.setChecked(False)
@@ -114,6 +124,7 @@ class InspectorPanel(PanelWidget):
         if name:
             self._since_ns = time.time_ns()
             self._watch = self.session.watch_shown(name)
+            self.history.begin(self.session.series, name)
             self.session.mark_seen(name)
         self._say_nothing()
 
@@ -126,17 +137,22 @@ class InspectorPanel(PanelWidget):
         if not self._topic:
             return
         topic, recorded = self.session.topic(self._topic), self.session.replay is not None
-        self.live.set(*chip_words(topic, self.frozen, recorded=recorded))
+        self.history.say()
+        earlier = self.history.at is not None
+        self.live.set(*chip_words(topic, self.frozen, recorded=recorded, earlier=earlier))
         newest = topic.newest if topic is not None and topic.gone_s is None else None
-        if topic is not None and newest is not None and newest is not self._shown and not self.frozen:
+        if topic is not None and newest is not None and newest is not self._shown and not self.holds:
             self._take(newest)
-        elif recorded and newest is None and self._shown is not None and not self.frozen:
+        elif recorded and newest is None and self._shown is not None and not self.holds:
             self._show_none_yet()
         if self.body.page == NOTHING:
             self._say_waiting(topic)
         done = self.reader.take()
         if done is not None and not self._raw_wanted:
             self._show_read(done)
+        answer = self.query.take(self.clock())
+        if answer is not None and self._value is not None:
+            self._show_found(answer)
         self.foot.show_next_facts(self.clock())
         if self.body.page == TREE and self.tree.fading():
             self.tree.viewport().update()
@@ -147,6 +163,7 @@ class InspectorPanel(PanelWidget):
         self._shown = self._allowed = self._reading = None
         self._value, self._before = None, OFF
         self.model.clear()
+        self.query.forget()
         self.foot.clear()
         self._page(NOTHING)
 
@@ -170,7 +187,9 @@ class InspectorPanel(PanelWidget):
 
     def _read_elsewhere(self, message: Message) -> None:
         """Let the reader's thread look into it; until then what was there stays."""
-        if not self.reader.ask_at_leisure(message, self.clock()):
+        if self.history.at is not None:  # a person waits for just this one
+            self.reader.ask(message)
+        elif not self.reader.ask_at_leisure(message, self.clock()):
             return
         if self._shown is None or self.body.page == LARGE:
             self.body.say_large(message.size_bytes, _("It is being read."))
@@ -187,13 +206,16 @@ class InspectorPanel(PanelWidget):
         if fresh:
             self._before = self._value if self._value is not None else OFF
             topic = self.session.topic(self._topic)
-            if message.size_bytes <= LARGE_BYTES and topic is not None and topic.previous is not None:
-                self._before = payload_or(topic.previous, self._before)
+            previous = topic.previous if topic is not None else None
+            if self.history.at is not None:
+                previous = self.history.before()
+            if message.size_bytes <= LARGE_BYTES and previous is not None:
+                self._before = payload_or(previous, self._before)
             self.finder.forget()
         self._value = done.value
         self._show_value()
         self.foot.show_facts(self._facts(message), self.clock())
-        self._page(TREE)
+        self._page(TABLE if self._table_wanted else TREE)
 
     def _facts(self, message: Message) -> str:
         """What is said of a message stays as it was when it came, however long it is looked at."""
@@ -207,15 +229,33 @@ class InspectorPanel(PanelWidget):
         """Put the message into the tree, compared or not."""
         if self._shown is None or self._value is None:
             return
+        if self.query.asking:
+            self.strip.hide()
+            self.query.ask(self._value)
+            return
+        if self._table_wanted:
+            self.strip.hide()
+            self.body.objects.show_message(self._value, self.clock())
+            return
         first = not self.model.rowCount()
         base: object = OFF
         if self.comparing:
             base = self._pinned if self.pin.isChecked() else self._before
-            compared_with = PINNED if self.pin.isChecked() else BEFORE
-            self.strip.say(_(compared_with), *count_changes(self._value, base))
+            compared_with = self._pinned_words if self.pin.isChecked() else _(BEFORE)
+            self.strip.say(compared_with, *count_changes(self._value, base))
         self.strip.setVisible(self.comparing and self.body.page == TREE)
         only = self.comparing and base is not OFF and self.strip.only.isChecked()
         self.model.set_value(self._value, self.clock(), base, changes_only=only)
+        if first:
+            self.tree.expand_small(FIRST_ROWS)
+
+    def _show_found(self, answer: QueryAnswer) -> None:
+        """Put what the query found into the tree or the table, in place of the message."""
+        if self._table_wanted:
+            self.body.objects.show_found(answer.found.items(), self.clock())
+            return
+        first = not self.model.rowCount()
+        self.model.set_value(answer.found, self.clock())
         if first:
             self.tree.expand_small(FIRST_ROWS)
 
@@ -263,16 +303,48 @@ class InspectorPanel(PanelWidget):
         return self.freeze.isChecked()
 
     @property
+    def holds(self) -> bool:
+        """Whether it shows a message that a person chose, whatever comes."""
+        return self.frozen or self.history.at is not None
+
+    @property
     def comparing(self) -> bool:
         """Whether the tree shows how the message differs from another one."""
-        return self.compare.isChecked() or self.pin.isChecked()
+        return (self.compare.isChecked() or self.pin.isChecked()) and not self.query.asking
 
     def _pin(self, pinned: bool) -> None:
         self._pinned = self._value if pinned and self._value is not None else OFF
+        stamp_ns = self._shown.stamp_ns if self._shown is not None else None
+        self._pinned_words = _(PINNED)
+        if self.history.at is not None and stamp_ns is not None and 0 <= stamp_ns < 2**62:
+            at = clock_words(stamp_ns)
+            self._pinned_words = _("{message} of {clock}").format(message=_(PINNED), clock=at)
+        self._show_value()
+
+    def _moved(self) -> None:
+        """A person went to another message of the history, or back to the newest."""
+        self.reader.forget()
+        message = self.history.shown()
+        if message is not None:
+            self._take(message)
+        elif self.history.at is None:
+            self.freeze.setChecked(False)
+            self.refresh()
+
+    def _queried(self, text: str) -> None:
+        """A query was typed, or ("") there is none any more: the tree begins anew."""
+        if not text and not self.query.asking:
+            return
+        self.finder.mark(wrong=not self.query.set_query(text))
+        self.compare.setVisible(not text)  # parts of messages are not compared, and a query is long
+        self.model.clear()
         self._show_value()
 
     def _set_mode(self, mode: str) -> None:
-        self._raw_wanted = mode == "raw"
+        self._raw_wanted, self._table_wanted = mode == "raw", mode == "table"
+        if self._table_wanted and self.body.page == TREE and not self.query.asking:
+            index = self.tree.currentIndex()
+            self.body.objects.want(steps_of(self.model.node(index)) if index.isValid() else ())
         shown = self._shown
         if shown is None:
             return
@@ -284,14 +356,26 @@ class InspectorPanel(PanelWidget):
     def _chosen(self, index: QModelIndex) -> None:
         self.foot.show_path(self.model.node(index).path if index.isValid() else "")
 
+    def _reveal(self, steps: object) -> None:
+        """Show in the tree what a person chose in the table."""
+        self.mode.set_value("tree")
+        self._set_mode("tree")
+        self.body.reveal(steps)
+        self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
+
     def _drag(self, node: TreeNode) -> None:
         """A value leaves the tree in a person's hand."""
         path = field_of(node)
         if path:
             drag_field(self.tree, self._topic, path, press=lambda key: self.context.run(f"key:{key}"))
 
+    def _whole(self) -> object:
+        """The whole message, also while a query or a table shows parts of it."""
+        shows_parts = self.query.asking or self._table_wanted
+        return self._value if shows_parts else self.model.value()
+
     def _looked_through(self) -> tuple[object, JsonIndex | None]:
-        return self.model.value(), self._reading.index if self._reading is not None else None
+        return self._whole(), self._reading.index if self._reading is not None else None
 
     def _show_menu(self, at: QPoint) -> None:
         menu = Menu(self.theme, self)
@@ -316,12 +400,15 @@ class InspectorPanel(PanelWidget):
     def theme_changed(self) -> None:
         self.tree.row_height = round(self.theme.scaled(self.theme.size("row", "tree")))
         self.tree.doItemsLayout()
+        self.body.objects.set_row_height(self.row_height())
 
     def save_state(self) -> dict[str, object]:
         return {
             "topic": self._topic,
             "compare": self.compare.isChecked(),
             "changes_only": self.strip.only.isChecked(),
+            "table": self._table_wanted,
+            "query": self.finder.field.text() if self.finder.is_query else "",
         }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
@@ -330,9 +417,14 @@ class InspectorPanel(PanelWidget):
             self.show_topic(topic)
         self.compare.setChecked(state.get("compare") is True)
         self.strip.only.setChecked(state.get("changes_only") is True)
+        self._table_wanted = state.get("table") is True
+        query = state.get("query")
+        if isinstance(query, str) and query.startswith("$"):
+            self.finder.field.setText(query)
 
     def _leave(self) -> None:
         self.reader.forget()
+        self.history.pause()
         if self._watch is not None:
             self._watch.close()
             self._watch = None
@@ -340,7 +432,12 @@ class InspectorPanel(PanelWidget):
     def wake(self) -> None:
         if self._watch is not None and self._watch.resting:
             self._since_ns = time.time_ns()
+            self.history.begin(self.session.series, self._topic)
         super().wake()
+
+    def rest(self) -> None:
+        self.history.pause()
+        super().rest()
 
     def looks(self) -> Iterable[Suspendable | None]:
         return (self._watch,)
@@ -348,12 +445,17 @@ class InspectorPanel(PanelWidget):
     def shut(self) -> None:
         self._leave()
         self.reader.close()
+        self.query.close_worker()
 
 
-def chip_words(topic: Topic | None, frozen: bool, *, recorded: bool = False) -> tuple[str, str, str]:
+def chip_words(
+    topic: Topic | None, frozen: bool, *, recorded: bool = False, earlier: bool = False
+) -> tuple[str, str, str]:
     """The words, status and icon of the chip that says whether what is shown is still coming."""
     if frozen:
         return pgettext("message", "frozen"), "off", "snowflake"
+    if earlier:
+        return pgettext("message", "earlier"), "off", "history"
     if recorded:
         return pgettext("message", "recorded"), "info", ""
     if topic is None:

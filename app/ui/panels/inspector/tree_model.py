@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt
 
+from app.core.messages.query import FoundPath
 from app.core.series.field_path import ALL, FieldPath, Step, kind_of_value
 from app.ui.panels.inspector.diff import MARK_WORDS, MISSING, OFF, Mark, Part, differs, parts_of
 from app.ui.panels.inspector.values import is_container, keys_of, size_of, values_of, words_of
@@ -66,11 +67,11 @@ def field_of(node: TreeNode) -> str:
 
 
 def steps_of(node: TreeNode) -> tuple[str | int, ...]:
-    """The keys and places that lead from the message to a value."""
+    """The keys and places that lead from the message to a value; also to what a query found."""
     steps: list[str | int] = []
     above: TreeNode | None = node
     while above is not None and above.parent is not None:
-        steps.insert(0, above.key)
+        steps[:0] = above.key.steps if isinstance(above.key, FoundPath) else (above.key,)
         above = above.parent
     return tuple(steps)
 

@@ -30,7 +30,7 @@ def is_container(value: object) -> bool:
 def keys_of(value: object, count: int) -> list[str | int]:
     """The first ``count`` keys of a container."""
     if isinstance(value, Mapping):
-        return [str(key) for key in islice(value, count)]
+        return [key if isinstance(key, str) else str(key) for key in islice(value, count)]
     if is_container(value):
         return list(range(min(count, len(value))))  # type: ignore[arg-type]
     return []

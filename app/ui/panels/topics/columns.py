@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from app.core.network.topic_tree import TopicFolder, TreeRow, parts_of_name
 from app.core.networks.kinds import NetworkKind, kind_named
 from app.ui.text.numbers import age_words, bandwidth_words, grouped, rate_words
 from app.ui.widgets.table.model import Cell, Column
@@ -218,13 +219,120 @@ COLUMNS: tuple[Column[Topic], ...] = (
 
 
 NETWORK = Column("network", lazy("Network"), 84, network_cell, lambda t: t.network, tip=_network_tip)
+INDENT, CHEVRON = 14, 19
+"""How far a level of the tree stands further in, and the room of a folder's arrow."""
 
 
-def columns(own: Callable[[Topic], bool], several: Callable[[], bool]) -> tuple[Column[Topic], ...]:
-    """The columns; what is Studio's ``own`` is no news. Networks are told while there are ``several``."""
+def _folder_name(folder: TopicFolder) -> Cell:
+    icon = "chevron-down" if folder.is_open else "chevron-right"
+    return Cell(f"{folder.name}/", icon, mono=True, indent=folder.deep * INDENT)
+
+
+def _folder_type(folder: TopicFolder) -> Cell:
+    count = len(folder.topics)
+    words = ngettext("{count} topic", "{count} topics", count).format(count=grouped(count))
+    return Cell(words, role="textTertiary")
+
+
+def _folder_loss(folder: TopicFolder) -> Cell:
+    lost = folder.figures.lost
+    if not lost:
+        return Cell() if lost is None else Cell("0")
+    return Cell(grouped(lost), "triangle-alert", "warn")
+
+
+def _folder_loss_tip(folder: TopicFolder) -> str:
+    lost = folder.figures.lost
+    if lost is None:
+        return _("No subscriber tells what is lost")
+    said = ngettext("{count} message lost below {folder}", "{count} messages lost below {folder}", lost)
+    return said.format(count=grouped(lost), folder=folder.path)
+
+
+def _sum_tip(folder: TopicFolder) -> str:
+    return _("The sum of what is below {folder}").format(folder=folder.path)
+
+
+FolderColumn = tuple[
+    Callable[[TopicFolder], Cell], Callable[[TopicFolder], object], Callable[[TopicFolder], str] | None
+]
+FOLDERS: dict[str, FolderColumn] = {
+    "topic": (_folder_name, lambda f: f.path.casefold(), lambda f: f.path),
+    "network": (
+        lambda f: network_cell(f.topics[0]), lambda f: f.network, lambda f: _network_tip(f.topics[0])
+    ),
+    "type": (_folder_type, lambda _f: "", None),
+    "rate": (lambda f: Cell(rate_words(f.figures.rate_hz)), lambda f: f.figures.rate_hz, _sum_tip),
+    "bandwidth": (
+        lambda f: Cell(bandwidth_words(f.figures.bandwidth_Bps)), lambda f: f.figures.bandwidth_Bps, _sum_tip
+    ),
+    "age": (
+        lambda f: Cell(age_words(f.figures.age_s)),
+        lambda f: f.figures.age_s,
+        lambda f: _("The newest message below {folder}").format(folder=f.path),
+    ),
+    "loss": (_folder_loss, lambda _f: None, _folder_loss_tip),
+}  # fmt: skip
+"""What a folder shows in a column, sorts by and says; in other columns it is blank."""
+
+
+BLANK: FolderColumn = (lambda _f: Cell(), lambda _f: None, None)
+
+
+def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[TreeRow]:
+    """The same column for the rows of a tree."""
+    cell, key, tip = of_folder
+    of_topic, topic_key, topic_tip = column.cell, column.key, column.tip
+
+    def told(row: TreeRow) -> str:
+        if isinstance(row, TopicFolder):
+            return tip(row) if tip is not None else ""
+        return topic_tip(row) if topic_tip is not None else ""
+
+    return Column(
+        column.name,
+        column.title,
+        column.width,
+        lambda row: cell(row) if isinstance(row, TopicFolder) else of_topic(row),
+        (lambda row: key(row) if isinstance(row, TopicFolder) else topic_key(row)) if topic_key else None,
+        figures=column.figures,
+        stretch=column.stretch,
+        tip=told if topic_tip is not None else None,
+        yields=column.yields,
+        off=column.off,
+        words=column.words,
+        when=column.when,
+    )
+
+
+OTHERS = tuple(_with_folders(column, FOLDERS.get(column.name, BLANK)) for column in COLUMNS[1:])
+"""The columns that are the same for every panel."""
+
+
+def columns(
+    own: Callable[[Topic], bool], several: Callable[[], bool], as_tree: Callable[[], bool]
+) -> tuple[Column[TreeRow], ...]:
+    """The columns; what is Studio's ``own`` is no news. Networks are told while there are ``several``.
+
+    While the rows stand ``as_tree`` a topic shows the last part of its name below its folders.
+    """
 
     def named(topic: Topic) -> Cell:
         cell = name_cell(topic)
-        return replace(cell, bold=False, chip=None) if cell.chip and own(topic) else cell
+        if cell.chip and own(topic):
+            cell = replace(cell, bold=False, chip=None)
+        if not as_tree():
+            return cell
+        parts = parts_of_name(topic.name)
+        return replace(cell, text=parts[-1], indent=(len(parts) - 1) * INDENT + CHEVRON)
 
-    return (replace(COLUMNS[0], cell=named), replace(NETWORK, when=several), *COLUMNS[1:])
+    def folder_named(folder: TopicFolder) -> Cell:
+        cell = _folder_name(folder)
+        fresh = not folder.is_open and any(
+            topic.new and topic.gone_s is None and not own(topic) for topic in folder.topics
+        )
+        return replace(cell, chip=pgettext("topic", "new")) if fresh else cell
+
+    first = _with_folders(replace(COLUMNS[0], cell=named), (folder_named, *FOLDERS["topic"][1:]))
+    network = _with_folders(replace(NETWORK, when=several), FOLDERS["network"])
+    return (first, network, *OTHERS)

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.network.source import NODE_NAME
+from app.core.network.topic_tree import TopicFolder, TopicTree, TreeRow, fits, folders_above
+from app.core.network.topics import split_key
 from app.core.networks.networks import network_words
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.network_table import NetworkTable, own_everywhere
-from app.ui.panels.row_actions import RowAction, show_messages, topic_actions
+from app.ui.panels.row_actions import RowAction, copies, show_messages, topic_actions
 from app.ui.panels.table_panel import TableWords
 from app.ui.panels.topics.columns import columns
 from app.ui.text.numbers import grouped
-from app.ui.widgets import EmptyAction, label
+from app.ui.widgets import EmptyAction, IconButton, label
+from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, listed, ngettext
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from app.core.network.topics import Topic
     from app.core.networks.kinds import NetworkKind
@@ -41,15 +46,43 @@ WORDS = TableWords(
 FIGURES_EVERY = 3  # refreshes of 30 a second: figures are renewed ten times a second
 SORT_EVERY = 30
 LIVELY = frozenset({"rate", "bandwidth", "age", "loss"})
+MOST_CLOSED = 1000
+"""Folders that a layout remembers as closed."""
 
 
-class TopicsPanel(NetworkTable["Topic"]):
-    """The table of topics, a filter in the title, a line about the figures below."""
+class TopicsTable(TableView[TreeRow]):
+    """Left and Right close and open the folders of a tree.
+
+    `fold_wanted` with the key of a row, and whether it is to be open (Right) or closed (Left).
+    """
+
+    fold_wanted = Signal(str, bool)
+    folds = False
+    """Whether there are folders: else these keys do what they do in any table."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        key = self.chosen_key() if self.folds and is_plain(event) else None
+        if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right} and key is not None:
+            self.keyboard = True
+            self.fold_wanted.emit(key, event.key() == Qt.Key.Key_Right)
+        else:
+            super().keyPressEvent(event)
+
+
+class TopicsPanel(NetworkTable[TreeRow]):
+    """The table of topics, as a list or a tree, a filter in the title, a line about the figures below."""
 
     def __init__(self, context: PanelContext) -> None:
+        self._closed: set[str] = set()
+        self._tree: TopicTree | None = None
         super().__init__(context, WORDS, "radio-tower")
+        self.as_tree = IconButton(
+            self.theme, "list-tree", _("As a tree by the slashes in the names"), checkable=True, size=26
+        )
+        self.as_tree.toggled.connect(lambda _on: self.rebuild())
         self.count = label("", "small", role="textSecondary")
         self.header.insert(0, self.count)
+        self.header.append(self.as_tree)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -61,11 +94,14 @@ class TopicsPanel(NetworkTable["Topic"]):
         self._ticks = 0
         self._wanted = ""
 
-    def make_model(self) -> TableModel[Topic]:
-        return TableModel(columns(self._own, self.has_several), lambda topic: topic.key)
+    def make_model(self) -> TableModel[TreeRow]:
+        every = columns(self._own, self.has_several, lambda: self._tree is not None)
+        return TableModel(every, lambda row: row.key)
 
-    def make_table(self, model: TableModel[Topic]) -> TableView[Topic]:
-        return TableView(self.theme, model, "topic")
+    def make_table(self, model: TableModel[TreeRow]) -> TableView[TreeRow]:
+        self.topics_table = TopicsTable(self.theme, model, "topic")
+        self.topics_table.fold_wanted.connect(self._fold)
+        return self.topics_table
 
     def _own(self, topic: Topic) -> bool:
         """Whether only virtual robots that Studio itself started publish it, or Studio."""
@@ -83,6 +119,8 @@ class TopicsPanel(NetworkTable["Topic"]):
         if facts != self._seen or (lively and self._ticks % SORT_EVERY == 0):
             self.rebuild()
         if self._ticks % FIGURES_EVERY == 0 and self.model.rowCount():
+            if self._tree is not None:
+                self._tree.renew()
             self.table.tell_visible_changed()
 
     def _facts(self) -> tuple[object, ...]:
@@ -97,8 +135,9 @@ class TopicsPanel(NetworkTable["Topic"]):
         topics = [*self.session.topics, *self.session.networks.topics]
         self._ours = self.session.launcher.virtual_robots
         words = self.filter_words()
-        rows = [topic for topic in topics if all(word in _haystack(topic) for word in words)]
-        self.model.set_rows(self.table.order.sort(rows))
+        fit = fits(words)
+        rows = [topic for topic in topics if fit(topic.name, _haystack(topic))] if words else topics
+        self._show_rows(rows, filtered=bool(words))
         if self._wanted:
             self.show_topic(self._wanted)
         self._say_counts(len(topics), len(rows) if words else None)
@@ -109,6 +148,19 @@ class TopicsPanel(NetworkTable["Topic"]):
         self.foot.setText(_(RECORDED_FOOT) if recorded else _foot(kinds))
         self.foot.setVisible(bool(rows))
         self.line.setVisible(bool(rows))
+
+    def _show_rows(self, topics: list[Topic], *, filtered: bool) -> None:
+        """As a list or as a tree; what a filter found is never in a closed folder."""
+        was_tree = self._tree is not None
+        self.topics_table.folds = self.as_tree.isChecked()
+        if self.as_tree.isChecked():
+            self._tree = TopicTree(topics, () if filtered else self._closed)
+            self.model.set_rows(self._tree.rows(self.table.order.sort))
+        else:
+            self._tree = None
+            self.model.set_rows(self.table.order.sort([*topics]))
+        if was_tree or self._tree is not None:
+            self.table.tell_visible_changed()  # the same topic is written otherwise, a folder has opened
 
     def _say_counts(self, known: int, found: int | None) -> None:
         nodes = len(self.session.networks.nodes)
@@ -140,14 +192,75 @@ class TopicsPanel(NetworkTable["Topic"]):
         self.context.run("robots.virtual")
 
     def open_row(self, key: str) -> None:
-        show_messages(self.context, key)
+        if self._folder(key) is not None:
+            self._fold(key, None)
+        else:
+            show_messages(self.context, key)
+
+    def _folder(self, key: str) -> TopicFolder | None:
+        return self._tree[key] if self._tree is not None and key in self._tree else None
+
+    def _fold(self, key: str, is_open: bool | None) -> None:
+        """Open or close a folder (None: whatever it is not); of a topic, or twice, go to the folder above."""
+        folder = self._folder(key)
+        if folder is None or (is_open is False and not folder.is_open):
+            if is_open is False:
+                self._go_up(key)
+            return
+        if is_open is None:
+            is_open = not folder.is_open
+        if is_open:
+            self._closed.discard(key)
+        elif len(self._closed) < MOST_CLOSED and not self.filter_words():
+            self._closed.add(key)
+        self.rebuild()
+        self.table.choose(key)
+
+    def _go_up(self, key: str) -> None:
+        network, name = split_key(key)
+        above = folders_above(name.removesuffix("/*"), network)
+        if self._tree is not None and above:
+            self.table.choose(above[-1])
+
+    def _fold_all(self, *, is_open: bool) -> None:
+        self._closed.clear()
+        if not is_open and self._tree is not None:
+            self._closed.update(folder.key for folder in list(self._tree)[:MOST_CLOSED])
+        self.rebuild()
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
-        return topic_actions(self.context, key)
+        folder = self._folder(key)
+        if folder is None:
+            return topic_actions(self.context, key)
+        fold = _("Close the folder") if folder.is_open else _("Open the folder")
+        return (
+            RowAction(
+                fold, "chevron-right" if folder.is_open else "chevron-down", lambda: self.open_row(key)
+            ),
+            RowAction(_("Open all folders"), "list-tree", lambda: self._fold_all(is_open=True)),
+            RowAction(_("Close all folders"), "list", lambda: self._fold_all(is_open=False)),
+            copies(self.context, split_key(key)[1]),
+        )
 
     def show_topic(self, name: str) -> None:
+        if self._tree is not None and not self._closed.isdisjoint(
+            above := folders_above(*split_key(name)[::-1])
+        ):
+            self._closed.difference_update(above)
+            self._wanted = ""
+            self.rebuild()
         self._wanted = "" if self.model.index_of(name).isValid() else name  # its row may still come
         self.table.choose(name)
+
+    def save_state(self) -> dict[str, object]:
+        return {**super().save_state(), "tree": self.as_tree.isChecked(), "closed": sorted(self._closed)}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        closed = state.get("closed")
+        known = closed if isinstance(closed, list) else []
+        self._closed = {key for key in known[:MOST_CLOSED] if isinstance(key, str)}
+        self.as_tree.setChecked(state.get("tree") is True)
+        super().restore_state(state)
 
 
 def _foot(kinds: Sequence[NetworkKind]) -> str:
@@ -160,7 +273,7 @@ def _foot(kinds: Sequence[NetworkKind]) -> str:
 
 def _haystack(topic: Topic) -> str:
     words = (network_words(topic.network), topic.name, topic.msg_type, *topic.publisher_nodes)
-    return " ".join(words).casefold()
+    return " ".join(words)
 
 
 PANEL = Panel("topics", WORDS.title, "list", (), TopicsPanel)

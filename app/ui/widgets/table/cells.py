@@ -15,7 +15,6 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets.indicators import SPARK, paint_sparkline
 from app.ui.widgets.paint import box as paint_box
 from app.ui.widgets.table.model import Cell, Column, Order
-from nep.i18n import _
 
 Index = QModelIndex | QPersistentModelIndex
 EDGE, PADDING, ICON = 12, 6, 14
@@ -64,7 +63,7 @@ def head_font(theme: Theme) -> QFont:
 
 def head_width(theme: Theme, column: Column[Any]) -> int:
     """The room that a column's head wants, at the outer edge too."""
-    return math.ceil(QFontMetricsF(head_font(theme)).horizontalAdvance(_(column.title))) + EDGE + PADDING + 1
+    return math.ceil(QFontMetricsF(head_font(theme)).horizontalAdvance(column.head)) + EDGE + PADDING + 1
 
 
 class CellDelegate(QStyledItemDelegate):
@@ -199,7 +198,7 @@ class TableHeader(QHeaderView):
         ordered = self._view.shown_order.column is column
         metrics = QFontMetricsF(font)
         arrow = 16.0 if ordered else 0.0
-        text = metrics.elidedText(_(column.title), Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow))
+        text = metrics.elidedText(column.head, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow))
         advance = metrics.horizontalAdvance(text)
         x = box.right() - advance - arrow if column.figures else box.left()
         painter.setFont(font)

@@ -83,7 +83,7 @@ class ColumnChoice:
         for column in self._columns[1:]:
             if column.when is not None and not column.when():
                 continue
-            action = menu.addAction(_(column.words or column.title))
+            action = menu.addAction(column.called)
             action.setCheckable(True)
             action.setChecked(self.wanted(column))
             action.toggled.connect(lambda on, name=column.name: choose(name, on))

@@ -74,7 +74,8 @@ class Column(Generic[Row]):
     whatever the direction); without it the column can't be sorted. ``stretch`` takes the width that is left.
     ``tip`` is the tooltip's sentence. Where there is too little room (large text) columns that ``yield`` are
     not shown, the largest number first. ``off`` ones are shown only when a person chooses them, those with
-    ``when`` only while that is so; ``words`` names one whose head is blank.
+    ``when`` only while that is so; ``words`` names one whose head is blank. A ``verbatim`` title is not
+    Studio's own word, and is not translated.
     """
 
     name: str
@@ -89,6 +90,17 @@ class Column(Generic[Row]):
     off: bool = False
     words: str = ""
     when: Callable[[], bool] | None = None
+    verbatim: bool = False
+
+    @property
+    def head(self) -> str:
+        """Its head, in the person's language."""
+        return self.title if self.verbatim else _(self.title) if self.title else ""
+
+    @property
+    def called(self) -> str:
+        """What it is called where a blank head says nothing."""
+        return _(self.words) if self.words else self.head
 
 
 @dataclass(slots=True)
@@ -144,7 +156,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if role == Qt.ItemDataRole.ToolTipRole:
             return plain.tip(column.tip(row)) if column.tip is not None else None
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            cell, head = column.cell(row), _(column.title or column.words)
+            cell, head = column.cell(row), column.head or column.called
             return ", ".join(part for part in (head, cell.text or cell.said, cell.chip) if part)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column.figures)
@@ -157,9 +169,9 @@ class TableModel(QAbstractTableModel, Generic[Row]):
             return None
         column = self.columns[section]
         if role == Qt.ItemDataRole.DisplayRole:
-            return _(column.title)
+            return column.head
         if role == Qt.ItemDataRole.ToolTipRole:  # where there is no room for the whole
-            return plain.tip(_(column.words or column.title)) or None
+            return plain.tip(column.called) or None
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column.figures)
         return None

@@ -1,0 +1,180 @@
+"""What JSON messages draw on pictures: `foxglove.ImageAnnotations`, and the face of RIZE's `face_positions`.
+
+Places are shares of the picture's width and height, so that they fit however large it is shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+from nep.i18n import _
+from nep.text import shortened
+
+MOST_SHAPES = 2000
+MOST_POINTS = 20_000
+LONGEST_TEXT = 200
+MOST_PIXELS = 1e6
+"""Further away, wider or larger nothing is drawn: no screen and no painter has room for it."""
+FACE_FRAME = (640, 480)
+"""RIZE's face detection makes every picture so large before it looks for faces."""
+POINTS, LINE_LOOP, LINE_STRIP, LINE_LIST = 1, 2, 3, 4
+
+Colour = tuple[float, float, float, float]
+"""Red, green, blue and how much it covers, each 0 to 1."""
+Point = tuple[float, float]
+YELLOW: Colour = (1.0, 0.77, 0.24, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """One thing that is drawn: its points as shares of the picture.
+
+    ``kind`` is "points", "line", "area" (closed), "circle" (centre; ``size`` is its radius as shares of width
+    and height), or "text" (its lower left corner; ``size`` is the letters' height as a share). ``thickness``
+    is in the picture's pixels. Without an ``outline`` or a ``fill`` there is none.
+    """
+
+    kind: str
+    points: tuple[Point, ...]
+    outline: Colour | None = None
+    fill: Colour | None = None
+    thickness: float = 1.0
+    size: Point = (0.0, 0.0)
+    words: str = ""
+
+
+def is_annotation(payload: object) -> bool:
+    """Whether a decoded message may draw something."""
+    if not isinstance(payload, Mapping):
+        return False
+    lists = (payload.get(name) for name in ("circles", "points", "texts"))
+    return any(_is_list(each) for each in lists) or _face_of(payload) is not None or "positions" in payload
+
+
+def drawn_by(payload: object, width: int, height: int) -> tuple[Drawn, ...]:
+    """What a decoded message draws on a picture of so many pixels; whatever can't be drawn is left out."""
+    if not isinstance(payload, Mapping) or width <= 0 or height <= 0:
+        return ()
+    frame = _Frame(width, height)
+    return tuple(islice(_all(payload, frame), MOST_SHAPES))
+
+
+class _Frame:
+    """Turns pixels into shares, and counts the points that are left."""
+
+    def __init__(self, width: float, height: float) -> None:
+        self.width, self.height = width, height
+        self.left = MOST_POINTS
+
+    def point(self, value: object) -> Point | None:
+        if not isinstance(value, Mapping):
+            return None
+        x, y = _number(value.get("x")), _number(value.get("y"))
+        if x is None or y is None:
+            return None
+        self.left -= 1
+        return x / self.width, y / self.height
+
+
+def _all(payload: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
+    makers = (("circles", _circle), ("points", _points), ("texts", _text))
+    for name, maker in makers:
+        for item in _items(payload.get(name)):
+            if isinstance(item, Mapping) and frame.left > 0:
+                yield from maker(item, frame)
+    face = _face_of(payload)
+    if face is not None:
+        yield from face
+
+
+def _circle(item: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
+    centre, diameter = frame.point(item.get("position")), _number(item.get("diameter"))
+    if centre is None or diameter is None or diameter <= 0:
+        return
+    size = diameter / 2 / frame.width, diameter / 2 / frame.height
+    outline, fill = _colour(item.get("outline_color")), _colour(item.get("fill_color"))
+    yield Drawn("circle", (centre,), outline, fill, _thickness(item), size)
+
+
+def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
+    kind = _number(item.get("type")) or 0
+    found = (frame.point(value) for value in islice(_items(item.get("points")), frame.left))
+    points, thickness = tuple(point for point in found if point is not None), _thickness(item)
+    outline, fill = _colour(item.get("outline_color")), _colour(item.get("fill_color"))
+    each = [_colour(colour) for colour in islice(_items(item.get("outline_colors")), len(points))]
+    if kind == POINTS and len(each) == len(points):
+        for at, own in zip(points, each, strict=True):
+            yield Drawn("points", (at,), own, None, thickness)
+    elif kind == POINTS:
+        yield Drawn("points", points, outline, fill, thickness)
+    elif kind == LINE_LOOP and len(points) > 1:
+        yield Drawn("area", points, outline, fill, thickness)
+    elif kind == LINE_STRIP and len(points) > 1:
+        yield Drawn("line", points, outline, None, thickness)
+    elif kind == LINE_LIST:
+        for place in range(0, len(points) - 1, 2):
+            own = each[place // 2] if place // 2 < len(each) else outline
+            yield Drawn("line", points[place : place + 2], own, None, thickness)
+
+
+def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
+    at, words, height = frame.point(item.get("position")), item.get("text"), _number(item.get("font_size"))
+    if at is None or not isinstance(words, str) or not words.strip():
+        return
+    size = (0.0, (height if height is not None and height > 0 else 12.0) / frame.height)
+    ink, ground = _colour(item.get("text_color")) or YELLOW, _colour(item.get("background_color"))
+    yield Drawn("text", (at,), ink, ground, 1.0, size, shortened(" ".join(words.split()), LONGEST_TEXT))
+
+
+def _face_of(payload: Mapping[str, object]) -> tuple[Drawn, ...] | None:
+    """The face of `face_positions`: what it calls its centre is the upper left corner."""
+    face = payload.get("face")
+    if not isinstance(face, Mapping):
+        return None
+    frame = _Frame(*FACE_FRAME)
+    corner, size = frame.point(face.get("center")), face.get("size")
+    if corner is None or not isinstance(size, Mapping):
+        return None
+    wide, high = _number(size.get("w")), _number(size.get("h"))
+    if wide is None or high is None or wide <= 0 or high <= 0:
+        return None
+    x, y = corner
+    right, low = x + wide / frame.width, y + high / frame.height
+    corners = ((x, y), (right, y), (right, low), (x, low))
+    return (Drawn("area", corners, YELLOW, None, 2.0, words=_("face")),)
+
+
+def _thickness(item: Mapping[str, object]) -> float:
+    found = _number(item.get("thickness"))
+    return found if found is not None and found > 0 else 1.0
+
+
+def _colour(value: object) -> Colour | None:
+    """A colour that can be seen."""
+    if not isinstance(value, Mapping):
+        return None
+    red, green, blue, covers = (_number(value.get(name)) for name in "rgba")
+    if red is None or green is None or blue is None or not covers or covers <= 0:
+        return None
+    return _share(red), _share(green), _share(blue), _share(covers)
+
+
+def _share(value: float) -> float:
+    return min(max(value, 0.0), 1.0)
+
+
+def _items(value: object) -> Iterator[object]:
+    return iter(value) if _is_list(value) else iter(())  # type: ignore[call-overload]
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview))
+
+
+def _number(value: object) -> float | None:
+    """A number that a painter can be given."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    return float(value) if abs(value) <= MOST_PIXELS else None  # NaN is not, either

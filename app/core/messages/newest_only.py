@@ -1,0 +1,73 @@
+"""NewestOnly: one thread that works on what was asked last; what waited before it is forgotten."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+Asked = TypeVar("Asked")
+Done = TypeVar("Done")
+
+
+class NewestOnly(Generic[Asked, Done]):
+    """The thread is started by the first job and waits for more; `take` gives what was done last, once."""
+
+    def __init__(self, work: Callable[[Asked], Done], name: str) -> None:
+        """``work`` is called in the thread, which is called ``name``; it must not raise."""
+        self._work, self._name = work, name
+        self._wake = threading.Condition()
+        self._waiting: list[Asked] = []  # one at most
+        self._working: list[Asked] = []
+        self._done: list[Done] = []
+        self._closing = False
+        self._thread: threading.Thread | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being worked on, or waits for it."""
+        with self._wake:
+            return bool(self._waiting or self._working)
+
+    def ask(self, job: Asked) -> None:
+        """Do this one next; one that still waits is forgotten."""
+        with self._wake:
+            self._waiting = [job]
+            if self._thread is None and not self._closing:
+                self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+                self._thread.start()
+            self._wake.notify()
+
+    def take(self) -> Done | None:
+        """What was done last, once."""
+        with self._wake:
+            done, self._done = self._done, []
+        return done[0] if done else None
+
+    def forget(self) -> None:
+        """Nobody wants what waits, is being worked on, or was done."""
+        with self._wake:
+            self._waiting, self._working, self._done = [], [], []
+
+    def close(self) -> None:
+        """End the thread; what is being worked on is waited for a second at most."""
+        with self._wake:
+            self._closing = True
+            self._waiting, self._working, self._done = [], [], []
+            self._wake.notify()
+        if self._thread is not None:
+            self._thread.join(1.0)
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                while not self._waiting and not self._closing:
+                    self._wake.wait()
+                if self._closing:
+                    return
+                mine = self._working = self._waiting
+                self._waiting = []
+            done = self._work(mine[0])
+            with self._wake:
+                if self._working is mine:  # else nobody wants it any more
+                    self._done, self._working = [done], []

@@ -1,0 +1,169 @@
+"""How a person wants pictures shown: brighter, with more contrast, numbers in which colours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+COLOUR_MAPS = ("grey", "viridis", "turbo", "inferno", "jet")
+"""By their usual names; "" is whatever fits: grey for bytes, viridis for numbers of more."""
+LEAST_CONTRAST, MOST_CONTRAST = 0.1, 10.0
+STRIP_ROWS = 64
+SPREAD = "viridis"
+
+
+@dataclass(frozen=True, slots=True)
+class PictureLook:
+    """How pictures are shown; equal looks make the same of a picture.
+
+    ``brightness`` -1 to 1, 0 as it is; ``contrast`` 0.1 to 10, 1 as it is. Of pictures with one channel:
+    ``colours`` is one of `COLOUR_MAPS` or "", and the numbers from ``low`` to ``high`` have all of them; None
+    is the picture's own smallest and largest (of bytes 0 and 255).
+    """
+
+    brightness: float = 0.0
+    contrast: float = 1.0
+    colours: str = ""
+    low: float | None = None
+    high: float | None = None
+
+    def saved(self) -> dict[str, object]:
+        """For a layout; `restored` reads it."""
+        return {
+            "brightness": self.brightness,
+            "contrast": self.contrast,
+            "colours": self.colours,
+            "low": self.low,
+            "high": self.high,
+        }
+
+
+PLAIN = PictureLook()
+
+
+def restored(saved: object) -> PictureLook:
+    """What `PictureLook.saved` gave; whatever does not fit is as at first."""
+    if not isinstance(saved, Mapping):
+        return PLAIN
+    found = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
+    brightness, contrast, low, high = found.values()
+    colours = saved.get("colours")
+    look = PictureLook(
+        min(max(brightness, -1.0), 1.0) if brightness is not None else 0.0,
+        min(max(contrast, LEAST_CONTRAST), MOST_CONTRAST) if contrast is not None else 1.0,
+        colours if isinstance(colours, str) and colours in COLOUR_MAPS else "",
+    )
+    return replace(look, low=low, high=high) if low is None or high is None or low < high else look
+
+
+def _number(value: object) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    try:
+        found = float(value)
+    except OverflowError:
+        return None
+    return found if math.isfinite(found) else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColourScale:
+    """What the colours of a picture with one channel mean: ``low`` has the first, ``high`` the last.
+
+    ``colours`` is a uint8 array (256, 3) of red, green and blue.
+    """
+
+    low: float
+    high: float
+    colours: NDArray[np.uint8]
+
+
+def toned(look: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Numbers of 8 bits, brighter and with more contrast as the look wants it."""
+    if (look.brightness, look.contrast) == (0.0, 1.0):
+        return picture
+    import cv2  # noqa: PLC0415  heavy
+    import numpy as np  # noqa: PLC0415
+
+    return np.asarray(cv2.LUT(picture, _tones(look)), np.uint8)
+
+
+def in_colours(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
+    """A picture of one channel (rows, columns) in blue, green, red and 255, black where no number is known.
+
+    And what its colours mean.
+    """
+    import cv2  # noqa: PLC0415
+    import numpy as np  # noqa: PLC0415
+
+    known = np.isfinite(numbers)
+    low, high = _ends(look, numbers[known], is_bytes=numbers.dtype == np.uint8)
+    colours = _colours(look.colours or ("grey" if numbers.dtype == np.uint8 else SPREAD))[_tones(look)]
+    shown = cv2.cvtColor(scaled(numbers, known, low, high), cv2.COLOR_GRAY2BGR)
+    bgra = cv2.cvtColor(cv2.LUT(shown, colours[:, ::-1].reshape(256, 1, 3)), cv2.COLOR_BGR2BGRA)
+    if not known.all():
+        bgra[~known] = (0, 0, 0, 255)
+    return np.asarray(bgra, np.uint8), ColourScale(low, high, colours)
+
+
+def _ends(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[float, float]:
+    """The numbers that have the first and the last colour; never in the wrong order."""
+    own = (
+        (0.0, 255.0)
+        if is_bytes
+        else (float(values.min()), float(values.max()))
+        if values.size
+        else (0.0, 0.0)
+    )
+    low = look.low if look.low is not None else own[0]
+    high = look.high if look.high is not None else own[1]
+    return (low, high) if low <= high else (low, low) if look.low is not None else (high, high)
+
+
+def scaled(frame: NDArray[Any], known: NDArray[np.bool_], low: float, high: float) -> NDArray[np.uint8]:
+    """Its values from 0, ``low`` and below, to 255, ``high`` and above; 0 where a value is not known."""
+    import numpy as np  # noqa: PLC0415
+
+    shown = np.zeros(frame.shape, np.uint8)
+    span = high / 2 - low / 2  # halves: the distance of two floats may be no float any more
+    if span <= 0:
+        return shown
+    for start in range(0, len(frame), STRIP_ROWS):  # double precision takes eight bytes for each
+        rows = slice(start, start + STRIP_ROWS)
+        strip = np.where(known[rows], frame[rows], low).astype(np.float64)
+        shown[rows] = np.clip((strip / 2 - low / 2) * (255 / span), 0, 255).astype(np.uint8)
+    return shown
+
+
+def _tones(look: PictureLook) -> NDArray[np.uint8]:
+    """What brightness and contrast make of each of the 256 steps."""
+    import numpy as np  # noqa: PLC0415
+
+    steps = (np.arange(256.0) - 127.5) * look.contrast + 127.5 + look.brightness * 255
+    return np.clip(steps + 0.5, 0, 255).astype(np.uint8)
+
+
+@lru_cache(maxsize=len(COLOUR_MAPS))
+def _colours(name: str) -> NDArray[np.uint8]:
+    """The 256 colours of a map, as red, green and blue."""
+    import cv2  # noqa: PLC0415
+    import numpy as np  # noqa: PLC0415
+
+    steps = np.arange(256, dtype=np.uint8)
+    if name == "grey":
+        return np.repeat(steps[:, None], 3, axis=1)
+    maps = {
+        "viridis": cv2.COLORMAP_VIRIDIS,
+        "turbo": cv2.COLORMAP_TURBO,
+        "inferno": cv2.COLORMAP_INFERNO,
+        "jet": cv2.COLORMAP_JET,
+    }
+    bgr = cv2.applyColorMap(steps.reshape(256, 1), maps[name]).reshape(256, 3)
+    return np.ascontiguousarray(bgr[:, ::-1])

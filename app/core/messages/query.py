@@ -1,0 +1,226 @@
+"""A JSONPath query (RFC 9535) over a decoded message, bounded: no query makes anybody wait for long.
+
+What is looked through counts each step into it, so a query that multiplies itself (``$..*..*..*``) ends, with
+what was found until then. Regular expressions are left out: nothing bounds how long one takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, overload
+
+from app.errors import QueryError
+from nep.i18n import _
+from nep.messages.fields import path_text
+from nep.system.lazy_import import lazy_module
+from nep.text import shortened
+
+if TYPE_CHECKING:
+    import jsonpath
+else:
+    jsonpath = lazy_module("jsonpath")  # 30 ms that only who asks a query waits for
+
+LONGEST = 500
+"""Letters of a query."""
+MOST_STEPS = 50_000
+"""Values that are looked at for one answer."""
+MOST_FOUND = 2_000
+Steps = tuple[str | int, ...]
+
+
+class FoundPath(str):
+    """The path of a value that was found, as it is written; ``steps`` lead to it from the message."""
+
+    __slots__ = ("steps",)
+    steps: Steps
+
+    @classmethod
+    def of(cls, steps: Steps) -> FoundPath:
+        """The path that these steps make; of the whole message it is ``$``."""
+        made = cls(path_text(steps) if steps else "$")
+        made.steps = steps
+        return made
+
+
+@dataclass(frozen=True, slots=True)
+class QueryAnswer:
+    """What a query found: the values by their paths, and the sentence why these are not all, or ""."""
+
+    found: Mapping[FoundPath, object]
+    cut: str = ""
+
+
+class JsonQuery:
+    """A query that was understood; `answer` may be asked in any thread, of one message after the other."""
+
+    def __init__(self, text: str) -> None:
+        """Understand it. Raises `QueryError` with the sentence that says what is wrong and where."""
+        self.text = text.strip()
+        if len(self.text) > LONGEST:
+            raise QueryError(_("a query has {most} letters at most").format(most=LONGEST))
+        try:
+            self._path = _environment().compile(self.text)
+        except jsonpath.JSONPathError as error:
+            raise QueryError(_sentence(error, self.text)) from error
+        except (RecursionError, ValueError) as error:  # brackets a thousand deep; numbers no computer has
+            raise QueryError(_("the query can't be understood")) from error
+
+    def answer(
+        self, value: object, most_steps: int = MOST_STEPS, most_found: int = MOST_FOUND
+    ) -> QueryAnswer:
+        """What it finds in a decoded message; ``most_steps`` values are looked at, ``most_found`` kept."""
+        count = _Steps(most_steps)
+        looked_through = _counted(value, count)
+        found: dict[FoundPath, object] = {}
+        if not isinstance(looked_through, (_CountedObject, _CountedList)):
+            return QueryAnswer({FoundPath.of(()): value} if self.text == "$" else {})
+        cut = ""
+        try:
+            for match in self._path.finditer(looked_through):
+                if len(found) >= most_found:
+                    cut = _("The first {count} are shown.").format(count=most_found)
+                    break
+                found[FoundPath.of(tuple(match.parts))] = _plain(match.obj)
+        except _TooMany:
+            cut = _("It looks at more than {count} values; this was found until then.").format(
+                count=most_steps
+            )
+        except RecursionError:
+            cut = _("The message is nested too deep for it.")
+        except jsonpath.JSONPathError as error:
+            cut = _sentence(error, self.text)
+        return QueryAnswer(found, cut)
+
+
+@cache
+def _environment() -> jsonpath.JSONPathEnvironment:
+    made = jsonpath.JSONPathEnvironment(strict=True)
+    for name in ("match", "search"):
+        made.function_extensions.pop(name, None)
+    return made
+
+
+def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
+    """What is wrong, and from where on."""
+    reason, token = str(error.message or ""), error.token
+    rest = text[token.index :] if token is not None and 0 <= token.index < len(text) else ""
+    if not rest:
+        return _("the query does not end well: {reason}").format(reason=reason)
+    said = _("the query can't be understood from {rest} on: {reason}")
+    return said.format(rest=shortened(rest, 20), reason=reason)
+
+
+class _TooMany(Exception):  # noqa: N818  it is no fault: it ends the search
+    """As many values were looked at as may be."""
+
+
+class _Steps:
+    """Counts what is looked at."""
+
+    def __init__(self, most: int) -> None:
+        self._left = most
+
+    def take(self, steps: int = 1) -> None:
+        self._left -= steps
+        if self._left < 0:
+            raise _TooMany
+
+
+def _counted(value: object, count: _Steps) -> object:
+    if isinstance(value, Mapping):
+        return _CountedObject(value, count)
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        return _Bytes(value)
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return _CountedList(value, count)
+    return value
+
+
+def _plain(value: object) -> object:
+    """What was counted, as it is in the message."""
+    return value.raw if isinstance(value, (_CountedObject, _CountedList, _Bytes)) else value
+
+
+def _same(one: object, other: object) -> bool:
+    """Whether two values are equal in JSON, where true is not 1."""
+    return isinstance(one, bool) is isinstance(other, bool) and one == other
+
+
+@dataclass(frozen=True, slots=True)
+class _Bytes:
+    """Bytes of msgpack are one value, no list of numbers."""
+
+    raw: object
+
+
+class _CountedObject(Mapping[str, object]):
+    __slots__ = ("_count", "raw")
+
+    def __init__(self, raw: Mapping[object, object], count: _Steps) -> None:
+        self.raw, self._count = raw, count
+
+    def __getitem__(self, key: str) -> object:
+        self._count.take()
+        return _counted(self.raw[key], self._count)
+
+    def __iter__(self) -> Iterator[str]:
+        for key in self.raw:
+            self._count.take()
+            yield str(key)
+
+    def items(self) -> Iterator[tuple[str, object]]:  # type: ignore[override]
+        """Without looking each key up again, and with those of msgpack that are numbers."""
+        for key, value in self.raw.items():
+            self._count.take()
+            yield str(key), _counted(value, self._count)
+
+    def __len__(self) -> int:
+        return len(self.raw)
+
+    def __eq__(self, other: object) -> bool:
+        self._count.take()
+        if not isinstance(other, _CountedObject) or len(self) != len(other):
+            return False
+        return self.raw is other.raw or all(
+            key in other.raw and _same(value, other[key]) for key, value in self.items()
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class _CountedList(Sequence[object]):
+    __slots__ = ("_count", "raw")
+
+    def __init__(self, raw: Sequence[object], count: _Steps) -> None:
+        self.raw, self._count = raw, count
+
+    @overload
+    def __getitem__(self, row: int) -> object: ...
+
+    @overload
+    def __getitem__(self, row: slice) -> Sequence[object]: ...
+
+    def __getitem__(self, row: int | slice) -> object:
+        if isinstance(row, slice):
+            self._count.take(len(range(*row.indices(len(self.raw)))))
+            return [_counted(value, self._count) for value in self.raw[row]]
+        self._count.take()
+        return _counted(self.raw[row], self._count)
+
+    def __iter__(self) -> Iterator[object]:
+        for value in self.raw:
+            self._count.take()
+            yield _counted(value, self._count)
+
+    def __len__(self) -> int:
+        return len(self.raw)
+
+    def __eq__(self, other: object) -> bool:
+        self._count.take()
+        if not isinstance(other, _CountedList) or len(self) != len(other):
+            return False
+        return self.raw is other.raw or all(map(_same, self, other))
+
+    __hash__ = None  # type: ignore[assignment]

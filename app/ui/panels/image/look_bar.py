@@ -1,0 +1,141 @@
+"""The bar below a picture in which a person says how it is shown: brightness, contrast, colours, range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import exp, log
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
+
+from app.core.messages.picture import Picture
+from app.core.messages.picture_look import COLOUR_MAPS, MOST_CONTRAST, PLAIN, PictureLook
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, ComboBox, NumberEdit, ToggleButton, label
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.slider import Track
+from nep.i18n import _, lazy
+
+STEPS = 100
+"""Of a slider to each side of its middle, which leaves the picture as it is."""
+WORDS = {
+    "grey": lazy("Grey"),
+    "viridis": lazy("Viridis"),
+    "turbo": lazy("Turbo"),
+    "inferno": lazy("Inferno"),
+    "jet": lazy("Jet"),
+}
+"""Of the maps, which are called so everywhere."""
+
+
+class _EndEdit(NumberEdit):
+    """Writes numbers as short as they can be said."""
+
+    def written(self, value: float) -> str:
+        return f"{value:.7g}"
+
+
+class LookBar(QWidget):
+    """`changed` with the look that a person chose."""
+
+    changed = Signal(object)
+
+    def __init__(self, theme: Theme, picture: Callable[[], Picture | None]) -> None:
+        """``picture`` gives the one that is shown."""
+        super().__init__()
+        self._picture = picture
+        self._of_numbers = True
+        self.look = PLAIN
+        self.brightness = self._slider(theme, _("Brightness"), self._set_brightness)
+        self.contrast = self._slider(theme, _("Contrast"), self._set_contrast)
+        maps = [(name, _(WORDS[name])) for name in COLOUR_MAPS]
+        names = [("", _("Usual colours")), *maps]
+        self.colours = ComboBox(theme, names, name=_("Colours of numbers"))
+        self.colours.activated.connect(lambda _at: self._set(replace(self.look, colours=self.colours.value)))
+        self.own_range = ToggleButton(theme, _("Own range"), "ruler")
+        self.own_range.toggled.connect(self._set_own_range)
+        self.low, self.high = (_EndEdit(theme, None, None) for _end in range(2))
+        for field, name in ((self.low, _("First colour from")), (self.high, _("Last colour from"))):
+            field.setAccessibleName(name)
+            field.setFixedWidth(92)
+            field.number.connect(lambda _value: self._read_range())
+        self.again = Button(theme, _("As it came"), "undo-2", size="small")
+        self.again.clicked.connect(lambda: self._set(PLAIN, show=True))
+        flow = Flow(self, gap=8, row_gap=4)
+        flow.setContentsMargins(12, 6, 12, 6)
+        parts: tuple[QWidget, ...] = (
+            label(_("Brightness"), "small", role="textSecondary"), self.brightness,
+            label(_("Contrast"), "small", role="textSecondary"), self.contrast,
+            self.colours, self.own_range, self.low, self.high, self.again,
+        )  # fmt: skip
+        for part in parts:
+            flow.addWidget(part)
+        self.show_look(PLAIN)
+
+    def _slider(self, theme: Theme, name: str, does: Callable[[int], None]) -> Track:
+        made = Track(theme, 2 * STEPS)
+        made.setAccessibleName(name)
+        made.setMaximumWidth(120)
+        made.valueChanged.connect(does)
+        made.reset.connect(lambda: made.setValue(STEPS))
+        return made
+
+    def show_look(self, look: PictureLook) -> None:
+        """Show it without telling."""
+        self.look = look
+        wanted = (
+            (self.brightness, round(STEPS * (1 + look.brightness))),
+            (self.contrast, round(STEPS * (1 + log(look.contrast) / log(MOST_CONTRAST)))),
+        )
+        for slider, value in wanted:
+            slider.blockSignals(True)
+            slider.setValue(value)
+            slider.blockSignals(False)
+            slider.update()
+        self.colours.set_value(look.colours)
+        has_range = look.low is not None and look.high is not None
+        self.own_range.blockSignals(True)
+        self.own_range.setChecked(has_range)
+        self.own_range.blockSignals(False)
+        for field, end in ((self.low, look.low), (self.high, look.high)):
+            field.setVisible(has_range)
+            if end is not None:
+                field.show_number(end)
+
+    def refresh(self) -> None:
+        """Offer only what does something to the picture that is shown."""
+        picture = self._picture()
+        of_numbers = picture is None or picture.one_channel
+        if of_numbers != self._of_numbers:
+            self._of_numbers = of_numbers
+            for part in (self.colours, self.own_range, self.low, self.high):
+                part.setEnabled(of_numbers)
+
+    def _set(self, look: PictureLook, *, show: bool = False) -> None:
+        if show:
+            self.show_look(look)
+        if look != self.look or show:
+            self.look = look
+            self.changed.emit(look)
+
+    def _set_brightness(self, value: int) -> None:
+        self._set(replace(self.look, brightness=value / STEPS - 1))
+
+    def _set_contrast(self, value: int) -> None:
+        self._set(replace(self.look, contrast=exp((value / STEPS - 1) * log(MOST_CONTRAST))))
+
+    def _set_own_range(self, on: bool) -> None:
+        picture = self._picture()
+        scale = picture.scale if picture is not None else None
+        low, high = (scale.low, scale.high) if scale is not None else (0.0, 255.0)
+        low, high = (low, high) if low < high else (low, low + 1)
+        self._set(replace(self.look, low=low if on else None, high=high if on else None), show=True)
+
+    def _read_range(self) -> None:
+        try:
+            low, high = (float(field.text().replace(",", ".")) for field in (self.low, self.high))
+        except ValueError:  # one is not whole yet, and says so
+            return
+        if low < high:
+            self._set(replace(self.look, low=low, high=high))

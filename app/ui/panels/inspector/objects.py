@@ -1,0 +1,281 @@
+"""Lists of objects as a table: one row an object, one column a key, sorted, copied as CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.messages.object_table import (
+    MISSING,
+    MOST_COLUMNS,
+    MOST_ROWS,
+    ObjectRow,
+    Steps,
+    column_name,
+    columns_of,
+    is_list_of_objects,
+    lists_of_objects,
+    rows_found,
+    rows_of,
+    sort_key,
+    table_csv,
+    value_at,
+)
+from app.ui.panels.inspector.values import size_of, words_of
+from app.ui.text import plain
+from app.ui.text.numbers import grouped
+from app.ui.theme.theme import Theme
+from app.ui.widgets import ElidedLabel, EmptyState, IconButton, Separator
+from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.table.model import Cell, Column, TableModel
+from app.ui.widgets.table.view import TableView
+from nep.i18n import _, ngettext
+from nep.messages.fields import path_text
+
+SORT_S = 1.0
+"""Rows that are sorted by what changes stay where they are for so long: nobody can read what jumps."""
+LETTER, LEAST, MOST = 8, 56, 220
+"""Pixels of a letter, and of a column."""
+SMALL_ROOM = 24
+
+
+class ObjectsView(QWidget):
+    """The table with a line above it: which list, how many rows, the choice of another list, the copy.
+
+    `revealed` with the steps of an object that a person wants to see in the tree.
+    """
+
+    revealed = Signal(object)
+
+    def __init__(self, theme: Theme, toast: Callable[[str], None]) -> None:
+        super().__init__()
+        self._theme, self._toast = theme, toast
+        self._value: object = None
+        self._wanted: Steps = ()
+        self._steps: Steps | None = None
+        self._columns: tuple[Steps, ...] = ()
+        self._sorted_at = 0.0
+        self._row_height = 26
+        self.table: TableView[ObjectRow] | None = None
+        self.words = ElidedLabel("small", "textSecondary")
+        self.choose = IconButton(theme, "chevron-down", _("Choose a list of the message"), size=24)
+        self.choose.clicked.connect(self._show_lists)
+        self.copy = IconButton(theme, "copy", _("Copy the table as CSV"), size=24)
+        self.copy.clicked.connect(self.copy_csv)
+        self.empty = EmptyState(
+            theme, "table-2", _("No list of objects"), _("A table shows lists whose values are objects.")
+        )
+        row = QHBoxLayout()
+        row.setContentsMargins(12, 3, 8, 3)
+        row.setSpacing(4)
+        row.addWidget(self.words, 1)
+        row.addWidget(self.choose)
+        row.addWidget(self.copy)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(row)
+        column.addWidget(Separator(theme))
+        column.addWidget(self.pages, 1)
+
+    @property
+    def rows(self) -> list[ObjectRow]:
+        """The rows that are shown, in their order."""
+        return self._model.rows() if self.table is not None else []
+
+    def set_row_height(self, height: int) -> None:
+        """The height of all rows."""
+        self._row_height = height
+        if self.table is not None:
+            self.table.set_row_height(height, large=False)
+
+    def begin_anew(self) -> None:
+        """Another topic is shown."""
+        self._wanted, self._steps, self._value = (), None, None
+        self._drop_table()
+
+    def want(self, steps: Steps) -> None:
+        """Show the list that is there or, nearest above it, that it is in, as soon as the message has one."""
+        self._wanted = steps
+
+    def show_message(self, value: object, now: float) -> None:
+        """Show the wanted list of a decoded message, or the first that there is; ``now`` is monotonic."""
+        self._value = value
+        steps = self._find(value)
+        if steps != self._steps:
+            self._steps = steps
+            self._sorted_at = 0.0
+        shown = value_at(value, steps) if steps is not None else MISSING
+        self._show(rows_of(shown), size_of(shown), path_text(steps) if steps else "", now)
+        self.choose.setVisible(True)
+
+    def show_found(self, found: Iterable[tuple[str, object]], now: float) -> None:
+        """Show the objects that a query found."""
+        self._value, self._steps = None, None
+        rows = rows_found(found)
+        self._show(rows, len(rows), "", now)
+        self.choose.setVisible(False)
+
+    def _find(self, value: object) -> Steps | None:
+        for length in range(len(self._wanted), -1, -1):
+            if is_list_of_objects(value_at(value, self._wanted[:length])):
+                return self._wanted[:length]
+        there = lists_of_objects(value, 1)
+        return there[0] if there else None
+
+    def _show(self, rows: list[ObjectRow], total: int, path: str, now: float) -> None:
+        columns = columns_of(rows)
+        self.copy.setEnabled(bool(columns))
+        if not columns:
+            self._drop_table()
+            self.words.setText("")
+            return
+        if columns != self._columns or self.table is None:
+            self._make_table(columns, rows)
+        self._put(rows, now)
+        self._say(len(rows), total, path)
+
+    def _say(self, shown: int, total: int, path: str) -> None:
+        if shown < total and shown >= MOST_ROWS:
+            words = _("the first {shown} of {count} rows").format(shown=grouped(shown), count=grouped(total))
+        else:
+            words = ngettext("{count} row", "{count} rows", shown).format(count=grouped(shown))
+        if len(self._columns) >= MOST_COLUMNS:
+            words = _("{rows}, the first {count} columns").format(rows=words, count=MOST_COLUMNS)
+        self.words.setText(f"{path}   {words}" if path else words)
+
+    def _put(self, rows: list[ObjectRow], now: float) -> None:
+        """Show the rows in the order of before, sorted anew once a second."""
+        table = self.table
+        if table is None:
+            return
+        if now - self._sorted_at >= SORT_S or now < self._sorted_at:
+            self._sorted_at = now
+            rows = table.order.sort(rows)
+        else:
+            place = {row.name: number for number, row in enumerate(self._model.rows())}
+            rows.sort(key=lambda row: place.get(row.name, len(place) + row.place))
+        self._model.set_rows(rows)
+        table.tell_visible_changed()
+
+    def _resort(self) -> None:
+        if self.table is not None:
+            self._model.set_rows(self.table.order.sort(sorted(self._model.rows(), key=lambda row: row.place)))
+            self.table.tell_visible_changed()
+
+    def _make_table(self, columns: tuple[Steps, ...], rows: Sequence[ObjectRow]) -> None:
+        before = self.table.saved_state() if self.table is not None else None
+        self._drop_table()
+        self._columns = columns
+        made = [_place_column(rows)]
+        made += [_column(column, rows) for column in columns]
+        self._model = _ObjectModel(made, lambda row: row.name)
+        table = self.table = TableView(self._theme, self._model, "#")
+        table.setAccessibleName(_("Objects"))
+        if before is not None:
+            table.restore(before)
+        table.set_row_height(self._row_height, large=False)
+        table.order_changed.connect(self._resort)
+        table.menu_wanted.connect(self._show_menu)
+        self.pages.addWidget(table)
+        self.pages.setCurrentWidget(table)
+        self.setFocusProxy(table)
+
+    def _drop_table(self) -> None:
+        if self.table is not None:
+            self.setFocusProxy(None)  # type: ignore[arg-type]
+            self.pages.setCurrentWidget(self.empty)
+            self.pages.removeWidget(self.table)
+            self.table.deleteLater()
+            self.table, self._columns = None, ()
+
+    def copy_csv(self) -> None:
+        """Put the rows that are shown on the clipboard, in their order."""
+        if self.table is not None:
+            QGuiApplication.clipboard().setText(table_csv("#", self._columns, self._model.rows()))
+            count = len(self._model.rows())
+            said = ngettext("Copied {count} row as CSV", "Copied {count} rows as CSV", count)
+            self._toast(said.format(count=grouped(count)))
+
+    def _show_lists(self) -> None:
+        menu = Menu(self._theme, self)
+        for steps in lists_of_objects(self._value):
+            action = menu.addAction(plain.entry(path_text(steps) if steps else _("The message")))
+            action.setCheckable(True)
+            action.setChecked(steps == self._steps)
+            action.triggered.connect(lambda _on=False, steps=steps: self._choose(steps))
+        if menu.isEmpty():  # Qt shows no empty menu, and would keep it
+            menu.deleteLater()
+            return
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        drop_below(menu, self.choose)
+
+    def _choose(self, steps: Steps) -> None:
+        self.want(steps)
+        self.show_message(self._value, self._sorted_at)
+
+    def _show_menu(self, key: str, at: QPoint) -> None:
+        menu = Menu(self._theme, self)
+        menu.addAction(self._theme.icon("copy"), _("Copy the table as CSV"), self.copy_csv)
+        if self._steps is not None:
+            steps = (*self._steps, int(key))
+            show = lambda: self.revealed.emit(steps)  # noqa: E731
+            menu.addAction(self._theme.icon("list-tree"), _("Show it in the tree"), show)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(at)
+
+
+class _ObjectModel(TableModel[ObjectRow]):
+    """Gives its rows back, in their order."""
+
+    def rows(self) -> list[ObjectRow]:
+        return list(self._rows.shown)
+
+
+def _place_column(rows: Sequence[ObjectRow]) -> Column[ObjectRow]:
+    """Where each object stands among the others."""
+    width = _width("#", [row.name for row in rows])
+    return Column("#", "#", width, _name_cell, lambda row: row.place, verbatim=True)
+
+
+def _name_cell(row: ObjectRow) -> Cell:
+    return Cell(row.name, role="textTertiary", mono=True)
+
+
+def _column(steps: Steps, rows: Sequence[ObjectRow]) -> Column[ObjectRow]:
+    name = column_name(steps)
+    first = [row.at(steps) for row in rows[:20]]
+    figures = all(isinstance(value, (int, float)) or value in (None, MISSING) for value in first)
+    return Column(
+        name,
+        name,
+        _width(name, [_words(value) for value in first]),
+        lambda row: Cell(_words(value := row.at(steps)), role=_role(value), mono=True),
+        lambda row: sort_key(row.at(steps)),
+        figures=figures,
+        tip=lambda row: _words(row.at(steps)),
+        verbatim=True,
+    )
+
+
+def _words(value: object) -> str:
+    if value is MISSING:
+        return ""
+    return value.replace("\n", "⏎") if isinstance(value, str) else words_of(value)
+
+
+def _role(value: object) -> str:
+    if isinstance(value, str):
+        return "ok"
+    return "textTertiary" if value is None else "text"
+
+
+def _width(head: str, words: Sequence[str]) -> int:
+    """Wide enough for the head with its arrow and for the first rows, within bounds."""
+    letters = max([len(head) + 2, *(len(each) for each in words[:20])])
+    return min(MOST, max(LEAST, letters * LETTER + SMALL_ROOM))

@@ -1,0 +1,117 @@
+"""The strip above what a query found: how much, or why not; asks each message in a thread of its own."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from app.core.messages.newest_only import NewestOnly
+from app.core.messages.query import JsonQuery, QueryAnswer
+from app.errors import QueryError
+from app.ui.widgets import label
+from app.ui.widgets.labels import set_role
+from app.ui.widgets.paint import show_when
+from nep.i18n import ngettext
+
+SHARE = 4
+"""A query that takes a while is asked again after so many times that while: a quarter of a core at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    query: JsonQuery
+    value: object
+
+
+@dataclass(frozen=True, slots=True)
+class _Answered:
+    answer: QueryAnswer
+    took_s: float
+
+
+def _answer(asked: _Asked) -> _Answered:
+    began = time.perf_counter()
+    answer = asked.query.answer(asked.value)
+    return _Answered(answer, time.perf_counter() - began)
+
+
+class QueryStrip(QWidget):
+    """Says ``12 found``, or the sentence why a query can't be asked; hidden while nothing is asked."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._worker = NewestOnly(_answer, "studio-query")
+        self._query: JsonQuery | None = None
+        self._typed = ""
+        self._value: object = None
+        self._due = self._on_tree = False
+        self._not_before = 0.0
+        self.words = label("", "small", role="textSecondary", wrap=True)
+        self.words.setMinimumWidth(0)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 3, 8, 3)
+        row.addWidget(self.words, 1)
+        self.hide()
+
+    @property
+    def asking(self) -> bool:
+        """Whether a query was typed, also one that can't be understood."""
+        return bool(self._typed)
+
+    def set_query(self, text: str) -> bool:
+        """Ask this from now on, "" for nothing; whether it was understood."""
+        self._typed, self._query = text, None
+        self._worker.forget()
+        self._not_before = 0.0
+        sentence = ""
+        if text:
+            try:
+                self._query = JsonQuery(text)
+            except QueryError as error:
+                sentence = error.sentence
+        self._say(sentence, wrong=bool(sentence))
+        return not sentence
+
+    def ask(self, value: object) -> None:
+        """Ask this message as soon as there is time for it; `take` has the answer then."""
+        self._value, self._due = value, True
+
+    def take(self, now: float) -> QueryAnswer | None:
+        """A new answer, once; call it with every refresh at ``now`` (monotonic)."""
+        done = self._worker.take()
+        if done is not None:
+            self._not_before = now + (SHARE - 1) * done.took_s
+            self._say(found_words(done.answer), wrong=False)
+        if self._due and self._query is not None and not self._worker.busy and now >= self._not_before:
+            self._due = False
+            self._worker.ask(_Asked(self._query, self._value))
+        return done.answer if done is not None else None
+
+    def forget(self) -> None:
+        """Another topic is shown: what was asked of the one before is of no use."""
+        self._worker.forget()
+        self._value, self._due = None, False
+        self._say("", wrong=False)
+
+    def show_on(self, *, tree: bool) -> None:
+        """Show it where the tree is shown, and there is something to say."""
+        self._on_tree = tree
+        show_when(self, tree and bool(self.words.text()))
+
+    def close_worker(self) -> None:
+        """End its thread."""
+        self._worker.close()
+
+    def _say(self, words: str, *, wrong: bool) -> None:
+        self.words.setText(words)
+        set_role(self.words, "warn" if wrong else "textSecondary")
+        self.show_on(tree=self._on_tree)
+
+
+def found_words(answer: QueryAnswer) -> str:
+    """``12 found``, and why these are not all."""
+    count = len(answer.found)
+    said = ngettext("{count} found.", "{count} found.", count).format(count=count)
+    return f"{said} {answer.cut}".rstrip()

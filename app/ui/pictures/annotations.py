@@ -1,0 +1,118 @@
+"""Paints on pictures what messages say of them: points, lines, areas, circles and texts; the colour bar."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
+from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF, QTransform
+
+from app.core.messages.annotations import Colour, Drawn
+from app.core.messages.picture_look import ColourScale
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from nep.i18n import number
+
+LEAST_PEN, MOST_PEN = 1.0, 64.0
+LEAST_LETTERS, MOST_LETTERS = 8.0, 96.0
+FACE_LETTERS = 12.0
+BAR = QSizeF(12, 140)
+BAR_EDGE = 10
+LEAST_BAR = 40
+
+
+def paint_drawn(
+    painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Iterable[Drawn]
+) -> None:
+    """Paint them; ``shares`` leads from shares of the picture to the view, ``scale`` is a pixel's width."""
+    painter.save()
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    for each in drawn:
+        points = [shares.map(QPointF(x, y)) for x, y in each.points]
+        painter.setPen(_pen(each.outline, each.thickness * scale))
+        painter.setBrush(_brush(each.fill))
+        _paint_one(painter, theme, shares, scale, each, points)
+    painter.restore()
+
+
+def _paint_one(
+    painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Drawn, points: list[QPointF]
+) -> None:
+    if drawn.kind == "points":
+        radius = max(1.5, drawn.thickness * scale)
+        painter.setBrush(_brush(drawn.outline or drawn.fill))
+        painter.setPen(Qt.PenStyle.NoPen)
+        for point in points:
+            painter.drawEllipse(point, radius, radius)
+    elif drawn.kind == "circle":
+        around = QRectF(0, 0, drawn.size[0] * 2, drawn.size[1] * 2)
+        around.moveCenter(QPointF(*drawn.points[0]))
+        painter.drawEllipse(shares.mapRect(around))
+    elif drawn.kind == "area":
+        painter.drawPolygon(QPolygonF(points))
+        if drawn.words:
+            corner = QPolygonF(points).boundingRect().topLeft()
+            _paint_words(painter, theme, corner, FACE_LETTERS, drawn)
+    elif drawn.kind == "line":
+        painter.drawPolyline(QPolygonF(points))
+    else:
+        high = shares.mapRect(QRectF(0, 0, drawn.size[1], drawn.size[1])).height()
+        _paint_words(painter, theme, points[0], high, drawn)
+
+
+def _paint_words(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn: Drawn) -> None:
+    """Words whose lower left corner is there, upright however the picture is turned."""
+    font, words = theme.font("small"), drawn.words
+    font.setPixelSize(round(min(max(high, LEAST_LETTERS), MOST_LETTERS)))
+    metrics = QFontMetricsF(font)
+    room = QRectF(at.x(), at.y() - metrics.height(), metrics.horizontalAdvance(words) + 4, metrics.height())
+    if drawn.fill is not None:
+        painter.fillRect(room, _colour(drawn.fill))
+    ink = _colour(drawn.outline) if drawn.outline is not None else QColor("white")
+    paint.words(painter, room.adjusted(2, 0, 2, 0), words, font, ink)
+
+
+def _pen(colour: Colour | None, width: float) -> QPen:
+    if colour is None:
+        return QPen(Qt.PenStyle.NoPen)
+    pen = QPen(_colour(colour), min(max(width, LEAST_PEN), MOST_PEN))
+    pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+    return pen
+
+
+def _brush(colour: Colour | None) -> QBrush:
+    return QBrush(_colour(colour)) if colour is not None else QBrush(Qt.BrushStyle.NoBrush)
+
+
+def _colour(colour: Colour) -> QColor:
+    return QColor.fromRgbF(*colour)
+
+
+def end_words(value: float) -> str:
+    """A number at the end of a colour bar."""
+    return number(value, ".4g")
+
+
+def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: ColourScale) -> None:
+    """What the colours mean, at the upper right of the view; nothing where there is too little room."""
+    font = theme.font("small")
+    line = paint.height_of(font)
+    high = min(BAR.height(), view.height() - 2 * BAR_EDGE - 2 * line - 40)
+    if high < LEAST_BAR:
+        return
+    ends = (end_words(scale.high), end_words(scale.low / 2 + scale.high / 2), end_words(scale.low))
+    wide = max(paint.width_of(font, words) for words in ends)
+    ground = QRectF(0, 0, BAR.width() + wide + 22, high + line + 8)
+    ground.moveTopRight(QPointF(view.right() - BAR_EDGE, view.top() + BAR_EDGE))
+    paint.box(painter, ground, 4, QColor(0, 0, 0, 190))
+    bar = QRectF(ground.right() - BAR.width() - 7, ground.top() + line / 2 + 4, BAR.width(), high)
+    painter.drawImage(bar, bar_image(scale))
+    for words, y in zip(ends, (bar.top(), bar.center().y(), bar.bottom()), strict=True):
+        place = QRectF(ground.left() + 7, y - line / 2, wide, line)
+        paint.words(painter, place, words, font, QColor("white"), paint.RIGHT)
+
+
+def bar_image(scale: ColourScale) -> QImage:
+    """The 256 colours below each other, the last one on top."""
+    colours = scale.colours[::-1].copy()
+    return QImage(colours.data, 1, 256, 3, QImage.Format.Format_RGB888).copy()

@@ -1,0 +1,99 @@
+"""What messages draw on pictures: places as shares, and nothing that a painter could not bear."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.core.messages.annotations import MOST_POINTS, MOST_SHAPES, drawn_by, is_annotation
+
+RED = {"r": 1, "g": 0, "b": 0, "a": 1}
+CLEAR = {"r": 1, "g": 1, "b": 1, "a": 0}
+
+
+def points(kind: object, count: int = 4, **more: object) -> dict[str, object]:
+    made = {"type": kind, "points": [{"x": 32 * n, "y": 24 * n} for n in range(count)], "thickness": 3}
+    return {"points": [{**made, "outline_color": RED, **more}]}
+
+
+def test_circles_points_and_texts_are_drawn_where_they_are() -> None:
+    payload = {
+        "circles": [
+            {"position": {"x": 160, "y": 120}, "diameter": 64, "thickness": 2, "outline_color": RED,
+             "fill_color": CLEAR},
+        ],
+        "texts": [
+            {"position": {"x": 32, "y": 48}, "text": " two\nlines ", "font_size": 24, "text_color": RED},
+        ],
+    }  # fmt: skip
+    circle, text = drawn_by(payload, 320, 240)
+    assert (circle.kind, circle.points, circle.size) == ("circle", ((0.5, 0.5),), (0.1, 64 / 480))
+    assert (circle.outline, circle.fill, circle.thickness) == ((1, 0, 0, 1), None, 2)
+    assert (text.kind, text.points, text.words) == ("text", ((0.1, 0.2),), "two lines")
+    assert text.size == (0.0, 0.1)
+    assert is_annotation(payload)
+
+
+@pytest.mark.parametrize(
+    ("kind", "kinds"),
+    [
+        (1, ["points"]),
+        (2, ["area"]),
+        (3, ["line"]),
+        (4, ["line", "line"]),
+        (0, []),
+        (9, []),
+        ("2", []),
+        (None, []),
+    ],
+)
+def test_points_are_points_or_lines_by_their_type(kind, kinds) -> None:
+    assert [each.kind for each in drawn_by(points(kind), 320, 240)] == kinds
+
+
+def test_points_and_pieces_of_lines_have_colours_of_their_own() -> None:
+    colours = [{**RED, "g": n / 4} for n in range(4)]
+    greens = [each.outline[1] for each in drawn_by(points(1, outline_colors=colours), 320, 240)]  # type: ignore[index]
+    assert greens == [0, 0.25, 0.5, 0.75]
+    greens = [each.outline[1] for each in drawn_by(points(4, outline_colors=colours[1:3]), 320, 240)]  # type: ignore[index]
+    assert greens == [0.25, 0.5]
+
+
+def test_rizes_face_is_a_box_in_its_own_frame() -> None:
+    payload = {"face": {"center": {"x": 320, "y": 120}, "size": {"w": 64, "h": 48}, "box": {}}}
+    (face,) = drawn_by(payload, 1280, 960)
+    assert face.points == ((0.5, 0.25), (0.6, 0.25), (0.6, 0.35), (0.5, 0.35))
+    assert face.words == "face"
+    assert is_annotation(payload)
+    assert drawn_by({"positions": []}, 1280, 960) == ()
+    assert is_annotation({"positions": []})
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        None,
+        [],
+        "text",
+        {"circles": 7, "points": "no", "texts": b"bytes"},
+        {"circles": [None, 3, {}, {"position": {"x": "1", "y": 2}, "diameter": 4}]},
+        {"circles": [{"position": {"x": float("nan"), "y": 2}, "diameter": 4}]},
+        {"circles": [{"position": {"x": 1, "y": 2}, "diameter": -4}]},
+        {"circles": [{"position": {"x": 1e300, "y": 2}, "diameter": 4}]},
+        {"circles": [{"position": {"x": 1, "y": 2}, "diameter": 10**400}]},
+        {"points": [{"type": 2, "points": [{"x": 1, "y": 1}]}]},
+        {"points": [{"type": 4, "points": [{"x": True, "y": 1}] * 9}]},
+        {"texts": [{"position": {"x": 1, "y": 1}, "text": "  "}, {"position": {}, "text": "a"}]},
+        {"face": {"center": {"x": 1, "y": 1}, "size": {"w": 0, "h": 5}}},
+        {"face": [1, 2]},
+    ],
+)
+def test_what_is_no_drawing_draws_nothing(payload) -> None:
+    assert drawn_by(payload, 320, 240) == ()
+
+
+def test_no_message_draws_without_end() -> None:
+    many = [{"position": {"x": 1, "y": 1}, "diameter": 2, "outline_color": RED}] * (MOST_SHAPES + 50)
+    assert len(drawn_by({"circles": many}, 320, 240)) == MOST_SHAPES
+    (line,) = drawn_by(points(3, MOST_POINTS + 50), 320, 240)
+    assert len(line.points) == MOST_POINTS
+    assert drawn_by({"circles": many[:1]}, 0, 240) == ()

@@ -1,0 +1,111 @@
+"""The history of a topic: bounded in number and bytes, numbers that stay, nothing decoded or borrowed."""
+
+from __future__ import annotations
+
+from app.core.messages.history import MessageHistory
+from app.core.network.mailbox import Batch
+from app.core.series.feed import SeriesFeed
+from nep.messages.message import UNDECODED, Message
+
+
+def message(number: int, size: int = 10) -> Message:
+    return Message("/a", b'"%0*d"' % (size - 2, number), "json", "json", seq=number, stamp_ns=number)
+
+
+def numbers(history: MessageHistory) -> list[int | None]:
+    return [kept.seq for kept in history]
+
+
+def test_the_oldest_leave_when_there_are_too_many_and_numbers_stay() -> None:
+    history = MessageHistory(most_messages=3)
+    for number in range(5):
+        history.add(message(number))
+    assert (numbers(history), history.first, history.end, len(history)) == ([2, 3, 4], 2, 5, 3)
+    assert [history.at(number) and history.at(number).seq for number in range(-1, 7)] == [  # type: ignore[union-attr]
+        None, None, None, 2, 3, 4, None, None,
+    ]  # fmt: skip
+    assert [history.nearest(number) for number in (-5, 0, 3, 99)] == [2, 2, 3, 4]
+
+
+def test_bytes_bound_it_too_and_the_newest_stays_however_large() -> None:
+    history = MessageHistory(most_bytes=100)
+    for number in range(20):
+        history.add(message(number, 30))
+    assert (len(history), history.size_bytes) == (3, 90)
+    history.add(message(99, 1000))
+    assert (numbers(history), history.size_bytes) == ([99], 1000)
+    history.add(message(100, 30))
+    assert (numbers(history), history.size_bytes) == ([100], 30)
+
+
+def test_nothing_is_kept_decoded_or_of_somebody_elses_bytes() -> None:
+    history = MessageHistory()
+    ground = bytearray(b'{"a": 1}')
+    lent = Message("/a", memoryview(ground), "json", "json")
+    assert lent.payload == {"a": 1}
+    history.add(lent)
+    ground[:] = b'{"a": 2}'
+    again = history.at(0)
+    assert again is not None
+    assert again.payload == {"a": 1}
+    assert [kept.decoded for kept in history] == [UNDECODED]
+
+
+def test_how_long_it_took_is_what_it_was_when_it_came() -> None:
+    history = MessageHistory()
+    sent = message(1)
+    history.add(sent)
+    first, again = history.at(0), history.at(0)
+    assert first is not None
+    assert again is not None
+    assert first.latency_s == again.latency_s == sent.latency_s
+
+
+def test_what_came_too_fast_is_counted_and_another_time_begins_anew() -> None:
+    history = MessageHistory()
+    history.take(Batch([message(1), message(2)], dropped=7), 0)
+    assert (numbers(history), history.missed) == ([1, 2], 7)
+    history.rewind()
+    assert (len(history), history.size_bytes, history.first, history.missed, history.at(0)) == (
+        0,
+        0,
+        0,
+        0,
+        None,
+    )
+
+
+class Watching:
+    def __init__(self, log: list[str]) -> None:
+        self.log = log
+
+    def rest(self) -> None:
+        """Nothing to do."""
+
+    def wake(self) -> None:
+        """Nothing to do."""
+
+    def close(self) -> None:
+        self.log.append("closed")
+
+
+def test_who_is_not_deep_wants_no_more_room_than_there_is_and_no_past() -> None:
+    log: list[str] = []
+    feed = SeriesFeed(
+        lambda _topic: Watching(log), lambda: 0, lambda topic, room: log.append(f"{topic} {room}")
+    )
+    shallow, deep = MessageHistory(), MessageHistory()
+    feed.join("/a", shallow, deep=False)
+    assert log == []
+    feed.join("/a", deep)
+    assert log == ["/a 8192"]
+    feed.add({"/a": Batch([message(1)])})
+    assert numbers(shallow) == numbers(deep) == [1]
+    feed.leave("/a", deep)
+    feed.leave("/a", deep)
+    assert log == ["/a 8192", "/a None"]
+    feed.add({"/a": Batch([message(2)])})
+    assert (numbers(shallow), numbers(deep)) == ([1, 2], [1])
+    feed.leave("/a", shallow)
+    assert log == ["/a 8192", "/a None", "closed"]
+    assert feed.topics == ()

@@ -1,0 +1,101 @@
+"""How pictures are shown: brighter, in colours of which a scale tells what they mean."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.core.messages.picture import decode
+from app.core.messages.picture_look import COLOUR_MAPS, PLAIN, PictureLook, in_colours, restored, toned
+from nep.messages.message import Message
+
+ENCODINGS = {("uint8", 1): "mono8", ("uint16", 1): "mono16", ("uint8", 3): "bgr8"}
+
+
+def message(array: np.ndarray) -> Message:
+    channels = array.shape[2] if array.ndim == 3 else 1
+    extension = {"shape": list(array.shape), "encoding": ENCODINGS[array.dtype.name, channels]}
+    return Message("/c", array.tobytes(), "image", "image", extension=extension)
+
+
+def test_as_it_came_nothing_is_computed() -> None:
+    picture = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
+    assert toned(PLAIN, picture) is picture
+
+
+def test_brightness_and_contrast_move_and_spread_and_stay_within_bounds() -> None:
+    grey = np.array([[0, 64, 128, 192, 255]], np.uint8)
+    assert toned(PictureLook(brightness=0.5), grey).tolist() == [[128, 192, 255, 255, 255]]
+    assert toned(PictureLook(brightness=-1), grey).tolist() == [[0, 0, 0, 0, 0]]
+    assert toned(PictureLook(contrast=2), grey).tolist() == [[0, 1, 129, 255, 255]]
+    assert toned(PictureLook(contrast=0.1), grey).tolist() == [[115, 121, 128, 134, 140]]
+
+
+@pytest.mark.parametrize("name", COLOUR_MAPS)
+def test_numbers_have_the_colours_that_the_scale_tells(name) -> None:
+    depth = np.array([[100, 600, 1100]], np.uint16)
+    bgra, scale = in_colours(PictureLook(colours=name), depth)
+    assert (scale.low, scale.high) == (100.0, 1100.0)
+    assert bgra[0, 0, 2::-1].tolist() == scale.colours[0].tolist()
+    assert bgra[0, 1, 2::-1].tolist() == scale.colours[127].tolist()
+    assert bgra[0, 2, 2::-1].tolist() == scale.colours[255].tolist()
+
+
+def test_a_range_of_ones_own_and_what_is_beside_it() -> None:
+    depth = np.array([[0.0, 1.0, 2.0, 9.0, np.nan, np.inf]], np.float32)
+    bgra, scale = in_colours(PictureLook(colours="grey", low=1.0, high=3.0), depth)
+    assert (scale.low, scale.high) == (1.0, 3.0)
+    assert bgra[0, :, 0].tolist() == [0, 0, 127, 255, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "ends"),
+    [
+        (np.full((2, 2), 7, np.uint16), (7.0, 7.0)),
+        (np.full((2, 2), np.nan, np.float32), (0.0, 0.0)),
+        (np.array([[-1e308, 1e308]]), (-1e308, 1e308)),
+        (np.array([[0, 2**64 - 1]], np.uint64), (0.0, float(2**64 - 1))),
+    ],
+)
+def test_odd_numbers_have_a_scale_too(numbers, ends) -> None:
+    bgra, scale = in_colours(PLAIN, numbers)
+    assert bgra.shape == (*numbers.shape, 4)
+    assert (scale.low, scale.high) == ends
+
+
+def test_a_range_that_does_not_fit_is_not_turned_round() -> None:
+    _bgra, scale = in_colours(PictureLook(low=50.0), np.array([[1, 2]], np.uint16))
+    assert scale.low == scale.high == 50.0
+    _bgra, scale = in_colours(PictureLook(high=-5.0), np.array([[1, 2]], np.uint16))
+    assert scale.low == scale.high == -5.0
+
+
+def test_a_decoded_picture_says_how_it_is_shown_and_what_its_colours_mean() -> None:
+    plain, _error = decode(message(np.array([[0, 255]], np.uint8)), 0.0)
+    assert plain is not None
+    assert (plain.scale, plain.look) == (None, PLAIN)
+    look = PictureLook(colours="jet", brightness=0.1)
+    shown, _error = decode(message(np.array([[0, 255]], np.uint8)), 0.0, None, look)
+    assert shown is not None
+    assert shown.scale is not None
+    assert (shown.scale.low, shown.scale.high, shown.look) == (0.0, 255.0, look)
+    assert shown.pixel(1, 0) == 255  # the number, whatever its colour
+    colours, _error = decode(message(np.zeros((2, 2, 3), np.uint8)), 0.0, None, PictureLook(brightness=1.0))
+    assert colours is not None
+    assert colours.scale is None
+    assert colours.bgra[..., :3].min() == 255
+
+
+@pytest.mark.parametrize(
+    ("saved", "look"),
+    [
+        (PictureLook(0.25, 2.0, "turbo", 1.0, 9.0).saved(), PictureLook(0.25, 2.0, "turbo", 1.0, 9.0)),
+        (None, PLAIN),
+        ({"brightness": 7, "contrast": 0, "colours": "none such"}, PictureLook(1.0, 0.1)),
+        ({"brightness": "x", "contrast": float("nan"), "low": 10**400, "high": True}, PLAIN),
+        ({"low": 9.0, "high": 1.0}, PLAIN),
+        ({"low": 9.0}, PictureLook(low=9.0)),
+    ],
+)
+def test_a_look_is_kept_and_what_does_not_fit_is_as_at_first(saved, look) -> None:
+    assert restored(saved) == look

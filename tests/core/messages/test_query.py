@@ -1,0 +1,128 @@
+"""JSONPath queries over messages: what they find, what is wrong with them, and that none runs for ever."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.core.messages.query import LONGEST, FoundPath, JsonQuery, QueryAnswer
+from app.core.messages.reader import LARGE_BYTES, read
+from app.errors import QueryError
+from nep.messages.message import Message
+
+SEEN = {
+    "people": [
+        {"name": "Ann", "age": 7, "at": {"x": 1.5}},
+        {"name": "Bea", "age": 41, "at": {"x": -0.5}},
+        {"name": "Cy", "at": None},
+    ],
+    "on": True,
+    "one": 1,
+    "odd key": {"a.b": "dots"},
+    "picture": b"\x00\x01" * 1000,
+}
+
+
+def found(text: str, value: object = SEEN) -> dict[str, object]:
+    return {str(path): each for path, each in JsonQuery(text).answer(value).found.items()}
+
+
+def test_values_are_found_with_the_paths_that_panels_write() -> None:
+    assert found("$.people[*].name") == {
+        "people[0].name": "Ann",
+        "people[1].name": "Bea",
+        "people[2].name": "Cy",
+    }
+    assert found("$.people[?@.age > 18].at.x") == {"people[1].at.x": -0.5}
+    assert found("$.people[-1].name") == {"people[2].name": "Cy"}
+    assert found("$..x") == {"people[0].at.x": 1.5, "people[1].at.x": -0.5}
+    assert found("$['odd key']['a.b']") == {'["odd key"]["a.b"]': "dots"}
+    assert found("$.people[?!@.age].at") == {"people[2].at": None}
+
+
+def test_what_is_found_is_what_is_in_the_message_and_its_steps_lead_to_it() -> None:
+    answer = JsonQuery("$.people[?@.name=='Bea'].at").answer(SEEN)
+    (path,) = answer.found
+    assert path.steps == ("people", 1, "at")
+    assert answer.found[path] is SEEN["people"][1]["at"]  # type: ignore[index]
+    assert FoundPath.of(()) == "$"
+
+
+def test_true_is_not_one_and_equal_lists_are_equal() -> None:
+    lists = {"a": [1, {"b": [2]}], "b": [1, {"b": [2]}], "c": [True, {"b": [2]}]}
+    assert list(found("$[?@ == $.a]", lists)) == ["a", "b"]
+    assert list(found("$[?@ == true]")) == ["on"]
+
+
+@pytest.mark.parametrize("value", [3, None, "words", '{"a": 1}', "[", b"\x00\x01"])
+def test_of_what_is_no_container_only_the_whole_is_found(value) -> None:
+    assert found("$", value) == {"$": value}
+    assert found("$.a", value) == {}
+    assert found("$..*", value) == {}
+
+
+def test_bytes_are_one_value_and_keys_that_are_numbers_are_written() -> None:
+    assert found("$.picture") == {"picture": SEEN["picture"]}
+    assert found("$.picture[*]") == {}
+    assert list(found("$..*", {1: {2: "x"}}).values()) == [{2: "x"}, "x"]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("$.people[", "the query does not end well: "),
+        ("$.people[?@.age >]", "the query can't be understood from "),
+        ("people", "the query can't be understood from people on: "),
+        ("", "the query does not end well: "),
+        ("$[?match(@.name, '(a+)+$')]", "the query can't be understood from match(@.name, '(a+)+"),
+        ("$[?search(@.name, 'a')]", "the query can't be understood from search("),
+        ("$[99999999999999999999999]", "the query can't be understood from 9999"),
+        ("$." + "x" * LONGEST, f"a query has {LONGEST} letters at most"),
+        ("$[?" + "(" * 400, "the query "),
+        ("$\x00", "the query "),
+    ],
+)
+def test_a_wrong_query_is_a_sentence(text, sentence) -> None:
+    with pytest.raises(QueryError) as told:
+        JsonQuery(text)
+    assert told.value.sentence.startswith(sentence)
+    assert "\n" not in told.value.sentence
+
+
+MANY = {"people": [{"name": "Ann", "age": number} for number in range(1000)]}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "$..*..*..*..*",
+        "$..[?count(@..*) > 1]",
+        "$..[?@..[?@..[?@..[?@.x]]]]",
+        "$.people[?count($..age) == 3]",
+    ],
+)
+def test_a_query_that_multiplies_itself_ends_with_what_it_found(text) -> None:
+    answer = JsonQuery(text).answer(MANY, most_steps=5000)
+    assert answer.cut == "It looks at more than 5000 values; this was found until then."
+
+
+def test_comparing_long_lists_counts_what_is_compared() -> None:
+    lists = {"a": list(range(4000)), "b": list(range(4000))}
+    answer = JsonQuery("$[?$.a == $.b]").answer(lists, most_steps=3000)
+    assert answer.cut.startswith("It looks at more than 3000 values")
+
+
+def test_so_many_are_shown_and_a_deep_message_says_so() -> None:
+    answer = JsonQuery("$..age").answer(MANY, most_found=10)
+    assert (len(answer.found), answer.cut) == (10, "The first 10 are shown.")
+    deep: dict[str, object] = {}
+    for _each in range(500):
+        deep = {"a": deep}
+    answer = JsonQuery("$..*").answer(deep)
+    assert answer.found
+    assert answer.cut
+
+
+def test_a_large_message_that_is_only_looked_into_is_asked_too() -> None:
+    large = read(Message("/big", b'{"a": [{"x": 1}, {"x": 2}]}' + b" " * LARGE_BYTES, "json", "json"))
+    assert found("$.a[?@.x > 1].x", large.value) == {"a[1].x": 2}
+    assert JsonQuery("$.a").answer(large.value) == QueryAnswer({FoundPath.of(("a",)): large.value["a"]})  # type: ignore[index]

@@ -1,0 +1,113 @@
+"""Topics as a tree: folders by slashes, what is below them added up, and what a filter's words fit."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.core.network.topic_tree import (
+    DEEPEST,
+    TopicFolder,
+    TopicTree,
+    TreeRow,
+    fits,
+    folders_above,
+    parts_of_name,
+)
+from app.core.network.topics import Topic
+
+
+def by_name(rows: list[TreeRow]) -> list[TreeRow]:
+    return sorted(rows, key=lambda row: row.path if isinstance(row, TopicFolder) else row.name)
+
+
+def keys(tree: TopicTree) -> list[str]:
+    return [row.key for row in tree.rows(by_name)]
+
+
+def test_folders_stand_before_what_is_in_them_and_a_topic_may_have_a_folders_name() -> None:
+    tree = TopicTree([Topic(name) for name in ("/b", "/a/y", "/a/x", "/a/x/deep", "/a")])
+    assert keys(tree) == ["/a", "/a/*", "/a/x", "/a/x/*", "/a/x/deep", "/a/y", "/b"]
+    assert [folder.deep for folder in tree] == [0, 1]
+
+
+def test_a_closed_folder_shows_nothing_of_what_is_in_it() -> None:
+    topics = [Topic(name) for name in ("/a/x", "/a/b/y", "/c/z")]
+    assert keys(TopicTree(topics, {"/a/*"})) == ["/a/*", "/c/*", "/c/z"]
+    assert keys(TopicTree(topics, {"/a/b/*", "/never/*"})) == ["/a/*", "/a/b/*", "/a/x", "/c/*", "/c/z"]
+
+
+def test_a_folder_adds_up_what_is_known_of_those_that_are_there() -> None:
+    topics = [
+        Topic("/a/x", rate_hz=10.0, bandwidth_Bps=100.0, age_s=3.0, lost=2),
+        Topic("/a/b/y", rate_hz=5.5, age_s=1.0),
+        Topic("/a/b/gone", rate_hz=99.0, lost=7, gone_s=2.0),
+        Topic("/c/unknown"),
+    ]
+    tree = TopicTree(topics)
+    figures = tree["/a/*"].figures
+    assert (figures.rate_hz, figures.bandwidth_Bps, figures.age_s, figures.lost) == (15.5, 100.0, 1.0, 2)
+    assert tree["/a/b/*"].figures.lost is None
+    unknown = tree["/c/*"].figures
+    assert (unknown.rate_hz, unknown.bandwidth_Bps, unknown.age_s, unknown.lost) == (None,) * 4
+    topics[0].rate_hz = 20.0
+    assert tree["/a/*"].figures.rate_hz == 15.5  # nothing is added up twice for one painting
+    tree.renew()
+    assert tree["/a/*"].figures.rate_hz == 25.5
+
+
+def test_networks_have_folders_of_their_own() -> None:
+    tree = TopicTree([Topic("/a/x"), Topic("/a/x", network="ros2")])
+    assert [folder.key for folder in tree] == ["/a/*", "ros2 /a/*"]
+    assert [len(folder.topics) for folder in tree] == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("/a/b", ("a", "b")),
+        ("a", ("a",)),
+        ("/a//b/", ("a", "b")),
+        ("/", ("/",)),
+        ("", ("",)),
+        ("/" * 5, ("/////",)),
+    ],
+)
+def test_odd_names_are_rows_too(name, parts) -> None:
+    assert parts_of_name(name) == parts
+    assert len(TopicTree([Topic(name)]).rows(by_name)) == len(parts)
+
+
+def test_ten_thousand_slashes_make_no_deeper_tree() -> None:
+    name = "/x" * 10_000
+    assert len(parts_of_name(name)) == DEEPEST + 1
+    assert len(folders_above(name)) == DEEPEST
+    assert max(folder.deep for folder in TopicTree([Topic(name)])) == DEEPEST - 1
+
+
+def test_the_folders_above_a_topic() -> None:
+    assert folders_above("/a/b/c") == ["/a/*", "/a/b/*"]
+    assert folders_above("/a/b", "ros2") == ["ros2 /a/*"]
+    assert folders_above("/a") == []
+
+
+@pytest.mark.parametrize(
+    ("words", "fit"),
+    [
+        ([], True),
+        (["IMAGE", "depth"], True),
+        (["image", "colour"], False),
+        (["/robot/*"], True),
+        (["/robot/?epth"], True),
+        (["/robot"], True),
+        (["robot/*"], False),
+        (["*depth"], True),
+        (["!image"], False),
+        (["!json", "*"], True),
+        (["!/robot/*"], False),
+        (["!"], False),
+        (["[d]epth*"], False),
+        (["*" * 50 + "x"], False),
+    ],
+)
+def test_words_are_found_and_patterns_fit_the_whole_name(words, fit) -> None:
+    assert fits(words)("/robot/depth", " /robot/depth image camera_driver") is fit

@@ -1,0 +1,198 @@
+"""The image panel's colours, its colour bar, and what messages draw on a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtGui import QColor, QImage, QPainter, QTransform
+
+from app.core.messages.annotations import MOST_PIXELS, drawn_by
+from app.core.messages.picture_look import ColourScale
+from app.ui.panels.image.overlays import MOST_OVERLAYS
+from app.ui.panels.image.panel import PANEL, ImagePanel
+from app.ui.pictures.annotations import bar_image, paint_colour_bar, paint_drawn
+from app.ui.theme.theme import Theme
+from nep.messages.message import Message
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, press, ticks
+from tests.ui.sample_data import Topic
+
+DEPTH, CAMERA, MARKS = "/robot/depth16", "/cam", "/marks"
+RED = {"r": 1, "g": 0, "b": 0, "a": 1}
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    made = Window(Session())
+    for name in (DEPTH, CAMERA):
+        made.session.put(Topic(name, "image", "image"))
+    made.session.put(Topic(MARKS, "foxglove.ImageAnnotations"))
+    made.session.put(Topic("/face_positions"))
+    made.session.put(Topic("/other"))
+    return made
+
+
+@pytest.fixture
+def panel(qtbot, window) -> Iterator[ImagePanel]:
+    made = window.make(PANEL, (640, 480))
+    qtbot.addWidget(made)
+    assert isinstance(made, ImagePanel)
+    yield made
+    made.shut()
+
+
+def sends(window: Window, panel: ImagePanel, topic: str, frame: np.ndarray, encoding: str) -> None:
+    extension = {"shape": list(frame.shape), "encoding": encoding}
+    window.session.images.offer([Message(topic, frame.tobytes(), "image", "image", extension=extension)])
+    ticks(window, panel)
+
+
+def depth() -> np.ndarray:
+    return np.tile(np.linspace(500, 4500, 320).astype(np.uint16), (240, 1))
+
+
+def shown(panel: ImagePanel) -> np.ndarray:
+    picture = panel.view.picture
+    assert picture is not None
+    return picture.bgra
+
+
+def test_depth_has_a_colour_bar_and_colours_and_a_range_by_choice(panel, window) -> None:
+    panel.show_topic(DEPTH)
+    sends(window, panel, DEPTH, depth(), "mono16")
+    assert panel.view.picture.scale is not None
+    assert (panel.view.picture.scale.low, panel.view.picture.scale.high) == (500.0, 4500.0)
+    usual = shown(panel).copy()
+    press(panel.tune)
+    assert panel.look_bar.isVisible()
+    panel.look_bar.colours.set_value("turbo")
+    panel.look_bar.colours.activated.emit(panel.look_bar.colours.currentIndex())
+    ticks(window, panel)
+    assert not np.array_equal(shown(panel), usual)  # the very same picture, in other colours
+    press(panel.look_bar.own_range)
+    assert panel.look_bar.low.isVisible()
+    assert (panel.look_bar.low.text(), panel.look_bar.high.text()) == ("500", "4500")
+    panel.look_bar.low.setText("1000")
+    panel.look_bar.high.setText("2000")
+    panel.look_bar.high.editingFinished.emit()
+    ticks(window, panel)
+    assert (panel.view.picture.scale.low, panel.view.picture.scale.high) == (1000.0, 2000.0)
+    press(panel.look_bar.again)
+    ticks(window, panel)
+    assert np.array_equal(shown(panel), usual)
+
+
+def test_brightness_and_contrast_change_a_frozen_picture_too(panel, window) -> None:
+    panel.show_topic(CAMERA)
+    sends(window, panel, CAMERA, np.full((24, 32, 3), 100, np.uint8), "bgr8")
+    assert panel.view.picture.scale is None
+    assert not panel.look_bar.colours.isEnabled()  # colours are no numbers
+    panel.freeze.setChecked(True)
+    panel.look_bar.brightness.setValue(panel.look_bar.brightness.maximum())
+    ticks(window, panel)
+    assert shown(panel)[..., :3].min() == 255
+    panel.look_bar.brightness.reset.emit()  # a double click
+    panel.look_bar.contrast.setValue(0)
+    ticks(window, panel)
+    assert shown(panel)[0, 0, :3].tolist() == [125, 125, 125]
+
+
+def test_a_look_belongs_to_a_topic_and_comes_back_with_the_layout(qtbot, panel, window) -> None:
+    panel.show_topic(DEPTH)
+    panel.look_bar.contrast.setValue(150)
+    panel.tune.setChecked(True)
+    panel.overlays.choose(MARKS, shown=True)
+    look = panel.look_bar.look
+    panel.show_topic(CAMERA)
+    assert panel.look_bar.look != look
+    panel.show_topic(DEPTH)
+    assert panel.look_bar.look == look
+    again = window.make(PANEL)
+    qtbot.addWidget(again)
+    assert isinstance(again, ImagePanel)
+    again.restore_state(panel.save_state())
+    assert again.look_bar.look == look
+    assert again.tune.isChecked()
+    assert again.overlays.chosen == (MARKS,)
+    again.restore_state({"look": {"contrast": "much"}, "layers": [3], "topic": DEPTH})
+    again.shut()
+
+
+def test_topics_that_draw_on_pictures_are_offered_watched_while_chosen_and_drawn(panel, window) -> None:
+    panel.show_topic(CAMERA)
+    assert panel.overlays.choices() == [MARKS, "/face_positions"]
+    panel.overlays.choose(MARKS, shown=True)
+    assert MARKS in window.session.watched
+    sends(window, panel, CAMERA, np.zeros((240, 320, 3), np.uint8), "bgr8")
+    assert panel.view.drawn == ()
+    circle = {"position": {"x": 160, "y": 120}, "diameter": 80, "thickness": 4, "outline_color": RED}
+    window.session.send(MARKS, {"circles": [{**circle, "fill_color": RED}]})
+    ticks(window, panel)
+    assert [each.kind for each in panel.view.drawn] == ["circle"]
+    middle = panel.view.grab().toImage().pixelColor(panel.view.rect().center())
+    assert (middle.red(), middle.green()) == (255, 0)
+    window.session.send(MARKS, {"circles": "none"})
+    ticks(window, panel)
+    assert panel.view.drawn == ()
+    panel.overlays.choose(MARKS, shown=False)
+    assert MARKS not in window.session.watched
+    for number in range(MOST_OVERLAYS + 3):
+        panel.overlays.choose(f"/m{number}", shown=True)
+    assert len(panel.overlays.chosen) == MOST_OVERLAYS
+
+
+def painted(payload: object, turned: int = 0) -> QImage:
+    image = QImage(320, 240, QImage.Format.Format_RGB32)
+    image.fill(QColor("black"))
+    painter = QPainter(image)
+    shares = QTransform.fromScale(320, 240)
+    if turned:
+        shares = QTransform().translate(0.5, 0.5).rotate(turned).translate(-0.5, -0.5) * shares
+    paint_drawn(painter, Theme("light"), shares, 1.0, drawn_by(payload, 320, 240))
+    painter.end()
+    return image
+
+
+def test_lines_areas_points_and_texts_are_where_they_are_said_to_be(qapp) -> None:
+    line = {"type": 3, "points": [{"x": 0, "y": 120}, {"x": 320, "y": 120}], "thickness": 5}
+    assert painted({"points": [{**line, "outline_color": RED}]}).pixelColor(200, 120).red() == 255
+    area = {"type": 2, "points": [{"x": 10, "y": 10}, {"x": 90, "y": 10}, {"x": 90, "y": 90}]}
+    image = painted({"points": [{**area, "fill_color": RED}]})
+    assert (image.pixelColor(80, 20).red(), image.pixelColor(20, 80).red()) == (255, 0)
+    image = painted({"points": [{**area, "fill_color": RED}]}, turned=180)
+    assert (image.pixelColor(240, 220).red(), image.pixelColor(80, 20).red()) == (255, 0)
+    point = {"type": 1, "points": [{"x": 50, "y": 60}], "outline_color": RED, "thickness": 6}
+    assert painted({"points": [point]}).pixelColor(50, 60).red() == 255
+    text = {"position": {"x": 100, "y": 100}, "text": "HHHH", "font_size": 30, "background_color": RED}
+    assert painted({"texts": [text]}).pixelColor(102, 90).red() == 255
+    face = {"face": {"center": {"x": 64, "y": 48}, "size": {"w": 320, "h": 240}}}
+    assert painted(face).pixelColor(32, 80).red() > 100
+
+
+def test_far_away_and_huge_nothing_breaks(qapp) -> None:
+    far = {"x": MOST_PIXELS, "y": -MOST_PIXELS}
+    huge = {"position": far, "diameter": MOST_PIXELS, "thickness": MOST_PIXELS, "outline_color": RED}
+    text = {"position": {"x": 5, "y": 5}, "text": "x" * 10_000, "font_size": MOST_PIXELS}
+    image = painted({"circles": [huge], "points": [{"type": 3, "points": [far, far], "outline_color": RED}],
+                     "texts": [text]})  # fmt: skip
+    assert image.width() == 320
+
+
+def test_the_colour_bar_has_the_last_colour_on_top_and_gives_way_where_there_is_no_room(qapp) -> None:
+    colours = np.zeros((256, 3), np.uint8)
+    colours[:, 0] = np.arange(256)
+    scale = ColourScale(-1.5, 2500.0, colours)
+    bar = bar_image(scale)
+    assert (bar.pixelColor(0, 0).red(), bar.pixelColor(0, 255).red()) == (255, 0)
+    for height, is_there in ((300, True), (60, False)):
+        image = QImage(300, height, QImage.Format.Format_RGB32)
+        image.fill(QColor("blue"))
+        painter = QPainter(image)
+        paint_colour_bar(painter, Theme("light"), QRectF(image.rect()), scale)
+        painter.end()
+        changed = any(image.pixelColor(x, 20).blue() < 200 for x in range(150, 300))
+        assert changed is is_there
+        assert image.pixelColor(QPointF(20, 20).toPoint()).blue() == 255

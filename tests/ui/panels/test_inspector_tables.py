@@ -1,0 +1,255 @@
+"""The inspector's query, its table of objects, and going back through what came."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
+
+from app.ui.panels.inspector.body import RAW, TABLE, TREE
+from app.ui.panels.inspector.panel import PANEL, InspectorPanel
+from app.ui.widgets.table.model import CELL_ROLE
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, press, ticks
+from tests.ui.sample_data import Topic
+
+TOPIC = "/people"
+LONG_MS = 30_000
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(qtbot, window) -> Iterator[InspectorPanel]:
+    made = window.make(PANEL, (360, 700))
+    qtbot.addWidget(made)
+    for widget in made.header:
+        qtbot.addWidget(widget)
+    assert isinstance(made, InspectorPanel)
+    window.session.put(Topic(TOPIC))
+    made.show_topic(TOPIC)
+    yield made
+    made.shut()
+
+
+def seen(*ages: int, stamp: int = 0) -> dict[str, object]:
+    names = ("Ann", "Bea", "Cy", "Di")
+    people = [{"name": name, "age": age} for name, age in zip(names, ages, strict=False)]
+    return {"stamp": stamp, "people": people, "doors": [{"open": True}, {"open": False}]}
+
+
+def send(window: Window, panel: InspectorPanel, value: object) -> None:
+    window.session.send(TOPIC, value)
+    ticks(window, panel)
+
+
+@pytest.fixture
+def soon(qtbot, window, panel) -> Callable[[Callable[[], object]], None]:
+    """Goes on with the window until something is so; a query is answered in a thread."""
+
+    def wait(true: Callable[[], object]) -> None:
+        qtbot.waitUntil(lambda: (ticks(window, panel), bool(true()))[1], timeout=LONG_MS)
+
+    return wait
+
+
+def rows(panel: InspectorPanel) -> list[str]:
+    model = panel.model
+    return [model.node(model.index(row, 0)).path for row in range(model.rowCount())]
+
+
+def test_what_begins_with_a_dollar_is_a_query_and_the_tree_shows_what_it_finds(panel, window, soon) -> None:
+    send(window, panel, seen(7, 41))
+    panel.compare.setChecked(True)
+    panel.finder.field.setText("$.people[?@.age > 18].name")
+    soon(lambda: rows(panel) == ["people[1].name"])
+    assert panel.query.words.text() == "1 found."
+    assert panel.query.isVisible()
+    assert not panel.strip.isVisible()  # parts are not compared
+    send(window, panel, seen(30, 41))  # asked again of every message
+    soon(lambda: rows(panel) == ["people[0].name", "people[1].name"])
+    panel.tree.setCurrentIndex(panel.model.index(1, 0))
+    panel.own.copy_path()
+    assert QGuiApplication.clipboard().text() == "people[1].name"
+    panel.own.plot()
+    assert window.plotted == [(TOPIC, "people[1].name")]
+    panel.own.copy_message()
+    assert '"doors"' in QGuiApplication.clipboard().text()
+    panel.finder.field.clear()
+    assert rows(panel) == ["stamp", "people", "doors"]
+    assert not panel.query.isVisible()
+    assert panel.compare.isVisible()
+    ticks(window, panel)
+    assert panel.strip.isVisible()
+
+
+def test_a_wrong_query_is_a_sentence_and_the_next_letters_may_mend_it(panel, window, soon) -> None:
+    send(window, panel, seen(7))
+    panel.finder.field.setText("$.people[")
+    assert panel.query.words.text().startswith("the query does not end well: ")
+    assert panel.query.isVisible()
+    assert panel.finder.field.property("wrong") == "true"
+    assert rows(panel) == []
+    QTest.keyClicks(panel.finder.field, "*]")
+    soon(lambda: rows(panel) == ["people[0]"])
+    assert panel.finder.field.property("wrong") == "false"
+    panel.finder.field.setText("$.nobody")
+    soon(lambda: panel.query.words.text() == "0 found.")
+    assert rows(panel) == []
+
+
+def test_a_query_comes_back_with_the_layout_and_rests_in_raw(qtbot, panel, window, soon) -> None:
+    send(window, panel, seen(7))
+    panel.finder.field.setText("$..age")
+    soon(lambda: rows(panel) == ["people[0].age"])
+    panel.mode.changed.emit("raw")
+    assert panel.body.page == RAW
+    assert not panel.query.isVisible()
+    again = window.make(PANEL, (360, 700))
+    qtbot.addWidget(again)
+    assert isinstance(again, InspectorPanel)
+    again.restore_state(panel.save_state())
+    assert again.finder.field.text() == "$..age"
+    again.shut()
+
+
+def as_table(panel: InspectorPanel) -> None:
+    panel.mode.set_value("table")
+    panel.mode.changed.emit("table")
+
+
+def table(panel: InspectorPanel) -> list[list[str]]:
+    shown = panel.body.objects.table
+    assert shown is not None
+    model = shown.model()
+    return [
+        [model.data(model.index(row, column), CELL_ROLE).text for column in range(model.columnCount())]
+        for row in range(model.rowCount())
+    ]
+
+
+def head(panel: InspectorPanel, section: int) -> None:
+    shown = panel.body.objects.table
+    assert shown is not None
+    shown.horizontalHeader().sectionClicked.emit(section)
+
+
+def test_a_list_of_objects_is_a_table_whose_order_holds_while_values_change(panel, window) -> None:
+    now = panel.clock()
+    panel.clock = lambda: now
+    send(window, panel, seen(7, 41, 30))
+    panel.tree.setCurrentIndex(panel.model.reveal(("people", 1, "age")))
+    as_table(panel)
+    assert panel.body.page == TABLE
+    assert table(panel) == [["0", "Ann", "7"], ["1", "Bea", "41"], ["2", "Cy", "30"]]
+    assert panel.body.objects.words.text() == "people   3 rows"
+    head(panel, 2)  # the largest first
+    assert [row[1] for row in table(panel)] == ["Bea", "Cy", "Ann"]
+    made = panel.body.objects.table
+    send(window, panel, seen(99, 41, 30))  # within a second: values change, nothing jumps
+    assert table(panel) == [["1", "Bea", "41"], ["2", "Cy", "30"], ["0", "Ann", "99"]]
+    panel.clock = lambda: now + 2
+    send(window, panel, seen(99, 41, 30, 50))
+    assert [row[1] for row in table(panel)] == ["Ann", "Di", "Bea", "Cy"]
+    assert panel.body.objects.table is made  # twenty times a second nothing is built anew
+    press(panel.body.objects.copy)
+    lines = list(csv.reader(QGuiApplication.clipboard().text().splitlines()))
+    assert lines[:2] == [["#", "name", "age"], ["0", "Ann", "99"]]
+    assert window.toasts[-1] == "Copied 4 rows as CSV"
+
+
+def test_the_first_list_where_none_is_chosen_another_by_choice_and_none_says_so(panel, window) -> None:
+    send(window, panel, seen(7))
+    as_table(panel)
+    assert table(panel) == [["0", "Ann", "7"]]
+    panel.body.objects._choose(("doors",))
+    assert [row[1] for row in table(panel)] == ["true", "false"]
+    panel.body.objects.revealed.emit(("doors", 1))
+    assert panel.body.page == TREE
+    assert panel.foot.path.text() == "doors[1]"
+    as_table(panel)
+    send(window, panel, {"numbers": [1, 2]})
+    assert panel.body.objects.table is None
+    assert panel.body.objects.empty.isVisible()
+    assert not panel.body.objects.copy.isEnabled()
+
+
+def test_what_a_query_finds_is_a_table_too(panel, window, soon) -> None:
+    send(window, panel, seen(7, 41, 30))
+    panel.finder.field.setText("$.people[?@.age > 18]")
+    as_table(panel)
+    soon(lambda: panel.body.objects.table is not None)
+    assert table(panel) == [["people[1]", "Bea", "41"], ["people[2]", "Cy", "30"]]
+
+
+def test_heads_are_the_messages_words_whatever_they_mean_in_studio(panel, window) -> None:
+    send(window, panel, {"people": [{"": 1, "Age": 2, "Topic": 3}]})
+    as_table(panel)
+    model = panel.body.objects.table.model()
+    heads = [model.headerData(section, Qt.Orientation.Horizontal) for section in range(model.columnCount())]
+    assert heads == ["#", '[""]', "Age", "Topic"]
+
+
+def shown_stamp(panel: InspectorPanel) -> object:
+    value = panel.model.value()
+    assert isinstance(value, dict)
+    return value["stamp"]
+
+
+def test_a_person_goes_back_through_what_came_and_compares_with_any_of_it(panel, window) -> None:
+    for number in range(5):
+        send(window, panel, seen(number, stamp=number))
+    panel.history.say(at_once=True)
+    assert panel.history.isVisible()
+    assert panel.history.words.text() == "the newest of 5"
+    press(panel.history.back)
+    ticks(window, panel)
+    assert shown_stamp(panel) == 3
+    assert panel.live.text == "earlier"
+    assert panel.history.words.text().startswith("4 of 5")
+    send(window, panel, seen(9, stamp=9))  # what comes is kept, and what is looked at stays
+    assert shown_stamp(panel) == 3
+    panel.history.track.setValue(0)
+    assert shown_stamp(panel) == 0
+    assert not panel.history.back.isEnabled()
+    panel.pin.setChecked(True)
+    QTest.keyClick(panel.tree, Qt.Key.Key_Right, Qt.KeyboardModifier.AltModifier)
+    panel.history.step(1)
+    assert panel.strip.words.text().startswith("Pinned message of ")
+    assert panel.strip.words.text().endswith(": 2 changed")
+    press(panel.history.newest)
+    ticks(window, panel)
+    assert shown_stamp(panel) == 9
+    assert panel.live.text == "live"
+
+
+def test_the_one_before_is_compared_with_the_one_before_it(panel, window) -> None:
+    for number in (0, 0, 5):
+        send(window, panel, seen(number, stamp=number))
+    panel.compare.setChecked(True)
+    assert panel.strip.words.text() == "Message before: 2 changed"
+    press(panel.history.back)
+    assert panel.strip.words.text() == "Message before: no difference"
+
+
+def test_another_topic_has_a_history_of_its_own_and_who_is_not_seen_keeps_nothing(panel, window) -> None:
+    send(window, panel, seen(1, stamp=1))
+    send(window, panel, seen(2, stamp=2))
+    panel.rest()
+    send(window, panel, seen(3, stamp=3))
+    assert len(panel.history.kept) == 2
+    panel.wake()
+    send(window, panel, seen(4, stamp=4))
+    assert len(panel.history.kept) == 3
+    panel.show_topic("/odom")
+    assert len(panel.history.kept) == 0
+    assert not panel.history.isVisible()
+    panel.shut()
+    assert window.session.series.topics == ()
