@@ -115,8 +115,7 @@ class Runs:
         self.ran_blocks: frozenset[str] = frozenset()  # so far, also those between two looks of a slow window
         self.block_errors: Mapping[str, str] = {}
         self._warnings = RunWarnings(lambda words: self._console.add("warn", self._run.name, words))
-        self._warned_edits = 0
-        self.blocks_revision = 0
+        self._warned_edits = self.blocks_revision = 0
         self.values: Mapping[str, VariableValue] = {}
         """What the run's variables hold, by their ids; after its end what they held then."""
         self.values_revision = 0
