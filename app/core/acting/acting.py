@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 from app.blocks.runtime.publishing import moved_by
 from app.core.acting.arming import ARMED_S, Arming, Target
 from app.core.acting.calling import CallRecord, ServiceCalls
-from app.core.acting.json_text import JsonText
+from app.core.acting.json_text import read_json
 from app.core.acting.sending import Order, Outbox, SendResult
 from app.core.acting.shelf import (
     MOST_BYTES,
@@ -193,7 +193,7 @@ class SessionActing:
             return said.format(type=message.msg_type)
         if is_plain(message.msg_type):
             return ""
-        read = JsonText(message.text)
+        read = read_json(message.text)
         if read.fault is not None:
             return read.fault.sentence
         typed = {name for name, value in message.values if value.strip()}
@@ -249,7 +249,7 @@ class SessionActing:
     def call(self, service: str, text: str, timeout_s: float) -> str:
         """Call a service with this JSON, armed first if need be; why it can't be, as a sentence."""
         try:
-            request = JsonText(text).filled({})
+            request = read_json(text).filled({})
         except NepError as error:
             return str(error)
         not_armed = self._ready(Target("service", service), partial(self.call, service, text, timeout_s))

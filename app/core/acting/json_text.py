@@ -14,6 +14,7 @@ import time
 import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 from nep.errors import NepError
 from nep.i18n import _
@@ -72,10 +73,11 @@ class JsonText:
                 self._spans.append((found.start(), found.end(), found["name"]))
         self.places = tuple(dict.fromkeys(name for _start, _end, name in self._spans))
         # as texts of the same length they are values, and every letter stays where it is
-        masked = text
+        parts, after = [], 0
         for start, end, _name in self._spans:
-            masked = f'{masked[:start]}"{masked[start + 1 : end - 1]}"{masked[end:]}'
-        self.fault = _fault_of(masked)
+            parts += [text[after:start], '"', text[start + 1 : end - 1], '"']
+            after = end
+        self.fault = _fault_of("".join([*parts, text[after:]]))
 
     @property
     def to_fill(self) -> tuple[str, ...]:
@@ -105,6 +107,12 @@ class JsonText:
             raise NepError(fault.sentence)
         made: object = json.loads(whole)
         return made
+
+
+@lru_cache(maxsize=64)
+def read_json(text: str) -> JsonText:
+    """A text that was read, perhaps some time ago: lists ask for it again and again."""
+    return JsonText(text)
 
 
 def value_typed(text: str) -> object:

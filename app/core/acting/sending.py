@@ -75,9 +75,11 @@ class Repeated:
     since_s: float = 0.0
     is_over: threading.Event = field(default_factory=threading.Event)
 
-    def rate_now(self, now_s: float) -> float:
-        """Messages a second since it began, as they were sent."""
-        return self.count / (now_s - self.since_s) if now_s > self.since_s else 0.0
+    @property
+    def rate_now_hz(self) -> float:
+        """Messages a second since it began, as they were sent; 0 before there are two."""
+        passed_s = time.monotonic() - self.since_s
+        return (self.count - 1) / passed_s if self.count > 1 and passed_s > 0 else 0.0
 
 
 class Outbox:

@@ -8,7 +8,7 @@ import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from app.core.acting.json_text import MOST_LETTERS, JsonText, value_typed
+from app.core.acting.json_text import MOST_LETTERS, read_json, value_typed
 from app.core.acting.sending import LEAST_HZ, MOST_HZ
 from app.core.acting.templates import is_plain
 from nep.errors import NepError
@@ -50,7 +50,7 @@ class KeptMessage:
         if is_plain(self.msg_type):
             return self.text
         typed = {name: value_typed(value) for name, value in self.values if value.strip()}
-        return JsonText(self.text).filled(typed)
+        return read_json(self.text).filled(typed)
 
     def with_value(self, name: str, value: str) -> KeptMessage:
         """The same with another value in a place."""
@@ -204,7 +204,7 @@ def _message(told: object) -> KeptMessage | None:
     id, name, topic, kind, text = (told.get(key) for key in ("id", "name", "topic", "type", "text"))
     if not (isinstance(id, str) and id and isinstance(name, str) and isinstance(topic, str)):
         return None
-    if not (isinstance(kind, str) and isinstance(text, str)) or len(text) > MOST_LETTERS:
+    if not (isinstance(kind, str) and isinstance(text, str)) or len(text) > MOST_LETTERS + 1:
         return None
     values, rate_hz = told.get("values"), told.get("rate_hz")
     typed = tuple(
