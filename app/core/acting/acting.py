@@ -270,7 +270,7 @@ class SessionActing:
         if self._session.sources_shown != self._source_seen:
             self._source_seen = self._session.sources_shown
             self.disarm()
-        if self.arming.targets and not self.arming.is_on:
+        if self.arming.is_over:
             self.disarm()
         for each in self.outbox.all_repeated:  # a robot may have come that this topic moves
             target = each.order.target
@@ -291,7 +291,7 @@ class SessionActing:
             self.sent_at_s[order.id] = self._clock_s()
         for known in (self.last, self.sent_at_s):
             for gone in [id for id in known if self.shelf.get(id) is None]:
-                del known[gone]  # type: ignore[attr-defined]
+                del known[gone]
         self.revision += 1
         level = "warn" if result.kind == "failed" else "info"
         self._say(level, f"{order.topic}: {order.name}, {result_words(result)}")

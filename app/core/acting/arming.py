@@ -40,6 +40,11 @@ class Arming:
         return self._is_on and self._clock() < self._until_s
 
     @property
+    def is_over(self) -> bool:
+        """Whether its time is over, and nobody has switched it off since."""
+        return self._is_on and self._clock() >= self._until_s
+
+    @property
     def left_s(self) -> float:
         """How long it stays on."""
         return max(0.0, self._until_s - self._clock()) if self._is_on else 0.0

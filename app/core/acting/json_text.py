@@ -203,12 +203,12 @@ def _unexpected(text: str, place: int, said: str) -> JsonFault:
     last = text[end - 1 : end]
     if here in {"}", "]"} and last == ",":
         return _comma_too_many(text, end - 1)
+    if said.startswith("Expecting ':'"):
+        return _at(text, end, _("Line {line} needs a colon after the name."), mend=JsonMend(end, end, ":"))
     if not here:
         return _no_end(text, end)
     if said.startswith("Expecting ','"):
         return _no_comma(text, place, end)
-    if said.startswith("Expecting ':'"):
-        return _at(text, end, _("Line {line} needs a colon after the name."), mend=JsonMend(end, end, ":"))
     if here in {"}", "]", ","} and last == ":":
         return _at(text, end, _("Line {line} has no value after the colon."))
     return _no_value(text, place, is_name=said.startswith("Expecting property name"))

@@ -212,6 +212,7 @@ def _message(told: object) -> KeptMessage | None:
         for name, each in (values.items() if isinstance(values, dict) else ())
         if isinstance(each, str)
     )
-    is_number = isinstance(rate_hz, (int, float)) and not isinstance(rate_hz, bool) and math.isfinite(rate_hz)
-    hertz = min(MOST_HZ, max(LEAST_HZ, float(rate_hz))) if is_number else 1.0
+    hertz = 1.0
+    if isinstance(rate_hz, (int, float)) and not isinstance(rate_hz, bool) and math.isfinite(rate_hz):
+        hertz = float(min(MOST_HZ, max(LEAST_HZ, rate_hz)))
     return KeptMessage(id, name[:NAME_LETTERS], topic, kind, text, typed[:MOST_VALUES], hertz)

@@ -31,8 +31,7 @@ def left_words(seconds: float) -> str:
 class ArmedStrip(QWidget):
     """Stands on top of each panel from which something can be sent."""
 
-    def __init__(self, context: PanelContext, targets: str) -> None:
-        """``targets`` says what they are whose names stand here: "sends on", "calls"."""
+    def __init__(self, context: PanelContext) -> None:
         super().__init__()
         self._context, self._theme = context, context.theme
         self._seen: tuple[object, ...] = ()
@@ -40,7 +39,7 @@ class ArmedStrip(QWidget):
         self.switch = Switch(self._theme, _("Armed"))
         self.switch.clicked.connect(self._switched)
         self.words = label("", "small", role="textSecondary")
-        self._sends = label(targets, "small", role="textSecondary")
+        self._sends = label(_("sends to"), "small", role="textSecondary")
         self.tokens: list[LinkButton] = []
         self._flow_place = QWidget()
         self._flow = Flow(self._flow_place, gap=8, row_gap=4)

@@ -24,6 +24,7 @@ from app.core.acting.shelf import NAME_LETTERS, KeptMessage
 from app.core.acting.templates import is_plain
 from app.ui.panels.publish.value_fields import ValueFields
 from app.ui.text import plain
+from app.ui.text.numbers import tip_with_key
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel, NumberEdit, Separator, label
 from app.ui.widgets.indicators import StatusIcon
@@ -127,7 +128,7 @@ class MessageForm(QWidget):
     def _make_buttons(self) -> None:
         theme = self._theme
         self.send = Button(theme, _("Send"), "send", kind="primary")
-        self.send.setToolTip(plain.tip(_("Sends it once (Ctrl+Enter)")))
+        self.send.setToolTip(plain.tip(tip_with_key(_("Sends it once"), "Ctrl+Enter")))
         self.last = ElidedLabel("small", "textSecondary")
         self.repeat = Button(theme, _("Start sending"), "repeat")
         self.rate = NumberEdit(theme, LEAST_HZ, MOST_HZ, _("/s"), 1)

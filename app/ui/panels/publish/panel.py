@@ -50,7 +50,7 @@ class PublishPanel(PanelWidget):
         self.new.setAccessibleName(_("New message"))
         self.new.clicked.connect(lambda: self.begin(""))
         self.header = [self.new]
-        self.strip = ArmedStrip(context, _("sends on"))
+        self.strip = ArmedStrip(context)
         self.filter = FilterField(self.theme, _("Filter the kept messages"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = ShelfList(self.theme, lambda each: state_cell(each, self.acting))
@@ -95,6 +95,7 @@ class PublishPanel(PanelWidget):
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.column.insertWidget(0, self.form)
         scroll.column.setStretchFactor(self.form, 1)
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
         self._upright = Separator(self.theme, upright=True)
         inside = QWidget()
         self._sides = QBoxLayout(QBoxLayout.Direction.LeftToRight, inside)
@@ -291,6 +292,7 @@ class PublishPanel(PanelWidget):
             self.acting.shelf.put(message)
             if self.acting.outbox.is_going(message.id):
                 self.acting.end(message.id)  # what is sent is what stands there
+            self._say_sending()
 
     def send(self) -> None:
         """Send the chosen message once."""

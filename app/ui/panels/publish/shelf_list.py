@@ -56,7 +56,7 @@ class ShelfList(TableView[KeptMessage]):
                 stretch=True,
                 tip=lambda each: f"{each.name}\n{each.topic}",
             ),
-            Column("state", lazy("State"), 94, state, figures=True),
+            Column("state", lazy("State"), 112, state, figures=True),
         )
         super().__init__(theme, TableModel(columns, lambda each: each.id))
         self.horizontalHeader().hide()

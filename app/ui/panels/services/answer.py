@@ -30,7 +30,7 @@ INDENT_PX = 14
 
 @dataclass(frozen=True, slots=True)
 class AnswerRow:
-    """One value of an answer: where it is, how deep, its name, and itself in words ("" for what has parts)."""
+    """One value of an answer: where it is, how deep, its name, and itself in words ("{2}" has two parts)."""
 
     path: str
     depth: int
@@ -40,7 +40,7 @@ class AnswerRow:
 
 def answer_rows(answer: object) -> list[AnswerRow]:
     """An answer as rows, those of a part below it; at most 500."""
-    found = []
+    found: list[AnswerRow] = []
     for row in (
         _rows("", 0, "", answer) if _has_parts(answer) else [AnswerRow("", 0, _("answer"), _words(answer))]
     ):

@@ -18,7 +18,7 @@ from app.ui.panels.services.answer import AnswerView, clock_of, took_cell
 from app.ui.panels.services.request_form import RequestForm
 from app.ui.panels.services.service_list import ServiceList, count_words, offered
 from app.ui.text import plain
-from app.ui.text.numbers import seconds_words
+from app.ui.text.numbers import seconds_words, tip_with_key
 from app.ui.widgets import (
     Button,
     ElidedLabel,
@@ -29,6 +29,7 @@ from app.ui.widgets import (
     Separator,
     label,
 )
+from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.inputs.json_edit import JsonEdit
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
@@ -57,7 +58,7 @@ class ServicesPanel(PanelWidget):
         self._is_showing = False
         self.count = label("", "small", role="textSecondary")
         self.chips = [self.count]
-        self.strip = ArmedStrip(context, _("calls"))
+        self.strip = ArmedStrip(context)
         self.filter = FilterField(self.theme, _("Filter the services"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = ServiceList(self.theme)
@@ -83,7 +84,7 @@ class ServicesPanel(PanelWidget):
         self.sentence.setMinimumWidth(0)
         self.mend = Button(theme, _("Put it right"), "wrench", size="small")
         self.call_button = Button(theme, _("Call"), "play", kind="primary")
-        self.call_button.setToolTip(plain.tip(_("Calls it (Ctrl+Enter)")))
+        self.call_button.setToolTip(plain.tip(tip_with_key(_("Calls it"), "Ctrl+Enter")))
         self.give_up = Button(theme, _("Give up"), "x")
         self.seconds = NumberEdit(theme, LEAST_S, MOST_S, _("s"), 1)
         self.seconds.setAccessibleName(_("Waits at most, in seconds"))
@@ -159,16 +160,19 @@ class ServicesPanel(PanelWidget):
         column.addWidget(self.pages, 1)
 
     def _right_side(self) -> QWidget:
-        head, fault, buttons = QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
+        head, fault, buttons = QHBoxLayout(), QHBoxLayout(), Flow(gap=10, row_gap=6)
         head.addWidget(self.name, 1)
         head.addWidget(self.way)
         fault.addWidget(self.sentence, 1)
         fault.addWidget(self.mend, 0, Qt.AlignmentFlag.AlignTop)
-        for widget in (self.call_button, self.give_up):
-            buttons.addWidget(widget)
-        buttons.addStretch(1)
-        buttons.addWidget(label(_("waits at most"), "small", role="textSecondary"))
-        buttons.addWidget(self.seconds)
+        for button in (self.call_button, self.give_up):
+            buttons.addWidget(button)
+        limit = QWidget()
+        beside = QHBoxLayout(limit)
+        beside.setContentsMargins(0, 0, 0, 0)
+        beside.addWidget(label(_("waits at most"), "small", role="textSecondary"))
+        beside.addWidget(self.seconds)
+        buttons.addWidget(limit)
         self._asks = QWidget()
         request = QVBoxLayout(self._asks)
         request.setContentsMargins(12, 8, 12, 8)
@@ -192,6 +196,7 @@ class ServicesPanel(PanelWidget):
         ):
             scroll.column.insertWidget(place, widget)
             scroll.column.setStretch(place, stretch)
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
         return scroll
 
     def resizeEvent(self, event: QResizeEvent) -> None:

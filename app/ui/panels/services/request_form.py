@@ -69,7 +69,7 @@ class RequestForm(QWidget):
     def show_request(self, request: object) -> None:
         """Show these values; what is no map has no fields."""
         given = dict(request) if isinstance(request, Mapping) else {}
-        if given == self._request and self.fields and not self.problems:
+        if given == self._request and self._kinds and not self.problems:
             return
         some = dict(list(given.items())[:MOST_FIELDS])
         kinds = {name: self._kind(name, value) for name, value in some.items()}
@@ -116,6 +116,7 @@ class RequestForm(QWidget):
         for row, (name, kind) in enumerate(kinds.items()):
             words = label(name, "body", role="textSecondary", wrap=True)
             words.setTextFormat(Qt.TextFormat.PlainText)
+            words.setMinimumHeight(26)
             field = self._field(name, kind)
             field.setAccessibleName(name)
             self._grid.addWidget(words, row, 0, Qt.AlignmentFlag.AlignTop)

@@ -147,9 +147,9 @@ class JsonLinesEdit(QPlainTextEdit):
         marks = []
         if line:
             mark = QTextEdit.ExtraSelection()
-            mark.format.setBackground(self._theme.colour("errorTint"))  # type: ignore[attr-defined]
-            mark.format.setProperty(QTextFormat.Property.FullWidthSelection, True)  # type: ignore[attr-defined]
-            mark.cursor = QTextCursor(self.document().findBlockByNumber(line - 1))  # type: ignore[attr-defined]
+            mark.format.setBackground(self._theme.colour("errorTint"))
+            mark.format.setProperty(QTextFormat.Property.FullWidthSelection, True)
+            mark.cursor = QTextCursor(self.document().findBlockByNumber(line - 1))
             marks.append(mark)
         self.setExtraSelections(marks)
         self._numbers.update()
