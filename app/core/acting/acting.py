@@ -17,7 +17,7 @@ from app.blocks.runtime.publishing import moved_by
 from app.core.acting.arming import ARMED_S, Arming, Target
 from app.core.acting.calling import CallRecord, ServiceCalls
 from app.core.acting.json_text import read_json
-from app.core.acting.sending import Order, Outbox, SendResult
+from app.core.acting.sending import Outbox, SendOrder, SendResult
 from app.core.acting.shelf import (
     MOST_BYTES,
     KeptMessage,
@@ -213,7 +213,7 @@ class SessionActing:
         not_armed = self._ready(target, go_on)
         if not_armed is not None:
             return not_armed
-        order = Order(message.id, message.name, message.topic, message.msg_type, message.payload)
+        order = SendOrder(message.id, message.name, message.topic, message.msg_type, message.payload)
         if not rate_hz:
             self.outbox.send(order)
         elif not self.outbox.begin(order, rate_hz):

@@ -30,7 +30,7 @@ RESULTS_KEPT = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class SendOrder:
     """What is to be sent: ``make`` gives the message, each time anew, and raises `NepError` when it can't."""
 
     id: str
@@ -52,7 +52,7 @@ class SendResult:
     ``count`` messages were sent at a rate, ``skipped`` were left out because their time had gone by.
     """
 
-    order: Order
+    order: SendOrder
     kind: str
     sentence: str = ""
     heard: int = 0
@@ -64,7 +64,7 @@ class SendResult:
 class Repeated:
     """What is sent again and again; only its thread changes it."""
 
-    order: Order
+    order: SendOrder
     rate_hz: float
     turn: int
     publisher: Publisher
@@ -126,7 +126,7 @@ class Outbox:
 
     # ---- what a person asks
 
-    def send(self, order: Order) -> None:
+    def send(self, order: SendOrder) -> None:
         """Send it once."""
         turn, asked_s = self._arming.turn, self._clock()
 
@@ -140,7 +140,7 @@ class Outbox:
 
         self._submit("", self._guarded(order, asked_s, send_it))
 
-    def begin(self, order: Order, rate_hz: float) -> bool:
+    def begin(self, order: SendOrder, rate_hz: float) -> bool:
         """Send it again and again from now on; False when too much goes on."""
         rate_hz = min(MOST_HZ, max(LEAST_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()
@@ -205,7 +205,7 @@ class Outbox:
 
     # ---- in the thread of the network
 
-    def _guarded(self, order: Order, asked_s: float, job: Job) -> Job:
+    def _guarded(self, order: SendOrder, asked_s: float, job: Job) -> Job:
         """The job; what it raises is told as the result."""
 
         def run(node: Node) -> None:
@@ -220,7 +220,7 @@ class Outbox:
 
         return run
 
-    def _publisher(self, node: Node, order: Order) -> Publisher:
+    def _publisher(self, node: Node, order: SendOrder) -> Publisher:
         key = (order.topic, order.msg_type)
         with self._changed:
             used = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}

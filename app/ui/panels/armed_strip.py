@@ -137,15 +137,27 @@ class ArmedStrip(QWidget):
             painter.end()
 
 
-def minutes_menu(theme: Theme, parent: QWidget, acting: SessionActing) -> QAction:
-    """How long it stays armed, as an entry with a menu."""
-    menu = Menu(theme, parent, _("Stays armed for"))
-    menu.setIcon(theme.icon("clock"))
-    group = QActionGroup(menu)
-    for count in MINUTES:
-        action = menu.addAction(ngettext("{count} minute", "{count} minutes", count).format(count=count))
-        action.setCheckable(True)
-        action.setChecked(round(acting.armed_s / 60) == count)
-        action.triggered.connect(lambda _on=False, count=count: setattr(acting, "armed_s", count * 60.0))
-        group.addAction(action)
-    return menu.menuAction()
+class ArmedMinutes(Menu):
+    """How long it stays armed, as an entry with a menu among a panel's other actions."""
+
+    def __init__(self, theme: Theme, parent: QWidget, acting: SessionActing) -> None:
+        super().__init__(theme, parent, _("Stays armed for"))
+        self._acting = acting
+        self.setIcon(theme.icon("clock"))
+        self._choices: dict[int, QAction] = {}
+        group = QActionGroup(self)
+        for count in MINUTES:
+            words = ngettext("{count} minute", "{count} minutes", count).format(count=count)
+            action = self._choices[count] = self.addAction(words)
+            action.setCheckable(True)
+            action.triggered.connect(lambda _on=False, count=count: self._choose(count))
+            group.addAction(action)
+
+    def _choose(self, minutes: int) -> None:
+        self._acting.armed_s = minutes * 60.0
+
+    def entry(self) -> QAction:
+        """The entry, with what is so now."""
+        for count, action in self._choices.items():
+            action.setChecked(round(self._acting.armed_s / 60) == count)
+        return self.menuAction()

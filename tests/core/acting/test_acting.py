@@ -8,7 +8,7 @@ from pathlib import Path
 import nep
 from app.core.acting.acting import FILE, call_words, result_words
 from app.core.acting.arming import Target
-from app.core.acting.sending import Order, SendResult
+from app.core.acting.sending import SendOrder, SendResult
 from app.core.acting.shelf import KeptMessage
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -95,7 +95,7 @@ def test_a_file_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
 
 
 def test_how_it_ended_in_words() -> None:
-    order = Order("a", "Drive", "/cmd_vel", "json", dict)
+    order = SendOrder("a", "Drive", "/cmd_vel", "json", dict)
     for result, words in (
         (SendResult(order, "sent", heard=2), "heard by 2"),
         (SendResult(order, "sent"), "nobody hears it"),

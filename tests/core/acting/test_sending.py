@@ -9,7 +9,7 @@ import pytest
 import nep
 from app.core.acting import sending
 from app.core.acting.arming import Arming, Target
-from app.core.acting.sending import LATE_S, MOST_AT_ONCE, Order, Outbox, Repeated
+from app.core.acting.sending import LATE_S, MOST_AT_ONCE, Outbox, Repeated, SendOrder
 from nep.errors import NepError
 from nep.nodes.node import Node
 from tests.nep.programs import eventually
@@ -44,8 +44,10 @@ def bench(request) -> Iterator[Bench]:
         made.outbox.close()
 
 
-def order(topic: str = "/cmd_vel", msg_type: str = "json", payload: object = None, id: str = "a") -> Order:
-    return Order(id, "Drive", topic, msg_type, lambda: {"x": 1} if payload is None else payload)
+def order(
+    topic: str = "/cmd_vel", msg_type: str = "json", payload: object = None, id: str = "a"
+) -> SendOrder:
+    return SendOrder(id, "Drive", topic, msg_type, lambda: {"x": 1} if payload is None else payload)
 
 
 def kinds(bench: Bench) -> list[str]:
@@ -138,7 +140,7 @@ def test_one_that_raises_ends_and_the_others_go_on(bench) -> None:
             raise NepError("Fill in “yaw” first.")
         return value
 
-    bench.outbox.begin(Order("b", "Bad", "/bad", "json", once), 50)
+    bench.outbox.begin(SendOrder("b", "Bad", "/bad", "json", once), 50)
     bench.outbox.begin(order("/good", id="g"), 50)
     eventually(lambda: not bench.outbox.is_going("b"))
     while heard.receive(0.0) is not None:

@@ -38,7 +38,7 @@ RATE_PX = 84
 MOST_OFFERED = 500
 
 
-class TopicField(QLineEdit):
+class TopicEdit(QLineEdit):
     """The name of a topic; what exists is offered while one types."""
 
     def __init__(self, theme: Theme) -> None:
@@ -93,7 +93,7 @@ class MessageForm(QWidget):
         self.name.setAccessibleName(_("Name of the message"))
         self.name.setMaxLength(NAME_LETTERS)
         EditMenu(theme, self.name)
-        self.topic = TopicField(theme)
+        self.topic = TopicEdit(theme)
         self.kind = QLineEdit()
         self.kind.setAccessibleName(_("Type of the messages"))
         self.kind.setPlaceholderText("json")

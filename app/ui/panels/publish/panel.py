@@ -15,7 +15,7 @@ from app.core.acting.shelf import MOST_MESSAGES, KeptMessage
 from app.core.acting.templates import text_of_message, text_of_type
 from app.core.network.topics import split_key
 from app.core.network.watches import Suspendable, Watch
-from app.ui.panels.armed_strip import ArmedStrip, minutes_menu
+from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.publish.message_form import MessageForm
 from app.ui.panels.publish.shelf_list import ShelfList, state_cell
@@ -51,6 +51,7 @@ class PublishPanel(PanelWidget):
         self.new.clicked.connect(lambda: self.begin(""))
         self.header = [self.new]
         self.strip = ArmedStrip(context)
+        self._minutes = ArmedMinutes(self.theme, self, self.acting)
         self.filter = FilterField(self.theme, _("Filter the kept messages"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = ShelfList(self.theme, lambda each: state_cell(each, self.acting))
@@ -358,7 +359,7 @@ class PublishPanel(PanelWidget):
     # -- what every panel has -----------------------------------------------------------------------------
 
     def more_actions(self) -> Sequence[QAction]:
-        return (minutes_menu(self.theme, self, self.acting),)
+        return (self._minutes.entry(),)
 
     def focus_filter(self) -> bool:
         show_when(self.filter, True)

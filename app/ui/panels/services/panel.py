@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QStackedWidget, QVBoxLayo
 from app.core.acting.arming import Target
 from app.core.acting.calling import LEAST_S, MOST_S, TIMEOUT_S, CallRecord
 from app.core.acting.json_text import JsonText, pretty, read_json
-from app.ui.panels.armed_strip import ArmedStrip, minutes_menu
+from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.row_actions import RowAction, copies, filled
 from app.ui.panels.services.answer import AnswerView, clock_of, took_cell
@@ -59,6 +59,7 @@ class ServicesPanel(PanelWidget):
         self.count = label("", "small", role="textSecondary")
         self.chips = [self.count]
         self.strip = ArmedStrip(context)
+        self._minutes = ArmedMinutes(self.theme, self, self.acting)
         self.filter = FilterField(self.theme, _("Filter the services"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = ServiceList(self.theme)
@@ -444,7 +445,7 @@ class ServicesPanel(PanelWidget):
 
     def more_actions(self) -> Sequence[QAction]:
         self._clear.setEnabled(bool(self.acting.calls.records))
-        return (minutes_menu(self.theme, self, self.acting), self._clear)
+        return (self._minutes.entry(), self._clear)
 
     def focus_filter(self) -> bool:
         self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)
