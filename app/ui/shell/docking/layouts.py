@@ -131,7 +131,7 @@ DEVELOPER = Layout(
         "alarms": "topics",
         "recordings": "topics",
         "publish": "topics",
-        "services": "image",
+        "services": "inspector",
         "robot": "image",
         "camera": "image",
         "health": "console",
