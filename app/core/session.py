@@ -14,7 +14,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.core.acting.acting import SessionActing
 from app.core.alarms import SessionAlarms
 from app.core.alerts import Alerts
 from app.core.console import Console
@@ -58,6 +57,7 @@ from app.core.robots.stop import RobotStopper
 from app.core.robots.stop_lines import StopTarget
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
 from app.core.robots.voices import RobotVoices
+from app.core.run.acting.acting import SessionActing
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.core.series.feed import SeriesFeed

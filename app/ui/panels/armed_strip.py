@@ -8,8 +8,8 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QAction, QActionGroup, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.core.acting.acting import SessionActing
-from app.core.acting.arming import Target
+from app.core.run.acting.acting import SessionActing
+from app.core.run.acting.arming import Target
 from app.ui.panels.base import PanelContext
 from app.ui.text import plain
 from app.ui.theme.theme import Theme

@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 
 import nep
-from app.core.acting.acting import FILE, call_words, result_words
-from app.core.acting.arming import Target
-from app.core.acting.sending import SendOrder, SendResult
-from app.core.acting.shelf import KeptMessage
+from app.core.run.acting.acting import FILE, call_words, result_words
+from app.core.run.acting.arming import Target
+from app.core.run.acting.sending import SendOrder, SendResult
+from app.core.run.acting.shelf import KeptMessage
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from tests.core.waiting import tick_until

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.acting.arming import LEAST_S, MOST_NAMES, MOST_S, Arming, Target
+from app.core.run.acting.arming import LEAST_S, MOST_NAMES, MOST_S, Arming, Target
 
 TOPIC = Target("topic", "/cmd_vel")
 

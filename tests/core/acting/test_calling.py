@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 import nep
-from app.core.acting.arming import Arming, Target
-from app.core.acting.calling import ANSWERS_KEPT, HISTORY_KEPT, CallRecord, ServiceCalls
+from app.core.run.acting.arming import Arming, Target
+from app.core.run.acting.calling import ANSWERS_KEPT, HISTORY_KEPT, CallRecord, ServiceCalls
 from nep.errors import NepError
 from nep.nodes.node import Node
 from tests.nep.programs import eventually

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from app.core.acting.json_text import MOST_LETTERS, JsonText, pretty, value_typed
+from app.core.run.acting.json_text import MOST_LETTERS, JsonText, pretty, value_typed
 from nep.errors import NepError
 
 LINES = """{

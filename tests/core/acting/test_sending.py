@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import pytest
 
 import nep
-from app.core.acting import sending
-from app.core.acting.arming import Arming, Target
-from app.core.acting.sending import LATE_S, MOST_AT_ONCE, Outbox, Repeated, SendOrder
+from app.core.run.acting import sending
+from app.core.run.acting.arming import Arming, Target
+from app.core.run.acting.sending import LATE_S, MOST_AT_ONCE, Outbox, Repeated, SendOrder
 from nep.errors import NepError
 from nep.nodes.node import Node
 from tests.nep.programs import eventually

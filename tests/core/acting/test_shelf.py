@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from app.core.acting.sending import MOST_HZ
-from app.core.acting.shelf import (
+from app.core.run.acting.sending import MOST_HZ
+from app.core.run.acting.shelf import (
     MOST_MESSAGES,
     MOST_REQUESTS,
     KeptMessage,

@@ -8,9 +8,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.acting.acting import SessionActing
-from app.core.acting.arming import Target
-from app.core.acting.shelf import KeptMessage
+from app.core.run.acting.acting import SessionActing
+from app.core.run.acting.arming import Target
+from app.core.run.acting.shelf import KeptMessage
 from app.ui.panels.publish import PANEL
 from app.ui.panels.publish.panel import PublishPanel
 from app.ui.panels.topics import panel as topics

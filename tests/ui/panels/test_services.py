@@ -11,7 +11,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
-from app.core.acting.arming import Target
+from app.core.run.acting.arming import Target
 from app.ui.panels.row_actions import service_actions
 from app.ui.panels.services import PANEL
 from app.ui.panels.services.answer import MOST_ROWS, TEXT_LETTERS, answer_rows

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.core.acting.acting import SessionActing
-from app.core.acting.arming import Target
+from app.core.run.acting.acting import SessionActing
+from app.core.run.acting.arming import Target
 from app.ui.panels.publish import PANEL as PUBLISH
 from app.ui.panels.publish.panel import PublishPanel
 from app.ui.panels.services import PANEL as SERVICES

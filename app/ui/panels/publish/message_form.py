@@ -18,10 +18,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.acting.json_text import MOST_LETTERS, JsonFault, pretty, read_json
-from app.core.acting.sending import LEAST_HZ, MOST_HZ
-from app.core.acting.shelf import NAME_LETTERS, KeptMessage
-from app.core.acting.templates import is_plain
+from app.core.run.acting.json_text import MOST_LETTERS, JsonFault, pretty, read_json
+from app.core.run.acting.sending import LEAST_HZ, MOST_HZ
+from app.core.run.acting.shelf import NAME_LETTERS, KeptMessage
+from app.core.run.acting.templates import is_plain
 from app.ui.panels.publish.value_fields import ValueFields
 from app.ui.text import plain
 from app.ui.text.numbers import tip_with_key

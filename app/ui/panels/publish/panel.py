@@ -9,12 +9,12 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.acting.acting import result_words
-from app.core.acting.arming import Target
-from app.core.acting.shelf import MOST_MESSAGES, KeptMessage
-from app.core.acting.templates import text_of_message, text_of_type
 from app.core.network.topics import split_key
 from app.core.network.watches import Suspendable, Watch
+from app.core.run.acting.acting import result_words
+from app.core.run.acting.arming import Target
+from app.core.run.acting.shelf import MOST_MESSAGES, KeptMessage
+from app.core.run.acting.templates import text_of_message, text_of_type
 from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.publish.message_form import MessageForm

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from PySide6.QtCore import QModelIndex, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
-from app.core.acting.acting import SessionActing
-from app.core.acting.arming import Target
-from app.core.acting.json_text import read_json
-from app.core.acting.shelf import KeptMessage
-from app.core.acting.templates import is_plain
+from app.core.run.acting.acting import SessionActing
+from app.core.run.acting.arming import Target
+from app.core.run.acting.json_text import read_json
+from app.core.run.acting.shelf import KeptMessage
+from app.core.run.acting.templates import is_plain
 from app.ui.text.numbers import rate_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets.keyboard import is_plain as is_plain_key

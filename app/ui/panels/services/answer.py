@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.acting.acting import call_words, time_words
-from app.core.acting.calling import CallRecord
+from app.core.run.acting.acting import call_words, time_words
+from app.core.run.acting.calling import CallRecord
 from app.ui.panels.base import ShowToast
 from app.ui.text.numbers import seconds_words, size_words
 from app.ui.theme.theme import Theme

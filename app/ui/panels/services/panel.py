@@ -8,9 +8,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.acting.arming import Target
-from app.core.acting.calling import LEAST_S, MOST_S, TIMEOUT_S, CallRecord
-from app.core.acting.json_text import JsonText, pretty, read_json
+from app.core.run.acting.arming import Target
+from app.core.run.acting.calling import LEAST_S, MOST_S, TIMEOUT_S, CallRecord
+from app.core.run.acting.json_text import JsonText, pretty, read_json
 from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.row_actions import RowAction, copies, filled

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QVBoxLayout, QWidget
 
-from app.core.acting.json_text import value_typed
+from app.core.run.acting.json_text import value_typed
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Switch, label
 from app.ui.widgets.menus import EditMenu

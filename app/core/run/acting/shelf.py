@@ -8,9 +8,9 @@ import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from app.core.acting.json_text import MOST_LETTERS, read_json, value_typed
-from app.core.acting.sending import LEAST_HZ, MOST_HZ
-from app.core.acting.templates import is_plain
+from app.core.run.acting.json_text import MOST_LETTERS, read_json, value_typed
+from app.core.run.acting.sending import LEAST_HZ, MOST_HZ
+from app.core.run.acting.templates import is_plain
 from nep.errors import NepError
 from nep.i18n import _
 

@@ -14,11 +14,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from app.blocks.runtime.publishing import moved_by
-from app.core.acting.arming import ARMED_S, Arming, Target
-from app.core.acting.calling import CallRecord, ServiceCalls
-from app.core.acting.json_text import read_json
-from app.core.acting.sending import Outbox, SendOrder, SendResult
-from app.core.acting.shelf import (
+from app.core.alerts import Alerts
+from app.core.console import Console
+from app.core.documents.background_worker import BackgroundWorker
+from app.core.network.source import Source
+from app.core.robots.fleet import Fleet
+from app.core.run.acting.arming import ARMED_S, Arming, Target
+from app.core.run.acting.calling import CallRecord, ServiceCalls
+from app.core.run.acting.json_text import read_json
+from app.core.run.acting.sending import Outbox, SendOrder, SendResult
+from app.core.run.acting.shelf import (
     MOST_BYTES,
     KeptMessage,
     NewerShelfError,
@@ -27,12 +32,7 @@ from app.core.acting.shelf import (
     read_shelf,
     shelf_text,
 )
-from app.core.acting.templates import is_plain, is_written
-from app.core.alerts import Alerts
-from app.core.console import Console
-from app.core.documents.background_worker import BackgroundWorker
-from app.core.network.source import Source
-from app.core.robots.fleet import Fleet
+from app.core.run.acting.templates import is_plain, is_written
 from app.core.storage.atomic_file import read_whole, write_atomically
 from app.core.storage.settings import Settings
 from nep.errors import NepError

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import orjson
 
-from app.core.acting.json_text import MOST_LETTERS, pretty
+from app.core.run.acting.json_text import MOST_LETTERS, pretty
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_for

@@ -11,10 +11,10 @@ from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from app.core.acting.arming import Arming, Target
-from app.core.acting.json_text import pretty
 from app.core.faults import error_words
 from app.core.network.source import Job
+from app.core.run.acting.arming import Arming, Target
+from app.core.run.acting.json_text import pretty
 from nep.errors import NepError, NoServerError, ServiceError, WaitTimeoutError
 from nep.i18n import _, number
 from nep.nodes.node import Node

@@ -11,9 +11,9 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from app.core.acting.arming import Arming, Target
 from app.core.faults import error_words
 from app.core.network.source import Job
+from app.core.run.acting.arming import Arming, Target
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
