@@ -97,10 +97,11 @@ class ArmedStrip(QWidget):
         set_role(self.words, "warn" if arming.is_on else "textSecondary")
         self._sends.setVisible(bool(targets))
         self._show_tokens(targets)
-        self.question.setText(question.sentence if question is not None else "")
+        said = question.sentence if question is not None else ""
         self._asks.setVisible(question is not None)
-        if question is not None:
-            paint.announce(self, question.sentence)
+        if said != self.question.text():
+            self.question.setText(said)
+            paint.announce(self, said)
         self.update()
 
     def _show_tokens(self, targets: tuple[Target, ...]) -> None:
