@@ -57,6 +57,7 @@ from app.core.robots.stop import RobotStopper
 from app.core.robots.stop_lines import StopTarget
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
 from app.core.robots.voices import RobotVoices
+from app.core.run.acting.acting import SessionActing
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.core.series.feed import SeriesFeed
@@ -163,13 +164,14 @@ class Session:
         )
         self.runs.coming = lambda: self.coming
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
-        self.alarms, self.recordings = (
+        self.alarms, self.acting, self.recordings = (
             SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
+            SessionActing(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
             SessionRecordings(
                 self.settings, self.alerts, self.address, self._mailbox.post_event, clock=clock
             ),
         )
-        self.alarms.keep = self.recordings.carry
+        self.alarms.keep, self.runs.also_stops = self.recordings.carry, self.acting.disarm
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, self._mailbox.post_event)
@@ -199,6 +201,11 @@ class Session:
         if self._live is not None:
             return self._live
         return LiveNetwork(self.topics, self.nodes, self.networks, self.images, self.series, self.graph)
+
+    @property
+    def is_replaying(self) -> bool:
+        """Whether a recording shows in place of the live network."""
+        return self.replay is not None
 
     @property
     def shown_console(self) -> Console:
@@ -301,6 +308,8 @@ class Session:
             self._follow_robots()
         with self.guarded(lazy("watch over the alarms")):
             self.alarms.tick()
+        with self.guarded(lazy("see to what is sent by hand")):
+            self.acting.tick()
         with self.guarded(lazy("let the robots be heard")):
             self.voices.follow()
         with self.guarded(lazy("tell the program of its robots")):
@@ -329,6 +338,7 @@ class Session:
         self._faults.check()
         with self.guarded(lazy("keep the alarms")):
             self.alarms.check()
+            self.acting.check()
         with self.guarded(lazy("look after the recorder")):
             self.recordings.check()
         with self.guarded(lazy("keep which tabs are open")):
@@ -363,6 +373,7 @@ class Session:
         live = self.live
         ends: list[tuple[str, Callable[[], object]]] = [
             ("end the program", self.runs.close),
+            ("end what is sent by hand", self.acting.close),
             ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
             ("keep which robots were here", partial(self.last_robots.keep, self.launcher)),
             ("keep the alarms", self.alarms.close),

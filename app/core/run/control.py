@@ -65,7 +65,6 @@ class OpenBehaviours(Protocol):
     @property
     def current(self) -> Document:
         """The one that shows; Run runs it."""
-        ...
 
     def title(self, document: Document) -> str:
         """What people call it."""
@@ -90,8 +89,8 @@ class Runs:
         self._documents, self._fleet, self._network = documents, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._make_runner = make_runner
-        self.coming: Callable[[], Sequence[str]] = tuple
-        """Tells which robots are being started."""
+        self.coming: Callable[[], Sequence[str]] = tuple  # tells which robots are being started
+        self.also_stops: Callable[[], object] = tuple  # what else Stop ends, before it stops robots
         self.document: Document | None = None  # which the run belongs to: its blocks glow, fail and stop
         self.pace_s = 0.0
         self._runner: Runner | None = None
@@ -116,8 +115,7 @@ class Runs:
         self.ran_blocks: frozenset[str] = frozenset()  # so far, also those between two looks of a slow window
         self.block_errors: Mapping[str, str] = {}
         self._warnings = RunWarnings(lambda words: self._console.add("warn", self._run.name, words))
-        self._warned_edits = 0
-        self.blocks_revision = 0
+        self._warned_edits = self.blocks_revision = 0
         self.values: Mapping[str, VariableValue] = {}
         """What the run's variables hold, by their ids; after its end what they held then."""
         self.values_revision = 0
@@ -263,6 +261,7 @@ class Runs:
 
     def stop(self) -> None:
         """End the program and stop every robot; what they answer is the run bar's result."""
+        self.also_stops()
         self._asked_again.clear()
         self._next = None
         self._stop(None)
@@ -273,6 +272,7 @@ class Runs:
         if self.active:
             self.stop()
             return
+        self.also_stops()
         self._asked_again.discard(name)
         self._stop_one(name)
 

@@ -38,12 +38,22 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
     ]
     if has_fields(context, key):
         actions.append(RowAction(_("Plot a field of it"), "chart-line", lambda: context.plot(key, "")))
-    if not network:  # alarms and recordings are of Studio's own network
+    if not network:  # messages, alarms and recordings are of Studio's own network
+        if has_fields(context, key):
+            actions.append(RowAction(_("Publish to it"), "send", lambda: context.run(f"publish.topic:{key}")))
         actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.topic:{key}")))
         actions.append(
             RowAction(_("Record this topic"), "circle-dot", lambda: context.run(f"record.topic:{key}"))
         )
     return [*actions, copies(context, name)]
+
+
+def service_actions(context: PanelContext, name: str) -> list[RowAction]:
+    """What can be done with a service of Studio's own network."""
+    return [
+        RowAction(_("Call it"), "play", lambda: context.run(f"service.call:{name}")),
+        copies(context, name),
+    ]
 
 
 def node_actions(context: PanelContext, network: str, name: str) -> list[RowAction]:

@@ -470,10 +470,11 @@ class MainWindow(QMainWindow):
         if self.showing == "behaviour":
             self.status.show_facts(
                 (facts.health(), facts.saved()),
-                (facts.recording(), facts.topics(), facts.remote_access_quietly()),
+                (facts.armed(), facts.recording(), facts.topics(), facts.remote_access_quietly()),
             )
         elif self.showing == "developer":
-            left: tuple[Fact, ...] = (facts.master(), facts.remote_access(), facts.traffic(), facts.lost())
+            left: tuple[Fact, ...] = (facts.master(), facts.remote_access(), facts.traffic())
+            left = (*left, facts.armed(), facts.lost())
             right: tuple[Fact, ...] = (facts.recording(), facts.ring(), facts.shown(), facts.window())
             if self.session.replay is not None:
                 left = facts.replayed()

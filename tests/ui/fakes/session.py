@@ -108,11 +108,12 @@ class Session(session_module.Session):
             make_runner=self._make_runner,  # type: ignore[arg-type]
         )  # fmt: skip
         self.runs.coming = lambda: self.coming
+        self.runs.also_stops = self.acting.disarm
         self.doctor = Doctor()
         self.launcher = Launcher(ADDRESS, post, self.fleet.is_there, self.clock)
         self.images = Images(self.watch, self.clock)
         self.master = MasterState("none", ADDRESS)
-        self.alarms.path = None  # kept in memory alone
+        self.alarms.path = self.acting.path = None  # kept in memory alone
         self.ticks = 0
         self.runner: Runner | None = None
         """The program that runs, or ran last."""

@@ -292,18 +292,18 @@ def test_a_right_click_on_a_line_offers_what_its_topic_can(panel: GraphPanel, wi
     assert item.label is not None
     words = run_all(menu_at(panel, at(panel, item.label.center())))
     assert words == [
-        "Show its messages", "Show it in one more panel", "Plot a field of it", "New alarm",
-        "Record this topic", "Copy its name",
+        "Show its messages", "Show it in one more panel", "Plot a field of it", "Publish to it",
+        "New alarm", "Record this topic", "Copy its name",
     ]  # fmt: skip
     assert panel.canvas.choice == GraphChoice("topic", "/blackboard", key_of(panel, "blackboard"))
     assert (window.opened, window.beside, window.plotted) == (
         ["/blackboard"], ["/blackboard"], [("/blackboard", "")],
     )  # fmt: skip
-    assert window.commands == ["alarm.topic:/blackboard", "record.topic:/blackboard"]
+    about = ("publish.topic", "alarm.topic", "record.topic")
+    assert window.commands == [f"{command}:/blackboard" for command in about]
     assert QGuiApplication.clipboard().text() == "/blackboard"
-    assert [each.text() for each in panel.menu_of(GraphChoice("topic", "remember")).actions()] == [
-        "Copy its name"
-    ]
+    assert run_all(panel.menu_of(GraphChoice("topic", "remember"))) == ["Call it", "Copy its name"]
+    assert window.commands[-1] == "service.call:remember"
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
@@ -327,7 +327,8 @@ def test_a_line_of_several_topics_has_a_menu_for_each(qtbot, panel: GraphPanel, 
     part = menu.actions()[0].menu()
     assert isinstance(part, QMenu)
     run_all(part)
-    assert window.commands == ["alarm.topic:/touch&go", "record.topic:/touch&go"]
+    about = ("publish.topic", "alarm.topic", "record.topic")
+    assert window.commands == [f"{command}:/touch&go" for command in about]
 
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, 2.0**64, -1.0])

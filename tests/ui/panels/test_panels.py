@@ -21,6 +21,7 @@ from tests.ui.panel_case import Window, ticks
 from tests.ui.panels.test_behaviour import Editor
 
 BASES = {
+    "armed_strip",
     "base",
     "registry",
     "network_table",

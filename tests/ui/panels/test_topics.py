@@ -278,11 +278,12 @@ def test_a_right_click_on_a_topic_does_whatever_can_be_done_with_it(panel, windo
     assert menu is not None
     for action in menu.actions():
         action.trigger()
-    assert len({action.text() for action in menu.actions()}) == 6
+    assert len({action.text() for action in menu.actions()}) == 7
     assert window.opened == ["/blackboard"]
     assert window.beside == ["/blackboard"]
     assert window.plotted == [("/blackboard", "")]
-    assert window.commands == ["alarm.topic:/blackboard", "record.topic:/blackboard"]
+    about = ("publish.topic", "alarm.topic", "record.topic")
+    assert window.commands == [f"{command}:/blackboard" for command in about]
     assert QGuiApplication.clipboard().text() == "/blackboard"
 
 

@@ -35,7 +35,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 TIMES = 50
 PANELS = [
     "alarms", "alerts", "behaviour", "camera", "console", "doctor", "graph", "health", "image", "inspector",
-    "nodes", "plot", "problems", "robot", "robots", "sensors", "topics",
+    "nodes", "plot", "problems", "publish", "robot", "robots", "sensors", "services", "topics",
 ]  # fmt: skip
 COMMANDS = [
     "file.earlier", "settings.open", "palette.open", "layout.keep", "help.shortcuts", "help.about",

@@ -52,6 +52,7 @@ from app.ui.panels.row_actions import (
     copies,
     filled,
     node_actions,
+    service_actions,
     show_messages,
     topic_actions,
 )
@@ -378,7 +379,8 @@ class GraphPanel(PanelWidget):
 
     def _topic_actions(self, key: str) -> list[RowAction]:
         if self.session.topic(key) is None:
-            return [copies(self.context, split_key(key)[1])]  # a service
+            network, name = split_key(key)
+            return [copies(self.context, name)] if network else service_actions(self.context, name)
         return topic_actions(self.context, key)
 
     def _node_actions(self, node: DrawnNode | None) -> list[RowAction]:

@@ -385,6 +385,8 @@ class InspectorPanel(PanelWidget):
             what = f"alarm.value:{self._topic} {path_text(steps_of(self.model.node(index)))}"
             menu.addSeparator()
             menu.addAction(self.theme.icon("bell"), _("New alarm"), lambda: self.context.run(what))
+            publish = f"publish.topic:{self._topic}"
+            menu.addAction(self.theme.icon("send"), _("Publish to it"), lambda: self.context.run(publish))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.tree.viewport().mapToGlobal(at))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 
@@ -154,6 +155,23 @@ class StatusFacts:
             losses=losses if lost else _("none lost"),
         )
         return ("triangle-alert", words, "warn") if state.unkept else ("circle-dot", words, "recording")
+
+    def armed(self) -> Fact:
+        """That something may be sent by hand, for how long still, and what is sent now; nothing while not."""
+        acting = self._session.acting
+        if not acting.arming.is_on:
+            return NOTHING
+        left = length_words(math.ceil(acting.arming.left_s))
+        going = acting.outbox.all_repeated
+        if len(going) == 1:
+            words = _("Sending “{name}”, armed {time}").format(name=going[0].order.name, time=left)
+        elif going:
+            said = ngettext("Sending {count} message, armed {time}", "Sending {count} messages, armed {time}",
+                            len(going))  # fmt: skip
+            words = said.format(count=len(going), time=left)
+        else:
+            words = _("Armed {time}").format(time=left)
+        return "triangle-alert", words, "warn"
 
     def ring(self) -> Fact:
         """How much of the last seconds could be kept; nothing without a flight recorder."""

@@ -8,6 +8,7 @@ from app.core.session import Session
 from app.ui.shell.actions.actions import STOP, Actions
 from app.ui.shell.actions.command import UnknownCommandError
 from app.ui.shell.actions.shortcuts import Shortcuts
+from app.ui.shell.commands.acting import ActingCommands
 from app.ui.shell.commands.behaviours import BehaviourCommands, bring_into_view
 from app.ui.shell.commands.editing import EditCommands
 from app.ui.shell.commands.menus import MenuLists
@@ -57,6 +58,7 @@ class Commands:
             ReportCommands(shell, session, self.files, asks),
             self.recording,
             self.replay,
+            ActingCommands(shell),
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.why_not, keys)

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from app.core.session import Session
 from app.ui.shell.actions.command import ArgumentCommand, Command
+from app.ui.shell.commands.acting import ActingCommands
 from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPlace, read_stack
 from app.ui.shell.commands.editing import Edit, EditCommands
 from app.ui.shell.commands.freeze import freezable
@@ -54,6 +55,7 @@ class Handlers:
     reports: ReportCommands
     recording: RecordCommands
     replay: ReplayCommands
+    acting: ActingCommands
 
 
 # ---- why a command can't be done now: menus grey it, the palette says the sentence ------------------
@@ -318,6 +320,10 @@ COMMANDS: tuple[C, ...] = (
       icon="waypoints"),
     C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell", above=True,
       why_not=_no_panels),
+    C("publish.new", lazy("Publish a message"), lambda do: do.acting.publish(), icon="send",
+      tip=lazy("Begins a message; nothing is sent before you arm it")),
+    C("service.show", lazy("Call a service"), lambda do: do.acting.call(""), icon="spline",
+      tip=lazy("Shows what programs offer to be called")),
     C("recording.toggle", lazy("Start or stop recording"), lambda do: do.recording.toggle(), "View",
       ("Ctrl+R",), "circle-dot", lazy("Records what programs say, until it is stopped"), under=RECORD),
     C("recording.stop", lazy("Stop recording"), lambda do: do.session.recordings.stop(), icon="circle-dot",
@@ -363,6 +369,8 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     ),
     _about("alarm.node", str, lambda do, node: do.view.new_alarm(AlarmCondition("leaves", node))),
     _about("alarm.value", read_value, lambda do, about: do.view.alarm_on_value(about)),
+    _about("publish.topic", str, lambda do, topic: do.acting.publish(topic)),
+    _about("service.call", str, lambda do, service: do.acting.call(service)),
     _about("record.topic", str, lambda do, topic: do.recording.record_topic(topic)),
     _about("recording.open", Path, lambda do, path: do.replay.open(path)),
     _about("recording.folder", Path, lambda do, path: do.replay.show_folder(path)),

@@ -1,0 +1,407 @@
+"""What a person sends and calls by hand in this session: the shelf, the switch, what goes on.
+
+Everything goes to the live network. While a recording shows nothing can be armed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from app.blocks.runtime.publishing import moved_by
+from app.core.alerts import Alerts
+from app.core.console import Console
+from app.core.documents.background_worker import BackgroundWorker
+from app.core.network.source import Source
+from app.core.robots.fleet import Fleet
+from app.core.run.acting.arming import ARMED_S, Arming, Target
+from app.core.run.acting.calling import CallRecord, ServiceCalls
+from app.core.run.acting.json_text import read_json
+from app.core.run.acting.sending import Outbox, SendOrder, SendResult
+from app.core.run.acting.shelf import (
+    MOST_BYTES,
+    KeptMessage,
+    NewerShelfError,
+    Shelf,
+    new_message_id,
+    read_shelf,
+    shelf_text,
+)
+from app.core.run.acting.templates import is_plain, is_written
+from app.core.storage.atomic_file import read_whole, write_atomically
+from app.core.storage.settings import Settings
+from nep.errors import NepError
+from nep.i18n import _, listed, ngettext
+from nep.system.replace_file import replace_file
+
+if TYPE_CHECKING:
+    from app.robots.description.description import Robot
+
+FILE = "messages.json"
+
+
+class ActingSession(Protocol):
+    """What acting uses of the session that it belongs to."""
+
+    settings: Settings
+    alerts: Alerts
+    console: Console
+    source: Source
+    fleet: Fleet
+    sources_shown: int
+
+    @property
+    def is_replaying(self) -> bool:
+        """Whether a recording shows in place of the live network."""
+
+
+@dataclass(frozen=True, slots=True)
+class ArmQuestion:
+    """A topic moves these robots: a person is asked again before anything is sent there."""
+
+    topic: str
+    robots: tuple[str, ...]
+    go_on: Callable[[], object]
+
+    @property
+    def sentence(self) -> str:
+        """What would move."""
+        said = _("{topic} moves {robots}. See that nobody stands in the way; Stop is F12.")
+        return said.format(topic=self.topic, robots=listed(list(self.robots)))
+
+
+class SessionActing:
+    """Acting by hand. One thread uses it (the window's), but for `disarm`."""
+
+    def __init__(
+        self,
+        session: ActingSession,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        clock_s: Callable[[], float] = time.time,
+    ) -> None:
+        """Read what was kept beside the settings; without a ``path`` it is kept in memory alone."""
+        self._session, self._clock = session, clock
+        self.arming = Arming(clock)
+        submit = session.source.submit
+        self.outbox = Outbox(self.arming, submit, clock)
+        self.calls = ServiceCalls(self.arming, submit, clock, clock_s)
+        self.question: ArmQuestion | None = None
+        """What a person is to answer before a robot's topic is armed."""
+        self.last: dict[str, SendResult] = {}
+        """By message how it ended the last time; of those that are on the shelf."""
+        self.armed_s = ARMED_S
+        self.revision = 0
+        self._clock_s = clock_s
+        self.sent_at_s: dict[str, float] = {}
+        self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-shelf")
+        self._is_newer = False
+        self._source_seen = session.sources_shown
+        self.path: Path | None = session.settings.path.with_name(FILE)
+        self.shelf = self._read(self.path)
+        self._written = self.shelf.revision
+
+    # ---- the switch
+
+    def arm(self) -> str:
+        """Switch it on for `armed_s`; why it can't be, as a sentence."""
+        if self._session.is_replaying:
+            return _("A recording shows: go back to live to send.")
+        was_on = self.arming.is_on
+        self.arming.arm(self.armed_s)
+        self.revision += 1
+        if not was_on:
+            self._say("warn", _("armed for {count} min").format(count=round(self.armed_s / 60)))
+        return ""
+
+    def disarm(self) -> None:
+        """Switch it off, and end all sending; from when this returns on nothing is sent."""
+        was_on = self.arming.disarm()
+        self.question = None
+        self.outbox.end_all()
+        if was_on:
+            self.revision += 1
+            self._say("info", _("no longer armed"))
+
+    def allow(
+        self, target: Target, then: Callable[[], object] | None = None, *, is_sure: bool = False
+    ) -> str:
+        """Let something be sent there, and do ``then``; why it can't be, as a sentence.
+
+        A topic that moves robots is asked for again: then `question` stands, unless the person ``is_sure``.
+        """
+        moved = self._moved(target)
+        if moved and not is_sure and not self.arming.is_confirmed(target.name):
+            names = tuple(robot.name for robot in moved)
+            self.question = ArmQuestion(
+                target.name, names, partial(self._allow_surely, target, self.arming.turn, then)
+            )
+            self.revision += 1
+            return ""
+        if not self.arming.allow(target, is_confirmed=is_sure):
+            return _("Not armed, or too many names are: take one away first.")
+        self.revision += 1
+        if then is not None:
+            then()
+        return ""
+
+    def _allow_surely(self, target: Target, turn: int, then: Callable[[], object] | None) -> None:
+        if turn == self.arming.turn:
+            self.allow(target, then, is_sure=True)
+
+    def answer(self, *, let: bool) -> None:
+        """The person has answered the `question`."""
+        question, self.question = self.question, None
+        self.revision += 1
+        if question is not None and let:
+            question.go_on()
+
+    def forbid(self, target: Target) -> None:
+        """Send nothing there any more."""
+        self.arming.forbid(target)
+        for each in self.outbox.all_repeated:
+            if each.order.target == target:
+                self.outbox.end(each.order.id)
+        self.revision += 1
+
+    def _moved(self, target: Target) -> list[Robot]:
+        if target.kind != "topic":
+            return []
+        robots = [link.robot for link in self._session.fleet.connected]
+        names = set(moved_by(target.name, robots))
+        return [robot for robot in robots if robot.name in names]
+
+    # ---- messages
+
+    def new_message(self, topic: str, msg_type: str, text: str) -> KeptMessage | None:
+        """Keep a new message; None when the shelf is full."""
+        name = self.shelf.free_name(topic.rpartition("/")[2] or _("Message"))
+        made = KeptMessage(new_message_id(), name, topic, msg_type or "json", text)
+        return made if self.shelf.put(made) else None
+
+    def problem_of(self, message: KeptMessage) -> str:
+        """Why a message can't be sent, as a sentence; empty when it can, once it is armed."""
+        if not message.topic.strip():
+            return _("Choose a topic first.")
+        if not is_written(message.msg_type):
+            said = _("Messages of the type {type} can't be written by hand.")
+            return said.format(type=message.msg_type)
+        if is_plain(message.msg_type):
+            return ""
+        read = read_json(message.text)
+        if read.fault is not None:
+            return read.fault.sentence
+        typed = {name for name, value in message.values if value.strip()}
+        missing = [name for name in read.to_fill if name not in typed]
+        return _("Fill in “{name}” first.").format(name=missing[0]) if missing else ""
+
+    def send(self, message: KeptMessage, *, rate_hz: float = 0.0) -> str:
+        """Send it once, or again and again at a rate; why it can't be, as a sentence.
+
+        While it is not armed it is armed first, with this topic alone; a robot's topic is asked for again.
+        """
+        problem = self.problem_of(message)
+        if problem:
+            return problem
+        go_on = partial(self.send, message, rate_hz=rate_hz)
+        target = Target("topic", message.topic)
+        not_armed = self._ready(target, go_on)
+        if not_armed is not None:
+            return not_armed
+        order = SendOrder(message.id, message.name, message.topic, message.msg_type, message.payload)
+        if not rate_hz:
+            self.outbox.send(order)
+        elif not self.outbox.begin(order, rate_hz):
+            return _("So many messages are sent again and again that no more can be; end one first.")
+        self.revision += 1
+        return ""
+
+    def _ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
+        """None when something may be sent there now; else why not, or "" when a person is asked."""
+        if not self.arming.is_on:
+            why_not = self.arm()
+            if why_not:
+                return why_not
+        moved = self._moved(target)
+        if not self.arming.allows(target) or (moved and not self.arming.is_confirmed(target.name)):
+            return self.allow(target, go_on)
+        turn = self.arming.turn
+
+        def still() -> None:
+            if turn == self.arming.turn:
+                go_on()
+
+        wanted = [(robot, [action.name for action in robot.actions]) for robot in moved]
+        return None if self._session.fleet.permission.permits(wanted, still) else ""
+
+    def end(self, message_id: str) -> None:
+        """Send it no longer."""
+        self.outbox.end(message_id)
+        self.revision += 1
+
+    # ---- services
+
+    def call(self, service: str, text: str, timeout_s: float) -> str:
+        """Call a service with this JSON, armed first if need be; why it can't be, as a sentence."""
+        try:
+            request = read_json(text).filled({})
+        except NepError as error:
+            return str(error)
+        not_armed = self._ready(Target("service", service), partial(self.call, service, text, timeout_s))
+        if not_armed is not None:
+            return not_armed
+        try:
+            self.calls.call(service, request, text, timeout_s)
+        except NepError as error:
+            return str(error)
+        self.shelf.remember(service, text)
+        self.revision += 1
+        return ""
+
+    # ---- what the session does
+
+    def tick(self) -> None:
+        """Take over what has happened; the switch goes off when its time is over or another source shows."""
+        if self._session.sources_shown != self._source_seen:
+            self._source_seen = self._session.sources_shown
+            self.disarm()
+        if self.arming.is_over:
+            self.disarm()
+        for each in self.outbox.all_repeated:  # a robot may have come that this topic moves
+            target = each.order.target
+            if self._moved(target) and not self.arming.is_confirmed(target.name):
+                self.outbox.end(each.order.id)
+                self.allow(target)
+        for result in self.outbox.take():
+            self._take(result)
+        for record in self.calls.tick():
+            self.revision += 1
+            level = "info" if record.state == "answered" else "warn"
+            self._say(level, f"{record.service}: {call_words(record)}")
+
+    def _take(self, result: SendResult) -> None:
+        order = result.order
+        if self.shelf.get(order.id) is not None:
+            self.last[order.id] = result
+            self.sent_at_s[order.id] = self._clock_s()
+        for known in (self.last, self.sent_at_s):
+            for gone in [id for id in known if self.shelf.get(id) is None]:
+                del known[gone]
+        self.revision += 1
+        level = "warn" if result.kind == "failed" else "info"
+        self._say(level, f"{order.topic}: {order.name}, {result_words(result)}")
+
+    def _say(self, level: str, words: str) -> None:
+        self._session.console.add(level, "studio", words)
+
+    def check(self) -> None:
+        """Once a second: what changed is kept."""
+        self._write()
+        try:
+            if self._worker.take(FILE):
+                self._session.alerts.resolve("messages:kept")
+        except OSError as error:
+            self._written = -1  # tried again in a second
+            said = _("They stay until Studio ends: {reason}.").format(reason=error.strerror or error)
+            title = _("The kept messages can't be saved.")
+            self._session.alerts.put("messages:kept", "warn", title, said, count=0)
+
+    def close(self) -> None:
+        """Send nothing any more, and keep what is not kept yet."""
+        self.disarm()
+        self.outbox.close()
+        self.calls.close()
+        self._write()
+        self._worker.finish(FILE)
+        self._worker.close()
+
+    # ---- its file
+
+    def _write(self) -> None:
+        path, revision = self.path, self.shelf.revision
+        if path is None or self._is_newer or revision == self._written:
+            return
+        self._written = revision
+        kept = Shelf(self.shelf.messages, self.shelf.requests)
+
+        def write() -> bool:
+            write_atomically(path, shelf_text(kept), durable=False, private=True)
+            return True
+
+        self._worker.ask(FILE, write)
+
+    def _read(self, path: Path) -> Shelf:
+        """What was kept; what is damaged is put aside, and said."""
+        try:
+            data = read_whole(path, MOST_BYTES)
+        except (FileNotFoundError, NotADirectoryError):
+            return Shelf()
+        except OSError as error:
+            self._damaged(path, error.strerror or str(error))
+            return Shelf()
+        try:
+            shelf, unread = read_shelf(data)
+        except NepError as error:
+            self._is_newer = isinstance(error, NewerShelfError)
+            self._damaged(path, str(error))
+            return Shelf()
+        if unread:
+            said = ngettext("{count} message could not be read", "{count} messages could not be read", unread)
+            self._damaged(path, said.format(count=unread), data)
+        return shelf
+
+    def _damaged(self, path: Path, reason: str, data: bytes | None = None) -> None:
+        """Keep the file beside, and say so; ``data`` is it, where the rest of it is used."""
+        beside = path.with_name("messages.damaged.json")
+        said = _("The file is left as it is, and what you change is not kept: {reason}.")
+        if not self._is_newer:
+            said = _("The file is kept as “{file}”: {reason}.")
+            with suppress(OSError):
+                if data is None:
+                    replace_file(path, beside)
+                else:
+                    write_atomically(beside, data, durable=False, private=True)
+        title = _("Kept messages could not be read.")
+        self._session.alerts.put("messages:file", "warn", title, said.format(file=beside.name, reason=reason))
+
+
+def result_words(result: SendResult) -> str:
+    """How it ended, in a few words: "heard by 2", "412 sent, 3 left out, being late"."""
+    if result.kind == "sent":
+        return heard_words(result.heard)
+    if result.kind == "began":
+        return _("began")
+    words = ngettext("{count} sent", "{count} sent", result.count).format(count=result.count)
+    if result.skipped:
+        left_out = ngettext("{count} left out, being late", "{count} left out, being late", result.skipped)
+        words = f"{words}, {left_out.format(count=result.skipped)}"
+    parts = (words if result.count else "", result.sentence)
+    return ", ".join(filter(None, parts)) or words
+
+
+def heard_words(count: int) -> str:
+    """How many hear it: "heard by 2", "nobody hears it"."""
+    return (
+        ngettext("heard by {count}", "heard by {count}", count).format(count=count)
+        if count
+        else _("nobody hears it")
+    )
+
+
+def call_words(record: CallRecord) -> str:
+    """How a call ended: "answered in 412 ms", "no answer in 2 s"."""
+    if record.state == "answered":
+        return _("answered in {time}").format(time=time_words(record.took_s))
+    return record.sentence
+
+
+def time_words(seconds: float) -> str:
+    """A time that is measured: "412 ms", "1.42 s"."""
+    if seconds < 1:
+        return _("{count} ms").format(count=max(1, round(seconds * 1000)))
+    return _("{count} s").format(count=f"{seconds:.2f}")

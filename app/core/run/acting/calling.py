@@ -1,0 +1,251 @@
+"""Calls of services by hand, one at a time: each with its answer and its time, or why there is none."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import CancelledError, Future
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from app.core.faults import error_words
+from app.core.network.source import Job
+from app.core.run.acting.arming import Arming, Target
+from app.core.run.acting.json_text import pretty
+from nep.errors import NepError, NoServerError, ServiceError, WaitTimeoutError
+from nep.i18n import _, number
+from nep.nodes.node import Node
+from nep.patterns.services.client import Client
+
+TIMEOUT_S = 2.0
+LEAST_S, MOST_S = 0.1, 120.0
+HISTORY_KEPT = 200
+ANSWERS_KEPT = 20
+"""Of so many calls the answers are kept, too; of the others that there was one, and when."""
+ANSWER_LETTERS = 1_000_000
+MOST_CLIENTS = 20
+
+State = Literal["waiting", "answered", "failed", "given up"]
+
+
+@dataclass(frozen=True, slots=True)
+class CallRecord:
+    """One call. ``at_s`` is when it began (epoch seconds), ``took_s`` how long until it ended.
+
+    ``sentence`` says why there is no answer. ``answer`` is the value and ``text`` the same as JSON, of which
+    ``is_cut`` tells whether it goes on; both are forgotten when newer calls have theirs (``is_kept``).
+    """
+
+    number: int
+    service: str
+    request: str
+    at_s: float
+    timeout_s: float
+    state: State = "waiting"
+    took_s: float = 0.0
+    sentence: str = ""
+    answer: object = None
+    text: str = ""
+    is_cut: bool = False
+    is_kept: bool = True
+
+
+@dataclass(slots=True, eq=False)
+class _UnderWay:
+    """The call that is waited for; ``end`` may be called by any thread, once it counts."""
+
+    number: int
+    turn: int
+    asked_s: float
+    future: Future[object] | None = None
+    is_over: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Ended:
+    number: int
+    state: State
+    took_s: float
+    sentence: str = ""
+    answer: object = None
+    text: str = ""
+    is_cut: bool = False
+
+
+class ServiceCalls:
+    """Calls while the switch is on, one at a time. One thread uses it (the window's)."""
+
+    def __init__(
+        self,
+        arming: Arming,
+        submit: Callable[[str, Job], None],
+        clock: Callable[[], float] = time.monotonic,
+        clock_s: Callable[[], float] = time.time,
+    ) -> None:
+        """``submit`` gives Studio's node to a job (`app.core.network.source.Source.submit`)."""
+        self._arming, self._submit, self._clock, self._clock_s = arming, submit, clock, clock_s
+        self._numbers = itertools.count(1)
+        self._records: deque[CallRecord] = deque(maxlen=HISTORY_KEPT)
+        self._lock = threading.Lock()
+        self._ended: deque[_Ended] = deque(maxlen=HISTORY_KEPT)
+        self._now: _UnderWay | None = None
+        self._clients: dict[str, Client] = {}
+        self.revision = 0
+
+    @property
+    def records(self) -> Sequence[CallRecord]:
+        """All that are remembered, oldest first."""
+        return self._records
+
+    @property
+    def waiting(self) -> CallRecord | None:
+        """The call whose answer is waited for."""
+        last = self._records[-1] if self._records else None
+        return last if last is not None and last.state == "waiting" else None
+
+    @property
+    def waited_s(self) -> float:
+        """How long already."""
+        return self._clock() - self._now.asked_s if self._now is not None else 0.0
+
+    def call(self, service: str, request: object, words: str, timeout_s: float) -> CallRecord:
+        """Call it; ``words`` are the request as it is shown. Raises `NepError` while one is waited for."""
+        if self.waiting is not None:
+            raise NepError(_("Wait for the answer of {service} first.").format(service=self.waiting.service))
+        timeout_s = min(MOST_S, max(LEAST_S, timeout_s))
+        record = CallRecord(next(self._numbers), service, words, self._clock_s(), timeout_s)
+        now = _UnderWay(record.number, self._arming.turn, self._clock())
+        self._now = now
+        self._put(record)
+        self._submit("", lambda node: self._begin(node, now, record, request))
+        return record
+
+    def give_up(self) -> None:
+        """Wait no longer for the answer; it may still be carried out."""
+        self._end_now("given up", _("given up; it may still be carried out"))
+
+    def tick(self) -> list[CallRecord]:
+        """Take over how calls have ended; those that did."""
+        done = []
+        while self._ended:
+            ended = self._ended.popleft()
+            place = next((i for i, each in enumerate(self._records) if each.number == ended.number), None)
+            if place is None or self._records[place].state != "waiting":
+                continue
+            done.append(self._take(place, ended))
+        waiting, now = self.waiting, self._now
+        has_begun = now is None or now.future is not None  # then its client counts the time
+        if waiting is not None and not has_begun and self.waited_s > waiting.timeout_s:
+            said = _("no master was there within {time} s").format(time=number(waiting.timeout_s))
+            self._end_now("failed", said)
+            done.append(self._records[-1])
+        return done
+
+    def clear(self) -> None:
+        """Forget what was called, but for what is waited for."""
+        waiting = self.waiting
+        self._records.clear()
+        if waiting is not None:
+            self._records.append(waiting)
+        self.revision += 1
+
+    def close(self) -> None:
+        """Wait for nothing any more; its node closes the clients."""
+        self._end_now("given up", _("given up; it may still be carried out"))
+        self._clients.clear()
+
+    # ---- inside
+
+    def _put(self, record: CallRecord) -> None:
+        self._records.append(record)
+        for place in range(len(self._records) - ANSWERS_KEPT):
+            if self._records[place].is_kept:
+                self._records[place] = replace(self._records[place], answer=None, text="", is_kept=False)
+        self.revision += 1
+
+    def _take(self, place: int, ended: _Ended) -> CallRecord:
+        made = replace(
+            self._records[place],
+            state=ended.state,
+            took_s=ended.took_s,
+            sentence=ended.sentence,
+            answer=ended.answer,
+            text=ended.text,
+            is_cut=ended.is_cut,
+        )
+        self._records[place] = made
+        self._now = None
+        self.revision += 1
+        return made
+
+    def _end_now(self, state: State, sentence: str) -> None:
+        now, waiting = self._now, self.waiting
+        if now is None or waiting is None:
+            return
+        with self._lock:
+            now.is_over = True
+            future = now.future
+        if future is not None:
+            future.cancel()
+        self._take(len(self._records) - 1, _Ended(now.number, state, self.waited_s, sentence))
+
+    def _begin(self, node: Node, now: _UnderWay, record: CallRecord, request: object) -> None:
+        """In the thread of the network."""
+        began_s = time.monotonic()
+        try:
+            client = self._client(node, record.service)
+            target = Target("service", record.service)
+
+            def call_it() -> None:
+                with self._lock:
+                    if now.is_over:
+                        return
+                    now.future = client.call_async(request, record.timeout_s)
+
+            if not self._arming.if_armed(now.turn, target, call_it):
+                raise NepError(_("not called: it was no longer armed"))
+        except Exception as error:  # noqa: BLE001 - whatever it is, it belongs to this call
+            said = str(error) if isinstance(error, NepError) else error_words(error)
+            self._ended.append(_Ended(record.number, "failed", 0.0, said))
+            return
+        if now.future is not None:
+            now.future.add_done_callback(lambda future: self._answered(record, began_s, future))
+
+    def _client(self, node: Node, service: str) -> Client:
+        known = self._clients.get(service)
+        if known is None or known.is_closed:
+            if len(self._clients) >= MOST_CLIENTS:
+                self._clients.pop(next(iter(self._clients))).close()
+            known = self._clients[service] = node.new_client(service)
+        return known
+
+    def _answered(self, record: CallRecord, began_s: float, future: Future[object]) -> None:
+        """In the client's own thread."""
+        took_s = time.monotonic() - began_s
+        try:
+            answer = future.result()
+            text = pretty(answer)
+        except CancelledError:
+            return
+        except Exception as error:  # noqa: BLE001 - what the server's callback raised may be anything
+            self._ended.append(_Ended(record.number, "failed", took_s, reason_of(error, record.timeout_s)))
+            return
+        is_cut = len(text) > ANSWER_LETTERS
+        kept = None if is_cut else answer
+        self._ended.append(
+            _Ended(record.number, "answered", took_s, answer=kept, text=text[:ANSWER_LETTERS], is_cut=is_cut)
+        )
+
+
+def reason_of(error: Exception, timeout_s: float) -> str:
+    """Why there is no answer, in a few words: "no answer in 2 s", "refused: no face in sight"."""
+    if isinstance(error, NoServerError):
+        return _("nobody serves it")
+    if isinstance(error, WaitTimeoutError):
+        return _("no answer in {time} s").format(time=number(timeout_s))
+    if isinstance(error, ServiceError):
+        return _("refused: {reason}").format(reason=error.reason)
+    return str(error) if isinstance(error, NepError) else error_words(error)

@@ -1,0 +1,296 @@
+"""Messages on their way: once, or again and again at even distances, never in a burst.
+
+Publishers are made in the thread of the network; what is sent again and again has one thread for all of it.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from app.core.faults import error_words
+from app.core.network.source import Job
+from app.core.run.acting.arming import Arming, Target
+from nep.errors import NepError
+from nep.i18n import _
+from nep.messages.codecs import codec_for
+from nep.nodes.node import Node
+from nep.nodes.publisher import Publisher
+
+LEAST_HZ, MOST_HZ = 0.1, 50.0
+LATE_S = 10.0
+"""What waited for a master for longer is not sent any more."""
+MOST_AT_ONCE = 10
+"""So many are sent again and again at the same time."""
+MOST_KEPT = 20
+RESULTS_KEPT = 200
+
+
+@dataclass(frozen=True, slots=True)
+class SendOrder:
+    """What is to be sent: ``make`` gives the message, each time anew, and raises `NepError` when it can't."""
+
+    id: str
+    name: str
+    topic: str
+    msg_type: str
+    make: Callable[[], object]
+
+    @property
+    def target(self) -> Target:
+        """Where it is sent to."""
+        return Target("topic", self.topic)
+
+
+@dataclass(frozen=True, slots=True)
+class SendResult:
+    """How it ended: ``kind`` is "sent", "began", "ended" or "failed"; ``heard`` programs listen.
+
+    ``count`` messages were sent at a rate, ``skipped`` were left out because their time had gone by.
+    """
+
+    order: SendOrder
+    kind: str
+    sentence: str = ""
+    heard: int = 0
+    count: int = 0
+    skipped: int = 0
+
+
+@dataclass(slots=True, eq=False)
+class Repeated:
+    """What is sent again and again; only its thread changes it."""
+
+    order: SendOrder
+    rate_hz: float
+    turn: int
+    publisher: Publisher
+    due_s: float
+    count: int = 0
+    skipped: int = 0
+    heard: int = 0
+    since_s: float = 0.0
+    is_over: threading.Event = field(default_factory=threading.Event)
+
+    @property
+    def rate_now_hz(self) -> float:
+        """Messages a second since it began, as they were sent; 0 before there are two."""
+        passed_s = time.monotonic() - self.since_s
+        return (self.count - 1) / passed_s if self.count > 1 and passed_s > 0 else 0.0
+
+
+class Outbox:
+    """Sends while the switch is on. One thread uses it (the window's); `take` gives what has happened."""
+
+    def __init__(
+        self,
+        arming: Arming,
+        submit: Callable[[str, Job], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``submit`` gives Studio's node to a job (`app.core.network.source.Source.submit`)."""
+        self._arming, self._submit, self._clock = arming, submit, clock
+        self._changed = threading.Condition()
+        self._publishers: dict[tuple[str, str], Publisher] = {}
+        self._repeated: dict[str, Repeated] = {}
+        self._begun: dict[str, object] = {}
+        self._results: deque[SendResult] = deque(maxlen=RESULTS_KEPT)
+        self._thread: threading.Thread | None = None
+        self._is_closed = False
+
+    def take(self) -> list[SendResult]:
+        """What has happened since the last time."""
+        taken = []
+        while self._results:
+            taken.append(self._results.popleft())
+        return taken
+
+    def repeated(self, order_id: str) -> Repeated | None:
+        """How a message that is sent again and again goes on."""
+        with self._changed:
+            return self._repeated.get(order_id)
+
+    @property
+    def all_repeated(self) -> tuple[Repeated, ...]:
+        """All that are sent again and again."""
+        with self._changed:
+            return tuple(self._repeated.values())
+
+    def is_going(self, order_id: str) -> bool:
+        """Whether it is sent again and again, or is about to be."""
+        with self._changed:
+            return order_id in self._repeated or order_id in self._begun
+
+    # ---- what a person asks
+
+    def send(self, order: SendOrder) -> None:
+        """Send it once."""
+        turn, asked_s = self._arming.turn, self._clock()
+
+        def send_it(node: Node) -> None:
+            publisher = self._publisher(node, order)
+            made = codec_for(order.msg_type).encode(order.make())
+            if self._arming.if_armed(turn, order.target, lambda: publisher.publish(made)):
+                self._tell(SendResult(order, "sent", heard=publisher.subscribers))
+            else:
+                self._tell(SendResult(order, "failed", _("not sent: it was no longer armed")))
+
+        self._submit("", self._guarded(order, asked_s, send_it))
+
+    def begin(self, order: SendOrder, rate_hz: float) -> bool:
+        """Send it again and again from now on; False when too much goes on."""
+        rate_hz = min(MOST_HZ, max(LEAST_HZ, rate_hz))
+        turn, asked_s, token = self._arming.turn, self._clock(), object()
+        with self._changed:
+            if len(self._repeated.keys() | self._begun.keys() | {order.id}) > MOST_AT_ONCE:
+                return False
+            self._begun[order.id] = token
+
+        def begin_it(node: Node) -> None:
+            codec_for(order.msg_type).encode(order.make())  # what can't be sent is said before anything is
+            publisher = self._publisher(node, order)
+            now = time.monotonic()
+            made = Repeated(order, rate_hz, turn, publisher, now, since_s=now)
+            with self._changed:
+                if self._begun.get(order.id) is not token:
+                    return  # a person ended it meanwhile
+                self._repeated[order.id] = made
+                if self._thread is None and not self._is_closed:
+                    self._thread = threading.Thread(target=self._run, name="studio-sending", daemon=True)
+                    self._thread.start()
+                self._changed.notify_all()
+            self._tell(SendResult(order, "began"))
+
+        def begin_then(node: Node) -> None:
+            try:
+                begin_it(node)
+            finally:
+                with self._changed:
+                    if self._begun.get(order.id) is token:
+                        del self._begun[order.id]
+
+        self._submit("", self._guarded(order, asked_s, begin_then))
+        return True
+
+    def end(self, order_id: str) -> None:
+        """Send it no more."""
+        with self._changed:
+            self._begun.pop(order_id, None)
+            ended = self._repeated.pop(order_id, None)
+            self._changed.notify_all()
+        if ended is not None:
+            self._tell_end(ended)
+
+    def end_all(self) -> None:
+        """Send nothing any more, and publish those topics no longer."""
+        with self._changed:
+            self._begun.clear()
+            ids = list(self._repeated)
+        for each in ids:
+            self.end(each)
+        if self._publishers and not self._is_closed:
+            self._submit("", lambda _node: self._leave())
+
+    def close(self) -> None:
+        """End everything; waits for its thread, which does not wait for others."""
+        self.end_all()
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+        if self._thread is not None:
+            self._thread.join(2.0)
+
+    # ---- in the thread of the network
+
+    def _guarded(self, order: SendOrder, asked_s: float, job: Job) -> Job:
+        """The job; what it raises is told as the result."""
+
+        def run(node: Node) -> None:
+            try:
+                if self._clock() - asked_s > LATE_S:
+                    raise NepError(_("not sent: no master was there"))
+                job(node)
+            except NepError as error:
+                self._tell(SendResult(order, "failed", str(error)))
+            except Exception as error:  # noqa: BLE001 - whatever it is, it belongs to this message
+                self._tell(SendResult(order, "failed", error_words(error)))
+
+        return run
+
+    def _publisher(self, node: Node, order: SendOrder) -> Publisher:
+        key = (order.topic, order.msg_type)
+        with self._changed:
+            used = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
+        known = self._publishers.get(key)
+        if known is None or known.is_closed:
+            unused = [each for each in self._publishers if each not in used]
+            if len(self._publishers) >= MOST_KEPT and unused:
+                self._publishers.pop(unused[0]).close()
+            known = self._publishers[key] = node.new_pub(order.topic, order.msg_type)
+        return known
+
+    def _leave(self) -> None:
+        with self._changed:
+            used = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
+        if self._arming.is_on:
+            return  # it was armed again meanwhile
+        for key in [each for each in self._publishers if each not in used]:
+            self._publishers.pop(key).close()
+
+    def _tell(self, result: SendResult) -> None:
+        self._results.append(result)
+
+    def _tell_end(self, ended: Repeated, sentence: str = "") -> None:
+        if not ended.is_over.is_set():
+            ended.is_over.set()
+            kind = "failed" if sentence else "ended"
+            self._tell(SendResult(ended.order, kind, sentence, ended.heard, ended.count, ended.skipped))
+
+    # ---- the thread of what is sent again and again
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                if self._is_closed:
+                    return
+                now = time.monotonic()
+                due = [each for each in self._repeated.values() if each.due_s <= now]
+                if not due:
+                    next_s = min((each.due_s for each in self._repeated.values()), default=None)
+                    self._changed.wait(None if next_s is None else max(0.0, next_s - now))
+                    continue
+            for each in due:
+                self._repeat(each)
+
+    def _repeat(self, each: Repeated) -> None:
+        problem = ""
+        try:
+            made = codec_for(each.order.msg_type).encode(each.order.make())
+            is_done = self._arming.if_armed(each.turn, each.order.target, lambda: self._publish(each, made))
+        except Exception as error:  # noqa: BLE001 - the others go on
+            is_done, problem = False, str(error) if isinstance(error, NepError) else error_words(error)
+        if is_done:
+            each.heard = each.publisher.subscribers
+            each.skipped += self._next(each)
+            return
+        with self._changed:
+            if self._repeated.get(each.order.id) is each:
+                del self._repeated[each.order.id]
+        self._tell_end(each, problem)
+
+    def _publish(self, each: Repeated, made: object) -> None:
+        with self._changed:  # what a person ended is not sent once more
+            if self._repeated.get(each.order.id) is each:
+                each.publisher.publish(made)
+                each.count += 1
+
+    @staticmethod
+    def _next(each: Repeated) -> int:
+        """When the next one is due; how many are left out because their time has gone by."""
+        period_s = 1 / each.rate_hz
+        late = max(0, int((time.monotonic() - each.due_s) / period_s))
+        each.due_s += (1 + late) * period_s
+        return late

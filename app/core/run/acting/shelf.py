@@ -1,0 +1,218 @@
+"""The shelf: messages that a person keeps to send them again, in one file beside the settings."""
+
+from __future__ import annotations
+
+import json
+import math
+import secrets
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from app.core.run.acting.json_text import MOST_LETTERS, read_json, value_typed
+from app.core.run.acting.sending import LEAST_HZ, MOST_HZ
+from app.core.run.acting.templates import is_plain
+from nep.errors import NepError
+from nep.i18n import _
+
+FORMAT = 1
+MOST_MESSAGES = 200
+MOST_REQUESTS = 100
+MOST_VALUES = 50
+NAME_LETTERS = 80
+VALUE_LETTERS = 2000
+MOST_BYTES = 64 * 2**20
+"""What is larger is no shelf, and is not read."""
+
+
+class NewerShelfError(NepError):
+    """The file is of a newer Studio."""
+
+
+def new_message_id() -> str:
+    """An id that no other message has."""
+    return secrets.token_hex(4)
+
+
+@dataclass(frozen=True, slots=True)
+class KeptMessage:
+    """A message with a name. ``values`` are what a person typed for its places, by their names."""
+
+    id: str
+    name: str
+    topic: str
+    msg_type: str = "json"
+    text: str = "{}"
+    values: tuple[tuple[str, str], ...] = ()
+    rate_hz: float = 1.0
+
+    def payload(self) -> object:
+        """The message, made anew: ids and times that fill themselves. Raises `NepError` with a sentence."""
+        if is_plain(self.msg_type):
+            return self.text
+        typed = {name: value_typed(value) for name, value in self.values if value.strip()}
+        return read_json(self.text).filled(typed)
+
+    def with_value(self, name: str, value: str) -> KeptMessage:
+        """The same with another value in a place."""
+        others = {**dict(self.values), name: value[:VALUE_LETTERS]}
+        return replace(self, values=tuple(others.items())[-MOST_VALUES:])
+
+
+class Shelf:
+    """Messages in the order in which they were kept, and the last request of each service. Bounded."""
+
+    def __init__(
+        self, messages: Iterable[KeptMessage] = (), requests: Mapping[str, str] | None = None
+    ) -> None:
+        self._messages = list(messages)[:MOST_MESSAGES]
+        self._requests = dict(list((requests or {}).items())[-MOST_REQUESTS:])
+        self._removed: tuple[KeptMessage, int] | None = None
+        self.revision = 0
+
+    @property
+    def messages(self) -> tuple[KeptMessage, ...]:
+        """All of them."""
+        return tuple(self._messages)
+
+    @property
+    def requests(self) -> Mapping[str, str]:
+        """By service what was asked last, as JSON."""
+        return self._requests
+
+    def get(self, id: str) -> KeptMessage | None:
+        """The message of that id."""
+        return next((each for each in self._messages if each.id == id), None)
+
+    def put(self, message: KeptMessage) -> bool:
+        """Keep it, or change the one of this id; False when the shelf is full."""
+        place = self._place(message.id)
+        if place is None:
+            if len(self._messages) >= MOST_MESSAGES:
+                return False
+            self._messages.append(message)
+        elif self._messages[place] == message:
+            return True
+        else:
+            self._messages[place] = message
+        self.revision += 1
+        return True
+
+    def copy(self, id: str) -> KeptMessage | None:
+        """One more like it, right below; None when there is no such message, or no room."""
+        place = self._place(id)
+        if place is None or len(self._messages) >= MOST_MESSAGES:
+            return None
+        old = self._messages[place]
+        made = replace(old, id=new_message_id(), name=self.free_name(old.name))
+        self._messages.insert(place + 1, made)
+        self.revision += 1
+        return made
+
+    def free_name(self, wanted: str) -> str:
+        """The name, with a number where another message has it: "Stand still 2"."""
+        taken = {each.name for each in self._messages}
+        number, name = 2, wanted[:NAME_LETTERS]
+        while name in taken:
+            name = f"{wanted[: NAME_LETTERS - 5]} {number}"
+            number += 1
+        return name
+
+    def remove(self, id: str) -> KeptMessage | None:
+        """Take it away; `put_back` is its undo."""
+        place = self._place(id)
+        if place is None:
+            return None
+        removed = self._messages.pop(place)
+        self._removed = (removed, place)
+        self.revision += 1
+        return removed
+
+    def put_back(self) -> KeptMessage | None:
+        """Put what was removed last in its place again."""
+        if self._removed is None or len(self._messages) >= MOST_MESSAGES:
+            return None
+        (message, place), self._removed = self._removed, None
+        self._messages.insert(place, message)
+        self.revision += 1
+        return message
+
+    def remember(self, service: str, request: str) -> None:
+        """This was asked of a service."""
+        if self._requests.get(service) != request and len(request) <= MOST_LETTERS:
+            self._requests.pop(service, None)
+            self._requests[service] = request
+            while len(self._requests) > MOST_REQUESTS:
+                self._requests.pop(next(iter(self._requests)))
+            self.revision += 1
+
+    def _place(self, id: str) -> int | None:
+        return next((place for place, each in enumerate(self._messages) if each.id == id), None)
+
+
+# ---- its file
+
+
+def shelf_text(shelf: Shelf) -> bytes:
+    """The bytes of a file with these."""
+    value = {
+        "format": FORMAT,
+        "messages": [
+            {
+                "id": each.id,
+                "name": each.name,
+                "topic": each.topic,
+                "type": each.msg_type,
+                "text": each.text,
+                "values": dict(each.values),
+                "rate_hz": each.rate_hz,
+            }
+            for each in shelf.messages
+        ],
+        "requests": dict(shelf.requests),
+    }
+    return (json.dumps(value, indent=1, ensure_ascii=False) + "\n").encode("utf-8", "backslashreplace")
+
+
+def read_shelf(data: bytes) -> tuple[Shelf, int]:
+    """The shelf in the bytes of a file, and how many messages could not be read.
+
+    Raises `NewerShelfError`, and `NepError` for what is no shelf at all.
+    """
+    try:
+        value = json.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise NepError(_("it is no JSON")) from error
+    listed = value.get("messages") if isinstance(value, dict) else None
+    if not isinstance(value, dict) or not isinstance(listed, list):
+        raise NepError(_("it has no list of messages"))
+    if isinstance(number := value.get("format"), int) and number > FORMAT:
+        raise NewerShelfError(_("it was kept by a newer Studio"))
+    made = [_message(each) for each in listed[:MOST_MESSAGES]]
+    good = {each.id: each for each in made if each is not None}
+    requests = value.get("requests")
+    asked = {
+        name: text
+        for name, text in (requests.items() if isinstance(requests, dict) else ())
+        if isinstance(text, str) and len(text) <= MOST_LETTERS
+    }
+    return Shelf(good.values(), asked), len(listed) - len(good)
+
+
+def _message(told: object) -> KeptMessage | None:
+    if not isinstance(told, dict):
+        return None
+    id, name, topic, kind, text = (told.get(key) for key in ("id", "name", "topic", "type", "text"))
+    if not (isinstance(id, str) and id and isinstance(name, str) and isinstance(topic, str)):
+        return None
+    if not (isinstance(kind, str) and isinstance(text, str)) or len(text) > MOST_LETTERS + 1:
+        return None
+    values, rate_hz = told.get("values"), told.get("rate_hz")
+    typed = tuple(
+        (name, each[:VALUE_LETTERS])
+        for name, each in (values.items() if isinstance(values, dict) else ())
+        if isinstance(each, str)
+    )
+    hertz = 1.0
+    if isinstance(rate_hz, (int, float)) and not isinstance(rate_hz, bool) and math.isfinite(rate_hz):
+        hertz = float(min(MOST_HZ, max(LEAST_HZ, rate_hz)))
+    return KeptMessage(id, name[:NAME_LETTERS], topic, kind, text, typed[:MOST_VALUES], hertz)

@@ -1,0 +1,164 @@
+"""The switch without which nothing is sent, and the question that a robot's topic asks again."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QAction, QActionGroup, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app.core.run.acting.acting import SessionActing
+from app.core.run.acting.arming import Target
+from app.ui.panels.base import PanelContext
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Separator, Switch, label, paint, set_role
+from app.ui.widgets.buttons import LinkButton
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.menus import Menu
+from nep.i18n import _, ngettext
+
+MINUTES = (1, 5, 15, 60)
+
+
+def left_words(seconds: float) -> str:
+    """How long it stays armed: "3:48"."""
+    whole = math.ceil(seconds)
+    return f"{whole // 60}:{whole % 60:02d}"
+
+
+class ArmedStrip(QWidget):
+    """Stands on top of each panel from which something can be sent."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__()
+        self._context, self._theme = context, context.theme
+        self._seen: tuple[object, ...] = ()
+        self._is_on = False
+        self.switch = Switch(self._theme, _("Armed"))
+        self.switch.clicked.connect(self._switched)
+        self.words = label("", "small", role="textSecondary")
+        self._sends = label(_("sends to"), "small", role="textSecondary")
+        self.tokens: list[LinkButton] = []
+        self._flow_place = QWidget()
+        self._flow = Flow(self._flow_place, gap=8, row_gap=4)
+        for widget in (self.switch, self.words, self._sends):
+            self._flow.addWidget(widget)
+        self.question = label("", "small", role="warn", wrap=True)
+        self.question.setMinimumWidth(0)
+        self.let = Button(self._theme, _("Let it be sent"), size="small")
+        self.cancel = Button(self._theme, _("Cancel"), size="small")
+        self.let.clicked.connect(lambda: self.acting.answer(let=True))
+        self.cancel.clicked.connect(lambda: self.acting.answer(let=False))
+        self._asks = QWidget()
+        row = QHBoxLayout(self._asks)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(8)
+        row.addWidget(self.question, 1)
+        for button in (self.let, self.cancel):
+            row.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)
+        inside = QVBoxLayout()
+        inside.setContentsMargins(12, 7, 12, 7)
+        inside.setSpacing(6)
+        inside.addWidget(self._flow_place)
+        inside.addWidget(self._asks)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(inside)
+        column.addWidget(Separator(self._theme))
+        self._asks.hide()
+        self.refresh()
+
+    @property
+    def acting(self) -> SessionActing:
+        """The session's."""
+        return self._context.session.acting
+
+    def refresh(self) -> None:
+        """Say what is so now."""
+        acting = self.acting
+        arming, question = acting.arming, acting.question
+        left, replaying = left_words(arming.left_s), self._context.session.is_replaying
+        targets = arming.targets if arming.is_on else ()
+        facts = (arming.is_on, left, targets, question, replaying)
+        if facts == self._seen:
+            return
+        self._seen = facts
+        self._is_on = arming.is_on
+        self.switch.setChecked(arming.is_on)
+        self.switch.setEnabled(not replaying)
+        if replaying:
+            said = _("Nothing is sent while a recording shows")
+        else:
+            said = _("{time} left").format(time=left) if arming.is_on else _("Nothing is sent")
+        self.words.setText(said)
+        set_role(self.words, "warn" if arming.is_on else "textSecondary")
+        self._sends.setVisible(bool(targets))
+        self._show_tokens(targets)
+        said = question.sentence if question is not None else ""
+        self._asks.setVisible(question is not None)
+        if said != self.question.text():
+            self.question.setText(said)
+            paint.announce(self, said)
+        self.update()
+
+    def _show_tokens(self, targets: tuple[Target, ...]) -> None:
+        if [token.property("target") for token in self.tokens] == [each.name for each in targets]:
+            return
+        for token in self.tokens:
+            self._flow.removeWidget(token)
+            token.hide()
+            token.deleteLater()
+        self.tokens = []
+        for target in targets:
+            token = LinkButton(self._theme, target.name, "x")
+            token.setProperty("target", target.name)
+            token.setAccessibleName(_("Send nothing to {name} any more").format(name=target.name))
+            token.setToolTip(plain.tip(token.accessibleName()))
+            token.clicked.connect(lambda _on=False, target=target: self.acting.forbid(target))
+            self._flow.addWidget(token)
+            self.tokens.append(token)
+
+    def _switched(self) -> None:
+        if self.acting.arming.is_on:
+            self.acting.disarm()
+        else:
+            why_not = self.acting.arm()
+            if why_not:
+                self._context.toast(why_not)
+        self._seen = ()
+        self.refresh()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        if self._is_on:
+            painter = QPainter(self)
+            painter.fillRect(QRectF(self.rect()), self._theme.colour("warnTint"))
+            painter.end()
+
+
+class ArmedMinutes(Menu):
+    """How long it stays armed, as an entry with a menu among a panel's other actions."""
+
+    def __init__(self, theme: Theme, parent: QWidget, acting: SessionActing) -> None:
+        super().__init__(theme, parent, _("Stays armed for"))
+        self._acting = acting
+        self.setIcon(theme.icon("clock"))
+        self._choices: dict[int, QAction] = {}
+        group = QActionGroup(self)
+        for count in MINUTES:
+            words = ngettext("{count} minute", "{count} minutes", count).format(count=count)
+            action = self._choices[count] = self.addAction(words)
+            action.setCheckable(True)
+            action.triggered.connect(lambda _on=False, count=count: self._choose(count))
+            group.addAction(action)
+
+    def _choose(self, minutes: int) -> None:
+        self._acting.armed_s = minutes * 60.0
+
+    def entry(self) -> QAction:
+        """The entry, with what is so now."""
+        for count, action in self._choices.items():
+            action.setChecked(round(self._acting.armed_s / 60) == count)
+        return self.menuAction()

@@ -1,0 +1,304 @@
+"""The chosen message: its name, topic and values, its JSON with what is wrong in it, and what sends it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from PySide6.QtCore import QStringListModel, Qt, Signal
+from PySide6.QtWidgets import (
+    QCompleter,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QSizePolicy,
+    QStyledItemDelegate,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.core.run.acting.json_text import MOST_LETTERS, JsonFault, pretty, read_json
+from app.core.run.acting.sending import LEAST_HZ, MOST_HZ
+from app.core.run.acting.shelf import NAME_LETTERS, KeptMessage
+from app.core.run.acting.templates import is_plain
+from app.ui.panels.publish.value_fields import ValueFields
+from app.ui.text import plain
+from app.ui.text.numbers import tip_with_key
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, ElidedLabel, NumberEdit, Separator, label
+from app.ui.widgets.indicators import StatusIcon
+from app.ui.widgets.inputs.json_edit import JsonEdit
+from app.ui.widgets.menus import EditMenu
+from nep.errors import NepError
+from nep.i18n import _
+
+LABEL_PX = 80
+RATE_PX = 84
+MOST_OFFERED = 500
+
+
+class TopicEdit(QLineEdit):
+    """The name of a topic; what exists is offered while one types."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.setAccessibleName(_("Topic"))
+        self.setPlaceholderText("/topic")
+        self.setProperty("focusRadius", theme.radius("control"))
+        EditMenu(theme, self)
+        self._offered = QStringListModel(self)
+        completer = QCompleter(self._offered, self)
+        completer.setFilterMode(Qt.MatchFlag.MatchContains)
+        completer.setCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
+        completer.setMaxVisibleItems(10)
+        popup = completer.popup()
+        if popup is not None:
+            popup.setProperty("offers", "true")
+            popup.setItemDelegate(QStyledItemDelegate(popup))  # which the style sheet can give room
+        self.setCompleter(completer)
+
+    def offer(self, names: Sequence[str]) -> None:
+        """These exist now."""
+        some = list(names[:MOST_OFFERED])
+        if some != self._offered.stringList():
+            self._offered.setStringList(some)
+
+
+class MessageForm(QWidget):
+    """Shows a message; `changed` tells what a person made of it, the other signals what they want."""
+
+    changed = Signal(object)  # a KeptMessage
+    send_wanted = Signal()
+    repeat_wanted = Signal()
+    template_wanted = Signal()
+
+    def __init__(self, theme: Theme, type_of: Callable[[str], str]) -> None:
+        """``type_of`` gives the type of a topic that is there, "" of others."""
+        super().__init__()
+        self._theme, self._type_of = theme, type_of
+        self.message: KeptMessage | None = None
+        self.read = read_json("{}")
+        self._is_showing = False
+        self._make_fields()
+        self._make_text()
+        self._make_buttons()
+        self._arrange()
+
+    # -- its parts ----------------------------------------------------------------------------------------
+
+    def _make_fields(self) -> None:
+        theme = self._theme
+        self.name = QLineEdit()
+        self.name.setAccessibleName(_("Name of the message"))
+        self.name.setMaxLength(NAME_LETTERS)
+        EditMenu(theme, self.name)
+        self.topic = TopicEdit(theme)
+        self.kind = QLineEdit()
+        self.kind.setAccessibleName(_("Type of the messages"))
+        self.kind.setPlaceholderText("json")
+        EditMenu(theme, self.kind)
+        for field in (self.name, self.kind):
+            field.setProperty("focusRadius", theme.radius("control"))
+        self.values = ValueFields(theme)
+        self.name.textEdited.connect(lambda text: self._edit(name=text))
+        self.topic.textChanged.connect(self._topic_typed)
+        self.kind.textEdited.connect(lambda text: self._edit(msg_type=text.strip() or "json"))
+        self.values.typed.connect(self._value_typed)
+
+    def _make_text(self) -> None:
+        theme = self._theme
+        self.template = Button(theme, _("From the last message"), "history", kind="ghost", size="small")
+        self.template.setToolTip(plain.tip(_("Takes the topic's last message, or what its type has")))
+        self.tidy = Button(theme, _("Tidy"), "wand-sparkles", kind="ghost", size="small")
+        self.tidy.setToolTip(plain.tip(_("One line for each field")))
+        for button in (self.template, self.tidy):
+            button.let_shrink()
+        self.edit = JsonEdit(theme, _("The message"))
+        self.fault_icon = StatusIcon(theme, "error", height=20)
+        self.sentence = label("", "small", role="error", wrap=True)
+        self.sentence.setMinimumWidth(0)
+        self.mend = Button(theme, _("Put it right"), "wrench", size="small")
+        self.template.clicked.connect(self.template_wanted)
+        self.tidy.clicked.connect(self.make_tidy)
+        self.mend.clicked.connect(self.put_right)
+        self.edit.changed.connect(self._text_typed)
+        self.edit.sent.connect(self.send_wanted)
+
+    def _make_buttons(self) -> None:
+        theme = self._theme
+        self.send = Button(theme, _("Send"), "send", kind="primary")
+        self.send.setToolTip(plain.tip(tip_with_key(_("Sends it once"), "Ctrl+Enter")))
+        self.last = ElidedLabel("small", "textSecondary")
+        self.repeat = Button(theme, _("Start sending"), "repeat")
+        self.rate = NumberEdit(theme, LEAST_HZ, MOST_HZ, _("/s"), 1)
+        self.rate.setAccessibleName(_("Messages a second"))
+        self.rate.setFixedWidth(round(theme.scaled(RATE_PX)))
+        self.rate.number.connect(lambda value: self._edit(rate_hz=value))
+        self.count = ElidedLabel("small", "textSecondary")
+        self.rate_hint = label("", "small", role="textTertiary", wrap=True)
+        self.rate_hint.setMinimumWidth(0)
+        self.rate.problem.connect(self._say_rate)
+        self._say_rate("")
+        self.send.clicked.connect(self.send_wanted)
+        self.repeat.clicked.connect(self.repeat_wanted)
+
+    def _say_rate(self, problem: str) -> None:
+        said = _("0.1 to 50 a second; ends by itself when no longer armed")
+        self.rate_hint.setText(problem or said)
+
+    def _arrange(self) -> None:
+        fields = QGridLayout()
+        fields.setHorizontalSpacing(10)
+        fields.setVerticalSpacing(8)
+        fields.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_PX)))
+        fields.setColumnStretch(1, 1)
+        self._value_words = _name(_("Values"))
+        rows = ((_name(_("Name")), self.name), (_name(_("Topic")), self.topic), (_name(_("Type")), self.kind))
+        for place, (words, field) in enumerate((*rows, (self._value_words, self.values))):
+            if isinstance(field, QLineEdit):
+                words.setBuddy(field)
+            fields.addWidget(words, place, 0, Qt.AlignmentFlag.AlignTop)
+            fields.addWidget(field, place, 1)
+        head = QHBoxLayout()
+        head.setSpacing(4)
+        head.addWidget(label(_("Message"), "small", role="textSecondary"))
+        head.addStretch(1)
+        head.addWidget(self.template)
+        head.addWidget(self.tidy)
+        fault = QHBoxLayout()
+        fault.setSpacing(6)
+        fault.addWidget(self.fault_icon, 0, Qt.AlignmentFlag.AlignTop)
+        fault.addWidget(self.sentence, 1)
+        fault.addWidget(self.mend, 0, Qt.AlignmentFlag.AlignTop)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(12, 10, 12, 10)
+        column.setSpacing(8)
+        column.addLayout(fields)
+        column.addLayout(head)
+        column.addWidget(self.edit, 1)
+        column.addLayout(fault)
+        column.addWidget(Separator(self._theme))
+        column.addLayout(self._sending_rows())
+
+    def _sending_rows(self) -> QVBoxLayout:
+        once, again = QHBoxLayout(), QHBoxLayout()
+        for row, parts in ((once, (self.send, self.last)), (again, (self.repeat, self.rate, self.count))):
+            row.setSpacing(10)
+            for part in parts:
+                row.addWidget(part, 1 if isinstance(part, ElidedLabel) else 0)
+        for words in (self.last, self.count):
+            words.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        rows = QVBoxLayout()
+        rows.setSpacing(8)
+        rows.addLayout(once)
+        rows.addLayout(again)
+        rows.addWidget(self.rate_hint)
+        return rows
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def show_message(self, message: KeptMessage) -> None:
+        """Show this one; where a person types nothing is changed that says the same."""
+        other = self.message is None or self.message.id != message.id
+        if message == self.message:
+            return
+        self._is_showing = True
+        self.message = message
+        for field, text in (
+            (self.name, message.name),
+            (self.topic, message.topic),
+            (self.kind, message.msg_type),
+        ):
+            if other or (field.text().strip() or "json") != (text or "json"):
+                field.setText(text)
+        self.edit.set_text(message.text)
+        if other or not self.rate.hasFocus():
+            self.rate.show_number(message.rate_hz)
+        self._is_showing = False
+        self._judge()
+
+    def _judge(self) -> None:
+        """Say what is wrong in the text, and which values it wants."""
+        message = self.message
+        if message is None:
+            return
+        is_json = not is_plain(message.msg_type)
+        self.read = read_json(message.text) if is_json else read_json("{}")
+        self.edit.set_coloured(is_json)
+        fault = self.read.fault
+        self.edit.mark(fault.line if fault is not None else 0)
+        self.tidy.setEnabled(is_json and fault is None and not self.read.places)
+        self.values.show_places(self.read.to_fill, dict(message.values))
+        for widget in (self._value_words, self.values):
+            widget.setVisible(bool(self.read.to_fill))
+
+    def say_problem(self, problem: str) -> None:
+        """Why it can't be sent; empty when it can."""
+        fault = self.read.fault
+        words = _("{problem} It cannot be sent yet.").format(problem=problem) if problem else ""
+        if words != self.sentence.text():
+            self.sentence.setText(words)
+        self.fault_icon.setVisible(bool(problem))
+        self.sentence.setVisible(bool(problem))
+        self.mend.setVisible(fault is not None and fault.mend is not None)
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def _edit(self, **changes: object) -> None:
+        if self.message is None or self._is_showing:
+            return
+        self.message = replace(self.message, **changes)  # type: ignore[arg-type]
+        self._judge()
+        self.changed.emit(self.message)
+
+    def _topic_typed(self, text: str) -> None:
+        if self._is_showing:
+            return
+        topic = text.strip()
+        known = self._type_of(topic)
+        if known and known != self.kind.text():
+            self.kind.setText(known)
+            self._edit(topic=topic, msg_type=known)
+        else:
+            self._edit(topic=topic)
+
+    def _value_typed(self, name: str, text: str) -> None:
+        if self.message is not None:
+            self.message = self.message.with_value(name, text)
+            self._judge()
+            self.changed.emit(self.message)
+
+    def _text_typed(self) -> None:
+        text = self.edit.text()
+        if self.message is not None and text != self.message.text:
+            self._edit(text=text[: MOST_LETTERS + 1])
+
+    def set_type(self, msg_type: str) -> None:
+        """The topic has another type than was typed."""
+        self.kind.setText(msg_type)
+        self._edit(msg_type=msg_type)
+
+    def put_text(self, text: str) -> None:
+        """Another text in the place of all; Undo gives the old one back."""
+        self.edit.replace(0, len(self.edit.text()), text)
+
+    def make_tidy(self) -> None:
+        """One line for each field, as long as there are no places to be filled."""
+        try:
+            self.put_text(pretty(self.read.filled({})))
+        except NepError as error:
+            self.say_problem(str(error))
+
+    def put_right(self) -> None:
+        """Do what mends the first fault."""
+        fault: JsonFault | None = self.read.fault
+        if fault is not None and fault.mend is not None:
+            self.edit.replace(fault.mend.start, fault.mend.end, fault.mend.text)
+            self.edit.setFocus(Qt.FocusReason.OtherFocusReason)
+
+
+def _name(words: str) -> QLabel:
+    made = label(words, "body", role="textSecondary")
+    made.setMinimumHeight(26)
+    return made

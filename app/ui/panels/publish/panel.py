@@ -1,0 +1,389 @@
+"""Publish: the shelf of messages, the switch above it, the chosen message beside."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Iterable, Mapping, Sequence
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAction, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.network.topics import split_key
+from app.core.network.watches import Suspendable, Watch
+from app.core.run.acting.acting import result_words
+from app.core.run.acting.arming import Target
+from app.core.run.acting.shelf import MOST_MESSAGES, KeptMessage
+from app.core.run.acting.templates import text_of_message, text_of_type
+from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.publish.message_form import MessageForm
+from app.ui.panels.publish.shelf_list import ShelfList, state_cell
+from app.ui.panels.row_actions import RowAction, filled
+from app.ui.text.numbers import grouped, rate_words
+from app.ui.widgets import Button, EmptyAction, EmptyState, Separator, label
+from app.ui.widgets.inputs.fields import FilterField
+from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from app.ui.widgets.menus import Menu
+from app.ui.widgets.paint import show_when
+from nep.errors import NepError
+from nep.i18n import _, lazy, ngettext
+
+LIST_PX, SIDE_BY_SIDE_PX, LIST_HIGH_PX = 236, 520, 130
+STATES_EVERY = 6  # refreshes of 30 a second
+
+
+class PublishPanel(PanelWidget):
+    """The list at the left, or above where there is little room; the chosen message."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, _("Publish"))
+        self.acting = context.session.acting
+        self._seen: tuple[object, ...] = ()
+        self._ticks = 0
+        self._wanted = ""
+        self._peek: Watch | None = None
+        self._peeked = ""
+        self.count = label("", "small", role="textSecondary")
+        self.chips = [self.count]
+        self.new = Button(self.theme, _("New"), "plus", size="small")
+        self.new.setAccessibleName(_("New message"))
+        self.new.clicked.connect(lambda: self.begin(""))
+        self.header = [self.new]
+        self.strip = ArmedStrip(context)
+        self._minutes = ArmedMinutes(self.theme, self, self.acting)
+        self.filter = FilterField(self.theme, _("Filter the kept messages"))
+        self.filter.setMaximumWidth(16_777_215)
+        self.list = ShelfList(self.theme, lambda each: state_cell(each, self.acting))
+        self.form = MessageForm(self.theme, self._type_of)
+        self.empty = EmptyState(
+            self.theme,
+            "send",
+            _("No messages kept"),
+            _("Right click a topic or a message, or begin one."),
+            [EmptyAction(_("New"), lambda: self.begin(""), "plus", primary=True)],
+        )
+        self._connect()
+        self._arrange()
+        self.refresh()
+
+    def _connect(self) -> None:
+        self.filter.textChanged.connect(lambda _text: self._rebuild())
+        self.filter.leave.connect(lambda: self.list.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        shelf, form = self.list, self.form
+        shelf.filter_wanted.connect(self.focus_filter)
+        shelf.chosen.connect(lambda _id: self._show_chosen())
+        shelf.send_wanted.connect(lambda _id: self.send())
+        shelf.copy_wanted.connect(self.copy)
+        shelf.delete_wanted.connect(self.delete)
+        shelf.menu_wanted.connect(self._show_menu)
+        form.changed.connect(self._changed)
+        form.send_wanted.connect(self.send)
+        form.repeat_wanted.connect(self.repeat)
+        form.template_wanted.connect(self.take_template)
+
+    def _arrange(self) -> None:
+        self._left = QWidget()
+        left = QVBoxLayout(self._left)
+        left.setContentsMargins(0, 8, 0, 0)
+        left.setSpacing(6)
+        find = QHBoxLayout()
+        find.setContentsMargins(8, 0, 8, 0)
+        find.addWidget(self.filter)
+        left.addLayout(find)
+        left.addWidget(self.list, 1)
+        scroll = ScrollColumn(_("The chosen message"))
+        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        scroll.column.insertWidget(0, self.form)
+        scroll.column.setStretchFactor(self.form, 1)
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
+        self._upright = Separator(self.theme, upright=True)
+        inside = QWidget()
+        self._sides = QBoxLayout(QBoxLayout.Direction.LeftToRight, inside)
+        self._sides.setContentsMargins(0, 0, 0, 0)
+        self._sides.setSpacing(0)
+        self._sides.addWidget(self._left)
+        self._sides.addWidget(self._upright)
+        self._sides.addWidget(scroll, 1)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(inside)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.strip)
+        column.addWidget(self.pages, 1)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """The list beside the message, or above it where there is little room."""
+        beside = self.width() >= self.theme.scaled(SIDE_BY_SIDE_PX)
+        way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        self._sides.setDirection(way)
+        self._upright.setVisible(beside)
+        most = 16_777_215
+        wide = round(min(self.theme.scaled(LIST_PX), self.width() * 0.4))
+        self._left.setMinimumWidth(wide if beside else 0)
+        self._left.setMaximumWidth(wide if beside else most)
+        self._left.setMaximumHeight(most if beside else round(self.theme.scaled(LIST_HIGH_PX)))
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        self._ticks += 1
+        self.strip.refresh()
+        self._follow_peek()
+        acting, topics = self.acting, self.session.live.topics
+        facts = (acting.shelf.revision, acting.revision, acting.arming.revision, topics.revision)
+        if facts != self._seen:
+            self._seen = facts
+            self._rebuild()
+            self.form.topic.offer(sorted(topic.name for topic in topics.live()))
+        elif self._ticks % STATES_EVERY == 0:
+            self._say_sending()
+            self.list.tell_visible_changed()
+
+    def source_changed(self) -> None:
+        self._seen = ()
+        self._end_peek()
+
+    def _rebuild(self) -> None:
+        messages = self.acting.shelf.messages
+        words = self.filter.text().casefold().split()
+        rows = [
+            each
+            for each in messages
+            if each.id == self._wanted
+            or all(word in f"{each.name} {each.topic}".casefold() for word in words)
+        ]
+        chosen = self._wanted or self.list.chosen_key() or ""
+        model = self.list.model()
+        model.set_rows(rows)  # type: ignore[attr-defined]  # it is a TableModel
+        if rows:
+            known = {each.id for each in rows}
+            wanted = chosen if chosen in known else rows[0].id
+            if self.list.chosen_key() != wanted:
+                self.list.choose(wanted)
+        self._wanted = ""
+        self.list.tell_visible_changed()
+        self.pages.setCurrentIndex(1 if messages else 0)
+        said = ngettext("{count} message kept", "{count} messages kept", len(messages))
+        self.count.setText(said.format(count=len(messages)) if messages else "")
+        self._show_chosen()
+
+    @property
+    def message(self) -> KeptMessage | None:
+        """The chosen one."""
+        return self.acting.shelf.get(self.list.chosen_key() or "")
+
+    def _show_chosen(self) -> None:
+        message = self.message
+        self.form.setVisible(message is not None)
+        if message is not None:
+            if self.form.message is not None and self.form.message.id != message.id:
+                self._end_peek()
+            self.form.show_message(message)
+            self._say_sending()
+
+    def _say_sending(self) -> None:
+        """What the buttons do, and what came of it."""
+        message, form, acting = self.message, self.form, self.acting
+        if message is None:
+            return
+        problem = acting.problem_of(message)
+        form.say_problem(problem)
+        is_armed = acting.arming.allows(Target("topic", message.topic))
+        is_going = acting.outbox.is_going(message.id)
+        can_send = not problem and not self.session.is_replaying
+        form.send.setEnabled(can_send)
+        form.send.set_word(_("Send") if is_armed else _("Arm and send"), "send" if is_armed else "lock")
+        form.repeat.setEnabled(can_send or is_going)
+        form.repeat.set_word(
+            _("End sending") if is_going else _("Start sending"), "square" if is_going else "repeat"
+        )
+        form.rate.setEnabled(not is_going)
+        form.last.setText(self._last_words(message))
+        form.count.setText(self._count_words(message))
+
+    def _last_words(self, message: KeptMessage) -> str:
+        result, at_s = self.acting.last.get(message.id), self.acting.sent_at_s.get(message.id)
+        if result is None or at_s is None:
+            return ""
+        clock = dt.datetime.fromtimestamp(at_s, tz=dt.timezone.utc).astimezone().strftime("%H:%M:%S")
+        return _("last at {time}: {what}").format(time=clock.lstrip("0"), what=result_words(result))
+
+    def _count_words(self, message: KeptMessage) -> str:
+        going = self.acting.outbox.repeated(message.id)
+        if going is None:
+            return ""
+        said = ngettext("{count} sent, {rate}/s", "{count} sent, {rate}/s", going.count)
+        return said.format(count=grouped(going.count), rate=rate_words(going.rate_now_hz))
+
+    def _type_of(self, topic: str) -> str:
+        known = self.session.live.topics.get(topic)
+        return known.msg_type if known is not None else ""
+
+    def badge(self) -> tuple[str, str] | None:
+        going = len(self.acting.outbox.all_repeated)
+        return (str(going), "warn") if going else None
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def begin(self, key: str) -> None:
+        """A message for this topic: one that is kept, or a new one with the topic's last message."""
+        _network, topic = split_key(key)
+        kept = [each for each in self.acting.shelf.messages if topic and each.topic == topic]
+        msg_type = self._type_of(topic) or "json"
+        made = kept[-1] if kept else self.acting.new_message(topic, msg_type, text_of_type(msg_type))
+        if made is None:
+            said = _("{count} messages are kept, and no more can be: delete one first.")
+            self.context.toast(said.format(count=MOST_MESSAGES))
+            return
+        self._wanted = made.id
+        self.filter.clear()
+        self._rebuild()
+        if not kept and topic:
+            self.take_template()
+        field = self.form.edit if topic else self.form.topic
+        field.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def take_template(self) -> None:
+        """Take the topic's last message as it comes, or at once what its type has where nobody publishes."""
+        message = self.message
+        if message is None:
+            return
+        topic = self.session.live.topics.get(message.topic)
+        if self._peek is not None or topic is None or not topic.publishers:
+            self._end_peek()
+            self.form.put_text(text_of_type(message.msg_type))
+            if topic is None or not topic.publishers:
+                self.context.toast(_("Nobody publishes it now: these are the fields of its type"))
+            return
+        if topic.msg_type != message.msg_type:
+            self.form.set_type(topic.msg_type)
+        self._peeked = message.topic
+        self._peek = self.session.watch(message.topic)
+        self.form.template.set_word(_("Waiting for a message"), "hourglass")
+        self._follow_peek()
+
+    def _follow_peek(self) -> None:
+        if self._peek is None:
+            return
+        topic = self.session.live.topics.get(self._peeked)
+        newest = topic.newest if topic is not None else None
+        if newest is None:
+            return
+        self._end_peek()
+        try:
+            self.form.put_text(text_of_message(newest))
+        except NepError as error:
+            self.context.toast(str(error))
+
+    def _end_peek(self) -> None:
+        if self._peek is not None:
+            self._peek.close()
+            self._peek = None
+            self.form.template.set_word(_("From the last message"), "history")
+
+    def _changed(self, message: object) -> None:
+        if isinstance(message, KeptMessage):
+            self.acting.shelf.put(message)
+            if self.acting.outbox.is_going(message.id):
+                self.acting.end(message.id)  # what is sent is what stands there
+            self._say_sending()
+
+    def send(self) -> None:
+        """Send the chosen message once."""
+        message = self.message
+        if message is not None:
+            self._tell(self.acting.send(message))
+
+    def repeat(self) -> None:
+        """Send the chosen message again and again, or no longer."""
+        message = self.message
+        if message is None:
+            return
+        if self.acting.outbox.is_going(message.id):
+            self.acting.end(message.id)
+            self.refresh()
+        else:
+            self._tell(self.acting.send(message, rate_hz=message.rate_hz))
+
+    def _tell(self, why_not: str) -> None:
+        if why_not:
+            self.context.toast(why_not)
+        self.refresh()
+
+    def copy(self, id: str) -> None:
+        """One more message like this one."""
+        made = self.acting.shelf.copy(id)
+        if made is not None:
+            self._wanted = made.id
+            self._rebuild()
+
+    def delete(self, id: str) -> None:
+        """Take a message off the shelf."""
+        self.acting.end(id)
+        removed = self.acting.shelf.remove(id)
+        if removed is not None:
+            said = _("Deleted “{name}”").format(name=removed.name)
+            self.context.toast(said, _("Undo"), self._put_back)
+            self._rebuild()
+
+    def _put_back(self) -> None:
+        back = self.acting.shelf.put_back()
+        if back is not None:
+            self._wanted = back.id
+            self._rebuild()
+
+    def menu_of(self, id: str) -> Menu:
+        """What can be done with a message of the list."""
+        is_going = self.acting.outbox.is_going(id)
+        words = _("End sending") if is_going else _("Start sending")
+        actions = [
+            RowAction(_("Send"), "send", self.send),
+            RowAction(words, "square" if is_going else "repeat", self.repeat),
+            RowAction(_("Duplicate"), "copy", lambda: self.copy(id)),
+            RowAction(_("Delete"), "trash-2", lambda: self.delete(id)),
+        ]
+        return filled(Menu(self.theme, self), self.theme, actions)
+
+    def _show_menu(self, id: str, at: QPoint) -> None:
+        menu = self.menu_of(id)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(at)
+
+    # -- what every panel has -----------------------------------------------------------------------------
+
+    def more_actions(self) -> Sequence[QAction]:
+        return (self._minutes.entry(),)
+
+    def focus_filter(self) -> bool:
+        show_when(self.filter, True)
+        self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.filter.selectAll()
+        return True
+
+    def theme_changed(self) -> None:
+        self.list.fit_rows()
+        self._fit()
+
+    def save_state(self) -> dict[str, object]:
+        return {"message": self.list.chosen_key() or ""}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        self._wanted = str(state.get("message", ""))
+        self._rebuild()
+
+    def looks(self) -> Iterable[Suspendable | None]:
+        return (self._peek,)
+
+    def shut(self) -> None:
+        self._end_peek()
+        self.acting.disarm()
+
+
+PANEL = Panel("publish", lazy("Publish"), "send", (), PublishPanel)

@@ -1,0 +1,88 @@
+"""The kept messages as a list: each with its topic, and whether it is sent, can't be, or is not armed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QModelIndex, Qt, Signal
+from PySide6.QtGui import QKeyEvent
+
+from app.core.run.acting.acting import SessionActing
+from app.core.run.acting.arming import Target
+from app.core.run.acting.json_text import read_json
+from app.core.run.acting.shelf import KeptMessage
+from app.core.run.acting.templates import is_plain
+from app.ui.text.numbers import rate_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets.keyboard import is_plain as is_plain_key
+from app.ui.widgets.table.model import Cell, Column, TableModel
+from app.ui.widgets.table.two_lines import ROW_PX, TwoLines
+from app.ui.widgets.table.view import TableView
+from nep.i18n import _, lazy
+
+
+def state_cell(message: KeptMessage, acting: SessionActing) -> Cell:
+    """How it is with a message, in a word."""
+    if acting.outbox.is_going(message.id):
+        return Cell(_("{rate}/s").format(rate=rate_words(message.rate_hz)), "dot", "warn")
+    fault = None if is_plain(message.msg_type) else read_json(message.text).fault
+    if fault is not None:
+        return Cell(_("line {line}").format(line=fault.line), "circle-x", "error")
+    if acting.problem_of(message):
+        return Cell(_("not ready"), "circle-x", "error")
+    if not acting.arming.allows(Target("topic", message.topic)):
+        return Cell(_("not armed"), "lock", "textTertiary")
+    return Cell("", "send", "textSecondary", said=_("can be sent"))
+
+
+class ShelfList(TableView[KeptMessage]):
+    """A click chooses. `chosen` tells the id, also when arrows lead there; keys send, copy and delete."""
+
+    chosen = Signal(str)
+    send_wanted = Signal(str)
+    copy_wanted = Signal(str)
+    delete_wanted = Signal(str)
+
+    def __init__(self, theme: Theme, state: Callable[[KeptMessage], Cell]) -> None:
+        columns: tuple[Column[KeptMessage], ...] = (
+            Column(
+                "message",
+                lazy("Message"),
+                90,
+                lambda each: Cell(
+                    mark=TwoLines(each.name, each.topic or _("no topic yet")),
+                    said=f"{each.name}, {each.topic}",
+                ),
+                stretch=True,
+                tip=lambda each: f"{each.name}\n{each.topic}",
+            ),
+            Column("state", lazy("State"), 112, state, figures=True),
+        )
+        super().__init__(theme, TableModel(columns, lambda each: each.id))
+        self.horizontalHeader().hide()
+        self.setAccessibleName(_("Kept messages"))
+        self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._tell_chosen())
+        theme.changed.connect(self.fit_rows)
+        self.fit_rows()
+
+    def fit_rows(self) -> None:
+        """Rows grow with the text."""
+        self.set_row_height(round(self.theme.scaled(ROW_PX)), large=False)
+
+    def _open(self, index: QModelIndex) -> None:
+        """A click only chooses."""
+
+    def _tell_chosen(self) -> None:
+        self.chosen.emit(self.chosen_key() or "")
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        key, pressed = self.chosen_key(), event.key()
+        held = event.modifiers() == Qt.KeyboardModifier.ControlModifier
+        if key is not None and held and pressed in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self.send_wanted.emit(key)
+        elif key is not None and held and pressed == Qt.Key.Key_D:
+            self.copy_wanted.emit(key)
+        elif key is not None and is_plain_key(event) and pressed == Qt.Key.Key_Delete:
+            self.delete_wanted.emit(key)
+        else:
+            super().keyPressEvent(event)

@@ -1,0 +1,83 @@
+"""The fields for what stands in the places of a message: ``{yaw}`` is filled here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
+from app.ui.widgets import label
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.menus import EditMenu
+from nep.i18n import _
+
+FIELD_PX = 120
+
+
+class ValueFields(QWidget):
+    """One field for each place, by its name; `typed` tells (name, text)."""
+
+    typed = Signal(str, str)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.fields: dict[str, QLineEdit] = {}
+        self._parts: list[QWidget] = []
+        self._place = QWidget()
+        self._flow = Flow(self._place, gap=12, row_gap=6)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self._place)
+
+    def show_places(self, names: Sequence[str], values: Mapping[str, str]) -> None:
+        """Show fields for these places; those that stay keep what is typed and the keyboard."""
+        if list(names) != list(self.fields):
+            self._rebuild(names)
+        for name, field in self.fields.items():
+            value = values.get(name, "")
+            if field.text() != value:
+                field.setText(value)
+            self._mark(field, wrong=not value.strip())
+
+    def _rebuild(self, names: Sequence[str]) -> None:
+        focused = next((name for name, field in self.fields.items() if field.hasFocus()), "")
+        for part in self._parts:
+            self._flow.removeWidget(part)
+            part.hide()
+            part.deleteLater()
+        self._parts, self.fields = [], {}
+        for name in names:
+            self._add(name)
+        if focused in self.fields:
+            self.fields[focused].setFocus()
+
+    def _add(self, name: str) -> None:
+        part = QWidget()
+        row = QHBoxLayout(part)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        words = label(name, "mono", role="accentText")
+        field = QLineEdit()
+        field.setMinimumWidth(round(self._theme.scaled(FIELD_PX)))
+        field.setAccessibleName(_("Value of {name}").format(name=name))
+        field.setToolTip(plain.tip(_("JSON, such as 12.5 or true; anything else is a text")))
+        field.setProperty("focusRadius", self._theme.radius("control"))
+        EditMenu(self._theme, field)
+        field.textEdited.connect(lambda text, name=name: self.typed.emit(name, text))
+        words.setBuddy(field)
+        row.addWidget(words)
+        row.addWidget(field)
+        self._flow.addWidget(part)
+        self._parts.append(part)
+        self.fields[name] = field
+
+    @staticmethod
+    def _mark(field: QLineEdit, *, wrong: bool) -> None:
+        if (field.property("wrong") == "true") != wrong:
+            field.setProperty("wrong", "true" if wrong else "false")
+            field.style().unpolish(field)
+            field.style().polish(field)

@@ -1,0 +1,205 @@
+"""What a service answered: field by field, or as JSON; or why there is none."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.run.acting.acting import call_words, time_words
+from app.core.run.acting.calling import CallRecord
+from app.ui.panels.base import ShowToast
+from app.ui.text.numbers import seconds_words, size_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Chip, ElidedLabel, IconButton, Segments, label
+from app.ui.widgets.inputs.json_edit import JsonEdit
+from app.ui.widgets.table.model import Cell, Column, TableModel
+from app.ui.widgets.table.view import TableView
+from nep.i18n import _, lazy
+from nep.text import shortened
+
+MOST_ROWS = 500
+DEEPEST = 12
+TEXT_LETTERS = 200
+INDENT_PX = 14
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerRow:
+    """One value of an answer: where it is, how deep, its name, and itself in words ("{2}" has two parts)."""
+
+    path: str
+    depth: int
+    name: str
+    words: str
+
+
+def answer_rows(answer: object) -> list[AnswerRow]:
+    """An answer as rows, those of a part below it; at most 500."""
+    found: list[AnswerRow] = []
+    for row in (
+        _rows("", 0, "", answer) if _has_parts(answer) else [AnswerRow("", 0, _("answer"), _words(answer))]
+    ):
+        if len(found) == MOST_ROWS:
+            found.append(AnswerRow("…", 0, "…", _("there is more; it is in the JSON")))
+            break
+        found.append(row)
+    return found
+
+
+def _has_parts(value: object) -> bool:
+    return isinstance(value, Mapping) or (isinstance(value, Sequence) and not isinstance(value, (str, bytes)))
+
+
+def _rows(path: str, depth: int, name: str, value: object) -> Iterator[AnswerRow]:
+    if name:
+        yield AnswerRow(path, depth - 1, name, _words(value))
+    if depth >= DEEPEST or not _has_parts(value):
+        return
+    inside = value.items() if isinstance(value, Mapping) else enumerate(value)  # type: ignore[arg-type]
+    for key, part in inside:
+        here = f"{path}[{key}]" if isinstance(key, int) else f"{path}.{key}" if path else str(key)
+        yield from _rows(here, depth + 1, str(key), part)
+
+
+def _words(value: object) -> str:
+    if isinstance(value, Mapping):
+        return "{}" if not value else f"{{{len(value)}}}"
+    if _has_parts(value):
+        return f"[{len(value) or ''}]"  # type: ignore[arg-type]
+    if isinstance(value, bytes):
+        return shortened(value.hex(" "), TEXT_LETTERS)
+    return shortened(json.dumps(value, ensure_ascii=False, default=str), TEXT_LETTERS)
+
+
+def took_cell(record: CallRecord) -> Cell:
+    """How a call ended, in the table of calls."""
+    match record.state:
+        case "waiting":
+            return Cell(_("waiting"), "circle-dashed", "textSecondary")
+        case "answered":
+            return Cell(time_words(record.took_s), "circle-check", "ok")
+        case "given up":
+            return Cell(_("given up"), "circle-x", "textSecondary")
+        case _:
+            return Cell(record.sentence, "circle-x", "error")
+
+
+def clock_of(record: CallRecord) -> str:
+    """When it was called: "8:41:50"."""
+    then = dt.datetime.fromtimestamp(record.at_s, tz=dt.timezone.utc).astimezone()
+    return then.strftime("%H:%M:%S").lstrip("0")
+
+
+class AnswerView(QWidget):
+    """Shows one call: the newest of the chosen service, or the one that was chosen among the older ones."""
+
+    def __init__(self, theme: Theme, toast: ShowToast) -> None:
+        super().__init__()
+        self._toast = toast
+        self.record: CallRecord | None = None
+        self.chip = Chip(theme)
+        self.facts = ElidedLabel("small", "textTertiary")
+        self.facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.way = Segments(
+            theme,
+            [("fields", _("Fields"), None), ("json", _("JSON"), None)],
+            size="small",
+            name=_("Answer as"),
+        )
+        self.way.changed.connect(self._turn)
+        self.copy = IconButton(theme, "copy", _("Copy the answer"), size=26)
+        self.copy.clicked.connect(self._copy)
+        self.model: TableModel[AnswerRow] = TableModel(
+            (
+                Column("name", lazy("Field"), 90, _name_cell, stretch=True, tip=lambda row: row.path),
+                Column("value", lazy("Value"), 150, _value_cell, figures=True, tip=lambda row: row.words),
+            ),
+            lambda row: row.path,
+        )
+        self.table = TableView(theme, self.model)
+        self.table.horizontalHeader().hide()
+        self.table.setAccessibleName(_("Answer"))
+        self.text = JsonEdit(theme, _("Answer as JSON"), least_lines=3)
+        self.text.edit.setReadOnly(True)
+        self.sentence = label("", "body", role="textSecondary", wrap=True)
+        self.sentence.setMinimumWidth(0)
+        self.sentence.setContentsMargins(12, 4, 12, 4)
+        self.pages = QStackedWidget()
+        for page in (self.sentence, self.table, self.text):
+            self.pages.addWidget(page)
+        head = QHBoxLayout()
+        head.setContentsMargins(12, 4, 8, 0)
+        head.setSpacing(8)
+        head.addWidget(label(_("Answer"), "title"))
+        head.addWidget(self.chip)
+        head.addWidget(self.facts, 1)
+        head.addWidget(self.way)
+        head.addWidget(self.copy)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(head)
+        column.addWidget(self.pages, 1)
+        self.show_record(None)
+
+    def show_record(self, record: CallRecord | None, waited_s: float = 0.0) -> None:
+        """Show this call, or none."""
+        if record is not None and record.state == "waiting":
+            self.chip.set(_("waiting {time}").format(time=seconds_words(waited_s)), "info", "circle-dashed")
+        if record == self.record and record is not None:
+            return
+        self.record = record
+        has_answer = record is not None and record.state == "answered" and record.is_kept
+        self.way.setVisible(has_answer)
+        self.copy.setVisible(has_answer)
+        if record is None:
+            self.chip.set("")
+            self.facts.setText("")
+            self.sentence.setText(_("It was not called yet."))
+        elif record.state != "waiting":
+            status = "ok" if record.state == "answered" else "off" if record.state == "given up" else "error"
+            self.chip.set(call_words(record), status)
+        self._say_facts(record)
+        if has_answer and record is not None:
+            self.model.set_rows(answer_rows(record.answer) if not record.is_cut else [])
+            self.text.set_text(record.text)
+        self._turn(self.way.value)
+
+    def _say_facts(self, record: CallRecord | None) -> None:
+        if record is None:
+            return
+        self.facts.setText(clock_of(record))
+        if record.state == "waiting":
+            self.sentence.setText(_("Waiting for the answer."))
+        elif record.state != "answered":
+            self.sentence.setText(record.sentence)
+        elif not record.is_kept:
+            self.sentence.setText(_("Its answer is no longer kept: newer ones took its place."))
+        else:
+            size = size_words(len(record.text.encode("utf-8", "replace")))
+            self.facts.setText(_("{time}, {size}").format(time=clock_of(record), size=size))
+
+    def _turn(self, way: str) -> None:
+        record = self.record
+        if record is None or record.state != "answered" or not record.is_kept:
+            self.pages.setCurrentIndex(0)
+        else:
+            self.pages.setCurrentIndex(2 if way == "json" or record.is_cut else 1)
+
+    def _copy(self) -> None:
+        if self.record is not None:
+            QGuiApplication.clipboard().setText(self.record.text)
+            self._toast(_("Copied the answer of {service}").format(service=self.record.service))
+
+
+def _name_cell(row: AnswerRow) -> Cell:
+    return Cell(row.name, mono=True, role="textSecondary", indent=row.depth * INDENT_PX)
+
+
+def _value_cell(row: AnswerRow) -> Cell:
+    return Cell(row.words, mono=True)

@@ -1,0 +1,487 @@
+"""Services: what can be called, the request, the answer, and the calls before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAction, QGuiApplication, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.run.acting.arming import Target
+from app.core.run.acting.calling import LEAST_S, MOST_S, TIMEOUT_S, CallRecord
+from app.core.run.acting.json_text import JsonText, pretty, read_json
+from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.row_actions import RowAction, copies, filled
+from app.ui.panels.services.answer import AnswerView, clock_of, took_cell
+from app.ui.panels.services.request_form import RequestForm
+from app.ui.panels.services.service_list import ServiceList, count_words, offered
+from app.ui.text import plain
+from app.ui.text.numbers import seconds_words, tip_with_key
+from app.ui.widgets import (
+    Button,
+    ElidedLabel,
+    EmptyAction,
+    EmptyState,
+    NumberEdit,
+    Segments,
+    Separator,
+    label,
+)
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.fields import FilterField
+from app.ui.widgets.inputs.json_edit import JsonEdit
+from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from app.ui.widgets.menus import Menu
+from app.ui.widgets.table.model import Cell, Column, TableModel
+from app.ui.widgets.table.view import TableView
+from nep.errors import NepError
+from nep.i18n import _, lazy
+from nep.text import shortened
+
+LIST_PX, SIDE_BY_SIDE_PX, LIST_HIGH_PX, SECONDS_PX = 196, 480, 120, 84
+REQUEST_LETTERS = 120
+EMPTY_REQUEST = "{}"
+
+
+class ServicesPanel(PanelWidget):
+    """The list at the left, or above where there is little room; the chosen service beside it."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, _("Services"))
+        self.acting = context.session.acting
+        self._seen: tuple[object, ...] = ()
+        self._wanted = ""
+        self._texts: dict[str, str] = {}
+        self._shown = ""
+        self._is_showing = False
+        self.count = label("", "small", role="textSecondary")
+        self.chips = [self.count]
+        self.strip = ArmedStrip(context)
+        self._minutes = ArmedMinutes(self.theme, self, self.acting)
+        self.filter = FilterField(self.theme, _("Filter the services"))
+        self.filter.setMaximumWidth(16_777_215)
+        self.list = ServiceList(self.theme)
+        self.empty = EmptyState(self.theme, "spline", _("Nobody offers a service"), "")
+        self._make_request()
+        self._make_calls()
+        self._connect()
+        self._arrange()
+        self.refresh()
+
+    def _make_request(self) -> None:
+        theme = self.theme
+        self.name = ElidedLabel("code", "text", least=60)
+        self.way = Segments(
+            theme, [("form", _("Form"), None), ("json", _("JSON"), None)], size="small", name=_("Request as")
+        )
+        self.form = RequestForm(theme)
+        self.edit = JsonEdit(theme, _("The request"), least_lines=4)
+        self.requests = QStackedWidget()
+        self.requests.addWidget(self.form)
+        self.requests.addWidget(self.edit)
+        self.sentence = label("", "small", role="error", wrap=True)
+        self.sentence.setMinimumWidth(0)
+        self.mend = Button(theme, _("Put it right"), "wrench", size="small")
+        self.call_button = Button(theme, _("Call"), "play", kind="primary")
+        self.call_button.setToolTip(plain.tip(tip_with_key(_("Calls it"), "Ctrl+Enter")))
+        self.give_up = Button(theme, _("Give up"), "x")
+        self.seconds = NumberEdit(theme, LEAST_S, MOST_S, _("s"), 1)
+        self.seconds.setAccessibleName(_("Waits at most, in seconds"))
+        self.seconds.setFixedWidth(round(theme.scaled(SECONDS_PX)))
+        self.seconds.show_number(TIMEOUT_S)
+        self.timeout_s = TIMEOUT_S
+
+    def _make_calls(self) -> None:
+        self.answer = AnswerView(self.theme, self.context.toast)
+        columns: tuple[Column[CallRecord], ...] = (
+            Column(
+                "at", lazy("Calls"), 76, lambda each: Cell(clock_of(each), role="textSecondary", mono=True)
+            ),
+            Column(
+                "request",
+                lazy("Request"),
+                90,
+                _request_cell,
+                stretch=True,
+                tip=lambda each: each.request[:2000],
+            ),
+            Column("took", lazy("Took"), 120, took_cell, figures=True, tip=lambda each: each.sentence),
+        )
+        self.calls_model: TableModel[CallRecord] = TableModel(columns, lambda each: str(each.number))
+        self.calls = TableView(self.theme, self.calls_model)
+        self.calls.setAccessibleName(_("Calls"))
+        self._clear = QAction(_("Clear the calls"), self)
+        self._clear.triggered.connect(self._clear_calls)
+
+    def _connect(self) -> None:
+        self.filter.textChanged.connect(lambda _text: self._rebuild())
+        self.filter.leave.connect(lambda: self.list.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.list.filter_wanted.connect(self.focus_filter)
+        self.list.chosen.connect(lambda _name: self._show_chosen())
+        self.list.call_wanted.connect(self.call)
+        self.list.menu_wanted.connect(self._show_menu)
+        self.way.changed.connect(self._turn)
+        self.form.typed.connect(self._form_typed)
+        self.edit.changed.connect(self._text_typed)
+        self.edit.sent.connect(self.call)
+        self.mend.clicked.connect(self._put_right)
+        self.call_button.clicked.connect(self.call)
+        self.give_up.clicked.connect(self._give_up)
+        self.seconds.number.connect(lambda value: setattr(self, "timeout_s", value))
+        self.calls.opened.connect(self._open_call)
+        self.calls.menu_wanted.connect(self._show_call_menu)
+
+    def _arrange(self) -> None:
+        find = QHBoxLayout()
+        find.setContentsMargins(8, 0, 8, 0)
+        find.addWidget(self.filter)
+        self._left = QWidget()
+        left = QVBoxLayout(self._left)
+        left.setContentsMargins(0, 8, 0, 0)
+        left.setSpacing(6)
+        left.addLayout(find)
+        left.addWidget(self.list, 1)
+        self._upright = Separator(self.theme, upright=True)
+        inside = QWidget()
+        self._sides = QBoxLayout(QBoxLayout.Direction.LeftToRight, inside)
+        self._sides.setContentsMargins(0, 0, 0, 0)
+        self._sides.setSpacing(0)
+        self._sides.addWidget(self._left)
+        self._sides.addWidget(self._upright)
+        self._sides.addWidget(self._right_side(), 1)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(inside)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.strip)
+        column.addWidget(self.pages, 1)
+
+    def _right_side(self) -> QWidget:
+        head, fault, buttons = QHBoxLayout(), QHBoxLayout(), Flow(gap=10, row_gap=6)
+        head.addWidget(self.name, 1)
+        head.addWidget(self.way)
+        fault.addWidget(self.sentence, 1)
+        fault.addWidget(self.mend, 0, Qt.AlignmentFlag.AlignTop)
+        for button in (self.call_button, self.give_up):
+            buttons.addWidget(button)
+        limit = QWidget()
+        beside = QHBoxLayout(limit)
+        beside.setContentsMargins(0, 0, 0, 0)
+        beside.addWidget(label(_("waits at most"), "small", role="textSecondary"))
+        beside.addWidget(self.seconds)
+        buttons.addWidget(limit)
+        self._asks = QWidget()
+        request = QVBoxLayout(self._asks)
+        request.setContentsMargins(12, 8, 12, 8)
+        request.setSpacing(8)
+        request.addLayout(head)
+        request.addWidget(self.requests, 1)
+        request.addLayout(fault)
+        request.addLayout(buttons)
+        self.answer.setMinimumHeight(round(self.theme.scaled(110)))
+        self.calls.setMinimumHeight(round(self.theme.scaled(90)))
+        scroll = ScrollColumn(_("The chosen service"))
+        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        for place, (widget, stretch) in enumerate(
+            (
+                (self._asks, 4),
+                (Separator(self.theme), 0),
+                (self.answer, 3),
+                (Separator(self.theme), 0),
+                (self.calls, 2),
+            )
+        ):
+            scroll.column.insertWidget(place, widget)
+            scroll.column.setStretch(place, stretch)
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
+        return scroll
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """The list beside the service, or above it where there is little room."""
+        beside = self.width() >= self.theme.scaled(SIDE_BY_SIDE_PX)
+        way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        self._sides.setDirection(way)
+        self._upright.setVisible(beside)
+        most = 16_777_215
+        wide = round(min(self.theme.scaled(LIST_PX), self.width() * 0.4))
+        self._left.setMinimumWidth(wide if beside else 0)
+        self._left.setMaximumWidth(wide if beside else most)
+        self._left.setMaximumHeight(most if beside else round(self.theme.scaled(LIST_HIGH_PX)))
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        self.strip.refresh()
+        acting, view = self.acting, self.session.live.graph
+        graph = (view.epoch, view.revision) if view is not None else None
+        facts = (
+            graph,
+            acting.revision,
+            acting.calls.revision,
+            acting.arming.revision,
+            self.session.master.kind,
+        )
+        if facts != self._seen:
+            self._seen = facts
+            self._rebuild()
+        elif acting.calls.waiting is not None:
+            self._say_call()
+
+    def source_changed(self) -> None:
+        self._seen = ()
+
+    def _rebuild(self) -> None:
+        services = offered(self.session.live.graph)
+        words = self.filter.text().casefold().split()
+        rows = [
+            each
+            for each in services
+            if each.name == self._wanted
+            or all(word in f"{each.name} {each.said}".casefold() for word in words)
+        ]
+        chosen = self._wanted or self.list.chosen_key() or self._shown
+        self.list.model().set_rows(rows)  # type: ignore[attr-defined]  # it is a TableModel
+        names = [each.name for each in rows]
+        if names:
+            wanted = chosen if chosen in names else names[0]
+            if self.list.chosen_key() != wanted:
+                self.list.choose(wanted)
+            self._wanted = ""
+        self.list.tell_visible_changed()
+        self.count.setText(count_words(services))
+        self.pages.setCurrentIndex(1 if services else 0)
+        if not services:
+            self._say_empty()
+        self._show_chosen()
+
+    def _say_empty(self) -> None:
+        if self.session.master.kind == "none":
+            self.empty.say(
+                _("No master is running"), _("A master lets programs find each other."), "radio-tower"
+            )
+            start = self.session.launcher.ensure_master
+            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
+        else:
+            said = _("Services appear here as soon as a program makes a server.")
+            self.empty.say(_("Nobody offers a service"), said, "spline")
+            self.empty.set_actions([])
+
+    @property
+    def service(self) -> str:
+        """The chosen one."""
+        return self.list.chosen_key() or ""
+
+    def _show_chosen(self) -> None:
+        name = self.service
+        if name and name != self._shown:
+            self._shown = name
+            self.name.setText(name)
+            self.form.forget()
+            self._put_text(self._text_of(name))
+            self._turn("form")
+            self.answer.show_record(None)
+        if name:
+            records = [each for each in reversed(self.acting.calls.records) if each.service == name]
+            self.calls_model.set_rows(records)
+            self.calls.tell_visible_changed()
+            self._say_call()
+
+    def _text_of(self, service: str) -> str:
+        return self._texts.get(service) or self.acting.shelf.requests.get(service, EMPTY_REQUEST)
+
+    @property
+    def text(self) -> str:
+        """The request, as JSON."""
+        return self._texts.get(self._shown, EMPTY_REQUEST)
+
+    def _put_text(self, text: str) -> None:
+        """The request is another: both ways show it."""
+        self._texts[self._shown] = text
+        self._is_showing = True
+        self.edit.set_text(text)
+        read = read_json(text)
+        if read.fault is None and not read.places:
+            self.form.show_request(read.filled({}))
+        self._is_showing = False
+        self._judge()
+
+    def _fits_a_form(self) -> bool:
+        read = read_json(self.text)
+        return read.fault is None and not read.places and isinstance(read.filled({}), Mapping)
+
+    def _judge(self) -> None:
+        fault = self._read().fault
+        self.edit.mark(fault.line if fault is not None else 0)
+        said = fault.sentence if fault is not None else self._problem()
+        self.sentence.setText(said)
+        self.sentence.setVisible(bool(said))
+        self.mend.setVisible(fault is not None and fault.mend is not None)
+        self._say_call()
+
+    def _read(self) -> JsonText:
+        return read_json(self.text)
+
+    def _problem(self) -> str:
+        """Why the request can't be sent though it is JSON."""
+        if self.way.value == "form" and self.form.problems:
+            return next(iter(self.form.problems.values()))
+        read = self._read()
+        return _("Fill in “{name}” first.").format(name=read.to_fill[0]) if read.to_fill else ""
+
+    def _say_call(self) -> None:
+        acting, name = self.acting, self.service
+        waiting = acting.calls.waiting
+        is_mine = waiting is not None and waiting.service == name
+        can_call = self._read().fault is None and not self._problem() and waiting is None
+        self.call_button.setEnabled(can_call and not self.session.is_replaying)
+        is_armed = acting.arming.allows(Target("service", name))
+        if is_mine:
+            said = _("Waiting {time}").format(time=seconds_words(acting.calls.waited_s))
+            self.call_button.set_word(said, "circle-dashed")
+        else:
+            self.call_button.set_word(
+                _("Call") if is_armed else _("Arm and call"), "play" if is_armed else "lock"
+            )
+        self.give_up.setVisible(is_mine)
+        record = self._shown_record()
+        self.answer.show_record(record, acting.calls.waited_s)
+
+    def _shown_record(self) -> CallRecord | None:
+        records = [each for each in self.acting.calls.records if each.service == self.service]
+        chosen = self.calls.chosen_key()
+        return next(
+            (each for each in records if str(each.number) == chosen), records[-1] if records else None
+        )
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def begin(self, service: str) -> None:
+        """Show this service, to be called."""
+        self._wanted = service
+        self.filter.clear()
+        self._rebuild()
+        self.call_button.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _turn(self, way: str) -> None:
+        if way == "form" and not self._fits_a_form():
+            way = "json"  # what stands there has no fields
+        self.way.set_value(way)
+        self.requests.setCurrentIndex(1 if way == "json" else 0)
+        self._judge()
+
+    def _form_typed(self, request: object) -> None:
+        if self._is_showing:
+            return
+        if self.form.problems:
+            self._judge()
+        else:
+            self._put_text(pretty(request))
+
+    def _text_typed(self) -> None:
+        if not self._is_showing:
+            self._put_text(self.edit.text())
+
+    def _put_right(self) -> None:
+        fault = self._read().fault
+        if fault is not None and fault.mend is not None:
+            self.edit.replace(fault.mend.start, fault.mend.end, fault.mend.text)
+
+    def call(self) -> None:
+        """Call the chosen service."""
+        if not self.call_button.isEnabled():
+            return
+        self.calls.clearSelection()
+        self.calls.setCurrentIndex(self.calls_model.index(-1, -1))
+        why_not = self.acting.call(self.service, self.text, self.timeout_s)
+        if why_not:
+            self.context.toast(why_not)
+        self.refresh()
+
+    def _give_up(self) -> None:
+        self.acting.calls.give_up()
+        self.refresh()
+
+    def _open_call(self, _key: str) -> None:
+        self._say_call()
+
+    def _clear_calls(self) -> None:
+        self.acting.calls.clear()
+        self.refresh()
+
+    def _show_menu(self, service: str, at: QPoint) -> None:
+        menu = filled(Menu(self.theme, self), self.theme, self.service_menu(service))
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(at)
+
+    def service_menu(self, service: str) -> list[RowAction]:
+        """What can be done with a service of the list."""
+        return [RowAction(_("Call"), "play", self.call), copies(self.context, service)]
+
+    def _show_call_menu(self, key: str, at: QPoint) -> None:
+        record = next((each for each in self.acting.calls.records if str(each.number) == key), None)
+        if record is None:
+            return
+        menu = Menu(self.theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.addAction(
+            self.theme.icon("repeat"), _("Ask the same again"), lambda: self._put_text(record.request)
+        )
+        menu.addAction(self.theme.icon("copy"), _("Copy the request"), lambda: self._copy(record.request))
+        menu.popup(at)
+
+    def _copy(self, text: str) -> None:
+        QGuiApplication.clipboard().setText(text)
+        self.context.toast(_("Copied the request"))
+
+    # -- what every panel has -----------------------------------------------------------------------------
+
+    def more_actions(self) -> Sequence[QAction]:
+        self._clear.setEnabled(bool(self.acting.calls.records))
+        return (self._minutes.entry(), self._clear)
+
+    def focus_filter(self) -> bool:
+        self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.filter.selectAll()
+        return True
+
+    def theme_changed(self) -> None:
+        self.list.fit_rows()
+        self._fit()
+
+    def save_state(self) -> dict[str, object]:
+        return {"service": self.service}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        self._wanted = str(state.get("service", ""))
+        self._rebuild()
+
+    def shut(self) -> None:
+        self.acting.disarm()
+
+
+def _request_cell(record: CallRecord) -> Cell:
+    """The request in one line: "name Aiko, pictures 12"."""
+    try:
+        asked = read_json(record.request).filled({})
+    except NepError:
+        asked = None
+    if isinstance(asked, Mapping):
+        words = ", ".join(f"{name} {_short(value)}" for name, value in asked.items()) or _("nothing")
+    else:
+        words = " ".join(record.request.split())
+    return Cell(shortened(words, REQUEST_LETTERS))
+
+
+def _short(value: object) -> str:
+    return value if isinstance(value, str) else " ".join(pretty(value).split())
+
+
+PANEL = Panel("services", lazy("Services"), "spline", (), ServicesPanel)

@@ -1,0 +1,176 @@
+"""A request as fields: made from the request that is there, one row for each of its names."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QGridLayout, QLineEdit, QVBoxLayout, QWidget
+
+from app.core.run.acting.json_text import value_typed
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Switch, label
+from app.ui.widgets.menus import EditMenu
+from nep.i18n import _, lazy
+
+LABEL_PX = 80
+MOST_FIELDS = 60
+WIDER = {("float", "int")}
+NEEDS = {
+    "int": lazy("{name} needs a whole number."),
+    "float": lazy("{name} needs a number."),
+    "json": lazy("{name} needs JSON, such as {example}."),
+}
+
+
+def kind_of(value: object) -> str:
+    """What a field takes: "bool", "int", "float", "str", or any "json"."""
+    if isinstance(value, bool):
+        return "bool"
+    if isinstance(value, (int, float)):
+        return "int" if isinstance(value, int) else "float"
+    return "str" if isinstance(value, str) else "json"
+
+
+class RequestForm(QWidget):
+    """Fields for a map. `typed` tells the request that a person made of it."""
+
+    typed = Signal(object)  # a dict
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._request: dict[str, object] = {}
+        self._kinds: dict[str, str] = {}
+        self.fields: dict[str, QLineEdit | Switch] = {}
+        self.problems: dict[str, str] = {}
+        """By name why what stands in a field can't be taken."""
+        self.nothing = label("", "small", role="textSecondary", wrap=True)
+        self.nothing.setMinimumWidth(0)
+        self._grid = QGridLayout()
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(10)
+        self._grid.setVerticalSpacing(8)
+        self._grid.setColumnMinimumWidth(0, round(theme.scaled(LABEL_PX)))
+        self._grid.setColumnStretch(1, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(8)
+        column.addWidget(self.nothing)
+        column.addLayout(self._grid)
+        column.addStretch(1)
+
+    def forget(self) -> None:
+        """What comes next is the request of another service."""
+        self._kinds, self._request = {}, {}
+
+    def show_request(self, request: object) -> None:
+        """Show these values; what is no map has no fields."""
+        given = dict(request) if isinstance(request, Mapping) else {}
+        if given == self._request and self._kinds and not self.problems:
+            return
+        some = dict(list(given.items())[:MOST_FIELDS])
+        kinds = {name: self._kind(name, value) for name, value in some.items()}
+        if kinds != self._kinds or list(kinds) != list(self.fields):
+            self._rebuild(kinds)
+        self._request = given
+        for name, value in some.items():
+            self._show(name, value)
+        if not isinstance(request, Mapping):
+            self.nothing.setText(_("This is no map of names and values: change it as JSON."))
+        elif not given:
+            said = _(
+                "Nothing is known of what it takes. It is asked with an empty map, or what you write as JSON."
+            )
+            self.nothing.setText(said)
+        elif len(given) > MOST_FIELDS:
+            self.nothing.setText(_("There are more fields; all of them are in the JSON."))
+        self.nothing.setVisible(not given or len(given) > MOST_FIELDS)
+
+    def _kind(self, name: str, value: object) -> str:
+        """What a field takes: one for decimals stays one when a whole number is typed, one for JSON too."""
+        kind, before = kind_of(value), self._kinds.get(name)
+        return before if (before is not None and (before, kind) in WIDER) or before == "json" else kind
+
+    def _show(self, name: str, value: object) -> None:
+        field, kind = self.fields[name], self._kinds[name]
+        self.problems.pop(name, None)
+        if isinstance(field, Switch):
+            field.setChecked(value is True)
+            return
+        words = value if isinstance(value, str) and kind == "str" else json.dumps(value, ensure_ascii=False)
+        # 12 and 12.0 are one number to who types it
+        if field.text() != words and not (field.hasFocus() and self._meant(name, field.text()) == (value,)):
+            field.setText(words)
+        self._mark(field, wrong=False)
+
+    def _rebuild(self, kinds: Mapping[str, str]) -> None:
+        while (item := self._grid.takeAt(0)) is not None:
+            old = item.widget()
+            if old is not None:
+                old.hide()
+                old.deleteLater()
+        self.fields, self._kinds, self.problems = {}, dict(kinds), {}
+        for row, (name, kind) in enumerate(kinds.items()):
+            words = label(name, "body", role="textSecondary", wrap=True)
+            words.setTextFormat(Qt.TextFormat.PlainText)
+            words.setMinimumHeight(26)
+            field = self._field(name, kind)
+            field.setAccessibleName(name)
+            self._grid.addWidget(words, row, 0, Qt.AlignmentFlag.AlignTop)
+            self._grid.addWidget(field, row, 1)
+            self.fields[name] = field
+
+    def _field(self, name: str, kind: str) -> QLineEdit | Switch:
+        if kind == "bool":
+            switch = Switch(self._theme, "")
+            switch.clicked.connect(lambda: self._put(name, switch.isChecked()))
+            return switch
+        line = QLineEdit()
+        line.setProperty("focusRadius", self._theme.radius("control"))
+        EditMenu(self._theme, line)
+        line.textEdited.connect(lambda text: self._typed(name, text))
+        return line
+
+    def _typed(self, name: str, text: str) -> None:
+        meant = self._meant(name, text)
+        field = self.fields[name]
+        if meant is None:
+            said = NEEDS[self._kinds[name]]
+            self.problems[name] = _(said).format(name=name, example="[1, 2]")
+            if isinstance(field, QLineEdit):
+                self._mark(field, wrong=True)
+            self.typed.emit(dict(self._request))
+        else:
+            self.problems.pop(name, None)
+            if isinstance(field, QLineEdit):
+                self._mark(field, wrong=False)
+            self._put(name, meant[0])
+
+    def _meant(self, name: str, text: str) -> tuple[object] | None:
+        """What a text means for a field; None when it can't be that."""
+        kind = self._kinds[name]
+        if kind == "str":
+            return (text,)
+        value = value_typed(text)
+        if isinstance(value, str) and value == text:
+            return None  # no JSON
+        if kind == "json":
+            return (value,)
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not is_number or (isinstance(value, float) and not math.isfinite(value)):
+            return None
+        return None if kind == "int" and isinstance(value, float) else (value,)
+
+    def _put(self, name: str, value: object) -> None:
+        self._request = {**self._request, name: value}
+        self.typed.emit(dict(self._request))
+
+    @staticmethod
+    def _mark(field: QLineEdit, *, wrong: bool) -> None:
+        if (field.property("wrong") == "true") != wrong:
+            field.setProperty("wrong", "true" if wrong else "false")
+            field.style().unpolish(field)
+            field.style().polish(field)

@@ -1,0 +1,96 @@
+"""The services that somebody offers, with who does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QModelIndex, Qt, Signal
+from PySide6.QtGui import QKeyEvent
+
+from app.core.graph.node_graph import OWN
+from app.ui.theme.theme import Theme
+from app.ui.widgets.table.model import Cell, Column, TableModel
+from app.ui.widgets.table.two_lines import ROW_PX, TwoLines
+from app.ui.widgets.table.view import TableView
+from nep.i18n import _, lazy, listed, ngettext
+from nep.protocol.graph_view import GraphView
+from nep.protocol.service_wire import SURVEY
+
+
+@dataclass(frozen=True, slots=True)
+class OfferedService:
+    """A service and the names of the nodes that offer it, the one that is called first."""
+
+    name: str
+    nodes: tuple[str, ...]
+
+    @property
+    def said(self) -> str:
+        """Who offers it: "of face_tracker"."""
+        return listed(list(self.nodes))
+
+
+def offered(view: GraphView | None) -> list[OfferedService]:
+    """By name, but for what nep itself makes (parameters) and surveys, which have many answers."""
+    if view is None:
+        return []
+    found = []
+    for name, info in sorted(view.services.items()):
+        if info.servers and not name.startswith((OWN, SURVEY)):
+            nodes = [view.nodes[each.node_id].name for each in info.servers if each.node_id in view.nodes]
+            found.append(OfferedService(name, tuple(dict.fromkeys(nodes))))
+    return found
+
+
+def count_words(services: Sequence[OfferedService]) -> str:
+    """How many there are: "6 services of 3 nodes"."""
+    if not services:
+        return ""
+    nodes = len({name for each in services for name in each.nodes})
+    said = ngettext("{count} service", "{count} services", len(services)).format(count=len(services))
+    by = ngettext("{count} node", "{count} nodes", nodes).format(count=nodes)
+    return _("{services} of {nodes}").format(services=said, nodes=by)
+
+
+class ServiceList(TableView[OfferedService]):
+    """A click chooses. `chosen` tells the name, also when arrows lead there; Ctrl+Enter calls."""
+
+    chosen = Signal(str)
+    call_wanted = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        columns: tuple[Column[OfferedService], ...] = (
+            Column(
+                "service",
+                lazy("Service"),
+                90,
+                lambda each: Cell(
+                    mark=TwoLines(each.name, each.said, mono=True), said=f"{each.name}, {each.said}"
+                ),
+                stretch=True,
+                tip=lambda each: f"{each.name}\n{each.said}",
+            ),
+        )
+        super().__init__(theme, TableModel(columns, lambda each: each.name))
+        self.horizontalHeader().hide()
+        self.setAccessibleName(_("Services"))
+        self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._tell_chosen())
+        self.fit_rows()
+
+    def fit_rows(self) -> None:
+        """Rows grow with the text."""
+        self.set_row_height(round(self.theme.scaled(ROW_PX)), large=False)
+
+    def _open(self, index: QModelIndex) -> None:
+        """A click only chooses."""
+
+    def _tell_chosen(self) -> None:
+        self.chosen.emit(self.chosen_key() or "")
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        held = event.modifiers() == Qt.KeyboardModifier.ControlModifier
+        if held and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self.call_wanted.emit()
+        else:
+            super().keyPressEvent(event)

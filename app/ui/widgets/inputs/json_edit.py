@@ -1,0 +1,260 @@
+"""JSON as it is typed: with the numbers of its lines, in colours, and with a mark where it is wrong."""
+
+from __future__ import annotations
+
+import re
+
+from PySide6.QtCore import QPoint, QRect, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QFocusEvent,
+    QKeyEvent,
+    QPainter,
+    QPaintEvent,
+    QResizeEvent,
+    QSyntaxHighlighter,
+    QTextBlock,
+    QTextCharFormat,
+    QTextCursor,
+    QTextDocument,
+    QTextFormat,
+)
+from PySide6.QtWidgets import QFrame, QPlainTextEdit, QTextEdit, QVBoxLayout, QWidget
+
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.menus import EditMenu
+
+INDENT = 2
+# The first rule that fits a place colours it: texts before what stands inside of them, names before texts.
+_RULES: tuple[tuple[str, str], ...] = (
+    ("textSecondary", r'"(?:\\.|[^"\\])*"(?=\s*:)'),
+    ("ok", r'"(?:\\.|[^"\\])*"?'),
+    ("accentText", r"\{ ?[^\W\d][\w ]* ?\}"),
+    ("changed", r"\b(?:true|false|null)\b"),
+    ("warn", r"-?\b\d+(?:\.\d+)?(?:[eE][+-]?\d+)?\b"),
+)
+_TOGETHER = re.compile("|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_RULES)))
+
+
+class _JsonColours(QSyntaxHighlighter):
+    def __init__(self, document: QTextDocument, theme: Theme) -> None:
+        super().__init__(document)
+        self._theme = theme
+        self.is_on = True
+
+    def highlightBlock(self, text: str) -> None:
+        if not self.is_on:
+            return
+        for found in _TOGETHER.finditer(text):
+            role = _RULES[int((found.lastgroup or "r0")[1:])][0]
+            shown = QTextCharFormat()
+            shown.setForeground(self._theme.colour(role))
+            if role == "accentText":
+                shown.setBackground(self._theme.colour("accentTint"))
+            self.setFormat(found.start(), found.end() - found.start(), shown)
+
+
+class _JsonLines(QWidget):
+    """The numbers at the left of the text."""
+
+    def __init__(self, text: JsonLinesEdit) -> None:
+        super().__init__(text)
+        self._text = text
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        self._text.paint_numbers(self, event.rect())
+
+
+class JsonLinesEdit(QPlainTextEdit):
+    """The text itself. Enter goes on where the line began; Tab leaves; `sent` by Ctrl+Enter."""
+
+    sent = Signal()
+    focus_changed = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.wrong_line = 0
+        self.setProperty("bare", "true")
+        self.setProperty("ownFocus", "true")
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setTabChangesFocus(True)
+        self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self.colours = _JsonColours(self.document(), theme)
+        self._numbers = _JsonLines(self)
+        EditMenu(theme, self)
+        self.blockCountChanged.connect(self._make_room)
+        self.updateRequest.connect(self._scrolled)
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def _restyle(self) -> None:
+        font = self._theme.font("code")
+        font.setPixelSize(round(self._theme.scaled(13)))
+        self.setFont(font)
+        self.colours.rehighlight()
+        self._make_room()
+        self.mark(self.wrong_line)
+
+    def _room(self) -> int:
+        digits = max(2, len(str(self.blockCount())))
+        return round(paint.width_of(self.font(), "0" * digits)) + 30
+
+    def _make_room(self) -> None:
+        self.setViewportMargins(self._room(), 0, 0, 0)
+        self._place_numbers()
+
+    def _place_numbers(self) -> None:
+        inside = self.contentsRect()
+        self._numbers.setGeometry(QRect(inside.left(), inside.top(), self._room(), inside.height()))
+
+    def _scrolled(self, rect: QRect, dy: int) -> None:
+        if dy:
+            self._numbers.scroll(0, dy)
+        else:
+            self._numbers.update(0, rect.y(), self._numbers.width(), rect.height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._place_numbers()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.focus_changed.emit()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self.focus_changed.emit()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
+        if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or self.isReadOnly():
+            super().keyPressEvent(event)
+        elif held:
+            self.sent.emit()
+        else:
+            before = self.textCursor().block().text()[: self.textCursor().positionInBlock()]
+            deep = len(before) - len(before.lstrip(" "))
+            deep += INDENT if before.rstrip().endswith(("{", "[")) else 0
+            self.textCursor().insertText("\n" + " " * deep)
+            self.ensureCursorVisible()
+
+    def mark(self, line: int) -> None:
+        """Mark this line as wrong, from 1; 0 for none."""
+        self.wrong_line = line
+        marks = []
+        if line:
+            mark = QTextEdit.ExtraSelection()
+            mark.format.setBackground(self._theme.colour("errorTint"))
+            mark.format.setProperty(QTextFormat.Property.FullWidthSelection, True)
+            mark.cursor = QTextCursor(self.document().findBlockByNumber(line - 1))
+            marks.append(mark)
+        self.setExtraSelections(marks)
+        self._numbers.update()
+
+    def paint_numbers(self, place: QWidget, rect: QRect) -> None:
+        """Paint the numbers of the lines that can be seen."""
+        theme, painter = self._theme, QPainter(place)
+        block = self.firstVisibleBlock()
+        while block.isValid():
+            area = self.blockBoundingGeometry(block).translated(self.contentOffset())
+            if area.top() > rect.bottom():
+                break
+            if block.isVisible() and area.bottom() >= rect.top():
+                self._paint_number(painter, block, area, theme.colour("textTertiary"))
+            block = block.next()
+        painter.end()
+
+    def _paint_number(self, painter: QPainter, block: QTextBlock, area: QRectF, ink: QColor) -> None:
+        theme, number = self._theme, block.blockNumber() + 1
+        if number == self.wrong_line:
+            ink = theme.colour("error")
+            row = QRectF(0, area.top(), self._numbers.width(), area.height())
+            painter.fillRect(row, theme.colour("errorTint"))
+            paint_icon(painter, QRectF(2, area.center().y() - 7, 14, 14), theme.status("error").icon, ink)
+        box = QRectF(0, area.top(), self._numbers.width() - 10, area.height())
+        paint.words(painter, box, str(number), self.font(), ink, paint.RIGHT)
+
+
+class JsonEdit(QWidget):
+    """The text in the frame of a field. `changed` with each letter, `sent` by Ctrl+Enter."""
+
+    changed = Signal()
+    sent = Signal()
+
+    def __init__(self, theme: Theme, name: str, *, least_lines: int = 6) -> None:
+        """``name`` is what a screen reader says; it is never lower than so many lines."""
+        super().__init__()
+        self._theme, self._least = theme, least_lines
+        self._is_wrong = False
+        self.edit = JsonLinesEdit(theme)
+        self.edit.setAccessibleName(name)
+        self.setFocusProxy(self.edit)
+        self.setProperty("focusRadius", theme.radius("control"))
+        column = QVBoxLayout(self)
+        column.setContentsMargins(2, 2, 2, 2)
+        column.addWidget(self.edit)
+        self.edit.textChanged.connect(self.changed)
+        self.edit.sent.connect(self.sent)
+        self.edit.focus_changed.connect(self.update)
+
+    def text(self) -> str:
+        """What stands in it."""
+        return self.edit.toPlainText()
+
+    def set_text(self, text: str) -> None:
+        """Show another text, of which nothing can be undone."""
+        if text != self.text():
+            self.edit.setPlainText(text)
+
+    def replace(self, start: int, end: int, text: str) -> None:
+        """Put other letters in the place of some, as a person would: Undo takes them back."""
+        cursor = QTextCursor(self.edit.document())
+        cursor.setPosition(start)
+        cursor.setPosition(end, QTextCursor.MoveMode.KeepAnchor)
+        cursor.insertText(text)
+
+    def go_to(self, line: int, column: int) -> None:
+        """Put the cursor there, both from 1."""
+        block = self.edit.document().findBlockByNumber(line - 1)
+        cursor = QTextCursor(block)
+        cursor.setPosition(block.position() + min(column - 1, max(0, block.length() - 1)))
+        self.edit.setTextCursor(cursor)
+
+    def set_coloured(self, is_json: bool) -> None:
+        """Whether the text is JSON: else it has no colours."""
+        if self.edit.colours.is_on != is_json:
+            self.edit.colours.is_on = is_json
+            self.edit.colours.rehighlight()
+
+    def mark(self, line: int) -> None:
+        """Mark this line as wrong, from 1; 0 for none."""
+        if line != self.edit.wrong_line or bool(line) != self._is_wrong:
+            self._is_wrong = bool(line)
+            self.edit.mark(line)
+            self.update()
+
+    @property
+    def wrong_line(self) -> int:
+        """The line that is marked, 0 for none."""
+        return self.edit.wrong_line
+
+    def _high(self, lines: int) -> int:
+        return round(lines * paint.height_of(self.edit.font())) + 12
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(150, self._high(self._least))
+
+    def sizeHint(self) -> QSize:
+        return QSize(320, self._high(max(self._least, 12)))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        has_focus = self.edit.hasFocus()
+        edge = "error" if self._is_wrong else "accent" if has_focus else "controlBorder"
+        rect = QRectF(QPoint(0, 0), self.size())
+        fill, width = theme.colour("panel"), 2.0 if has_focus else 1.0
+        paint.box(painter, rect, theme.radius("control"), fill, theme.colour(edge), width)
+        painter.end()

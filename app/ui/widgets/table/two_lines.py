@@ -1,0 +1,38 @@
+"""A cell of a list with high rows: a name, and below it where it belongs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QRectF
+from PySide6.QtGui import QFont, QPainter
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+ROW_PX = 50
+
+
+@dataclass(frozen=True, slots=True)
+class TwoLines:
+    """The name is ``mono`` for topics and services; what stands below it is then a plain word."""
+
+    name: str
+    below: str
+    mono: bool = False
+
+    def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
+        """Paint it in the inside of a cell."""
+        name, below = (
+            theme.font("code" if self.mono else "body"),
+            theme.font("small" if self.mono else "mono"),
+        )
+        if not self.mono:
+            name.setWeight(QFont.Weight.DemiBold)
+        below.setPixelSize(theme.font("small").pixelSize())
+        first, second = paint.height_of(name), paint.height_of(below)
+        top = box.center().y() - (first + second + 2) / 2
+        row = QRectF(box.left(), top, box.width(), first)
+        paint.words(painter, row, self.name, name, theme.colour("text"))
+        row = QRectF(box.left(), top + first + 2, box.width(), second)
+        paint.words(painter, row, self.below, below, theme.colour("textSecondary"))

@@ -1,0 +1,108 @@
+"""Acting by hand in a real session: sent and called through its network, ended by Stop, kept in a file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import nep
+from app.core.run.acting.acting import FILE, call_words, result_words
+from app.core.run.acting.arming import Target
+from app.core.run.acting.sending import SendOrder, SendResult
+from app.core.run.acting.shelf import KeptMessage
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from tests.core.waiting import tick_until
+
+STILL = KeptMessage("a", "Stand still", "/cmd_vel", "json", '{"x": 0, "id": {new id}}', (), 20.0)
+
+
+def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Session) -> None:
+    acting = session.acting
+    acting.shelf.put(STILL)
+    with nep.node("robot") as node:
+        heard = node.new_sub("/cmd_vel", "json")
+        node.new_server("sum", lambda asked: {"sum": asked["a"] + asked["b"]}, threads=1)
+        tick_until(session, lambda: "sum" in getattr(session.live.graph, "services", {}))
+        assert acting.send(STILL) == ""
+        assert acting.arming.targets == (Target("topic", "/cmd_vel"),)
+        is_there, first = heard.listen(timeout_s=20.0)
+        assert is_there
+        tick_until(session, lambda: "a" in acting.last)
+        assert result_words(acting.last["a"]) == "heard by 1"
+        assert acting.call("sum", '{"a": 2, "b": 3}', 20.0) == ""
+        tick_until(session, lambda: acting.calls.waiting is None)
+        assert acting.calls.records[-1].answer == {"sum": 5}
+        assert call_words(acting.calls.records[-1]).startswith("answered in ")
+        assert acting.shelf.requests["sum"] == '{"a": 2, "b": 3}'
+        assert acting.send(STILL, rate_hz=20.0) == ""
+        is_there, second = heard.listen(timeout_s=20.0)
+        assert is_there
+        assert first["id"] != second["id"]
+        session.runs.stop()
+        assert not acting.arming.is_on
+        assert acting.outbox.all_repeated == ()
+        while heard.receive(0.0) is not None:
+            pass
+        assert heard.receive(0.1) is None
+    said = [each.text for each in session.console.records]
+    assert "armed for 5 min" in said
+    assert "/cmd_vel: Stand still, heard by 1" in said
+    assert "no longer armed" in said
+
+
+def test_what_is_wrong_is_a_sentence_and_arms_nothing(session: Session) -> None:
+    acting = session.acting
+    for message, sentence in (
+        (KeptMessage("b", "No topic", " "), "Choose a topic first."),
+        (KeptMessage("b", "Wrong", "/t", "json", '{"a": }'), "Line 1 has no value after the colon."),
+        (KeptMessage("b", "Open", "/t", "json", '{"a": {yaw}}'), "Fill in “yaw” first."),
+        (KeptMessage("b", "Picture", "/t", "image"), "Messages of the type image can't be written by hand."),
+    ):
+        assert acting.send(message) == sentence
+    assert acting.call("sum", '{"a"', 1.0) == "Line 1 needs a colon after the name."
+    assert not acting.arming.is_on
+
+
+def test_the_shelf_is_kept_in_its_file_and_damage_is_told(tmp_path: Path) -> None:
+    first = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
+    first.acting.shelf.put(STILL)
+    first.acting.check()
+    first.close()
+    path = tmp_path / FILE
+    again = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
+    assert again.acting.shelf.messages == (STILL,)
+    assert not again.acting.arming.is_on
+    again.close()
+    told = json.loads(path.read_text("utf-8"))
+    path.write_text(json.dumps({**told, "messages": [*told["messages"], 7]}), "utf-8")
+    third = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
+    assert third.acting.shelf.messages == (STILL,)
+    assert any("1 message could not be read" in each.detail for each in third.alerts.active)
+    assert (tmp_path / "messages.damaged.json").is_file()
+    third.close()
+
+
+def test_a_file_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    data = json.dumps({"format": 99, "messages": []})
+    path.write_text(data, "utf-8")
+    session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
+    session.acting.shelf.put(STILL)
+    session.acting.check()
+    session.close()
+    assert path.read_text("utf-8") == data
+
+
+def test_how_it_ended_in_words() -> None:
+    order = SendOrder("a", "Drive", "/cmd_vel", "json", dict)
+    for result, words in (
+        (SendResult(order, "sent", heard=2), "heard by 2"),
+        (SendResult(order, "sent"), "nobody hears it"),
+        (SendResult(order, "began"), "began"),
+        (SendResult(order, "ended", count=412, skipped=3), "412 sent, 3 left out, being late"),
+        (SendResult(order, "failed", "not sent: no master was there"), "not sent: no master was there"),
+        (SendResult(order, "failed", "it is closed", count=2), "2 sent, it is closed"),
+        (SendResult(order, "ended"), "0 sent"),
+    ):
+        assert result_words(result) == words

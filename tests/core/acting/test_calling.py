@@ -1,0 +1,141 @@
+"""Calls by hand over nodes in memory: answers, times, and every way in which there is none."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+import nep
+from app.core.run.acting.arming import Arming, Target
+from app.core.run.acting.calling import ANSWERS_KEPT, HISTORY_KEPT, CallRecord, ServiceCalls
+from nep.errors import NepError
+from nep.nodes.node import Node
+from tests.nep.programs import eventually
+
+
+class Bench:
+    """Calls whose jobs are done at once, or when the test says so, by a node in memory."""
+
+    def __init__(self, node: Node) -> None:
+        self.node, self.now = node, 0.0
+        self.waiting: list[object] | None = None
+        self.arming = Arming(lambda: self.now)
+        self.arming.arm()
+        self.arming.allow(Target("service", "/sum"))
+        self.calls = ServiceCalls(self.arming, self._submit, lambda: self.now, lambda: 1000.0 + self.now)
+
+    def _submit(self, _what: str, job) -> None:
+        if self.waiting is None:
+            job(self.node)
+        else:
+            self.waiting.append(job)
+
+    def call(self, request: object = None, timeout_s: float = 20.0) -> None:
+        self.calls.call("/sum", request, "{}", timeout_s)
+
+    def end(self) -> CallRecord:
+        """Wait until the call has ended."""
+        ended: list[CallRecord] = []
+        eventually(lambda: bool(ended.extend(self.calls.tick()) or ended))
+        return ended[-1]
+
+
+@pytest.fixture
+def bench(request) -> Iterator[Bench]:
+    with nep.node("studio", "memory", master=request.node.name) as node:
+        made = Bench(node)
+        yield made
+        made.calls.close()
+
+
+def test_an_answer_with_its_time_and_as_json(bench) -> None:
+    bench.node.new_server("/sum", lambda asked: {"sum": asked["a"] + 1, "raw": [1.5]}, threads=1)
+    bench.call({"a": 2})
+    waiting = bench.calls.waiting
+    assert waiting is not None
+    record = bench.end()
+    assert (record.state, record.answer) == ("answered", {"sum": 3, "raw": [1.5]})
+    assert record.took_s > 0
+    assert record.text == '{\n  "sum": 3,\n  "raw": [\n    1.5\n  ]\n}'
+    assert bench.calls.waiting is None
+
+
+def test_what_the_server_raises_is_a_refusal_with_its_words(bench) -> None:
+    def refuse(_asked: object) -> object:
+        raise ValueError("no face in sight")
+
+    bench.node.new_server("/sum", refuse, threads=1)
+    bench.call()
+    record = bench.end()
+    assert (record.state, record.sentence) == ("failed", "refused: no face in sight")
+
+
+def test_nobody_serves_it(bench) -> None:
+    bench.call(timeout_s=0.1)
+    assert bench.end().sentence == "nobody serves it"
+
+
+def test_no_answer_in_time_and_giving_up(bench) -> None:
+    go_on = threading.Event()
+    bench.node.new_server("/sum", lambda _asked: go_on.wait(30), threads=2)
+    bench.call(timeout_s=0.2)
+    assert bench.end().sentence == "no answer in 0.2 s"
+    bench.call()
+    with pytest.raises(NepError, match="Wait for the answer of /sum first"):
+        bench.call()
+    bench.now += 3
+    assert bench.calls.waited_s == 3
+    bench.calls.give_up()
+    last = bench.calls.records[-1]
+    assert (last.state, last.took_s) == ("given up", 3)
+    assert bench.calls.waiting is None
+    go_on.set()
+
+
+def test_what_is_not_armed_is_not_called(bench) -> None:
+    asked: list[object] = []
+    bench.node.new_server("/sum", asked.append, threads=1)
+    bench.arming.disarm()
+    bench.call()
+    assert bench.end().sentence == "not called: it was no longer armed"
+    assert asked == []
+
+
+def test_without_a_master_it_ends_and_is_not_called_later(bench) -> None:
+    asked: list[object] = []
+    bench.node.new_server("/sum", asked.append, threads=1)
+    bench.waiting = []
+    bench.call(timeout_s=2.0)
+    assert bench.calls.tick() == []
+    bench.now += 2.1
+    (record,) = bench.calls.tick()
+    assert record.sentence == "no master was there within 2 s"
+    (job,) = bench.waiting
+    job(bench.node)
+    assert bench.calls.tick() == []
+    assert asked == []
+
+
+def test_what_cannot_be_sent_says_why(bench) -> None:
+    bench.call({"a": object()})
+    record = bench.end()
+    assert record.state == "failed"
+    assert record.sentence
+
+
+def test_history_and_answers_are_bounded(bench) -> None:
+    bench.node.new_server("/sum", lambda _asked: {"a": 1}, threads=1)
+    bench.call()
+    first = bench.end()
+    bench.arming.disarm()
+    for _each in range(HISTORY_KEPT + 5):
+        bench.call()
+        bench.calls.tick()
+    records = bench.calls.records
+    assert len(records) == HISTORY_KEPT
+    assert first.number not in {each.number for each in records}
+    assert sum(each.is_kept for each in records) == ANSWERS_KEPT
+    bench.calls.clear()
+    assert list(bench.calls.records) == []

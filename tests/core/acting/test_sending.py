@@ -1,0 +1,170 @@
+"""Sending once and again and again, over nodes in memory: while it is armed, and not once more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import nep
+from app.core.run.acting import sending
+from app.core.run.acting.arming import Arming, Target
+from app.core.run.acting.sending import LATE_S, MOST_AT_ONCE, Outbox, Repeated, SendOrder
+from nep.errors import NepError
+from nep.nodes.node import Node
+from tests.nep.programs import eventually
+
+
+class Bench:
+    """An outbox whose jobs are done at once, or when the test says so, by a node in memory."""
+
+    def __init__(self, node: Node) -> None:
+        self.node, self.now = node, 0.0
+        self.waiting: list[object] | None = None
+        self.arming = Arming(lambda: self.now)
+        self.outbox = Outbox(self.arming, self._submit, lambda: self.now)
+
+    def _submit(self, _what: str, job) -> None:
+        if self.waiting is None:
+            job(self.node)
+        else:
+            self.waiting.append(job)
+
+    def arm(self, *topics: str) -> None:
+        self.arming.arm()
+        for topic in topics:
+            assert self.arming.allow(Target("topic", topic))
+
+
+@pytest.fixture
+def bench(request) -> Iterator[Bench]:
+    with nep.node("studio", "memory", master=request.node.name) as node:
+        made = Bench(node)
+        yield made
+        made.outbox.close()
+
+
+def order(
+    topic: str = "/cmd_vel", msg_type: str = "json", payload: object = None, id: str = "a"
+) -> SendOrder:
+    return SendOrder(id, "Drive", topic, msg_type, lambda: {"x": 1} if payload is None else payload)
+
+
+def kinds(bench: Bench) -> list[str]:
+    return [each.kind for each in bench.outbox.take()]
+
+
+def test_it_is_sent_once_and_says_how_many_hear_it(bench) -> None:
+    heard = bench.node.new_sub("/cmd_vel", "json")
+    bench.arm("/cmd_vel")
+    bench.outbox.send(order())
+    assert heard.listen(timeout_s=5.0) == (True, {"x": 1})
+    (result,) = bench.outbox.take()
+    assert (result.kind, result.heard) == ("sent", 1)
+
+
+def test_what_is_not_armed_is_not_sent(bench) -> None:
+    heard = bench.node.new_sub("/cmd_vel", "json")
+    bench.outbox.send(order())
+    bench.arm("/other")
+    bench.outbox.send(order())
+    assert [(each.kind, each.sentence) for each in bench.outbox.take()] == [
+        ("failed", "not sent: it was no longer armed")
+    ] * 2
+    assert heard.receive(0.0) is None
+
+
+def test_what_waited_for_a_master_is_not_sent_when_it_is_late_or_no_longer_armed(bench) -> None:
+    heard = bench.node.new_sub("/cmd_vel", "json")
+    bench.arm("/cmd_vel")
+    bench.waiting = []
+    bench.outbox.send(order())
+    bench.outbox.send(order())
+    first, second = bench.waiting
+    bench.arming.disarm()
+    bench.arm("/cmd_vel")
+    first(bench.node)
+    bench.now += LATE_S + 1
+    second(bench.node)
+    said = [each.sentence for each in bench.outbox.take()]
+    assert said == ["not sent: it was no longer armed", "not sent: no master was there"]
+    assert heard.receive(0.0) is None
+
+
+@pytest.mark.parametrize(
+    ("topic", "msg_type", "payload"), [("/cmd_vel", "bytes", {"x": 1}), ("bad topic", "json", 1)]
+)
+def test_what_cannot_be_sent_says_why(bench, topic, msg_type, payload) -> None:
+    bench.arm(topic)
+    bench.outbox.send(order(topic, msg_type, payload))
+    bench.outbox.begin(order(topic, msg_type, payload), 10)
+    results = bench.outbox.take()
+    assert [each.kind for each in results] == ["failed", "failed"]
+    assert all(each.sentence for each in results)
+    assert bench.outbox.all_repeated == ()
+
+
+def test_again_and_again_until_it_is_ended_and_not_once_more(bench) -> None:
+    heard = bench.node.new_sub("/cmd_vel", "json")
+    bench.arm("/cmd_vel")
+    assert bench.outbox.begin(order(), 50)
+    for _each in range(3):
+        assert heard.listen(timeout_s=20.0) == (True, {"x": 1})
+    bench.outbox.end("a")
+    assert not bench.outbox.is_going("a")
+    began, ended = bench.outbox.take()
+    assert (began.kind, ended.kind) == ("began", "ended")
+    more = 0
+    while heard.receive(0.0) is not None:
+        more += 1
+    assert ended.count == 3 + more
+    assert heard.receive(0.1) is None
+
+
+def test_the_switch_ends_it_also_while_nobody_looks(bench) -> None:
+    bench.arm("/cmd_vel")
+    bench.outbox.begin(order(), 50)
+    bench.arming.disarm()
+    eventually(lambda: not bench.outbox.is_going("a"))
+    assert kinds(bench) == ["began", "ended"]
+
+
+def test_one_that_raises_ends_and_the_others_go_on(bench) -> None:
+    heard = bench.node.new_sub("/good", "json")
+    bench.arm("/good", "/bad")
+    made = iter([1, 2])
+
+    def once() -> object:
+        value = next(made, None)
+        if value is None:
+            raise NepError("Fill in “yaw” first.")
+        return value
+
+    bench.outbox.begin(SendOrder("b", "Bad", "/bad", "json", once), 50)
+    bench.outbox.begin(order("/good", id="g"), 50)
+    eventually(lambda: not bench.outbox.is_going("b"))
+    while heard.receive(0.0) is not None:
+        pass
+    assert heard.listen(timeout_s=20.0)[0]
+    failed = next(each for each in bench.outbox.take() if each.kind == "failed")
+    assert (failed.sentence, failed.count) == ("Fill in “yaw” first.", 1)
+
+
+def test_many_at_once_are_refused_and_rates_are_bounded(bench) -> None:
+    names = [f"/t{number}" for number in range(MOST_AT_ONCE + 1)]
+    bench.arm(*names)
+    begun = [bench.outbox.begin(order(name, id=name), 1e-9) for name in names]
+    assert begun == [True] * MOST_AT_ONCE + [False]
+    assert {each.rate_hz for each in bench.outbox.all_repeated} == {0.1}
+
+
+def test_who_is_late_leaves_out_what_has_gone_by_and_never_hurries(bench, monkeypatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(sending.time, "monotonic", lambda: now[0])
+    each = Repeated(order(), 10.0, 1, None, 100.0, since_s=100.0)  # type: ignore[arg-type]
+    assert (Outbox._next(each), round(each.due_s, 6)) == (0, 100.1)
+    now[0] = 100.55  # 100.1 is due; those of 100.2 to 100.5 have gone by
+    assert Outbox._next(each) == 4
+    assert round(each.due_s, 6) == 100.6
+    now[0] = 100.6
+    assert (Outbox._next(each), round(each.due_s, 6)) == (0, 100.7)

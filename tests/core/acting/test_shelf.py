@@ -1,0 +1,87 @@
+"""The shelf: kept messages, bounded, and their file."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from app.core.run.acting.sending import MOST_HZ
+from app.core.run.acting.shelf import (
+    MOST_MESSAGES,
+    MOST_REQUESTS,
+    KeptMessage,
+    NewerShelfError,
+    Shelf,
+    read_shelf,
+    shelf_text,
+)
+from nep.errors import NepError
+
+LOOK = KeptMessage("a", "Look at Aiko", "/robot_action", "json", '{"yaw": {yaw}}', (("yaw", "-12.5"),), 10.0)
+
+
+def test_a_message_is_made_with_its_values() -> None:
+    assert LOOK.payload() == {"yaw": -12.5}
+    assert LOOK.with_value("yaw", "left").payload() == {"yaw": "left"}
+    with pytest.raises(NepError, match="Fill in “yaw” first"):
+        LOOK.with_value("yaw", " ").payload()
+    assert KeptMessage("b", "Word", "/words", "string", "{yes").payload() == "{yes"
+
+
+def test_what_is_written_is_read_back() -> None:
+    shelf = Shelf([LOOK, KeptMessage("b", "Wörter\ud800", "/words", "string", "a\nb")])
+    shelf.remember("/sum", '{"a": 1}')
+    data = shelf_text(shelf)
+    read, unread = read_shelf(data)
+    assert unread == 0
+    assert read.messages[0] == LOOK
+    assert read.messages[1].text == "a\nb"
+    assert dict(read.requests) == {"/sum": '{"a": 1}'}
+
+
+def test_copies_stand_below_and_what_was_deleted_comes_back() -> None:
+    other = KeptMessage("b", "Stand still", "/cmd_vel")
+    shelf = Shelf([LOOK, other])
+    made = shelf.copy("a")
+    assert made is not None
+    assert [each.name for each in shelf.messages] == ["Look at Aiko", "Look at Aiko 2", "Stand still"]
+    assert shelf.remove("a") == LOOK
+    assert shelf.put_back() == LOOK
+    assert shelf.messages[0] == LOOK
+    assert shelf.put_back() is None
+    assert shelf.remove("nobody") is None
+
+
+def test_it_is_bounded() -> None:
+    shelf = Shelf()
+    kept = [shelf.put(KeptMessage(str(number), "", "/t")) for number in range(MOST_MESSAGES + 1)]
+    assert kept == [True] * MOST_MESSAGES + [False]
+    assert shelf.copy("0") is None
+    assert shelf.put(KeptMessage("0", "other", "/t"))
+    for number in range(MOST_REQUESTS + 5):
+        shelf.remember(f"/s{number}", "{}")
+    assert len(shelf.requests) == MOST_REQUESTS
+    assert "/s0" not in shelf.requests
+
+
+@pytest.mark.parametrize("data", [b"", b"{", b"[]", b"\xff\xfe", b'{"messages": 3}', b"[" * 100_000])
+def test_what_is_no_shelf_is_refused(data) -> None:
+    with pytest.raises(NepError):
+        read_shelf(data)
+
+
+def test_one_of_a_newer_studio_is_told_apart() -> None:
+    with pytest.raises(NewerShelfError):
+        read_shelf(json.dumps({"format": 2, "messages": []}).encode())
+
+
+def test_damaged_messages_are_left_out_and_counted() -> None:
+    good = {"id": "a", "name": "Stop", "topic": "/cmd_vel", "type": "json", "text": "{}", "values": {"x": 1}}
+    told = [good, None, 3, {}, {**good, "id": 7}, {**good, "id": "b", "rate_hz": 1e308}, {**good, "id": ""}]
+    shelf, unread = read_shelf(json.dumps({"messages": told, "requests": {"/sum": 3}}).encode())
+    assert [each.id for each in shelf.messages] == ["a", "b"]
+    assert unread == 5
+    assert shelf.messages[0].values == ()
+    assert [each.rate_hz for each in shelf.messages] == [1.0, MOST_HZ]
+    assert dict(shelf.requests) == {}

@@ -1,0 +1,272 @@
+"""The panel Publish: kept messages, what is wrong in them, the switch, sending once and again and again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.core.run.acting.acting import SessionActing
+from app.core.run.acting.arming import Target
+from app.core.run.acting.shelf import KeptMessage
+from app.ui.panels.publish import PANEL
+from app.ui.panels.publish.panel import PublishPanel
+from app.ui.panels.topics import panel as topics
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, button, press, ticks
+from tests.ui.test_accessible import unsaid
+
+pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+LOOK = KeptMessage(
+    "a", "Look at Aiko", "/look", "json", '{\n  "yaw": {yaw},\n  "pitch": 4.0\n  "speed": 0.3\n}', (), 10.0
+)
+STILL = KeptMessage("b", "Stand still", "/cmd_vel", "json", '{"x": 0}', (), 50.0)
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(qtbot, window) -> PublishPanel:
+    acting = window.session.acting
+    acting.shelf.put(LOOK)
+    acting.shelf.put(STILL)
+    made = window.make(PANEL, (760, 640))
+    qtbot.addWidget(made)
+    for widget in made.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(made, PublishPanel)
+    return made
+
+
+def acting_of(window: Window) -> SessionActing:
+    return window.session.acting
+
+
+def states(panel: PublishPanel) -> list[str]:
+    rows = range(panel.list.model().rowCount())
+    return [panel.list.cell_at(row, 1).text for row in rows]
+
+
+def test_a_fault_is_said_where_it_is_and_put_right_by_a_press(window, panel) -> None:
+    form = panel.form
+    assert form.message == LOOK
+    assert form.sentence.text() == "Line 3 needs a comma at its end. It cannot be sent yet."
+    assert form.edit.wrong_line == 3
+    assert not form.send.isEnabled()
+    assert states(panel) == ["line 3", "not armed"]
+    press(form.mend)
+    assert form.edit.wrong_line == 0
+    assert form.sentence.text() == "Fill in “yaw” first. It cannot be sent yet."
+    QTest.keyClicks(form.values.fields["yaw"], "-12.5")
+    ticks(window, panel)
+    assert not form.sentence.isVisible()
+    assert form.send.isEnabled()
+    kept = acting_of(window).shelf.get("a")
+    assert kept is not None
+    assert kept.payload() == {"yaw": -12.5, "pitch": 4.0, "speed": 0.3}
+    form.edit.edit.undo()
+    assert form.edit.wrong_line == 3
+
+
+def test_typing_goes_on_where_the_line_began(panel) -> None:
+    panel.list.choose("b")
+    edit = panel.form.edit.edit
+    edit.selectAll()
+    QTest.keyClicks(edit, "{")
+    QTest.keyClick(edit, Qt.Key.Key_Return)
+    QTest.keyClicks(edit, '"x": 1,')
+    QTest.keyClick(edit, Qt.Key.Key_Return)
+    QTest.keyClicks(edit, '"y": 2}')
+    assert edit.toPlainText() == '{\n  "x": 1,\n  "y": 2}'
+    assert panel.form.edit.wrong_line == 0
+    press(panel.form.tidy)
+    assert edit.toPlainText() == '{\n  "x": 1,\n  "y": 2\n}'
+
+
+def test_sending_arms_this_topic_alone_and_the_switch_ends_it(window, panel) -> None:
+    session, acting = window.session, acting_of(window)
+    heard = session.source.listen("/cmd_vel", "json")
+    panel.list.choose("b")
+    assert panel.form.send.text() == "Arm and send"
+    QTest.keyClick(panel.form.edit.edit, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
+    ticks(window, panel, 7)
+    assert acting.arming.targets == (Target("topic", "/cmd_vel"),)
+    assert panel.form.send.text() == "Send"
+    assert panel.form.last.text().endswith("heard by 1")
+    assert [token.text() for token in panel.strip.tokens] == ["/cmd_vel"]
+    assert panel.strip.words.text() == "5:00 left"
+    press(panel.form.repeat)
+    assert heard.listen(timeout_s=20.0)[0]
+    ticks(window, panel, 7)
+    assert states(panel)[1] == "50.0/s"
+    assert panel.badge() == ("1", "warn")
+    assert panel.form.count.text()
+    press(panel.strip.switch)
+    assert not acting.arming.is_on
+    assert acting.outbox.all_repeated == ()
+    ticks(window, panel, 7)
+    assert states(panel)[1] == "not armed"
+    assert panel.strip.words.text() == "Nothing is sent"
+
+
+def test_stop_another_source_and_closing_disarm(window, panel) -> None:
+    acting = acting_of(window)
+    for end in (window.session.runs.stop, panel.shut):
+        assert acting.arm() == ""
+        end()
+        assert not acting.arming.is_on
+    acting.arm()
+    acting.allow(Target("topic", "/cmd_vel"))
+    window.session.sources_shown += 1
+    ticks(window, panel)
+    assert not acting.arming.is_on
+
+
+def test_time_ends_it(window, panel) -> None:
+    acting = acting_of(window)
+    acting.arm()
+    acting.allow(Target("topic", "/cmd_vel"))
+    window.session.clock.now += 301
+    ticks(window, panel)
+    assert acting.arming.targets == ()
+    assert not panel.strip.switch.isChecked()
+
+
+def test_a_robots_topic_is_asked_for_again(window, panel) -> None:
+    session, acting = window.session, acting_of(window)
+    topic = session.fleet.connected[0].robot.topics.command
+    heard = session.source.listen(topic, "json")
+    acting.shelf.put(replace(STILL, topic=topic))
+    panel.list.choose("b")
+    ticks(window, panel)
+    press(panel.form.send)
+    ticks(window, panel)
+    assert panel.strip.question.text().startswith(f"{topic} moves Pepper.")
+    assert acting.arming.targets == ()
+    press(panel.strip.cancel)
+    ticks(window, panel)
+    assert not panel.strip.question.isVisible()
+    assert heard.receive(0.0) is None
+    press(panel.form.send)
+    ticks(window, panel)
+    press(panel.strip.let)
+    assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
+    press(panel.form.send)  # in this turn the person knows
+    assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
+    acting.disarm()
+    press(panel.form.send)
+    assert acting.question is not None
+    acting.disarm()
+    assert acting.question is None
+
+
+def test_a_real_robot_may_not_be_moved_before_a_person_let_it(window, panel) -> None:
+    session, acting = window.session, acting_of(window)
+    link = session.fleet.connected[0]
+    link.robot = replace(link.robot, virtual=False)
+    topic = link.robot.topics.command
+    heard = session.source.listen(topic, "json")
+    acting.arm()
+    acting.allow(Target("topic", topic), is_sure=True)
+    assert acting.send(replace(STILL, topic=topic)) == ""
+    question = session.fleet.permission.question
+    assert question is not None
+    assert heard.receive(0.0) is None
+    session.fleet.permission.answer(let=True)
+    assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
+
+
+def test_the_last_message_is_the_template(window, panel) -> None:
+    panel.begin("/blackboard")
+    assert panel.message is not None
+    assert (panel.message.topic, panel.message.msg_type) == ("/blackboard", "json")
+    assert panel.form.template.text() == "Waiting for a message"
+    window.session.send("/blackboard", {"mood": "happy", "n": [1, 2]})
+    ticks(window, panel)
+    kept = panel.message
+    assert kept is not None
+    assert kept.payload() == {"mood": "happy", "n": [1, 2]}
+    assert panel.form.template.text() == "From the last message"
+    assert window.session.watched == []
+    panel.begin("/blackboard")
+    assert panel.message == kept, "one that is kept is shown again"
+
+
+def test_without_a_publisher_its_type_is_the_template(window, panel) -> None:
+    panel.list.choose("b")
+    panel.form.topic.setText("/nowhere")
+    panel.form.kind.clear()
+    QTest.keyClicks(panel.form.kind, "geometry_msgs/Point")
+    press(panel.form.template)
+    assert window.toasts[-1] == "Nobody publishes it now: these are the fields of its type"
+    assert panel.message is not None
+    assert panel.message.payload() == {"x": 0.0, "y": 0.0, "z": 0.0}
+
+
+def test_names_of_topics_are_offered_and_their_type_taken(panel) -> None:
+    completer = panel.form.topic.completer()
+    completer.setCompletionPrefix("black")
+    assert completer.currentCompletion() == "/blackboard"
+    panel.form.topic.setText("/robot/camera")
+    assert panel.form.kind.text() == "image"
+    assert panel.form.sentence.text().startswith("Messages of the type image can't be written by hand.")
+
+
+def test_copying_deleting_and_undo(window, panel) -> None:
+    panel.list.choose("b")
+    QTest.keyClick(panel.list, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier)
+    names = [each.name for each in acting_of(window).shelf.messages]
+    assert names == ["Look at Aiko", "Stand still", "Stand still 2"]
+    assert panel.message is not None
+    assert panel.message.name == "Stand still 2"
+    QTest.keyClick(panel.list, Qt.Key.Key_Delete)
+    assert window.toasts[-1] == "Deleted “Stand still 2”"
+    undo = window.toast_buttons[-1][1]
+    assert undo is not None
+    undo()
+    assert panel.message is not None
+    assert panel.message.name == "Stand still 2"
+
+
+def test_the_filter_and_an_empty_shelf(window, panel) -> None:
+    panel.filter.setText("cmd")
+    assert panel.list.model().rowCount() == 1
+    panel.filter.clear()
+    for each in acting_of(window).shelf.messages:
+        panel.delete(each.id)
+    assert panel.pages.currentIndex() == 0
+    press(button(panel.empty, "New"))
+    assert panel.message is not None
+    assert panel.form.sentence.text().startswith("Choose a topic first.")
+
+
+def test_every_topic_has_it_in_its_menu(qtbot, window) -> None:
+    table = window.make(topics.PANEL)
+    qtbot.addWidget(table)
+    for widget in table.header_widgets():
+        qtbot.addWidget(widget)
+    action = next(each for each in table.row_actions("/blackboard") if each.words == "Publish to it")
+    action.run()
+    assert window.commands == ["publish.topic:/blackboard"]
+    assert "Publish to it" not in [each.words for each in table.row_actions("/robot/camera")]
+
+
+def test_in_a_recording_nothing_can_be_armed(window, panel, monkeypatch) -> None:
+    monkeypatch.setattr(type(window.session), "is_replaying", True)
+    assert acting_of(window).send(STILL) == "A recording shows: go back to live to send."
+    ticks(window, panel, 7)
+    assert not panel.strip.switch.isEnabled()
+    assert not panel.form.send.isEnabled()
+
+
+def test_everything_is_said_and_fits_also_where_it_is_narrow(panel, qtbot) -> None:
+    assert unsaid(panel) == []
+    panel.resize(420, 640)
+    qtbot.waitUntil(lambda: panel.list.width() > 300)
+    assert panel.form.width() <= 420

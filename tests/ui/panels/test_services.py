@@ -1,0 +1,219 @@
+"""The panel Services: what is offered, a form for the request, the answer, and the calls before."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit
+
+from app.core.run.acting.arming import Target
+from app.ui.panels.row_actions import service_actions
+from app.ui.panels.services import PANEL
+from app.ui.panels.services.answer import MOST_ROWS, TEXT_LETTERS, answer_rows
+from app.ui.panels.services.panel import ServicesPanel
+from app.ui.widgets import Switch
+from nep.protocol.graph_view import ServerInfo, ServiceInfo
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, press, ticks
+from tests.ui.test_accessible import unsaid
+
+pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+REQUEST = '{"name": "Aiko", "pictures": 12, "quality": 0.5, "replace": true, "box": [1, 2]}'
+
+
+def offer(session: Session, **services: str) -> None:
+    """The master tells that the nodes of these ids serve these services."""
+    view = session.live.graph
+    assert view is not None
+    infos = {
+        name: ServiceInfo(name, "json", (ServerInfo(1, node, (), 0, 0, 0),))
+        for name, node in services.items()
+    }
+    infos["/nep/parameters/1"] = ServiceInfo("/nep/parameters/1", "json", (ServerInfo(2, "1", (), 0, 0, 0),))
+    session.source.tell(replace(view, revision=view.revision + 1, services=infos))
+    session.take_over()
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    session = Session.full()
+    offer(session, remember_face="1", forget_face="1", set_language="2")
+    session.acting.shelf.remember("remember_face", REQUEST)
+    return Window(session)
+
+
+@pytest.fixture
+def panel(qtbot, window) -> ServicesPanel:
+    made = window.make(PANEL, (720, 640))
+    qtbot.addWidget(made)
+    for widget in made.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(made, ServicesPanel)
+    made.list.choose("remember_face")
+    return made
+
+
+def answered(window: Window, panel: ServicesPanel, qtbot) -> None:
+    """Wait until nothing is waited for."""
+
+    def is_over() -> bool:
+        ticks(window, panel)
+        return window.session.acting.calls.waiting is None
+
+    qtbot.waitUntil(is_over, timeout=30_000)
+
+
+def test_services_with_who_offers_them_but_no_parameters(panel) -> None:
+    names = [panel.list.cell_at(row, 0).said for row in range(panel.list.model().rowCount())]
+    assert names == [
+        "forget_face, camera_driver",
+        "remember_face, camera_driver",
+        "set_language, pepper_driver",
+    ]
+    assert panel.count.text() == "3 services of 2 nodes"
+    panel.filter.setText("pepper")
+    assert panel.list.model().rowCount() == 1
+
+
+def test_the_form_is_made_of_the_last_request_and_changes_the_json(panel) -> None:
+    fields = panel.form.fields
+    assert list(fields) == ["name", "pictures", "quality", "replace", "box"]
+    assert isinstance(fields["replace"], Switch)
+    assert fields["replace"].isChecked()
+    for name, text in (("name", "Grey Ada"), ("pictures", "30"), ("quality", "1"), ("box", '{"x": 1}')):
+        field = fields[name]
+        assert isinstance(field, QLineEdit)
+        field.selectAll()
+        QTest.keyClicks(field, text)
+        assert panel.form.fields[name] is field, "the keyboard stays"
+    press(fields["replace"])
+    assert panel._read().filled({}) == {
+        "name": "Grey Ada", "pictures": 30, "quality": 1, "replace": False, "box": {"x": 1},
+    }  # fmt: skip
+    press(panel.way.findChildren(type(panel.way.chosen_button()))[1])
+    assert panel.edit.isVisible()
+    panel.edit.set_text('{"name": "Bo"}')
+    panel._turn("form")
+    assert list(panel.form.fields) == ["name"]
+
+
+def test_what_no_field_takes_is_said_and_not_called(panel) -> None:
+    field = panel.form.fields["pictures"]
+    assert isinstance(field, QLineEdit)
+    field.selectAll()
+    QTest.keyClicks(field, "many")
+    assert panel.sentence.text() == "pictures needs a whole number."
+    assert not panel.call_button.isEnabled()
+    field.selectAll()
+    QTest.keyClicks(field, "3")
+    assert panel.sentence.text() == ""
+    assert panel.call_button.isEnabled()
+    panel._turn("json")
+    panel.edit.set_text("{'name': 1}")
+    assert panel.sentence.text() == "Line 1 has single quotes; JSON takes double ones."
+    press(panel.mend)
+    assert panel.edit.text() == '{"name": 1}'
+    panel.edit.set_text("[1]")
+    panel._turn("form")
+    assert panel.way.value == "json", "a list has no fields"
+
+
+def test_a_call_with_its_answer_time_and_history(window, panel, qtbot) -> None:
+    session = window.session
+    asked: list[object] = []
+
+    def serve(request: object) -> object:
+        asked.append(request)
+        return {"ok": True, "faces": [{"id": 7}], "quality": 0.93}
+
+    session.source.node.new_server("remember_face", serve, threads=1)
+    assert panel.call_button.text() == "Arm and call"
+    press(panel.call_button)
+    answered(window, panel, qtbot)
+    assert asked == [panel._read().filled({})]
+    assert session.acting.arming.targets == (Target("service", "remember_face"),)
+    rows = panel.answer.model
+    shown = [(rows.cell_at(row, 0).text, rows.cell_at(row, 1).text) for row in range(rows.rowCount())]
+    assert shown == [("ok", "true"), ("faces", "[1]"), ("0", "{1}"), ("id", "7"), ("quality", "0.93")]
+    assert panel.answer.chip.text.startswith("answered in ")
+    assert panel.answer.facts.text().endswith("B")
+    panel.answer.way.set_value("json")
+    panel.answer._turn("json")
+    assert '"quality": 0.93' in panel.answer.text.text()
+    press(panel.answer.copy)
+    assert '"ok": true' in QGuiApplication.clipboard().text()
+    assert panel.call_button.text() == "Call"
+    assert panel.calls_model.cell_at(0, 1).text.startswith("name Aiko, pictures 12")
+    assert panel.calls_model.cell_at(0, 2).role == "ok"
+    panel._clear_calls()
+    assert panel.calls_model.rowCount() == 0
+
+
+def test_a_refusal_a_timeout_and_giving_up(window, panel, qtbot) -> None:
+    session, go_on, mode = window.session, threading.Event(), ["refuse"]
+
+    def serve(_request: object) -> object:
+        if mode[0] == "refuse":
+            raise ValueError("no face in sight")
+        return go_on.wait(30)
+
+    session.source.node.new_server("remember_face", serve, threads=3)
+    press(panel.call_button)
+    answered(window, panel, qtbot)
+    assert panel.answer.sentence.text() == "refused: no face in sight"
+    mode[0] = "wait"
+    panel.seconds.setText("0.2")
+    QTest.keyClick(panel.seconds, Qt.Key.Key_Return)
+    press(panel.call_button)
+    assert not panel.call_button.isEnabled()
+    answered(window, panel, qtbot)
+    assert panel.answer.chip.text == "no answer in 0.2 s"
+    panel.seconds.setText("60")
+    QTest.keyClick(panel.seconds, Qt.Key.Key_Return)
+    press(panel.call_button)
+    ticks(window, panel)
+    assert panel.call_button.text().startswith("Waiting ")
+    press(panel.give_up)
+    assert panel.answer.chip.text.startswith("given up")
+    assert not panel.give_up.isVisible()
+    go_on.set()
+
+
+def test_closing_disarms_and_without_services_it_says_what_to_do(window, panel) -> None:
+    window.session.acting.arm()
+    panel.shut()
+    assert not window.session.acting.arming.is_on
+    offer(window.session)
+    ticks(window, panel)
+    assert panel.pages.currentIndex() == 0
+
+
+def test_a_service_in_the_menu_of_commands_is_chosen(window, panel) -> None:
+    panel.begin("set_language")
+    assert panel.service == "set_language"
+    assert panel.form.nothing.isVisible()
+    assert panel.text == "{}"
+    for action in service_actions(window.context(), "set_language"):
+        action.run()
+    assert window.commands == ["service.call:set_language"]
+
+
+def test_answers_of_any_form_have_rows_and_not_too_many() -> None:
+    assert [row.words for row in answer_rows(None)] == ["null"]
+    assert all(len(row.words) < 2 * TEXT_LETTERS for row in answer_rows("x" * 1000))
+    assert len(answer_rows(list(range(10_000)))) == MOST_ROWS + 1
+    deep: object = 1
+    for _each in range(2000):
+        deep = [deep]
+    assert len(answer_rows(deep)) < 20
+
+
+def test_everything_is_said_and_fits_also_where_it_is_narrow(panel, qtbot) -> None:
+    assert unsaid(panel) == []
+    panel.resize(400, 640)
+    qtbot.waitUntil(lambda: panel.list.width() > 300)
