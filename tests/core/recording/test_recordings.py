@@ -71,6 +71,17 @@ def test_a_recording_begins_with_the_last_choice_and_ends(made):
     assert (recordings.is_recording, recordings.elapsed_s) == (False, 0.0)
 
 
+def test_a_recording_that_begins_is_told_what_goes_on_already(made):
+    recordings = made.recordings
+    rule = AlarmRule("1", AlarmCondition("silent", "/camera", for_s=2.0))
+    recordings.events.take_alarm(AlarmEvent("on", rule, 1000.0))
+    recordings.record("a")
+    made.say("recording")
+    recordings.check()
+    said = [order["value"]["topic"] for order in made.lines[0].orders if order["op"] == "say"]
+    assert said == ["/camera", "/camera"]
+
+
 def test_a_choice_for_one_time_is_not_kept(made):
     only = RecordingChoice("chosen", ("/odom",))
     assert made.recordings.record(choice=only) == ""
