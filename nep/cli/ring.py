@@ -22,6 +22,7 @@ from nep.cli.screen import console, say, show_json, size
 from nep.cli.topic_wait import node_for
 from nep.errors import NepError, RecordingError
 from nep.i18n import _, ngettext
+from nep.protocol.graph_view import GraphView
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -32,11 +33,13 @@ else:  # the other commands need not wait for it, nor have what it needs
     rings = lazy_module("nep.recordings.ring")
 
 _LOOK_S = 0.2
-_KEEP_S = 120.0
+KEEP_S = 120.0
 """So long may it take to copy what is there: some GB on a slow disk."""
 _FOLDER = ".nep-ring"
 _END, _KEEP = "end", "keep"
 _NAME = "flight_recorder"
+KEEP_SERVICE = f"{_NAME}/keep"
+"""Keeps the last seconds, where nobody has given the ring another name."""
 NameOption = Annotated[
     str,
     typer.Option("--name", metavar=_("NAME"), help=_("Its name, where several are on.")),
@@ -193,6 +196,12 @@ def _carry_out(orders: queue.SimpleQueue[str], keeper: _Keeper, kept: rings.Flig
                 shown.update(words.format(time=clock_text(status.seconds), size=size(status.size_bytes)))
 
 
+def has_ring(graph: GraphView, service: str = KEEP_SERVICE) -> bool:
+    """Whether anybody can keep the last seconds: who asks nobody would wait for long."""
+    known = graph.services.get(service)
+    return known is not None and bool(known.servers)
+
+
 def keep(
     note: Annotated[
         str, typer.Option("--note", metavar=_("TEXT"), help=_("Words about it."), show_default=False)
@@ -212,7 +221,9 @@ def keep(
     if seconds is not None:
         asked["seconds"] = seconds
     with node_for("keep", master) as node:
-        answer = node.new_client(f"{name}/keep", timeout_s=_KEEP_S).call(asked)
+        if not has_ring(node.graph(), f"{name}/keep"):
+            raise NepError(_("no 'nep recording ring' is on, so there is nothing to keep"))
+        answer = node.new_client(f"{name}/keep", timeout_s=KEEP_S).call(asked)
     told = answer if isinstance(answer, dict) else {}
     if as_json:
         show_json(told)

@@ -6,7 +6,8 @@ Orders come as lines of JSON on the standard input, and what happens is told as 
      "seconds": 1800, "size_bytes": 8000000000}              ends by itself so; without them when it is told
     {"op": "note", "text": "it fell"}                        a bookmark in the recording
     {"op": "stop"}
-    {"op": "say", "role": "runs", "value": {...}}            what happens, into the recording and the ring
+    {"op": "say", "role": "runs", "value": {...}}            what happens, into the recording and the ring;
+                                                             with "to": "ring" or "recording" into that alone
     {"op": "ring", "folder": "ring", "seconds": 60, "size_bytes": 2000000000, "topics": [], "left_out": []}
     {"op": "keep", "path": "b.mcap", "seconds": 60, "note": "it fell"}
     {"op": "end_ring"}
@@ -201,12 +202,12 @@ class RecorderService:
 
     def _say(self, order: Mapping[str, Any]) -> None:
         """Something that happens now; where nothing is recorded nobody wants to know it."""
-        role, value = _text(order, "role"), order["value"]
-        if role not in SAID or not isinstance(value, dict):
+        role, value, to = _text(order, "role"), order["value"], _text(order, "to", "")
+        if role not in SAID or not isinstance(value, dict) or to not in {"", "ring", "recording"}:
             raise ValueError(role)
-        if self._recording is not None:
+        if self._recording is not None and to != "ring":
             self._recording.writer.say(role, value)
-        if self._ring is not None:
+        if self._ring is not None and to != "recording":
             self._ring[0].say(role, value)
 
     def _begin_ring(self, order: Mapping[str, Any]) -> None:

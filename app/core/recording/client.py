@@ -263,10 +263,14 @@ class RecorderClient:
         if self.state.phase == "recording":
             self._order(op="note", text=text)
 
-    def say(self, role: str, value: Mapping[str, object]) -> None:
-        """Put what happens now into what is recorded, and into the flight recorder; else it is dropped."""
-        if self._line is not None and (self.state.phase or self._ring is not None):
-            self._line.order({"op": "say", "role": role, "value": dict(value)})  # told again when it goes on
+    def say(self, role: str, value: Mapping[str, object], to: str = "") -> None:
+        """Put what happens now into what is recorded and into the flight recorder; else it is dropped.
+
+        ``to``: into one of them alone, "recording" or "ring".
+        """
+        is_heard = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
+        if self._line is not None and is_heard:
+            self._line.order({"op": "say", "role": role, "value": dict(value), "to": to})
 
     def follow_ring(self, choice: RingChoice | None) -> None:
         """Have the flight recorder on with this choice, or off. It comes back by itself when it has gone."""

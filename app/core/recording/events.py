@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from itertools import count
+from typing import Protocol
 
 from app.core.alarms import severity_of
 from app.core.run.view import RunState
@@ -16,15 +17,21 @@ MOST_PRESENT = 200
 """Alarms that are on at once and are told again and again; those beyond are told once."""
 MOST_LETTERS = 200
 _GOES_ON = frozenset({"running", "paused"})
-Say = Callable[[str, Mapping[str, object]], object]
-"""Takes the role of a channel ("runs", "alarms") and what stands in it."""
+
+
+class Say(Protocol):
+    """Gives something to the recorder."""
+
+    def __call__(self, role: str, value: Mapping[str, object], to: str = "") -> object:
+        """The role of a channel ("runs", "alarms"), what stands in it; "recording" or "ring": that alone."""
 
 
 class RecordedEvents:
     """Tells what happens as it happens. One thread uses it (the window's).
 
-    What goes on is told again once a second (`repeat`), so that it also stands in what is kept of the last
-    seconds, and in a recording that begins later.
+    What goes on is told again (`repeat`): to a recording that begins later, and once a second to the flight
+    recorder, so that it stands in what is kept of the last seconds. In a long recording it stands only where
+    it changes: to read it there the whole file would have to be read.
     """
 
     def __init__(self, say: Say, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
@@ -35,10 +42,10 @@ class RecordedEvents:
         self._run: RunState | None = None
         self._run_told: dict[str, object] = {}
 
-    def repeat(self) -> None:
-        """Tell once more what goes on."""
+    def repeat(self, to: str) -> None:
+        """Tell the "recording" or the "ring" once more what goes on."""
         for role, told in self._present.values():
-            self._say(role, told)
+            self._say(role, told, to)
 
     # ---- behaviours
 

@@ -239,7 +239,7 @@ class SessionRecordings:
     def check(self) -> None:
         """Once a second."""
         self.client.check()
-        self.events.repeat()
+        self.events.repeat("ring")
 
     def on_event(self, event: RecorderSaid | RecorderGone) -> None:
         """Take over what the recorder's process told."""
@@ -248,7 +248,7 @@ class SessionRecordings:
         state = self.client.state
         if was.phase == "starting" and state.phase == "recording":
             self._began = self._clock()
-            self.events.repeat()
+            self.events.repeat("recording")
         if was.phase and not state.phase:
             self._began = None
             if state.last is not None and state.last == was.path:

@@ -114,6 +114,7 @@ def test_what_happens_is_told_while_something_is_recorded_and_else_to_nobody(mad
     made.say("ended", path="a.mcap", status=status())
     client.say("runs", {"id": "3"})
     client.follow_ring(RingChoice(Path("ring")))
+    client.say("runs", {"id": "3"}, "recording")
     made.lines[0].is_full = True  # it is told again in a second: nothing is wrong
     client.say("alarms", {"id": "4"})
     said = [(each["role"], each["value"]) for each in made.lines[0].orders if each["op"] == "say"]

@@ -22,16 +22,16 @@ class Told:
     """What was said, at times that go on by 10 ns each time that somebody looks."""
 
     def __init__(self) -> None:
-        self.now, self.said = 1000, list[tuple[str, dict[str, object]]]()
+        self.now, self.said, self.to = 1000, list[tuple[str, dict[str, object]]](), set[str]()
         self.events = RecordedEvents(self._say, clock_ns=self._clock)
 
     def _clock(self) -> int:
         self.now += 10
         return self.now
 
-    def _say(self, role: str, value: object) -> None:
-        assert isinstance(value, dict)
+    def _say(self, role: str, value: Mapping[str, object], to: str = "") -> None:
         self.said.append((role, dict(value)))
+        self.to.add(to)
 
     def follow(self, *runs: RunState) -> list[dict[str, object]]:
         """What is said of these states one after the other."""
@@ -113,8 +113,10 @@ def test_what_goes_on_is_told_again_and_what_is_over_is_not(told):
     told.events.take_alarm(event("on", "/b"))
     told.events.follow_run(RUNNING)
     told.events.take_alarm(event("off", "/a"))
+    assert told.to == {""}
     told.said.clear()
-    told.events.repeat()
+    told.events.repeat("ring")
+    assert told.to == {"", "ring"}
     assert [role for role, _value in told.said] == ["alarms", "runs"]
     assert all(value["until_ns"] is None for _role, value in told.said)
 
@@ -125,7 +127,7 @@ def test_of_very_many_alarms_each_is_told_once_and_no_more_are_kept_than_fit(tol
         told.events.take_alarm(event("on", f"/{number}"))
     assert len(told.said) == 5
     told.said.clear()
-    told.events.repeat()
+    told.events.repeat("recording")
     assert len(told.said) == 3
     told.events.take_alarm(event("off", "/4"))
     assert len(told.said) == 3  # its end is not known, and nothing goes wrong
@@ -136,7 +138,7 @@ def test_a_session_tells_its_recorder(tmp_path, monkeypatch):
     session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)  # never started
     said: list[tuple[str, object]] = []
 
-    def say(role: str, told: Mapping[str, object]) -> None:
+    def say(role: str, told: Mapping[str, object], to: str = "") -> None:
         said.append((role, told.get("topic", told["name"])))
 
     monkeypatch.setattr(session.recordings.events, "_say", say)

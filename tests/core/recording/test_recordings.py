@@ -78,8 +78,15 @@ def test_a_recording_that_begins_is_told_what_goes_on_already(made):
     recordings.record("a")
     made.say("recording")
     recordings.check()
-    said = [order["value"]["topic"] for order in made.lines[0].orders if order["op"] == "say"]
-    assert said == ["/camera", "/camera"]
+
+    def said() -> list[tuple[str, str]]:
+        orders = made.lines[0].orders
+        return [(each["value"]["topic"], each["to"]) for each in orders if each["op"] == "say"]
+
+    assert said() == [("/camera", "recording")]
+    recordings.set_wish(RingWish(is_on=True))
+    recordings.check()
+    assert said() == [("/camera", "recording"), ("/camera", "ring")]
 
 
 def test_a_choice_for_one_time_is_not_kept(made):

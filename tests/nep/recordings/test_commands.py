@@ -16,6 +16,7 @@ import typer
 
 import nep
 from nep.cli.app import app
+from nep.cli.ring import has_ring
 from nep.errors import NepError, RecordingError, RecordingsUnavailableError, ServiceError
 from nep.recordings.reader import Recording
 from tests.nep.programs import eventually
@@ -122,6 +123,9 @@ def test_a_ring_keeps_the_last_seconds_by_a_command_and_by_a_signal(master, tmp_
             node.new_client("flight_recorder/keep", timeout_s=60.0).call({"seconds": "x"})
         child.send_signal(signal.SIGINT)
         child.communicate(timeout=60)
+        eventually(lambda: not has_ring(robot.graph()))
+        with pytest.raises(NepError, match="no 'nep recording ring' is on"):
+            run(*words)
     assert child.returncode == 0
     assert sorted(each.name for each in tmp_path.iterdir()) == [each.name for each in files()]
     with Recording(told["path"]) as recording:

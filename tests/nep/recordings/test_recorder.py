@@ -174,6 +174,7 @@ def test_orders_of_the_service(master, tmp_path):
         until(lambda: any((each["recording"] or {}).get("topics") for each in seen("figures")))
         order(op="note", text="it fell")
         order(op="say", role="runs", value={"id": "1", "name": "Greeting"})
+        order(op="say", role="alarms", value={"id": "2"}, to="ring")
         order(op="keep", path=str(tmp_path / "kept.mcap"), seconds=60, note="the fall")
         until(lambda: seen("kept"))
         order(op="stop")
@@ -201,7 +202,9 @@ def test_orders_of_the_service(master, tmp_path):
         assert recording.words["note"] == "first"
         assert [value for _at, value in recording.said("notes")] == [{"text": "it fell"}]
         assert [value for _at, value in recording.said("runs")] == [{"id": "1", "name": "Greeting"}]
+        assert list(recording.said("alarms")) == []
     with Recording(tmp_path / "kept.mcap") as recording:
+        assert [value for _at, value in recording.said("alarms")] == [{"id": "2"}]
         assert [value for _at, value in recording.said("runs")] == [{"id": "1", "name": "Greeting"}]
         assert (recording.topics["/a"].message_count, recording.words["note"]) == (5, "the fall")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.mcap", "kept.mcap", "ring"]

@@ -1,7 +1,8 @@
 """What went on for some time while it was recorded: behaviours that ran, and alarms. Reads; changes nothing.
 
-They stand in the recorder's own channels, told again and again while they go on (`app.core.recording.events`)
-and as the graph's alerts changed. Of a file of others, or a damaged one, anything may stand there.
+They stand in the recorder's own channels, as Studio told it (`app.core.recording.events`), in what was kept
+of a flight recorder again and again; and as the graph's alerts changed. Of a file of others, or a damaged
+one, anything may stand there.
 """
 
 from __future__ import annotations
