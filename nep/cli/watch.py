@@ -66,8 +66,8 @@ def watch(
 
     Each alarm is a line when it comes on and when it goes off, with what it saw. It may call a service, send
     a message, ring the terminal's bell, and keep the last seconds where 'nep recording ring' is on; what only
-    Studio can do is said at the start. A master that is
-    away is waited for: messages that still come are watched meanwhile.
+    Studio can do is said at the start. A master that is away is waited for: messages that still come are
+    watched meanwhile.
     """
     if example:
         write(EXAMPLE)
