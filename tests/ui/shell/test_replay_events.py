@@ -16,6 +16,7 @@ from app.core.session import Session
 from app.ui.panels.base import Panel, PanelWidget
 from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.timeline.canvas import TimelineCanvas
+from app.ui.panels.timeline.event_lanes import LaneMark
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from nep.recordings.writer import RecordingWriter
@@ -98,18 +99,19 @@ class Shown:
         assert window.bench is not None
         self.panel = window.bench.docks["timeline"].panel
         self.canvas: TimelineCanvas = self.panel.canvas
-        self.painted()
 
     def wait(self, true: Callable[[], object]) -> None:
         until(self.qtbot, self.window, true)
 
-    def painted(self) -> None:
-        self.wait(lambda: self.canvas.grab() and self.canvas._marks)
-
     def place(self, words: str) -> QPoint:
         """Where to press what has these words."""
-        self.painted()
-        (mark,) = [each for each in self.canvas._marks if words in each.words]
+
+        def found() -> list[LaneMark]:
+            self.canvas.grab()
+            return [each for each in self.canvas._marks if words in each.words]
+
+        self.wait(lambda: len(found()) == 1)
+        (mark,) = found()
         seen = mark.box.toRect().intersected(self.canvas.viewport().rect())
         return QPoint(seen.left() + 4, seen.center().y())
 

@@ -158,9 +158,15 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def x_of(self, at_ns: int) -> float:
         """Where a time is."""
-        plot = self._plot()
-        share = self.scale.share(at_ns) if self.scale is not None else 0.0
-        return plot.left() + max(-1.0, min(2.0, share)) * plot.width()
+        return self._places(self._plot())(at_ns)
+
+    def _places(self, plot: QRectF) -> Callable[[int], float]:
+        """Tells where times are: thousands are asked for each picture of the lanes."""
+        scale, left, wide = self.scale, plot.left(), plot.width()
+        if scale is None:
+            return lambda _at_ns: left
+        share = scale.share
+        return lambda at_ns: left + max(-1.0, min(2.0, share(at_ns))) * wide
 
     def time_at(self, x: float) -> int:
         """The time there."""
@@ -268,7 +274,7 @@ class TimelineCanvas(QAbstractScrollArea):
         self._marks = []
         if replay is None:
             return
-        lanes, high = EventLanes(theme, painter, plot, self.x_of), theme.scaled(MARKS)
+        lanes, high = EventLanes(theme, painter, plot, self._places(plot)), theme.scaled(MARKS)
         for place, lane in enumerate(shown_lanes(replay)):
             top = theme.scaled(RULER) + place * high
             icon, name = NAMES_OF_LANES[lane]
@@ -286,7 +292,7 @@ class TimelineCanvas(QAbstractScrollArea):
             return
         plot, high = self._plot(), theme.scaled(MARKS)
         top = theme.scaled(RULER) + lanes.index(RUNS) * high
-        event_lanes = EventLanes(theme, painter, plot, self.x_of)
+        event_lanes = EventLanes(theme, painter, plot, self._places(plot))
         painter.save()
         painter.setClipRect(QRectF(plot.left(), top, plot.width(), high))
         for span in replay.densities.spans.runs:
@@ -376,12 +382,12 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.setClipRect(
             QRectF(plot.left(), top, plot.width(), self._row()), Qt.ClipOperation.IntersectClip
         )
-        for span in replay.densities.spans.alarms:
-            if span.topic == topic:
-                left, right = self.x_of(span.start_ns), self.x_of(span.end_ns)
-                box = QRectF(left, top + (self._row() - DENSITY) / 2 - 2, max(4.0, right - left), DENSITY + 4)
-                edge = self._theme.colour("error" if span.is_error else "warn")
-                paint.box(painter, box, 2, None, edge)
+        about = [span for span in replay.densities.spans.alarms if span.topic == topic]
+        for span in EventLanes(self._theme, painter, plot, self._places(plot)).seen(about):
+            left, right = self.x_of(span.start_ns), self.x_of(span.end_ns)
+            box = QRectF(left, top + (self._row() - DENSITY) / 2 - 2, max(4.0, right - left), DENSITY + 4)
+            edge = self._theme.colour("error" if span.is_error else "warn")
+            paint.box(painter, box, 2, None, edge)
         painter.restore()
 
     def _paint_figures(self, painter: QPainter, box: QRectF, topic: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from PySide6.QtCore import QPointF, QRectF, Qt
@@ -30,6 +30,8 @@ RESULTS = {
     "failed": ("circle-x", "error", lazy("failed")),
 }
 """Icon, colour and words of how a run ended."""
+LEAST = 3.0
+"""However short it was, it can be seen."""
 ICON, GAP, LEAST_WORDS, LONGEST_NAME, FLAG = 13, 4, 34, 160, 8
 
 
@@ -70,15 +72,21 @@ class EventLanes:
         elif spans is None:
             made = []
         elif lane == RUNS:
-            made = [self._run(span, box, replay.start_ns) for span in spans.runs if self._is_seen(span)]
+            made = [self._run(span, box, replay.start_ns) for span in self.seen(spans.runs)]
         else:
-            made = self._alarms([span for span in spans.alarms if self._is_seen(span)], box, replay.start_ns)
+            made = self._alarms(list(self.seen(spans.alarms)), box, replay.start_ns)
         self._painter.restore()
         return made
 
-    def _is_seen(self, span: RecordedSpan) -> bool:
-        plot = self._plot
-        return self._x_of(span.end_ns) >= plot.left() - 1 and self._x_of(span.start_ns) <= plot.right() + 1
+    def seen(self, spans: Iterable[RecordedSpan]) -> Iterator[RecordedSpan]:
+        """Those that are in the plot; of very many only some: none that would hide in the one before it."""
+        plot, free = self._plot, -1.0
+        for span in spans:
+            left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
+            if right < plot.left() - 1 or left > plot.right() + 1 or max(right, left + LEAST) < free:
+                continue
+            free = max(right, left + LEAST) + 1
+            yield span
 
     # ---- bookmarks
 
@@ -113,7 +121,7 @@ class EventLanes:
     def bar(self, span: RecordedSpan, top: float, high: float) -> QRectF:
         """Where a run is."""
         left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
-        return QRectF(left, top + 3, max(3.0, right - left), high - 6)
+        return QRectF(left, top + 3, max(LEAST, right - left), high - 6)
 
     def _run(self, span: RecordedSpan, box: QRectF, start_ns: int) -> LaneMark:
         bar = self.bar(span, box.top(), box.height())
@@ -158,7 +166,7 @@ class EventLanes:
         for place, span in enumerate(spans):
             role = "error" if span.is_error else "warn"
             left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
-            bar = QRectF(left, box.top() + 5, max(3.0, right - left), box.height() - 10)
+            bar = QRectF(left, box.top() + 5, max(LEAST, right - left), box.height() - 10)
             paint.box(self._painter, bar, 1.5, theme.colour(role))
             words = alarm_words(span)
             until = self._x_of(spans[place + 1].start_ns) if place + 1 < len(spans) else box.right()
