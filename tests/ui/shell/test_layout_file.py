@@ -55,6 +55,8 @@ def test_a_name_is_one_line_that_fits(name, shown):
         (b"[" * 100_000, "it is damaged, or no layout of Studio"),
         (b"[]", "it is no layout of Studio"),
         (b'{"format": "another"}', "it is no layout of Studio"),
+        (changed(arrangement={**SAVED, "docks": "AAAA"}), "it is damaged"),
+        (changed(sum=None), "it is damaged"),
         (changed(version=2), "a newer Studio has made it; update this one"),
         (changed(version=0), "it is damaged"),
         (changed(version="1"), "it is damaged"),
@@ -91,10 +93,9 @@ def test_a_layout_goes_out_and_comes_back_and_can_be_undone(
     window.toast.button.click()
     assert set(window.bench.open_names()) == before
     assert window.saved_layouts.all() == ()
-    told = json.loads(file.read_bytes())
-    told["arrangement"]["open"].append("teleport")
-    told["name"] = "Arm"
-    file.write_text(json.dumps(told))
+    saved = json.loads(file.read_bytes())["arrangement"]
+    saved["open"].append("teleport")
+    file.write_bytes(layout_bytes("Arm", "developer", saved))
     for name in ("Arm", "Arm 2"):
         commands.files.open_all([file])  # a drop, or the command line
         assert (
@@ -102,6 +103,11 @@ def test_a_layout_goes_out_and_comes_back_and_can_be_undone(
             == f"Opened the layout “{name}”, without what this Studio does not have: teleport"
         )
         assert set(window.bench.open_names()) == {"topics", "console"}
+    file.write_bytes(layout_bytes("Arm", "developer", {**saved, "docks": ""}))  # Qt has nothing to put back
+    commands.files.open_all([file])
+    assert window.toast.text == "Mine.nep-layout can't be opened: it is damaged"
+    assert set(window.bench.open_names()) == {"topics", "console"}
+    assert [each.name for each in window.saved_layouts.all()] == ["Arm", "Arm 2"]
     file.write_bytes(b"nothing of the kind")
     commands.files.open_all([file])
     assert window.toast.text == "Mine.nep-layout can't be opened: it is damaged, or no layout of Studio"

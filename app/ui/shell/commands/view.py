@@ -353,6 +353,9 @@ class ViewCommands:
             shell.say(_("{file} can't be opened: {reason}").format(file=path.name, reason=reason))
             return
         layouts, before = shell.saved_layouts, shell.saved_layouts.own(found.base)
+        if not layouts.fits(shell.show_layout(found.base), found.base, found.saved):
+            shell.say(_("{file} can't be opened: {reason}").format(file=path.name, reason=_("it is damaged")))
+            return
         name, _is_kept = layouts.take_in(found.name, found.base, found.saved)
         self.show_own_layout(name)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
@@ -41,8 +42,15 @@ def layout_bytes(name: str, base: str, saved: Mapping[str, object]) -> bytes:
         "name": name,
         "base": base,
         "arrangement": dict(saved),
+        "sum": _sum(saved),
     }
     return orjson.dumps(plain, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+
+
+def _sum(saved: Mapping[str, object]) -> str:
+    """Of an arrangement: Qt takes its own part as it is, and may crash on one that is damaged."""
+    plain = orjson.dumps(dict(saved), option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
+    return hashlib.sha256(plain).hexdigest()
 
 
 def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
@@ -66,6 +74,8 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
         raise LayoutFileError(_("it arranges a layout that this Studio does not have"))
     opened = saved.get("open") if isinstance(saved, dict) else None
     if not isinstance(saved, dict) or not isinstance(opened, list) or not isinstance(saved.get("docks"), str):
+        raise LayoutFileError(_("it is damaged"))
+    if told.get("sum") != _sum(saved):
         raise LayoutFileError(_("it is damaged"))
     keys = list(dict.fromkeys(key for key in opened if isinstance(key, str)))
     known = [key for key in keys if kind_of(key)[0] in panels]
