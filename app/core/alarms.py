@@ -69,6 +69,7 @@ class SessionAlarms:
 
     ``keep`` keeps the last seconds of what happened, ``run_behaviour`` runs a behaviour by its name and gives
     why it can't; each is set by who can, and until then such an action says that it can't be done.
+    ``on_event`` is told of each that came on, went off or is still on.
     """
 
     def __init__(
@@ -85,6 +86,7 @@ class SessionAlarms:
         self._commands = AlarmCommands()
         self.keep: Carrier | None = None
         self.run_behaviour: Callable[[str], str] | None = None
+        self.on_event: Callable[[AlarmEvent], object] = _nobody
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-alarms")
         self._watches: dict[str, Watch] = {}
         self._removed: tuple[AlarmRule, int] | None = None
@@ -238,6 +240,7 @@ class SessionAlarms:
 
     def _show(self, event: AlarmEvent) -> None:
         rule, alerts = event.rule, self._session.alerts
+        self.on_event(event)
         if event.kind == "off":
             self._on.discard(rule.id)
             alerts.resolve(_alert_id(rule.id))
@@ -369,6 +372,10 @@ class SessionAlarms:
             action=SHOW,
         )
         return found if found is not None else AlarmFile()
+
+
+def _nobody(_event: AlarmEvent) -> None:
+    """Nobody wants to know."""
 
 
 def _alert_id(rule_id: str) -> str:

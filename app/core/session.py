@@ -171,7 +171,8 @@ class Session:
                 self.settings, self.alerts, self.address, self._mailbox.post_event, clock=clock
             ),
         )
-        self.alarms.keep, self.runs.also_stops = self.recordings.carry, self.acting.disarm
+        self.alarms.keep, self.alarms.on_event = self.recordings.carry, self.recordings.events.take_alarm
+        self.runs.also_stops = self.acting.disarm
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, self._mailbox.post_event)
@@ -321,6 +322,7 @@ class Session:
             self.launcher.follow()
         with self.guarded(lazy("show the run")):
             self.runs.tick()
+            self.recordings.events.follow_run(self.runs.state)
         if now >= self._next_check:
             self._next_check = now + CHECK_S
             self._check(now)

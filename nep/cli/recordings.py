@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nep.cli import ring
 from nep.cli.options import JsonOption
 from nep.cli.recording_files import (
     FileArgument,
@@ -40,6 +41,8 @@ app = typer.Typer(
     no_args_is_help=True,
     help=_("What was recorded: look into it, mend it, make other files of it."),
 )
+app.command("ring")(ring.ring)
+app.command("keep")(ring.keep)
 _COLUMNS = (
     TextColumn(lazy("topic"), style="bold", is_whole=True),
     TextColumn(lazy("type")),
@@ -189,8 +192,8 @@ def export(
         typer.Option(
             "--format",
             "-f",
-            metavar="csv|parquet|pictures|mp4",
-            help=_("Tables of values, or pictures as files or as a film."),
+            metavar="csv|parquet|pictures|mp4|mcap",
+            help=_("Tables of values, pictures as files or as a film, or a smaller recording."),
             autocompletion=_complete_format,
         ),
     ] = "csv",
@@ -205,7 +208,7 @@ def export(
     fps: Annotated[float, typer.Option("--fps", metavar="HZ", help=_("Pictures a second of a film."))] = 30.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Make tables (CSV, Parquet) of a recording's values, or files and films of its pictures."""
+    """Make tables (CSV, Parquet) of a recording's values, films of its pictures, or a part of it."""
     if kind not in exports.FORMATS:
         raise typer.BadParameter(_("no format '{kind}'").format(kind=kind), param_hint="--format")
     if not 0.1 <= fps <= 240:

@@ -6,6 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import ExitStack
 from datetime import datetime, timezone
 from pathlib import Path
@@ -15,6 +16,7 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.options import JsonOption, MasterOption
+from nep.cli.ring import KEEP_S, KEEP_SERVICE, has_ring
 from nep.cli.screen import console, say, show_json, write
 from nep.cli.values import cleaned
 from nep.errors import NepError, nearest
@@ -22,6 +24,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
+from nep.patterns.services.client import Client
 from nep.programs.alarms.alarms import Alarms, Done
 from nep.programs.alarms.commands import AlarmCommands
 from nep.programs.alarms.evaluator import AlarmEvent
@@ -34,7 +37,7 @@ from nep.text import escaped
 _AGAIN_S = 1.0
 _PATIENCE_S = 0.5
 _SLICE_S = 0.05
-_OF_STUDIO = frozenset({"keep", "run", "stop"})
+_OF_STUDIO = frozenset({"run", "stop"})
 """What only Studio can do."""
 _STYLES = {"on": "bold red", "off": "green", "still": "bold red"}
 
@@ -62,8 +65,9 @@ def watch(
     """Watch over topics, values and nodes, as a file of alarms says. Ctrl+C ends it.
 
     Each alarm is a line when it comes on and when it goes off, with what it saw. It may call a service, send
-    a message and ring the terminal's bell; what only Studio can do is said at the start. A master that is
-    away is waited for: messages that still come are watched meanwhile.
+    a message, ring the terminal's bell, and keep the last seconds where 'nep recording ring' is on; what only
+    Studio can do is said at the start. A master that is away is waited for: messages that still come are
+    watched meanwhile.
     """
     if example:
         write(EXAMPLE)
@@ -155,12 +159,14 @@ class _Watching:
     def __init__(self, node: Node, rules: tuple[AlarmRule, ...], out: _Lines | _JsonLines) -> None:
         self._node, self._out = node, out
         self._commands = AlarmCommands()
+        self._keeper: Client | None = None
         carriers: Mapping[str, Callable[[AlarmEvent, AlarmAction, Done], None]] = {
             "banner": _nothing,  # each alarm is a line anyway
             "console": _nothing,
             "sound": self._ring,
             "call": self._command,
             "send": self._command,
+            "keep": self._keep,
             **dict.fromkeys(_OF_STUDIO, self._not_here),
         }
         self.alarms = Alarms(rules, carriers=carriers)
@@ -263,6 +269,19 @@ class _Watching:
     def _command(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
         self._commands.carry(self._node, action, done)
 
+    def _keep(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+        """By the flight recorder of `nep recording ring`, which may be on another computer."""
+        if self._view is None or not has_ring(self._view):
+            done(False, _("nothing was kept: no 'nep recording ring' is on"))
+            return
+        asked = {"seconds": action.seconds, "note": what_words(event.rule.condition, event.seen)}
+        try:
+            if self._keeper is None:
+                self._keeper = self._node.new_client(KEEP_SERVICE, timeout_s=KEEP_S)
+            self._keeper.call_async(asked).add_done_callback(lambda ended: _tell_kept(ended, done))
+        except NepError as error:
+            done(False, _("nothing was kept: {reason}").format(reason=error))
+
     def _ring(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
         if sys.stderr.isatty():
             sys.stderr.write("\a")
@@ -277,6 +296,16 @@ class _Watching:
         for rule, words, at_s in self.alarms.take_deeds():
             if words:
                 self._out.deed(rule, words, at_s)
+
+
+def _tell_kept(ended: Future[object], done: Done) -> None:
+    error = None if ended.cancelled() else ended.exception()
+    if error is not None or ended.cancelled():
+        done(False, _("nothing was kept: {reason}").format(reason=error or ""))
+    else:
+        told = ended.result()
+        path = told.get("path") if isinstance(told, dict) else ""
+        done(True, _("kept {file}").format(file=path))
 
 
 def _nothing(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:

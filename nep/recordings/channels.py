@@ -45,8 +45,11 @@ OWN_TOPICS: Mapping[Role, str] = {
     "figures": "/nep/recording/figures",
     "alerts": "/nep/recording/alerts",
     "notes": "/nep/recording/notes",
+    "runs": "/nep/recording/runs",
+    "alarms": "/nep/recording/alarms",
 }
-"""What the recorder says itself, by its role: counts of each topic, alerts, bookmarks and notes."""
+"""What the recorder says itself, by its role: counts of each topic, alerts, bookmarks and notes; and what it
+is told by whoever runs behaviours and watches over alarms."""
 
 
 @dataclass(frozen=True)

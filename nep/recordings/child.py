@@ -2,15 +2,19 @@
 
 Orders come as lines of JSON on the standard input, and what happens is told as lines on the standard output:
 
-    {"op": "record", "path": "a.mcap", "topics": ["/camera", "/arm/*"], "left_out": [], "note": ""}
+    {"op": "record", "path": "a.mcap", "topics": ["/camera", "/arm/*"], "left_out": [], "note": "",
+     "seconds": 1800, "size_bytes": 8000000000}              ends by itself so; without them when it is told
     {"op": "note", "text": "it fell"}                        a bookmark in the recording
     {"op": "stop"}
+    {"op": "say", "role": "runs", "value": {...}}            what happens, into the recording and the ring;
+                                                             with "to": "ring" or "recording" into that alone
     {"op": "ring", "folder": "ring", "seconds": 60, "size_bytes": 2000000000, "topics": [], "left_out": []}
     {"op": "keep", "path": "b.mcap", "seconds": 60, "note": "it fell"}
     {"op": "end_ring"}
 
     {"event": "ready"}
-    {"event": "recording", "path": ...}      {"event": "ended", "path": ..., "status": {...}}
+    {"event": "recording", "path": ...}      {"event": "ended", "path": ..., "status": {...},
+                                              "limit": "time", "size" or ""}
     {"event": "ring"}                        {"event": "ring_ended", "status": {...}}
     {"event": "kept", "path": ..., "message_count": ..., "duration_s": ..., "note": ...}
     {"event": "figures", "recording": {...} or null, "ring": {...} or null, "free_bytes": ...}
@@ -28,9 +32,10 @@ import os
 import shutil
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import IO, Any
@@ -48,21 +53,50 @@ __all__ = ["RecorderService", "main"]
 
 FIGURES_S = 1.0
 _LONGEST_LINE = 1_000_000
+_MOST_SECONDS = 1e9
+SAID = ("runs", "alarms")
+"""What it may be told to write down; all else it says by itself."""
 _MOST_KEEPING = 4
 """Copies of the ring that are made at the same time: each reads and writes as fast as the disk can."""
 Tell = Callable[[Mapping[str, object]], object]
 
 
+@dataclass(frozen=True)
+class _OneRecording:
+    """What is being recorded; it ends at the time `until` (of the clock) and with `most_bytes`, if any."""
+
+    writer: RecordingWriter
+    recorder: Recorder
+    path: str
+    until: float | None
+    most_bytes: int | None
+
+    def limit(self, now: float) -> str:
+        """Which limit is reached: "time", "size", or ""."""
+        if self.until is not None and now >= self.until:
+            return "time"
+        is_full = self.most_bytes is not None and self.writer.status.size_bytes >= self.most_bytes
+        return "size" if is_full else ""
+
+
 class RecorderService:
     """Carries out orders; `tell` is given what happens, from any thread, one at a time."""
 
-    def __init__(self, node: Node, tell: Tell, *, figures_s: float = FIGURES_S) -> None:
+    def __init__(
+        self,
+        node: Node,
+        tell: Tell,
+        *,
+        figures_s: float = FIGURES_S,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         """The node stays the caller's."""
+        self._clock = clock
         self._node, self._tell_one = node, tell
         self._tell_lock = threading.Lock()
         self._lock = threading.RLock()
         """Held while something begins or ends."""
-        self._recording: tuple[RecordingWriter, Recorder, str] | None = None
+        self._recording: _OneRecording | None = None
         self._ring: tuple[FlightRecorder, Recorder] | None = None
         self._keeping: list[threading.Thread] = []
         self._is_ending = False
@@ -71,6 +105,7 @@ class RecorderService:
             "record": self._record,
             "stop": self._stop,
             "note": self._note,
+            "say": self._say,
             "ring": self._begin_ring,
             "keep": self._keep,
             "end_ring": self._end_ring,
@@ -134,6 +169,10 @@ class RecorderService:
             self._problem("record", _("a recording is being made already"), path)
             return
         selection = _selection(order)
+        seconds, most_bytes = order.get("seconds"), order.get("size_bytes")
+        until = None if seconds is None else self._clock() + _positive(seconds)
+        if most_bytes is not None and (type(most_bytes) is not int or most_bytes < 1):
+            raise ValueError("size_bytes")
         writer = RecordingWriter(
             path,
             note=_text(order, "note", ""),
@@ -146,19 +185,30 @@ class RecorderService:
             with suppress(OSError):  # it has nothing
                 Path(path).unlink()
             raise
-        self._recording = (writer, recorder, path)
+        self._recording = _OneRecording(writer, recorder, path, until, most_bytes)
+        self._look_now.set()  # it may end sooner than the next figures come
         self.tell("recording", path=path)
 
-    def _stop(self, _order: Mapping[str, Any]) -> None:
+    def _stop(self, _order: Mapping[str, Any], limit: str = "") -> None:
         if self._recording is None:
             return
-        (writer, recorder, path), self._recording = self._recording, None
-        recorder.close()
-        self.tell("ended", path=path, status=_plain(writer.close()))
+        ended, self._recording = self._recording, None
+        ended.recorder.close()
+        self.tell("ended", path=ended.path, status=_plain(ended.writer.close()), limit=limit)
 
     def _note(self, order: Mapping[str, Any]) -> None:
         if self._recording is not None:
-            self._recording[0].say("notes", {"text": _text(order, "text")})
+            self._recording.writer.say("notes", {"text": _text(order, "text")})
+
+    def _say(self, order: Mapping[str, Any]) -> None:
+        """Something that happens now; where nothing is recorded nobody wants to know it."""
+        role, value, to = _text(order, "role"), order["value"], _text(order, "to", "")
+        if role not in SAID or not isinstance(value, dict) or to not in {"", "ring", "recording"}:
+            raise ValueError(role)
+        if self._recording is not None and to != "ring":
+            self._recording.writer.say(role, value)
+        if self._ring is not None and to != "recording":
+            self._ring[0].say(role, value)
 
     def _begin_ring(self, order: Mapping[str, Any]) -> None:
         if self._ring is not None:
@@ -216,24 +266,35 @@ class RecorderService:
 
     def _tell_figures(self) -> None:
         while True:
-            self._look_now.wait(self._figures_s)
+            self._look_now.wait(self._wait_s())
             self._look_now.clear()
             if self._is_ending:
                 return
-            self._end_what_failed()
+            self._end_what_is_over()
             recording, ring = self._recording, self._ring
             if recording is not None or ring is not None:
                 self.tell(
                     "figures",
-                    recording=None if recording is None else _plain(recording[0].status),
+                    recording=None if recording is None else _plain(recording.writer.status),
                     ring=None if ring is None else _plain(ring[0].status),
-                    free_bytes=None if recording is None else _free_bytes(recording[2]),
+                    free_bytes=None if recording is None else _free_bytes(recording.path),
                 )
 
-    def _end_what_failed(self) -> None:
+    def _wait_s(self) -> float:
+        """Until the next figures, or the end of a recording when that is sooner."""
+        recording = self._recording
+        if recording is None or recording.until is None:
+            return self._figures_s
+        return max(0.0, min(self._figures_s, recording.until - self._clock()))
+
+    def _end_what_is_over(self) -> None:
+        """What has failed, and what has reached its limit."""
         with self._lock:
-            if self._recording is not None and self._recording[0].problem:
-                self._guarded("stop", self._recording[2], lambda: self._stop({}))
+            recording = self._recording
+            if recording is not None:
+                limit = recording.limit(self._clock())
+                if limit or recording.writer.problem:
+                    self._guarded("stop", recording.path, lambda: self._stop({}, limit))
             if self._ring is not None and self._ring[0].status.problem:
                 self._guarded("end_ring", "", lambda: self._end_ring({}))
 
@@ -247,6 +308,13 @@ def _free_bytes(path: str) -> int | None:
 
 def _plain(status: RecordingStatus | RingStatus) -> dict[str, object]:
     return asdict(status)
+
+
+def _positive(seconds: object) -> float:
+    """Raises `ValueError` for what is no length of time."""
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0.0 < seconds < _MOST_SECONDS:
+        raise ValueError(_("{given} is no time").format(given=seconds))
+    return float(seconds)
 
 
 def _selection(order: Mapping[str, Any]) -> TopicSelection:

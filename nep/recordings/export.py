@@ -1,7 +1,7 @@
-"""Export: a recording's numbers as CSV or Parquet, its pictures as files or as a film.
+"""Export: a recording's numbers as CSV or Parquet, its pictures as files or as a film, a part of it as MCAP.
 
-One file, or one folder of pictures, for each topic. Nothing is written over, and a file that is not whole is
-not left behind. Messages that cannot be read are left out and counted.
+One file, or one folder of pictures, for each topic; one file of all of them as MCAP. Nothing is written
+over, and a file that is not whole is not left behind. Messages that cannot be read are left out and counted.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +20,20 @@ from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.reader import RecordedMessage, Recording
-from nep.recordings.writer import disk_sentence
+from nep.recordings.writer import RecordingWriter, disk_sentence
 from nep.system.replace_file import replace_file
 
 __all__ = ["ALL_OF_IT", "FORMATS", "Exported", "Part", "export", "flattened"]
 
-FORMATS = ("csv", "parquet", "pictures", "mp4")
+FORMATS = ("csv", "parquet", "pictures", "mp4", "mcap")
 MOST_COLUMNS = 5_000
 _MOST_ITEMS = 100
 """Of a list that get a column each; a longer one is one column of JSON."""
 _DEEPEST = 20
+_FLUSH_BYTES, _FLUSH_MESSAGES = 16_000_000, 10_000
+"""So much is given to the writer of a recording until it has been written."""
+_MOST_SAID = 100_000
+_SAID = ("notes", "runs", "alarms", "alerts")
 _CELLS_AT_ONCE = 200_000
 _FIRST_COLUMNS = ("time_s", "stamp_s", "seq", "publisher")
 _FPS = 30.0
@@ -52,7 +57,10 @@ ALL_OF_IT = Part()
 
 @dataclass(frozen=True)
 class Exported:
-    """A file or folder that was made. `count`: messages in it; `unreadable`: those left out."""
+    """A file or folder that was made. `count`: messages in it; `unreadable`: those left out.
+
+    `topic` is "" for a file of all of them.
+    """
 
     topic: str
     path: Path
@@ -76,36 +84,68 @@ def export(
     """
     if kind not in FORMATS:
         raise ValueError(_("no format '{kind}'").format(kind=kind))
-    wants_pictures = kind in {"pictures", "mp4"}
-    topics = [
-        each
-        for each in recording.topics.values()
-        if (part.topics is None or each.name in part.topics)
-        and (each.codec == "image" if wants_pictures else each.codec in {"json", "msgpack", "string"})
-    ]
-    if not topics:
-        reason = _("no topic has pictures") if wants_pictures else _("no topic has values for a table")
-        raise RecordingError(str(recording.path), reason)
-    counted = _Counted(sum(each.message_count for each in topics), progress)
+    topics, counted = _wanted(recording, kind, part, progress)
+    if kind == "mcap":
+        return [_mcap(recording, folder, replace(part, topics=topics), counted)]
     make = {"csv": _csv, "parquet": _parquet, "pictures": _pictures, "mp4": _mp4}[kind]
     made, taken = [], set[str]()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for topic in topics:
-            path = folder / _file_name(topic.name, taken, _SUFFIXES[kind])
+            path = folder / _file_name(topic, taken, _SUFFIXES[kind])
             if path.exists():
                 raise RecordingError(str(path), _("there is such a file already; choose another name"))
             unfinished = path.with_name(f"{path.name}.part")
-            source = _Source(recording, topic.name, part, counted)
+            source = _Source(recording, topic, part, counted)
             try:
                 count = make(source, unfinished, fps)
                 replace_file(unfinished, path)
             except BaseException:
                 _remove(unfinished)
                 raise
-            made.append(Exported(topic.name, path, count, source.unreadable))
+            made.append(Exported(topic, path, count, source.unreadable))
     except OSError as error:
         raise disk_sentence(folder, error) from error
+    return made
+
+
+def _wanted(
+    recording: Recording, kind: str, part: Part, progress: Progress | None
+) -> tuple[list[str], _Counted]:
+    """The topics that have something for this format, and how far they are. Raises `RecordingError`."""
+    codecs = {"json", "msgpack", "string"}
+    if kind in {"pictures", "mp4"}:
+        codecs = {"image"}
+    topics = [
+        name
+        for name, each in recording.topics.items()
+        if (part.topics is None or name in part.topics) and (kind == "mcap" or each.codec in codecs)
+    ]
+    if not topics:
+        reason = {
+            "mcap": _("it has no such topic"),
+            "pictures": _("no topic has pictures"),
+            "mp4": _("no topic has pictures"),
+        }.get(kind, _("no topic has values for a table"))
+        raise RecordingError(str(recording.path), reason)
+    counts = _counts(recording, topics, part)
+    topics = [name for name in topics if counts.get(name)]
+    if not topics:
+        raise RecordingError(str(recording.path), _("nothing of it came in that part"))
+    return topics, _Counted(sum(counts.values()), progress)
+
+
+def _counts(recording: Recording, topics: list[str], part: Part) -> dict[str, int]:
+    """About how many messages of each topic there are in a part: of the indexes alone, never 0 for some."""
+    if part.start_ns is None and part.end_ns is None:
+        return {name: recording.topics[name].message_count for name in topics}
+    start_ns = recording.start_ns if part.start_ns is None else part.start_ns
+    end_ns = recording.end_ns + 1 if part.end_ns is None else part.end_ns
+    counted = recording.densities(start_ns, end_ns, 1, topics)
+    made = {}
+    for name in topics:
+        some = next(recording.read(start_ns, end_ns, (name,)), None) if start_ns < end_ns else None
+        made[name] = max(1, sum(counted.get(name, ()))) if some is not None else 0
     return made
 
 
@@ -226,6 +266,98 @@ def _columns(source: _Source) -> dict[str, set[type]]:
                 _("its messages have more than {most} different fields").format(most=MOST_COLUMNS),
             )
     return columns
+
+
+# ---- a recording
+
+
+def _mcap(recording: Recording, folder: Path, part: Part, counted: _Counted) -> Exported:
+    """One file of all topics, with the bytes, numbers and times that they have, and what the recorder said.
+
+    Raises `RecordingError`.
+    """
+    path = folder / f"{recording.path.stem}.mcap"
+    unfinished = path.with_name(f"{path.name}.part")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise disk_sentence(folder, error) from error
+    if path.exists():
+        raise RecordingError(str(path), _("there is such a file already; choose another name"))
+    start_ns = recording.start_ns if part.start_ns is None else max(part.start_ns, recording.start_ns)
+    clock = _Clock(start_ns)
+    writer = RecordingWriter(unfinished, note=recording.words.get("note", ""), clock=clock)
+    count = size = 0
+    try:
+        said = deque(_said_in(recording, part))
+        for at_ns, message in recording.read(part.start_ns, part.end_ns, part.topics):
+            while said and said[0][0] <= at_ns:
+                _say(writer, clock, *said.popleft(), path)
+            clock.now_ns = at_ns
+            writer.post([message])
+            counted.add()
+            count, size = count + 1, size + message.size_bytes
+            if size >= _FLUSH_BYTES or count % _FLUSH_MESSAGES == 0:
+                size = 0
+                _check(writer.flush(), writer, path)
+        for each in said:
+            _say(writer, clock, *each, path)
+        status = writer.close()
+        _check(not status.problem and not status.unkept, writer, path)
+        replace_file(unfinished, path)
+    except BaseException as error:
+        writer.close()
+        _remove(unfinished)
+        if isinstance(error, OSError):
+            raise disk_sentence(path, error) from error
+        raise
+    return Exported("", path, count, 0)
+
+
+class _Clock:
+    """The time at which something came."""
+
+    def __init__(self, now_ns: int) -> None:
+        self.now_ns = now_ns
+
+    def __call__(self) -> int:
+        return self.now_ns
+
+
+def _say(writer: RecordingWriter, clock: _Clock, at_ns: int, role: str, value: object, path: Path) -> None:
+    """Written at once: the writer asks for the time when it writes."""
+    _check(writer.flush(), writer, path)
+    clock.now_ns = at_ns
+    writer.say(role, value)
+    _check(writer.flush(), writer, path)
+
+
+def _check(is_well: bool, writer: RecordingWriter, path: Path) -> None:
+    if not is_well:
+        raise RecordingError(str(path), writer.problem or _("the disk does not answer"))
+
+
+def _said_in(recording: Recording, part: Part) -> list[tuple[int, str, object]]:
+    """(time, role, value) of what stands there beside messages; what is said again and again only once."""
+    found: list[tuple[int, str, object]] = []
+    for role in _SAID:
+        before: dict[str, object] = {}
+        for at_ns, value in recording.said(role):
+            is_late = part.end_ns is not None and at_ns >= part.end_ns
+            if (part.start_ns is not None and at_ns < part.start_ns) or is_late:
+                continue
+            id = value.get("id") if isinstance(value, Mapping) else None
+            if isinstance(id, str):
+                if before.get(id) == value:
+                    continue
+                before[id] = value
+            if len(found) < _MOST_SAID:
+                found.append((at_ns, role, value))
+    return sorted(found, key=_first)
+
+
+def _first(each: tuple[int, str, object]) -> int:
+    return each[0]
 
 
 # ---- tables

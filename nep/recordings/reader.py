@@ -190,7 +190,7 @@ class Recording:
                 yield log_ns, {topic: each for topic, each in made.items() if each is not None}
 
     def said(self, role: Role) -> Iterator[tuple[int, object]]:
-        """(time, value) of what the recorder said: "alerts", "figures", "notes"."""
+        """(time, value) of what the recorder said: "alerts", "figures", "notes", "runs", "alarms"."""
         channels = {number for number, each in self._decoders.items() if each.role == role}
         for _decoder, raw in self._raw(None, None, channels):
             try:

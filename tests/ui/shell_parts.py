@@ -133,6 +133,11 @@ class Answers:
         if self.path is not None:
             take(self.path)
 
+    def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
+        self.asked.append(f"layout {folder}")
+        if self.path is not None:
+            take(self.path)
+
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         self.asked.append(f"folder {folder}")
         if self.path is not None:

@@ -20,6 +20,8 @@ else:
 MODES = ("all", "chosen", "pattern")
 LEAST_S, MOST_S, USUAL_S = 5, 3_600, 60
 LEAST_GB, MOST_GB, USUAL_GB = 0.1, 1_000.0, 2.0
+LEAST_MIN, MOST_MIN = 0.1, 10_080.0
+"""How soon and how late a recording may end by itself, in minutes; its sizes are those of the ring."""
 MOST_NAMES = 1_000
 MOST_LETTERS = 80
 """Of a name for a file: with what is put behind it all file systems take it."""
@@ -33,13 +35,26 @@ class RecordingChoice:
     """Which topics are recorded.
 
     ``mode``: "all"; "chosen", those in ``topics``; "pattern", what fits ``patterns`` (all, when there are
-    none) and none of ``left_out``.
+    none) and none of ``left_out``. It ends after ``ends_min`` minutes or with ``ends_gb`` (of 10^9 bytes),
+    whichever comes first; None is never.
     """
 
     mode: str = "all"
     topics: tuple[str, ...] = ()
     patterns: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    ends_min: float | None = None
+    ends_gb: float | None = None
+
+    def end(self, elapsed_s: float, size_bytes: float, speed: float | None) -> tuple[float, float] | None:
+        """(seconds, bytes) that it will have at its end with so many bytes a second; None: nobody knows."""
+        ends = [] if self.ends_min is None else [60.0 * self.ends_min]
+        if self.ends_gb is not None and speed:
+            ends.append(elapsed_s + (1e9 * self.ends_gb - size_bytes) / speed)
+        if speed is None or not ends:
+            return None
+        at_s = max(elapsed_s, min(ends))
+        return at_s, size_bytes + speed * (at_s - elapsed_s)
 
     @property
     def selection(self) -> recorder.TopicSelection:
@@ -72,6 +87,8 @@ def read_choice(told: object) -> RecordingChoice:
         _names(told.get("topics")),
         _names(told.get("patterns")),
         _names(told.get("left_out")),
+        _number(told.get("ends_min"), LEAST_MIN, MOST_MIN),
+        _number(told.get("ends_gb"), LEAST_GB, MOST_GB),
     )
 
 
@@ -82,6 +99,8 @@ def plain_choice(choice: RecordingChoice) -> dict[str, object]:
         "topics": list(choice.topics),
         "patterns": list(choice.patterns),
         "left_out": list(choice.left_out),
+        "ends_min": choice.ends_min,
+        "ends_gb": choice.ends_gb,
     }
 
 
@@ -93,11 +112,21 @@ def _names(told: object) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class RingWish:
-    """Whether the flight recorder is on, for how many seconds, and in how many GB (10^9 bytes) at most."""
+    """Whether the flight recorder is on, for how many seconds, and in how many GB (10^9 bytes) at most.
+
+    It keeps what fits ``patterns`` (all, when there are none) and none of ``left_out``.
+    """
 
     is_on: bool = False
     seconds: int = USUAL_S
     size_gb: float = USUAL_GB
+    patterns: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def problem(self) -> str:
+        """Why nothing can be kept so, in a sentence; "" when it can."""
+        return RecordingChoice("pattern", (), self.patterns, self.left_out).problem
 
 
 def read_wish(told: object) -> RingWish:
@@ -109,12 +138,24 @@ def read_wish(told: object) -> RingWish:
         told.get("is_on") is True,
         int(seconds) if _within(seconds, LEAST_S, MOST_S) else USUAL_S,  # type: ignore[arg-type]
         float(size_gb) if _within(size_gb, LEAST_GB, MOST_GB) else USUAL_GB,  # type: ignore[arg-type]
+        _names(told.get("patterns")),
+        _names(told.get("left_out")),
     )
 
 
 def plain_wish(wish: RingWish) -> dict[str, object]:
     """The wish as settings keep it."""
-    return {"is_on": wish.is_on, "seconds": wish.seconds, "size_gb": wish.size_gb}
+    return {
+        "is_on": wish.is_on,
+        "seconds": wish.seconds,
+        "size_gb": wish.size_gb,
+        "patterns": list(wish.patterns),
+        "left_out": list(wish.left_out),
+    }
+
+
+def _number(value: object, least: float, most: float) -> float | None:
+    return float(value) if _within(value, least, most) else None  # type: ignore[arg-type]
 
 
 def _within(value: object, least: float, most: float) -> bool:
@@ -136,11 +177,6 @@ def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
             into.append(word)
         is_not = False
     return tuple(wanted), tuple(unwanted)
-
-
-def pattern_words(choice: RecordingChoice) -> str:
-    """The patterns as a person types them."""
-    return " ".join([*choice.patterns, *(f"{_(NOT)} {each}" for each in choice.left_out)])
 
 
 def file_stem(name: str) -> str:

@@ -69,7 +69,8 @@ class RecorderState:
     ``phase``: "" nothing, "starting", "recording", "ending". ``lost``: messages that did not come, by their
     publishers' numbers; ``unkept``: that came and could not be written. ``free_bytes``: on its disk, None
     while that is not known. ``ring_s``, ``ring_bytes``: what could be kept, None while there is no flight
-    recorder. ``keeping``: files that are being made of it. ``last``: the file that was finished last.
+    recorder. ``keeping``: files that are being made of it. ``last``: the file that was finished last;
+    ``limit``: why that ended by itself, as it was to: "time", "size", or "".
     """
 
     phase: str = ""
@@ -85,6 +86,7 @@ class RecorderState:
     ring_bytes: int = 0
     keeping: tuple[Path, ...] = ()
     last: Path | None = None
+    limit: str = ""
 
 
 class OrderLine(Protocol):
@@ -216,9 +218,19 @@ class RecorderClient:
     # ---- what a person does
 
     def record(
-        self, path: Path, topics: Sequence[str] = (), left_out: Sequence[str] = (), note: str = ""
+        self,
+        path: Path,
+        topics: Sequence[str] = (),
+        left_out: Sequence[str] = (),
+        note: str = "",
+        *,
+        seconds: float | None = None,
+        most_bytes: int | None = None,
     ) -> bool:
-        """Begin a recording; all topics when none are named. False when one goes on already."""
+        """Begin a recording; all topics when none are named. False when one goes on already.
+
+        It ends by itself after so many ``seconds``, or with ``most_bytes``, whichever comes first.
+        """
         if self.state.phase:
             return False
         self._alerts.resolve_all("recorder:")
@@ -233,7 +245,11 @@ class RecorderClient:
                 last=old.last,
             )
         )
-        self._order(op="record", path=str(path), topics=list(topics), left_out=list(left_out), note=note)
+        limits = {"seconds": seconds, "size_bytes": most_bytes}
+        ends = {name: limit for name, limit in limits.items() if limit is not None}
+        self._order(
+            op="record", path=str(path), topics=list(topics), left_out=list(left_out), note=note, **ends
+        )
         return True
 
     def stop(self) -> None:
@@ -246,6 +262,15 @@ class RecorderClient:
         """Put a bookmark with these words into the recording."""
         if self.state.phase == "recording":
             self._order(op="note", text=text)
+
+    def say(self, role: str, value: Mapping[str, object], to: str = "") -> None:
+        """Put what happens now into what is recorded and into the flight recorder; else it is dropped.
+
+        ``to``: into one of them alone, "recording" or "ring".
+        """
+        is_heard = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
+        if self._line is not None and is_heard:
+            self._line.order({"op": "say", "role": role, "value": dict(value), "to": to})
 
     def follow_ring(self, choice: RingChoice | None) -> None:
         """Have the flight recorder on with this choice, or off. It comes back by itself when it has gone."""
@@ -314,7 +339,8 @@ class RecorderClient:
         status = content.get("status")
         status = status if isinstance(status, Mapping) else {}
         path = self.state.path
-        self._set(replace(_with_status(self.state, status), phase="", last=path, free_bytes=None))
+        ended = replace(_with_status(self.state, status), phase="", last=path, free_bytes=None)
+        self._set(replace(ended, limit=str(content.get("limit", ""))))
         self._alerts.resolve("recorder:low")
         problem = status.get("problem")
         if isinstance(problem, str) and problem:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from nep.errors import NepError
 from nep.i18n import _, ngettext
-from nep.recordings.export import Exported, export
+from nep.recordings.export import ALL_OF_IT, Exported, Part, export
 from nep.recordings.reader import Recording
 
 
@@ -18,8 +18,9 @@ class _CancelledError(Exception):
 class RecordingExport:
     """One export, in a thread of its own. All that is here may be asked from any thread."""
 
-    def __init__(self, recording: Path, kind: str, folder: Path) -> None:
+    def __init__(self, recording: Path, kind: str, folder: Path, part: Part = ALL_OF_IT) -> None:
         """Begin; ``kind`` is one of `nep.recordings.export.FORMATS`, the folder is made."""
+        self._part = part
         self.folder = folder
         self.files: tuple[Exported, ...] = ()
         self.problem = ""
@@ -70,7 +71,7 @@ class RecordingExport:
     def _run(self) -> None:
         try:
             with Recording(self._recording) as recording:
-                made = export(recording, self._kind, self.folder, progress=self._tell)
+                made = export(recording, self._kind, self.folder, self._part, progress=self._tell)
             self.files = tuple(made)
         except _CancelledError:
             pass

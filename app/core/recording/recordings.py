@@ -29,6 +29,7 @@ from app.core.recording.client import (
     RingChoice,
     StartRecorder,
 )
+from app.core.recording.events import RecordedEvents
 from app.core.storage.settings import Settings, data_home
 from app.errors import SettingsError
 from nep.i18n import _
@@ -74,6 +75,7 @@ class SessionRecordings:
         """Read what was chosen; nothing is started before `start`, or before something is recorded."""
         self._settings, self._alerts, self._clock, self._now = settings, alerts, clock, now
         self.client = RecorderClient(address, alerts, post_event, start=start, clock=clock)
+        self.events = RecordedEvents(self.client.say)
         self.choice = read_choice(settings.get(CHOICE_KEY, {}))
         self.wish = read_wish(settings.get(RING_KEY, {}))
         self.on_made: Callable[[Path, str], object] = _nobody
@@ -158,7 +160,14 @@ class SessionRecordings:
             free_path(folder / f"{stem}{folders.SUFFIX}") if stem else folders.new_path(folder, self._now())
         )
         selection = choice.selection
-        self.client.record(path, selection.topics, selection.left_out, note)
+        self.client.record(
+            path,
+            selection.topics,
+            selection.left_out,
+            note,
+            seconds=None if choice.ends_min is None else 60.0 * choice.ends_min,
+            most_bytes=None if choice.ends_gb is None else round(choice.ends_gb * _GB),
+        )
         self.recorded, self._began = choice, None
         return ""
 
@@ -174,7 +183,10 @@ class SessionRecordings:
         return self.client.state.ring_s is not None
 
     def set_wish(self, wish: RingWish) -> None:
-        """Have the flight recorder on or off, now and after the next start."""
+        """Have the flight recorder on or off, now and after the next start.
+
+        Another choice of topics begins it anew: what was there to be kept is gone.
+        """
         self.wish = wish
         self._put(RING_KEY, plain_wish(wish))
         self._follow_wish()
@@ -185,7 +197,10 @@ class SessionRecordings:
             self.client.follow_ring(None)
             return
         folder = data_home() / "flight-recorder"
-        self.client.follow_ring(RingChoice(folder, float(wish.seconds), round(wish.size_gb * _GB)))
+        size_bytes = round(wish.size_gb * _GB)
+        self.client.follow_ring(
+            RingChoice(folder, float(wish.seconds), size_bytes, wish.patterns, wish.left_out)
+        )
 
     def keep(self, note: str = "", seconds: float | None = None, done: Done | None = None) -> str:
         """Make a recording of the last seconds; gives why not in a sentence, "" when it is being made.
@@ -224,6 +239,7 @@ class SessionRecordings:
     def check(self) -> None:
         """Once a second."""
         self.client.check()
+        self.events.repeat("ring")
 
     def on_event(self, event: RecorderSaid | RecorderGone) -> None:
         """Take over what the recorder's process told."""
@@ -232,6 +248,7 @@ class SessionRecordings:
         state = self.client.state
         if was.phase == "starting" and state.phase == "recording":
             self._began = self._clock()
+            self.events.repeat("recording")
         if was.phase and not state.phase:
             self._began = None
             if state.last is not None and state.last == was.path:

@@ -129,6 +129,11 @@ class Runs:
         return self._run.state in {"running", "paused"}
 
     @property
+    def state(self) -> RunState:
+        """How the run is now."""
+        return self._run
+
+    @property
     def tried_value(self) -> TriedValue | None:
         """The block that was tried last, and the value that it had."""
         return self._trial.value
@@ -527,12 +532,7 @@ class Runs:
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
         work = partial(
-            self._stop_all,
-            self._stop_number,
-            self._runner,
-            self._network.stopper,
-            asked,
-            self._program_key,
+            self._stop_all, self._stop_number, self._runner, self._network.stopper, asked, self._program_key
         )
         self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
         self._stop_thread.start()

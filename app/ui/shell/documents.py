@@ -22,7 +22,7 @@ from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
 
 LONGEST_FLUSH_MS = 500
-RECORDINGS = ".mcap"
+RECORDING, LAYOUT = OTHERS = (".mcap", ".nep-layout")
 
 
 @runtime_checkable
@@ -68,6 +68,8 @@ class DocumentController:
         self._editor, self._clock = editor, clock
         self.open_recording: Callable[[Path], object] = lambda _path: None
         """What opens a recording that came from outside."""
+        self.open_layout: Callable[[Path], object] = lambda _path: None
+        """What shows a layout that came from outside."""
 
     def new(self) -> None:
         """Begin an empty behaviour in a tab of its own."""
@@ -91,16 +93,16 @@ class DocumentController:
     def open_all(self, paths: Sequence[Path]) -> None:
         """Open files that came from outside: the command line, a drop, another start.
 
-        Those that are neither behaviours nor recordings become one alert, the others open.
+        Those that are neither behaviours nor recordings nor layouts become one alert, the others open.
         """
         self._session.alerts.resolve("strange")
-        recordings = [path for path in paths if path.suffix.lower() == RECORDINGS]
-        strange = [path for path in paths if path.suffix.lower() not in {SUFFIX, RECORDINGS}]
+        strange = [path for path in paths if path.suffix.lower() not in {SUFFIX, *OTHERS}]
         for path in paths:
-            if path not in strange and path not in recordings:
+            if path.suffix.lower() == SUFFIX:
                 self.open(path)
-        for path in recordings[-1:]:  # one at a time is shown
-            self.open_recording(path)
+        for kind, show in ((LAYOUT, self.open_layout), (RECORDING, self.open_recording)):
+            for path in [each for each in paths if each.suffix.lower() == kind][-1:]:  # one of them is shown
+                show(path)
         if strange:
             self._complain(strange_words(strange), "file.open", _("Open another file"), alert="strange")
 

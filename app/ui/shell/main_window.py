@@ -27,8 +27,8 @@ from app.ui.shell.bars.status_bar import Fact, StatusBar, StatusFacts
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.shell import START
-from app.ui.shell.dialogs.file_sheet import StudioDialogs
 from app.ui.shell.dialogs.motion_permission import MotionQuestion
+from app.ui.shell.dialogs.studio_dialogs import StudioDialogs
 from app.ui.shell.docking.dock import Dock, fitting
 from app.ui.shell.docking.layouts import LAYOUTS, Layout, layout_named
 from app.ui.shell.docking.saved_layouts import SavedLayouts

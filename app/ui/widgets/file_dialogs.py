@@ -55,6 +55,9 @@ class FileDialogs(Protocol):
     def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
         """Which recording to play."""
 
+    def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
+        """Which layout to show."""
+
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         """Which folder."""
 
@@ -70,6 +73,7 @@ def pictures_folder() -> str:
 
 BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
 RECORDINGS = (lazy("Recordings"), "*.mcap")
+LAYOUTS = (lazy("Layouts"), "*.nep-layout")
 PICTURES = (lazy("Pictures"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
 """What a dialog offers, in words, and the patterns of the names."""
 
@@ -124,6 +128,11 @@ class SystemDialogs:
 
     def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog(_("Open a recording"), folder, take, RECORDINGS)
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.show()
+
+    def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Open a layout"), folder, take, LAYOUTS)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 

@@ -11,7 +11,6 @@ from app.core.recording.choice import (
     RingWish,
     file_stem,
     free_path,
-    pattern_words,
     plain_choice,
     plain_wish,
     read_choice,
@@ -33,8 +32,6 @@ from app.core.recording.choice import (
 )
 def test_patterns_are_words_and_not_leaves_out(text, wanted, unwanted):
     assert read_patterns(text) == (wanted, unwanted)
-    choice = RecordingChoice("pattern", patterns=wanted, left_out=unwanted)
-    assert read_patterns(pattern_words(choice)) == (wanted, unwanted)
 
 
 def test_what_is_left_out_wins_and_none_wanted_is_all():
@@ -52,17 +49,35 @@ def test_what_can_not_be_recorded_says_why():
 
 
 @pytest.mark.parametrize(
-    "told", [None, 3, "x", [], {}, {"mode": 7, "topics": "abc"}, {"mode": "some", "patterns": [1, None]}]
-)
+    "told",
+    [None, 3, "x", [], {}, {"mode": 7, "topics": "abc"}, {"mode": "some", "patterns": [1, None]},
+     {"ends_min": 0, "ends_gb": float("nan")}, {"ends_min": "30", "ends_gb": -1}, {"ends_min": True}],
+)  # fmt: skip
 def test_whatever_settings_hold_is_read(told):
     assert read_choice(told) == RecordingChoice()
 
 
 def test_choice_and_wish_come_back_as_they_were():
-    choice = RecordingChoice("pattern", ("/a",), ("/b/*",), ("/c",))
+    choice = RecordingChoice("pattern", ("/a",), ("/b/*",), ("/c",), 30.0, 0.5)
     assert read_choice(plain_choice(choice)) == choice
-    wish = RingWish(is_on=True, seconds=90, size_gb=0.5)
+    wish = RingWish(is_on=True, seconds=90, size_gb=0.5, patterns=("/arm/*",), left_out=("/arm/raw",))
     assert read_wish(plain_wish(wish)) == wish
+
+
+@pytest.mark.parametrize(
+    ("ends", "so_far", "end"),
+    [
+        ((None, None), (10.0, 100.0, 10.0), None),
+        ((1.0, None), (10.0, 100.0, 10.0), (60.0, 600.0)),
+        ((1.0, None), (10.0, 100.0, None), None),
+        ((1.0, 1e-6), (10.0, 100.0, 100.0), (19.0, 1000.0)),
+        ((None, 1.0), (10.0, 100.0, 0.0), None),
+        ((1.0, 1.0), (10.0, 100.0, 0.0), (60.0, 100.0)),
+        ((0.1, None), (10.0, 100.0, 10.0), (10.0, 100.0)),  # it is about to end
+    ],
+)
+def test_how_large_it_will_be_at_its_end(ends, so_far, end):
+    assert RecordingChoice("all", ends_min=ends[0], ends_gb=ends[1]).end(*so_far) == end
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ import threading
 from app.core.recording import exporting as exporting_module
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.folder import picture_in
-from nep.recordings.export import export
+from nep.recordings.export import Part, export
 from tests.nep.programs import eventually
-from tests.nep.recordings.messages import json_message, record
+from tests.nep.recordings.messages import START_NS, STEP_NS, json_message, record
 
 
 def test_an_export_tells_what_it_made(tmp_path):
@@ -20,6 +20,15 @@ def test_an_export_tells_what_it_made(tmp_path):
     (made,) = job.files
     assert made.count == 250
     assert len(made.path.read_text("utf-8").splitlines()) == 251
+
+
+def test_a_part_of_it_tells_how_far_it_is_too(tmp_path):
+    messages = [json_message(seq, topic=f"/{'ab'[seq % 2]}") for seq in range(400)]
+    record(tmp_path / "a.mcap", [messages])
+    part = Part(START_NS + 100 * STEP_NS, START_NS + 300 * STEP_NS, ["/a"])
+    job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out", part)
+    eventually(lambda: job.is_over)
+    assert ([(each.topic, each.count) for each in job.files], job.share) == ([("/a", 100)], 1.0)
 
 
 def test_what_fails_is_a_sentence(tmp_path):
@@ -34,13 +43,13 @@ def test_who_gives_it_up_finds_no_half_file(tmp_path, monkeypatch):
     record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(500)]])
     has_begun, go_on = threading.Event(), threading.Event()
 
-    def slow(recording, kind, folder, *, progress):
+    def slow(recording, kind, folder, part, *, progress):
         def tell(done: int, total: int) -> None:
             has_begun.set()
             go_on.wait()
             progress(done, total)
 
-        return export(recording, kind, folder, progress=tell)
+        return export(recording, kind, folder, part, progress=tell)
 
     monkeypatch.setattr(exporting_module, "export", slow)
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")

@@ -71,6 +71,24 @@ def test_a_recording_begins_with_the_last_choice_and_ends(made):
     assert (recordings.is_recording, recordings.elapsed_s) == (False, 0.0)
 
 
+def test_a_recording_that_begins_is_told_what_goes_on_already(made):
+    recordings = made.recordings
+    rule = AlarmRule("1", AlarmCondition("silent", "/camera", for_s=2.0))
+    recordings.events.take_alarm(AlarmEvent("on", rule, 1000.0))
+    recordings.record("a")
+    made.say("recording")
+    recordings.check()
+
+    def said() -> list[tuple[str, str]]:
+        orders = made.lines[0].orders
+        return [(each["value"]["topic"], each["to"]) for each in orders if each["op"] == "say"]
+
+    assert said() == [("/camera", "recording")]
+    recordings.set_wish(RingWish(is_on=True))
+    recordings.check()
+    assert said() == [("/camera", "recording"), ("/camera", "ring")]
+
+
 def test_a_choice_for_one_time_is_not_kept(made):
     only = RecordingChoice("chosen", ("/odom",))
     assert made.recordings.record(choice=only) == ""

@@ -11,6 +11,7 @@ import pytest
 
 import nep
 from nep.cli import screen
+from nep.cli.ring import KEEP_SERVICE, has_ring
 from nep.masters.master import Master
 from nep.programs.alarms.rule_file import EXAMPLE
 from tests.nep.programs import eventually, running
@@ -79,6 +80,26 @@ def test_alarms_are_json_for_programs_and_what_only_studio_can_do_is_said(master
     assert records[0]["seen"] == 0.3
     assert records[1]["what"] == "only Studio can do this: stop all robots"
     assert "so it is not done here: stop all robots" in plain.stderr
+
+
+def test_an_alarm_keeps_the_last_seconds_by_whoever_has_them(master, type_in, file) -> None:
+    asked = []
+
+    def keep(request: object) -> object:
+        asked.append(request)
+        return {"path": "there/kept-1.mcap"}
+
+    name = file({"id": "near", "when": BELOW, "do": [{"keep_s": 30}]})
+    with Talker(master.address, "/distance", {"range": 0.3}) as node:
+        with node.new_server(KEEP_SERVICE, keep, threads=1):
+            done = type_in("watch", name, "-n", "1", "--master", master.address)
+        eventually(lambda: not has_ring(node.graph()))
+        refused = type_in("watch", name, "-n", "1", "--master", master.address, "--json")
+    assert done.stdout.splitlines()[1].split("  ", 1)[1].strip() == "kept there/kept-1.mcap"
+    assert asked == [{"seconds": 30, "note": "range of /distance is 0.3, below 0.4"}]
+    assert "only Studio" not in done.stderr
+    told = [json.loads(line)["what"] for line in refused.stdout.splitlines()]
+    assert told[1] == "nothing was kept: no 'nep recording ring' is on"
 
 
 def test_a_message_is_sent_and_a_typo_is_told(master, type_in, file) -> None:

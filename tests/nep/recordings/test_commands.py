@@ -7,6 +7,8 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -14,7 +16,8 @@ import typer
 
 import nep
 from nep.cli.app import app
-from nep.errors import NepError, RecordingError, RecordingsUnavailableError
+from nep.cli.ring import has_ring
+from nep.errors import NepError, RecordingError, RecordingsUnavailableError, ServiceError
 from nep.recordings.reader import Recording
 from tests.nep.programs import eventually
 from tests.nep.recordings.mcap_doctor import McapDoctor
@@ -81,6 +84,57 @@ def test_a_recording_ends_after_its_time_and_tells_as_json(master, tmp_path, cap
     with pytest.raises(typer.BadParameter):
         run("record", "-o", tmp_path / "b.mcap", "--duration", 0, "--master", master.address)
     assert not (tmp_path / "b.mcap").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals to another program need POSIX")
+def test_a_ring_keeps_the_last_seconds_by_a_command_and_by_a_signal(master, tmp_path, capfdbinary):
+    command = ["-m", "nep", "recording", "ring", "/arm/*", "--not", "/arm/raw", "-o", str(tmp_path)]
+    child = subprocess.Popen(
+        [sys.executable, *command, "--master", master.address],
+        stdin=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+    def files() -> list[Path]:
+        return sorted(each for each in tmp_path.glob("kept-*.mcap"))
+
+    with child, nep.node("robot", master=master.address) as robot:
+        publishers = [robot.new_pub(topic) for topic in ("/arm/joints", "/arm/raw", "/leg")]
+        assert "keeping the last 60 s" in child.stderr.readline()
+        eventually(lambda: publishers[0].subscribers == 1, 60.0)
+        for publisher in publishers:
+            publisher.publish({"n": 1})
+        words = ("recording", "keep", "--master", master.address)
+
+        def is_kept() -> bool:
+            with suppress(ServiceError):  # the message is on its way
+                run(*words, "--note", "it fell", "--json")
+            return bool(files())
+
+        eventually(is_kept, 60.0)
+        told = json.loads(capfdbinary.readouterr().out)
+        assert [str(each) for each in files()] == [told["path"]]
+        child.send_signal(signal.SIGUSR1)
+        eventually(lambda: len(files()) == 2, 60.0)
+        with pytest.raises(NepError, match="no time"):
+            run(*words, "--seconds", "-1")
+        with pytest.raises(NepError, match="a map such as"), nep.node("any", master=master.address) as node:
+            node.new_client("flight_recorder/keep", timeout_s=60.0).call({"seconds": "x"})
+        child.send_signal(signal.SIGINT)
+        child.communicate(timeout=60)
+        eventually(lambda: not has_ring(robot.graph()))
+        with pytest.raises(NepError, match="no 'nep recording ring' is on"):
+            run(*words)
+    assert child.returncode == 0
+    assert sorted(each.name for each in tmp_path.iterdir()) == [each.name for each in files()]
+    with Recording(told["path"]) as recording:
+        assert list(recording.topics) == ["/arm/joints"]
+        assert recording.words["note"] == "it fell"
+        assert recording.message_count == told["message_count"] > 0
+    for wrong in (("--seconds", 0), ("--seconds", "nan"), ("--size", -1)):
+        with pytest.raises(typer.BadParameter):
+            run("recording", "ring", "-o", tmp_path, "--master", master.address, *wrong)
 
 
 def test_info_tells_what_is_there_and_what_is_missing(path, tmp_path, capfd):

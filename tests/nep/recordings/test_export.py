@@ -17,7 +17,9 @@ from nep.messages import image_codec
 from nep.messages.message import Message
 from nep.recordings.export import Part, export, flattened
 from nep.recordings.reader import Recording
-from tests.nep.recordings.messages import STEP_NS, json_message, picture, record
+from nep.recordings.writer import RecordingWriter
+from tests.nep.recordings.mcap_doctor import McapDoctor
+from tests.nep.recordings.messages import STEP_NS, TestClock, json_message, kept, limits, picture, record
 
 VALUES = [
     {"pose": {"x": 0.1, "y": None}, "j": [1, 2], "name": 'a,\n"b"', "ok": True, "big": 2**63},
@@ -199,3 +201,44 @@ def test_values_alone_and_empty_things_have_a_column():
     assert flattened(5) == {"value": 5}
     assert flattened({}) == {"value": "{}"}
     assert flattened({"a": {}, "b": [], "c": b"\0"}) == {"a": "{}", "b": "[]", "c": "\"b'\\\\x00'\""}
+
+
+def test_a_part_as_a_recording_has_the_same_bytes_and_times_and_what_was_said(tmp_path):
+    path = tmp_path / "a.mcap"
+    run = {"id": "1", "name": "Greeting", "until_ns": None}
+    with RecordingWriter(path, note="first", clock=TestClock(), limits=limits(figures_s=1e6)) as writer:
+        for seq in range(40):
+            writer.post([picture(seq) if seq % 4 == 0 else json_message(seq, f"/{'ab'[seq % 2]}")])
+            assert writer.flush()
+            if seq % 5 == 0:
+                writer.say("runs", run)
+            if seq in {2, 21}:
+                writer.say("notes", {"text": f"note {seq}"})
+    with Recording(path) as whole:
+        times = [each.log_ns for each in whole.read()]
+        part = Part(times[10], times[30], ["/a", "/camera"])
+        wanted = [
+            (each.log_ns, kept(each.message)) for each in whole.read(part.start_ns, part.end_ns, part.topics)
+        ]
+        notes = list(whole.said("notes"))[1:]
+        told: list[tuple[int, int]] = []
+        (made,) = export(whole, "mcap", tmp_path / "out", part, progress=lambda *each: told.append(each))
+        assert (made.path, made.count, told[-1]) == (
+            tmp_path / "out" / "a.mcap",
+            len(wanted),
+            (len(wanted),) * 2,
+        )
+        with pytest.raises(RecordingError, match="such a file already"):
+            export(whole, "mcap", tmp_path / "out", part)
+        with pytest.raises(RecordingError, match="no such topic"):
+            export(whole, "mcap", tmp_path / "none", Part(topics=["/nowhere"]))
+        with pytest.raises(RecordingError, match="in that part"):
+            export(whole, "mcap", tmp_path / "none", Part(start_ns=times[-1] + 1))
+    with Recording(made.path) as recording:
+        assert recording.is_complete
+        assert [(each.log_ns, kept(each.message)) for each in recording.read()] == wanted
+        assert recording.words["note"] == "first"
+        assert list(recording.said("notes")) == notes
+        assert [value for _at, value in recording.said("runs")] == [run]  # not once for each second
+    assert McapDoctor(made.path).problems == []
+    assert sorted(each.name for each in (tmp_path / "out").iterdir()) == ["a.mcap"]

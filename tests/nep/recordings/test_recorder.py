@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import random
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -172,6 +173,8 @@ def test_orders_of_the_service(master, tmp_path):
             publisher.publish({"n": n})
         until(lambda: any((each["recording"] or {}).get("topics") for each in seen("figures")))
         order(op="note", text="it fell")
+        order(op="say", role="runs", value={"id": "1", "name": "Greeting"})
+        order(op="say", role="alarms", value={"id": "2"}, to="ring")
         order(op="keep", path=str(tmp_path / "kept.mcap"), seconds=60, note="the fall")
         until(lambda: seen("kept"))
         order(op="stop")
@@ -182,6 +185,8 @@ def test_orders_of_the_service(master, tmp_path):
             b'{"op":"none"}',
             b'{"op":"record"}',
             b'{"op":"keep"}',
+            b'{"op":"say","role":"figures","value":{}}',
+            b'{"op":"say","role":"runs","value":3}',
             b"\xff",
         ):
             service.order(wrong)
@@ -189,17 +194,61 @@ def test_orders_of_the_service(master, tmp_path):
         order(op="record", path=str(tmp_path / "c.mcap"), topics=["two words"])
         service.close()
     assert [each["op"] for each in seen("problem")][:1] == ["record"]
-    assert len(seen("problem")) == 10
+    assert len(seen("problem")) == 12
     (ended,) = seen("ended")
     assert ended["status"]["message_count"] == 5
     with Recording(tmp_path / "a.mcap") as recording:
         assert [each.message.payload for each in recording.read()] == [{"n": n} for n in range(5)]
         assert recording.words["note"] == "first"
         assert [value for _at, value in recording.said("notes")] == [{"text": "it fell"}]
+        assert [value for _at, value in recording.said("runs")] == [{"id": "1", "name": "Greeting"}]
+        assert list(recording.said("alarms")) == []
     with Recording(tmp_path / "kept.mcap") as recording:
+        assert [value for _at, value in recording.said("alarms")] == [{"id": "2"}]
+        assert [value for _at, value in recording.said("runs")] == [{"id": "1", "name": "Greeting"}]
         assert (recording.topics["/a"].message_count, recording.words["note"]) == (5, "the fall")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.mcap", "kept.mcap", "ring"]
     assert not list((tmp_path / "ring").iterdir())
+
+
+@pytest.mark.parametrize(("limit", "ends"), [("time", {"seconds": 5}), ("size", {"size_bytes": 1000})])
+def test_a_recording_ends_by_itself_after_so_long_or_with_so_many_bytes(master, tmp_path, limit, ends):
+    events: list[dict[str, object]] = []
+    now = [100.0]
+    with (
+        nep.node("recorder", master=master.address) as node,
+        nep.node("robot", master=master.address) as robot,
+    ):
+        service = RecorderService(
+            node, lambda event: events.append(dict(event)), figures_s=0.01, clock=lambda: now[0]
+        )
+        publisher = robot.new_pub("/a")
+        for wrong in ({"seconds": 0}, {"seconds": "x"}, {"seconds": float("inf")}, {"size_bytes": 0}):
+            path = tmp_path / "none.mcap"
+            service.order(json.dumps({"op": "record", "path": str(path), **wrong}).encode())
+            assert not path.exists()
+        assert [each["event"] for each in events] == ["problem"] * 4
+        service.order(json.dumps({"op": "record", "path": str(tmp_path / "a.mcap"), **ends}).encode())
+        publisher.publish({"n": random.Random(1).randbytes(2000).hex()})
+
+        def written() -> int:
+            told = [each["recording"] for each in events if each["event"] == "figures" and each["recording"]]
+            return told[-1]["message_count"] if told else 0
+
+        def is_over() -> bool:
+            return any(each["event"] == "ended" for each in events)
+
+        if limit == "time":
+            until(lambda: written() == 1)
+            assert not is_over()
+            now[0] += 5.0
+        until(is_over)
+        service.close()
+    (ended,) = [each for each in events if each["event"] == "ended"]
+    assert (ended["limit"], ended["status"]["problem"]) == (limit, "")
+    with Recording(tmp_path / "a.mcap") as recording:
+        assert recording.is_complete
+        assert recording.message_count == 1
 
 
 def test_what_ends_by_itself_is_told_and_something_new_may_begin(master, tmp_path, monkeypatch):

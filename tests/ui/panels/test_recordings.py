@@ -203,6 +203,54 @@ def test_an_export_goes_on_beside_and_says_what_it_made(qtbot, panel, window, fo
     assert panel.details.export.text() == "Export"
 
 
+def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
+    qtbot, panel, window, folder, tmp_path
+):
+    messages = [json_message(seq, f"/{'ab'[seq % 2]}") for seq in range(1000)]  # 10 s
+    record(folder / "long.mcap", [[*messages[:500], picture(1)], messages[500:]])
+    seen(qtbot, panel, "arm", "camera", "cut", "long")
+    choose(panel, folder, "long")
+    strip, details = panel.details.strip, panel.details
+
+    def is_there() -> bool:
+        panel.refresh()
+        return strip.look is not None
+
+    qtbot.waitUntil(is_there)
+    assert details.part_words.text() == "3 of 3 topics"
+    assert strip.grab().toImage().pixelColor(strip.width() // 2, 30) != strip._theme.colour("sunken")
+    assert strip._images.count(None) < len(strip._images)
+    QTest.keyClick(strip.begin, Qt.Key.Key_Right)
+    QTest.keyClick(strip.begin, Qt.Key.Key_Right)
+    place = QPoint(round(strip._x(strip.look.start_ns + 6 * 10**9)), 30)
+    QTest.mouseClick(strip, Qt.MouseButton.LeftButton, pos=place)
+    assert abs(strip.end_ns - strip.look.start_ns - 6 * 10**9) < 10**8
+    strip.set_part(strip.begin_ns, strip.look.start_ns + 6 * 10**9)
+    QTest.keyClicks(details.topics.edit, "/a ")
+    assert details.part_words.text() == "0:02.0 to 0:06.0, 1 of 3 topics"
+    window.answers.path = tmp_path
+    details.choose.click()
+    details.export.click()
+
+    def is_over() -> bool:
+        panel.refresh()
+        return bool(window.toasts)
+
+    qtbot.waitUntil(is_over)
+    (made,) = (tmp_path / "long, 0.02.0 to 0.06.0, CSV").iterdir()
+    assert (made.name, len(made.read_text("utf-8").splitlines())) == ("a.csv", 1 + 200)
+    QTest.keyClicks(details.topics.edit, "not /a ")
+    assert details.part_words.text() == "No topic of it fits"
+    window.toasts.clear()
+    details.export.click()
+    assert window.toasts == ["No topic of it fits"]
+    QTest.keyClick(strip.end, Qt.Key.Key_Home)  # a handle stops at the other one
+    assert strip.begin_ns == strip.end_ns
+    QTest.mouseDClick(strip.begin, Qt.MouseButton.LeftButton)
+    assert strip.is_whole
+    assert not list(unsaid(panel))
+
+
 def test_the_filter_finds_names_notes_and_topics(qtbot, panel):
     seen(qtbot, panel, "arm", "camera", "cut")
     panel.filter.setText("FIRST")

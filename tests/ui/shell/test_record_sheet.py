@@ -133,8 +133,7 @@ def test_what_is_chosen_is_what_is_recorded(window, recorder):
     place = sheet.model.index_of("/odom").row()
     assert [sheet.model.cell_at(place, column).said for column in (0,)] == ["left out"]
     sheet._choose_mode("pattern")
-    sheet.patterns.setText("")
-    QTest.keyClicks(sheet.patterns, "/** not /odom")
+    QTest.keyClicks(sheet.patterns.edit, "/** not /odom")
     assert session.recordings.choice.left_out == ("/odom",)
     sheet.note.setText("second try")
     sheet.record.click()
@@ -146,13 +145,75 @@ def test_a_pattern_that_can_be_none_says_so(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
     sheet._choose_mode("pattern")
-    sheet.patterns.setText("/a\x01")
-    sheet._take_patterns("/a\x01")
+    sheet.patterns.show_patterns(("/a\x01",), ())
+    sheet.patterns.changed.emit()
     assert sheet.wrong.isVisible()
     sheet.record.click()
     assert recorder.ops() == []
-    sheet._take_patterns("/a")
+    sheet.patterns.show_patterns(("/a",), ())
+    sheet.patterns.changed.emit()
     assert not sheet.wrong.isVisible()
+
+
+def test_patterns_are_tokens_that_keys_make_and_take_away(window, recorder):
+    window.commands.run("recording.sheet")
+    sheet = sheet_of(window)
+    sheet._choose_mode("pattern")
+    field = sheet.patterns
+
+    def tokens() -> list[tuple[str, bool]]:
+        return [(each.pattern, each.is_left_out) for each in field.tokens]
+
+    QTest.keyClicks(field.edit, "/arm/* *camera*,not /arm/raw")
+    assert tokens() == [("/arm/*", False), ("*camera*", False)]
+    QTest.keyClick(field.edit, Qt.Key.Key_Return)
+    assert tokens() == [("/arm/*", False), ("*camera*", False), ("/arm/raw", True)]
+    QTest.keyClicks(field.edit, "/arm/* ")  # it is there already
+    assert field.edit.text() == ""
+    choice = recorder.session.recordings.choice
+    assert (choice.patterns, choice.left_out) == (("/arm/*", "*camera*"), ("/arm/raw",))
+    QTest.keyClick(field.edit, Qt.Key.Key_Backspace)
+    assert len(tokens()) == 2
+    QTest.mouseClick(field.tokens[0], Qt.MouseButton.LeftButton)
+    assert tokens() == [("*camera*", False)]
+    QTest.keyClick(field.tokens[0], Qt.Key.Key_Delete)
+    assert (tokens(), recorder.session.recordings.choice.patterns) == ([], ())
+    assert not list(unsaid(field))
+
+
+def test_it_ends_after_what_is_chosen_and_says_how_large_it_will_be(window, recorder):
+    window.commands.run("recording.sheet")
+    sheet = sheet_of(window)
+    assert sheet.ends_words.text() == "when you end it"
+    for field, text in ((sheet.ends_min, "30"), (sheet.ends_gb, "8")):
+        field.setText(text)
+        field.editingFinished.emit()
+    assert sheet.ends_words.text() == "whichever comes first"
+    choice = recorder.session.recordings.choice
+    assert (choice.ends_min, choice.ends_gb) == (30.0, 8.0)
+    sheet.ends_min.setText("-1")
+    sheet.ends_min.editingFinished.emit()
+    assert sheet.ends_words.text() == "The least is 0.1 min."
+    sheet.ends_min.setText("30")
+    sheet.ends_min.editingFinished.emit()
+    assert not sheet.at_end.isVisible()
+    sheet.record.click()
+    assert (recorder.line.orders[0]["seconds"], recorder.line.orders[0]["size_bytes"]) == (1800.0, 8 * 10**9)
+    recorder.say("recording")
+    for size in (0, 4_000_000):
+        recorder.say("figures", recording=status(size_bytes=size), ring=None, free_bytes=10**12)
+        sheet.show_state()
+        recorder.session.clock.now += 1.0
+    assert sheet.at_end.isVisible() == (sheet._speed is not None)
+    recorder.session.clock.now += 1.0
+    recorder.say("figures", recording=status(size_bytes=12_000_000), ring=None, free_bytes=10**12)
+    sheet.show_state()
+    assert sheet.at_end.note.text() == "at 30:00"
+    recorder.say("ended", status=status(duration_s=1800.0), limit="time")
+    assert "for as long as you chose" in window.toast.text
+    sheet.ends_min.clear()
+    sheet.ends_min.editingFinished.emit()
+    assert recorder.session.recordings.choice.ends_min is None
 
 
 def test_keeping_needs_the_flight_recorder_which_one_press_switches_on(window, recorder):
@@ -173,6 +234,16 @@ def test_keeping_needs_the_flight_recorder_which_one_press_switches_on(window, r
     sheet.seconds.setText("30")
     sheet.seconds.editingFinished.emit()
     assert recorder.session.recordings.wish == RingWish(is_on=True, seconds=30)
+    QTest.keyClicks(sheet.ring_topics.edit, "/arm/* not /arm/raw")
+    assert recorder.session.recordings.wish.patterns == ("/arm/*",)
+    QTest.keyClick(sheet.ring_topics.edit, Qt.Key.Key_Return)
+    assert recorder.ops()[-2:] == ["end_ring", "ring"]
+    order = recorder.line.orders[-1]
+    assert (order["topics"], order["left_out"]) == (["/arm/*"], ["/arm/raw"])
+    sheet.ring_topics.show_patterns(("/b\x01",), ())
+    sheet.ring_topics.settled.emit()
+    assert recorder.session.recordings.wish.patterns == ("/arm/*",)
+    assert "cannot be a topic" in sheet.ring_words.text()
     sheet.ring.click()
     assert recorder.ops()[-1] == "end_ring"
 

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QMenu
 
 import app.ui
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.dialogs.file_sheet import StudioDialogs
+from app.ui.shell.dialogs.studio_dialogs import StudioDialogs
 from app.ui.shell.main_window import MainWindow
 from app.ui.widgets.field_drag import DragKeys, drag_field
 from app.ui.widgets.inputs.combo_box import ComboBox

@@ -1,4 +1,4 @@
-"""How full a recording is, and where something was lost: read in a thread, for who paints a time line."""
+"""How full a recording is, where something was lost, what went on: read in a thread, for a time line."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from app.core.documents.background_worker import BackgroundWorker
+from app.core.recording.replay.spans import RecordedSpans, spans_of
 from nep.recordings.reader import Recording
 
 MOST_MARKS = 2_000
@@ -40,19 +41,22 @@ class LossMark:
 class _Made:
     density: Density | None = None
     losses: Mapping[str, tuple[LossMark, ...]] | None = None
+    spans: RecordedSpans | None = None
 
 
 class Densities:
     """Of one recording. One thread uses it (the window's); what it asks for is there some ticks later."""
 
     def __init__(self, recording: Recording) -> None:
-        """Look for losses at once."""
+        """Look for losses, runs and alarms at once."""
         self._recording = recording
         self._worker: BackgroundWorker[_Made] = BackgroundWorker("studio-density")
         self.newest: Density | None = None
         self.losses: Mapping[str, tuple[LossMark, ...]] = {}
+        self.spans = RecordedSpans()
         self._wanted: tuple[int, int, int] | None = None
         self._worker.ask("losses", lambda: _Made(losses=losses_of(recording)))
+        self._worker.ask("spans", lambda: _Made(spans=spans_of(recording)))
 
     def want(self, start_ns: int, end_ns: int, buckets: int) -> None:
         """This part is shown; asked again and again it is read once."""
@@ -65,11 +69,14 @@ class Densities:
     def take(self) -> bool:
         """Take over what is ready; whether something is new. Raises what the reading raised."""
         density, losses = self._worker.take("density"), self._worker.take("losses")
+        spans = self._worker.take("spans")
         if density is not None:
             self.newest = density.density
         if losses is not None:
             self.losses = losses.losses or {}
-        return density is not None or losses is not None
+        if spans is not None:
+            self.spans = spans.spans or RecordedSpans()
+        return density is not None or losses is not None or spans is not None
 
     def close(self) -> None:
         """End."""

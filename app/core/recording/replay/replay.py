@@ -229,12 +229,20 @@ class Replay:
             self.loop(start_ns if start_ns < at_ns else self.start_ns, at_ns)
 
     def skip(self, *, forward: bool) -> None:
-        """Go to the next or previous mark: a bookmark, else the end or the beginning."""
+        """Go to the next or previous mark: a bookmark, where an alarm or a run begins, else an end."""
         if self.opened is None:
             return
-        at_ns, marks = self._position_ns(), self.opened.bookmarks
-        mark = marks.after(at_ns) if forward else marks.before(at_ns)
-        self.seek(mark.at_ns if mark is not None else self.end_ns if forward else self.start_ns)
+        at_ns, marks = self._position_ns(), [mark.at_ns for mark in self.bookmarks]
+        marks += self.densities.spans.starts() if self.densities is not None else []
+        if forward:
+            self.seek(min((mark for mark in marks if mark > at_ns), default=self.end_ns))
+        else:
+            self.seek(max((mark for mark in marks if mark < at_ns), default=self.start_ns))
+
+    def bookmark_here(self) -> Bookmark | None:
+        """The bookmark at the playhead; None where there is none."""
+        at_ns = self._position_ns()
+        return next((mark for mark in self.bookmarks if mark.at_ns == at_ns), None)
 
     def bookmark(self, name: str = "") -> Bookmark | None:
         """Make a bookmark at the playhead. Raises `RecordingError` when it can't be kept."""
@@ -244,6 +252,11 @@ class Replay:
         """Give one another name. Raises `RecordingError`, and `ValueError` for a note of the recording."""
         if self.opened is not None:
             self.opened.bookmarks.rename(bookmark, name)
+
+    def put_back_bookmark(self, bookmark: Bookmark) -> None:
+        """Make one again that was removed. Raises `RecordingError`."""
+        if self.opened is not None:
+            self.opened.bookmarks.add(bookmark.at_ns, bookmark.name)
 
     def remove_bookmark(self, bookmark: Bookmark) -> None:
         """Take one away. Raises as `rename_bookmark` does."""

@@ -1,21 +1,32 @@
-"""What can be done with the chosen recording: open, rename, show the file, export."""
+"""What can be done with the chosen recording: open, rename, show the file, export all or a part of it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.recording.exporting import RecordingExport
+from app.core.recording.film_strip import FilmStripLook, part_of
 from app.core.recording.folder import RecordingFacts
+from app.core.recording.replay.scale import span_words
+from app.ui.panels.recordings.film_strip import FilmStrip
 from app.ui.text.numbers import grouped
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, ElidedLabel, Segments, Separator, ValueBar, label
+from app.ui.widgets import Button, ElidedLabel, Segments, Separator, ValueBar, label, set_role
 from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.pattern_field import PatternField
+from nep.errors import BadTopicError
 from nep.i18n import _, lazy, ngettext
+from nep.recordings.export import ALL_OF_IT, Part
 
 BAR_PX = 120
 FORMAT_WORDS = {
     "csv": lazy("CSV"), "parquet": lazy("Parquet"), "pictures": lazy("Pictures"), "mp4": lazy("MP4"),
+    "mcap": lazy("MCAP"),
 }  # fmt: skip
 """As what a recording is exported, by the names of `nep.recordings.export`."""
 
@@ -28,6 +39,7 @@ class RecordingDetails(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
+        self._theme = theme
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self.name = ElidedLabel("title", "text", least=60)
         self.counts = label("", "small", role="textSecondary", wrap=True)
@@ -37,30 +49,53 @@ class RecordingDetails(QWidget):
         self.delete = Button(theme, _("Delete"), "trash-2", size="small")
         formats = [(kind, _(words), None) for kind, words in FORMAT_WORDS.items()]
         self.format = Segments(theme, formats, size="small", name=_("Export as"), wraps=True)
+        self._make_part()
         self.export = Button(theme, _("Export"), "download", size="small")
         self.export.clicked.connect(self._press)
         self.bar = ValueBar(theme)
         self.bar.setFixedWidth(round(theme.scaled(BAR_PX)))
         self.progress = label("", "small", role="textSecondary")
         self._is_exporting = False
-        acts, exports = Flow(gap=8, row_gap=6), Flow(gap=8, row_gap=6)
+        self._arrange()
+        self.show_export(None)
+        self.show_strip(None)
+
+    def _make_part(self) -> None:
+        """What of it is exported, and where to."""
+        theme = self._theme
+        self.strip = FilmStrip(theme)
+        self.strip.changed.connect(self._show_part)
+        self.topics = PatternField(theme, _("Topics that are exported"), _("all topics; or /odom *camera*"))
+        self.topics.changed.connect(self._show_part)
+        self.part_words = label("", "small", role="textSecondary", wrap=True)
+        self.folder: Path | None = None
+        self.into = ElidedLabel("small", "textSecondary", least=60)
+        self.choose = Button(theme, _("Into another folder"), "folder-open", size="small")
+
+    def _arrange(self) -> None:
+        acts, exports, places = (Flow(gap=8, row_gap=6) for _row in range(3))
         for button in (self.open, self.rename, self.show_file, self.delete):
             acts.addWidget(button)
-        for part in (label(_("Export as"), "small"), self.format, self.export, self.bar, self.progress):
+        for part in (label(_("Export as"), "small"), self.format, self.part_words):
             exports.addWidget(part)
+        for widget in (self.export, self.bar, self.progress, self.choose):
+            places.addWidget(widget)
+        places.add_elastic(self.into)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.addWidget(Separator(theme))
+        column.addWidget(Separator(self._theme))
         inside = QVBoxLayout()
         inside.setContentsMargins(12, 8, 12, 10)
         inside.setSpacing(8)
         inside.addWidget(self.name)
         inside.addWidget(self.counts)
         inside.addLayout(acts)
+        inside.addWidget(self.strip)
         inside.addLayout(exports)
+        inside.addWidget(self.topics)
+        inside.addLayout(places)
         column.addLayout(inside)
-        self.show_export(None)
 
     def show_facts(self, facts: RecordingFacts, being_written: bool) -> None:
         """Say this of the recording, and let be done what can be."""
@@ -79,11 +114,57 @@ class RecordingDetails(QWidget):
         self.rename.setEnabled(not being_written)
         self.delete.setEnabled(not being_written)
 
+    def show_strip(self, look: FilmStripLook | None, images: Sequence[QImage | None] = ()) -> None:
+        """Show another recording's time, all of it chosen; None while it is not known."""
+        self.strip.show_look(look, images)
+        self.topics.show_patterns((), ())
+        self.set_folder(None)
+        self._show_part()
+
+    def set_folder(self, folder: Path | None) -> None:
+        """Where it is exported to; None: a new folder beside it."""
+        self.folder = folder
+        self.into.setText(str(folder) if folder is not None else "")
+        self.into.setVisible(folder is not None)
+
+    def part(self) -> Part | None:
+        """What is to be exported; None when no topic fits, or a pattern can be none."""
+        look = self.strip.look
+        if look is None:
+            return ALL_OF_IT
+        wanted, unwanted = self.topics.patterns()
+        try:
+            made = part_of(look, self.strip.begin_ns, self.strip.end_ns, wanted, unwanted)
+        except BadTopicError:
+            return None
+        return made if made.topics is None or made.topics else None
+
+    def _show_part(self) -> None:
+        """Say which part of the time, and how many of the topics."""
+        look, part = self.strip.look, self.part()
+        self.topics.set_wrong(part is None)
+        set_role(self.part_words, "error" if part is None else "textSecondary")
+        if look is None:
+            self.part_words.setText("")
+            return
+        if part is None:
+            self.part_words.setText(_("No topic of it fits"))
+            return
+        count = len(look.topics if part.topics is None else part.topics)
+        said = ngettext("{count} of {all} topics", "{count} of {all} topics", len(look.topics))
+        words = said.format(count=grouped(count), all=grouped(len(look.topics)))
+        if not self.strip.is_whole:
+            ends = (self.strip.begin_ns, self.strip.end_ns)
+            begin, end = (span_words(at_ns - look.start_ns, digits=1) for at_ns in ends)
+            words = _("{begin} to {end}, {topics}").format(begin=begin, end=end, topics=words)
+        self.part_words.setText(words)
+
     def show_export(self, job: RecordingExport | None) -> None:
         """How far an export is; None while none goes on."""
         self._is_exporting = job is not None
         self.export.set_word(_("Cancel") if job is not None else _("Export"), "x" if job else "download")
-        self.format.setEnabled(job is None)
+        for field in (self.format, self.strip, self.topics, self.choose):
+            field.setEnabled(job is None)
         self.bar.setVisible(job is not None)
         self.progress.setVisible(job is not None)
         if job is not None:

@@ -13,11 +13,14 @@ from PySide6.QtGui import QAction, QImage, QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.documents.background_worker import BackgroundWorker
+from app.core.messages.picture import Picture
 from app.core.recording.choice import file_stem
 from app.core.recording.choice import free_path as free
 from app.core.recording.exporting import RecordingExport
+from app.core.recording.film_strip import FilmStripLook, film_strip
 from app.core.recording.folder import FolderLook, RecordingFacts, RecordingFolder, picture_in
 from app.core.recording.recordings import FOLDER_KEY
+from app.core.recording.replay.scale import span_words
 from app.ui.other_programs import open_outside
 from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.recordings.columns import PICTURE, columns, cropped
@@ -42,6 +45,7 @@ ROW = 56
 LOOK_EVERY = 30  # refreshes of 30 a second
 FIRST_LOOK = 1
 PICTURES_KEPT = 300
+STRIP_PICTURES, STRIP_BARS, STRIP_SIZE = 8, 120, (240, 142)
 SIDECAR = ".bookmarks.json"
 
 
@@ -57,6 +61,11 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self._asked: dict[str, tuple[Path, float, int]] = {}
         self._artist: BackgroundWorker[tuple[QImage | None]] = BackgroundWorker("recordings-pictures")
         self._job: RecordingExport | None = None
+        self._strips: BackgroundWorker[tuple[FilmStripLook | None, Sequence[QImage | None]]] = (
+            BackgroundWorker("recordings-strip")
+        )
+        self._strip_of: tuple[Path, float, int] | None = None
+        self._loop: tuple[int, int] | None = None
         self._ticks, self._wanted, self._recorder_seen = 0, "", -1
         super().__init__(context, WORDS, "film")
         self.count = label("", "small", role="textSecondary")
@@ -83,6 +92,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         details.show_file.clicked.connect(lambda: self._of_chosen(self._show_file))
         details.wants_export.connect(self._export)
         details.cancelled.connect(self._cancel)
+        details.choose.clicked.connect(self._choose_folder)
 
     def make_model(self) -> TableModel[RecordingFacts]:
         made = columns(self._picture, self._is_written, lambda: dt.datetime.now().astimezone())
@@ -112,6 +122,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             self.rebuild()
         if self._take_pictures():
             self.table.tell_visible_changed()
+        self._follow_strip()
         self._follow_export()
 
     def rebuild(self) -> None:
@@ -189,6 +200,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self.details.setVisible(facts is not None)
         if facts is not None:
             self.details.show_facts(facts, self._is_written(facts))
+        self._want_strip(facts)
 
     def _chosen(self) -> RecordingFacts | None:
         return self.model.row_at(self.table.currentIndex())
@@ -220,6 +232,38 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         while len(self._pictures) > PICTURES_KEPT:
             self._pictures.popitem(last=False)
         return is_any
+
+    # ---- the strip
+
+    def _want_strip(self, facts: RecordingFacts | None) -> None:
+        """Look at the chosen recording's time, in another thread."""
+        can_read = facts is not None and facts.is_read and not facts.problem and not self._is_written(facts)
+        mark = (facts.path, facts.changed_s, facts.size_bytes) if facts is not None and can_read else None
+        if mark == self._strip_of:
+            return
+        self._strip_of, self._loop = mark, None
+        self.details.show_strip(None)
+        if mark is not None:
+            path = mark[0]
+            self._strips.ask("strip", lambda: _strip(path))
+
+    def _follow_strip(self) -> None:
+        """Take over what is ready; a loop in the time line is the part that is exported."""
+        made = self._strips.take("strip")
+        if made is not None:
+            look, images = made
+            if look is not None and self._strip_of is not None and look.path == self._strip_of[0]:
+                self.details.show_strip(look, images)
+                self._loop = None
+        replay, look = self.session.replay, self.details.strip.look
+        player = replay.player if replay is not None else None
+        if look is None or replay is None or player is None or replay.path != look.path:
+            return
+        loop = player.loop if player.is_looping else None
+        if loop != self._loop:
+            self._loop = loop
+            if loop is not None:
+                self.details.strip.set_part(*loop)
 
     # ---- what a person does
 
@@ -338,12 +382,27 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     # ---- export
 
     def _export(self, kind: str) -> None:
-        facts = self._chosen()
+        facts, part = self._chosen(), self.details.part()
         if facts is None or self._job is not None:
             return
-        folder = free(facts.path.parent / f"{facts.path.stem}, {_(FORMAT_WORDS[kind])}")
-        self._job = RecordingExport(facts.path, kind, folder)
+        if part is None:
+            self.context.toast(_("No topic of it fits"))
+            return
+        strip, name = self.details.strip, facts.path.stem
+        if not strip.is_whole and strip.look is not None:
+            times = [span_words(at - strip.look.start_ns, digits=1) for at in (strip.begin_ns, strip.end_ns)]
+            begin, end = (each.replace(":", ".") for each in times)
+            name = _("{name}, {begin} to {end}").format(name=name, begin=begin, end=end)
+        place = self.details.folder or facts.path.parent
+        folder = free(place / file_stem(f"{name}, {_(FORMAT_WORDS[kind])}"))
+        self._job = RecordingExport(facts.path, kind, folder, part)
         self.details.show_export(self._job)
+
+    def _choose_folder(self) -> None:
+        facts = self._chosen()
+        if facts is not None:
+            place = self.details.folder or facts.path.parent
+            self.context.files.choose_folder(str(place), self.details.set_folder)
 
     def _cancel(self) -> None:
         if self._job is not None:
@@ -400,6 +459,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def shut(self) -> None:
         self._folder.close()
         self._artist.close()
+        self._strips.close()
         if self._job is not None:
             self._job.close()
 
@@ -407,12 +467,21 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 def _drawn(path: Path) -> QImage | None:
     """The small picture of a recording; asked in another thread."""
     found = picture_in(path, (2 * PICTURE.width(), 2 * PICTURE.height()))
-    if found is None:
-        return None
-    pixels = found.bgra
+    return cropped(_image(found)).copy() if found is not None else None
+
+
+def _image(picture: Picture) -> QImage:
+    pixels = picture.bgra
     high, wide = pixels.shape[:2]
-    whole = QImage(pixels.tobytes(), wide, high, wide * 4, QImage.Format.Format_RGB32)
-    return cropped(whole).copy()
+    return QImage(pixels.tobytes(), wide, high, wide * 4, QImage.Format.Format_RGB32).copy()
+
+
+def _strip(path: Path) -> tuple[FilmStripLook | None, Sequence[QImage | None]]:
+    """What is along the time of a recording; asked in another thread."""
+    look = film_strip(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE)
+    if look is None:
+        return None, ()
+    return look, [_image(each) if each is not None else None for each in look.pictures]
 
 
 def _haystack(facts: RecordingFacts) -> str:

@@ -5,60 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QModelIndex, QRect, Qt, Signal
-from PySide6.QtGui import QFocusEvent, QKeyEvent
-from PySide6.QtWidgets import QLineEdit, QWidget
+from PySide6.QtGui import QKeyEvent
 
 from app.core.recording.folder import RecordingFacts
 from app.ui.panels.recordings.columns import GAP, PICTURE
 from app.ui.theme.theme import Theme
+from app.ui.widgets.inputs.rename_field import RenameField
 from app.ui.widgets.keyboard import is_plain
-from app.ui.widgets.menus import EditMenu
 from app.ui.widgets.table.cells import EDGE
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _
-
-
-class RenameField(QLineEdit):
-    """The name of one recording, in its row. ``take`` gets it and says whether it can be."""
-
-    ended = Signal()
-
-    def __init__(
-        self, theme: Theme, place: QWidget, rect: QRect, name: str, take: Callable[[str], bool]
-    ) -> None:
-        super().__init__(name, place)
-        self._take, self._is_over = take, False
-        self.setAccessibleName(_("Name of the recording"))
-        self.setProperty("focusRadius", theme.radius("control"))
-        EditMenu(theme, self)
-        self.setGeometry(rect)
-        self.selectAll()
-        self.show()
-        self.setFocus(Qt.FocusReason.OtherFocusReason)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape:
-            self.leave()
-        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
-            if self._take(self.text()):
-                self.leave()
-        else:
-            super().keyPressEvent(event)
-
-    def focusOutEvent(self, event: QFocusEvent) -> None:
-        super().focusOutEvent(event)
-        if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_over:
-            self._take(self.text())
-            self.leave()
-
-    def leave(self) -> None:
-        """It goes; the name is as it was taken last."""
-        if not self._is_over:
-            self._is_over = True
-            self.hide()
-            self.ended.emit()
-            self.deleteLater()
 
 
 class RecordingTable(TableView[RecordingFacts]):
@@ -106,7 +63,8 @@ class RecordingTable(TableView[RecordingFacts]):
         left = row.left() + EDGE + round(self.theme.scaled(PICTURE.width())) + GAP - 8
         high = min(row.height() - 8, round(self.theme.scaled(32)))
         rect = QRect(left, row.center().y() - high // 2, max(80, row.right() - left - 8), high)
-        self.field = RenameField(self.theme, self.viewport(), rect, name, take)
+        said = _("Name of the recording")
+        self.field = RenameField(self.theme, self.viewport(), rect, name, take, said)
         self.field.ended.connect(self._renamed)
 
     def _renamed(self) -> None:

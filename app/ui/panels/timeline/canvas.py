@@ -1,4 +1,4 @@
-"""The ruler and the lanes of a recording: bookmarks, and for each topic how much came and what was lost.
+"""The ruler and the lanes of a recording: what happened, and for each topic how much came and was lost.
 
 The lanes are painted once into a picture; while it plays only the playhead moves over that.
 """
@@ -6,11 +6,12 @@ The lanes are painted once into a picture; while it plays only the playhead move
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
+    QContextMenuEvent,
     QHelpEvent,
     QImage,
     QKeyEvent,
@@ -27,12 +28,16 @@ from PySide6.QtWidgets import QAbstractScrollArea, QToolTip
 
 from app.core.recording.replay.replay import Replay
 from app.core.recording.replay.scale import TimeScale, clock_words, span_words
+from app.ui.panels.timeline.event_lanes import NAMES as NAMES_OF_LANES
+from app.ui.panels.timeline.event_lanes import RUNS, EventLanes, LaneMark, shown_lanes
 from app.ui.text import plain
 from app.ui.text.numbers import grouped
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.inputs.rename_field import RenameField
 from nep.i18n import _, ngettext
+from nep.recordings.bookmarks import Bookmark
 
 NAMES, FIGURES = 200, 140
 NARROW_NAMES, NARROW_FIGURES, NARROW = 120, 76, 560
@@ -44,15 +49,22 @@ RARE = 8
 MARK_PX = 78
 MOST_BUCKETS = 4000
 GRIP = 6
+FIELD_WIDE = 180
 ICONS = {"image": "image", "json": "braces", "string": "type", "msgpack": "braces"}
 WHEEL = 1.0015
 
 
 class TimelineCanvas(QAbstractScrollArea):
-    """One replay's time. `chosen` names a topic that was pressed, `opened` one that was pressed twice."""
+    """One replay's time. `chosen` names a topic that was pressed, `opened` one that was pressed twice.
+
+    `rename_wanted` tells a bookmark that was pressed twice, `menu_wanted` one whose menu is asked for, and
+    the place on the screen.
+    """
 
     chosen = Signal(str)
     opened = Signal(str)
+    rename_wanted = Signal(object)
+    menu_wanted = Signal(object, QPoint)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -62,6 +74,8 @@ class TimelineCanvas(QAbstractScrollArea):
         self._replay: Replay | None = None
         self._topics: Sequence[str] = ()
         self._lanes: QPixmap | None = None
+        self._marks: list[LaneMark] = []
+        self.field: RenameField | None = None
         self._held = ""  # what the mouse moves: "playhead", "start", "end"
         self._position_ns = 0
         self._loop: tuple[int, int] | None = None
@@ -78,12 +92,14 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def show_replay(self, replay: Replay | None) -> None:
         """Show another recording, all of it."""
+        if self.field is not None:
+            self.field.leave()
         self._replay = replay
         self._topics = tuple(replay.recorded) if replay is not None else ()
         there = replay is not None and replay.opened is not None
         self.scale = TimeScale.whole(replay.start_ns, replay.end_ns) if replay is not None and there else None
         self._position_ns, self._loop, self._follows = 0, None, True
-        self._fit()
+        self.fit()
 
     def move_to(self, position_ns: int, loop: tuple[int, int] | None) -> None:
         """The playhead is there now; where it left what is shown, that follows."""
@@ -130,7 +146,7 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def _top(self) -> float:
         """Where the lanes of topics begin."""
-        return self._theme.scaled(RULER) + self._theme.scaled(MARKS)
+        return self._theme.scaled(RULER) + self._theme.scaled(MARKS) * len(shown_lanes(self._replay))
 
     def _plot(self) -> QRectF:
         """Where time is, below and including the ruler."""
@@ -142,9 +158,15 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def x_of(self, at_ns: int) -> float:
         """Where a time is."""
-        plot = self._plot()
-        share = self.scale.share(at_ns) if self.scale is not None else 0.0
-        return plot.left() + max(-1.0, min(2.0, share)) * plot.width()
+        return self._places(self._plot())(at_ns)
+
+    def _places(self, plot: QRectF) -> Callable[[int], float]:
+        """Tells where times are: thousands are asked for each picture of the lanes."""
+        scale, left, wide = self.scale, plot.left(), plot.width()
+        if scale is None:
+            return lambda _at_ns: left
+        share = scale.share
+        return lambda at_ns: left + max(-1.0, min(2.0, share(at_ns))) * wide
 
     def time_at(self, x: float) -> int:
         """The time there."""
@@ -166,7 +188,8 @@ class TimelineCanvas(QAbstractScrollArea):
                 bar.setValue(top)
         self.renew()
 
-    def _fit(self) -> None:
+    def fit(self) -> None:
+        """Make room for what there is now, and paint it."""
         bar, room = self.verticalScrollBar(), self.viewport().height() - self._top()
         bar.setRange(0, max(0, round(len(self._topics) * self._row() - room)))
         bar.setPageStep(max(1, round(room)))
@@ -174,11 +197,11 @@ class TimelineCanvas(QAbstractScrollArea):
         self.renew()
 
     def _restyle(self) -> None:
-        self._fit()
+        self.fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._fit()
+        self.fit()
 
     def sizeHint(self) -> QSize:
         return QSize(900, 260)
@@ -195,6 +218,7 @@ class TimelineCanvas(QAbstractScrollArea):
             if self._lanes is None:
                 self._lanes = self._painted()
             painter.drawPixmap(0, 0, self._lanes)
+            self._paint_run_now(painter)
             self._paint_loop(painter)
             self._paint_playhead(painter)
         painter.end()
@@ -214,7 +238,7 @@ class TimelineCanvas(QAbstractScrollArea):
             self._paint_topic(painter, plot, place)
         painter.restore()
         self._paint_ruler(painter, plot)
-        self._paint_bookmarks(painter, plot)
+        self._paint_lanes(painter, plot)
         painter.end()
         return made
 
@@ -244,42 +268,37 @@ class TimelineCanvas(QAbstractScrollArea):
             paint.words(painter, half, _("Messages"), font, tertiary, paint.RIGHT)
         paint.words(painter, right, _("Lost"), font, tertiary, paint.RIGHT)
 
-    def _paint_bookmarks(self, painter: QPainter, plot: QRectF) -> None:
+    def _paint_lanes(self, painter: QPainter, plot: QRectF) -> None:
+        """Bookmarks, and the behaviours and alarms that there are."""
         theme, replay = self._theme, self._replay
+        self._marks = []
         if replay is None:
             return
-        top, high = theme.scaled(RULER), theme.scaled(MARKS)
-        font = theme.font("small")
-        self._paint_name(
-            painter, QRectF(0, top, plot.left(), high), "bookmark", _("Bookmarks"), "textSecondary"
-        )
-        marks = replay.bookmarks
-        if not marks:
-            ink = theme.colour("textTertiary")
-            paint.words(
-                painter, QRectF(plot.left() + 8, top, plot.width() - 8, high), _("B makes one"), font, ink
-            )
+        lanes, high = EventLanes(theme, painter, plot, self._places(plot)), theme.scaled(MARKS)
+        for place, lane in enumerate(shown_lanes(replay)):
+            top = theme.scaled(RULER) + place * high
+            icon, name = NAMES_OF_LANES[lane]
+            box = QRectF(0, top, plot.left(), high)
+            self._paint_name(painter, box, icon, _(name), "textSecondary")
+            self._marks += lanes.paint(lane, replay, top, high)
+            whole = QRectF(0, 0, self.viewport().width(), top + high)
+            paint.hairline(painter, whole, Qt.Edge.BottomEdge, theme.colour("border"))
+
+    def _paint_run_now(self, painter: QPainter) -> None:
+        """The behaviour that runs at the playhead."""
+        replay, theme, at_ns = self._replay, self._theme, self._position_ns
+        lanes = shown_lanes(replay)
+        if replay is None or replay.densities is None or RUNS not in lanes:
+            return
+        plot, high = self._plot(), theme.scaled(MARKS)
+        top = theme.scaled(RULER) + lanes.index(RUNS) * high
+        event_lanes = EventLanes(theme, painter, plot, self._places(plot))
         painter.save()
         painter.setClipRect(QRectF(plot.left(), top, plot.width(), high))
-        ink = theme.colour("accentText")
-        free = plot.left() - 1.0
-        for mark in marks:
-            x = self.x_of(mark.at_ns)
-            if not plot.left() - 1 <= x <= plot.right() + 1:
-                continue
-            painter.setPen(QPen(ink, 1.5))
-            painter.drawLine(QPointF(x, top + 3), QPointF(x, top + high - 3))
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(ink)
-            flag = QRectF(x, top + 4, 8, 7)
-            painter.drawRect(flag)
-            if x >= free and mark.name:
-                wide = min(paint.width_of(font, mark.name), theme.scaled(160))
-                paint.words(painter, QRectF(x + 12, top, wide, high), mark.name, font, theme.colour("text"))
-                free = x + 16 + wide
+        for span in replay.densities.spans.runs:
+            if span.start_ns <= at_ns < span.end_ns:
+                event_lanes.paint_run(span, event_lanes.bar(span, top, high), "changedTint", "running")
         painter.restore()
-        whole = QRectF(0, 0, self.viewport().width(), top + high)
-        paint.hairline(painter, whole, Qt.Edge.BottomEdge, theme.colour("border"))
 
     def _paint_name(self, painter: QPainter, box: QRectF, icon: str, words: str, role: str) -> None:
         theme = self._theme
@@ -305,6 +324,7 @@ class TimelineCanvas(QAbstractScrollArea):
         self._paint_name(painter, QRectF(0, top, plot.left(), self._row()), icon, topic, role)
         self._paint_density(painter, plot, top, topic, is_chosen=is_chosen)
         self._paint_losses(painter, plot, top, topic)
+        self._paint_alarms_of(painter, plot, top, topic)
         self._paint_figures(
             painter, QRectF(plot.right(), top, whole.right() - plot.right() - 10, self._row()), topic
         )
@@ -352,6 +372,23 @@ class TimelineCanvas(QAbstractScrollArea):
                 painter.fillRect(QRectF(x - 1, middle - 8, 2, 16), ink)
                 notch = [QPointF(x - 4, middle - 8), QPointF(x + 4, middle - 8), QPointF(x, middle - 3)]
                 painter.drawPolygon(QPolygonF(notch))
+
+    def _paint_alarms_of(self, painter: QPainter, plot: QRectF, top: float, topic: str) -> None:
+        """A frame where an alarm about this topic was on."""
+        replay = self._replay
+        if replay is None or replay.densities is None:
+            return
+        painter.save()
+        painter.setClipRect(
+            QRectF(plot.left(), top, plot.width(), self._row()), Qt.ClipOperation.IntersectClip
+        )
+        about = [span for span in replay.densities.spans.alarms if span.topic == topic]
+        for span in EventLanes(self._theme, painter, plot, self._places(plot)).seen(about):
+            left, right = self.x_of(span.start_ns), self.x_of(span.end_ns)
+            box = QRectF(left, top + (self._row() - DENSITY) / 2 - 2, max(4.0, right - left), DENSITY + 4)
+            edge = self._theme.colour("error" if span.is_error else "warn")
+            paint.box(painter, box, 2, None, edge)
+        painter.restore()
 
     def _paint_figures(self, painter: QPainter, box: QRectF, topic: str) -> None:
         theme, replay = self._theme, self._replay
@@ -406,6 +443,11 @@ class TimelineCanvas(QAbstractScrollArea):
 
     # -- the mouse -------------------------------------------------------------------------------------------
 
+    def mark_at(self, at: QPointF) -> LaneMark | None:
+        """What can be pressed there: the smallest of those that lie over each other."""
+        found = [mark for mark in self._marks if mark.box.contains(at)]
+        return min(found, key=lambda mark: mark.box.width(), default=None)
+
     def _grip(self, at: QPointF) -> str:
         """What a press there would move."""
         plot = self._plot()
@@ -420,6 +462,10 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton or self._replay is None:
+            return
+        mark = self.mark_at(event.position())
+        if mark is not None:
+            self._replay.seek(mark.at_ns)
             return
         self._held = self._grip(event.position())
         topic = self.topic_at(event.position().y())
@@ -446,9 +492,46 @@ class TimelineCanvas(QAbstractScrollArea):
         self._held = ""
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        mark = self.mark_at(event.position())
+        if mark is not None and mark.bookmark is not None:
+            self.rename_wanted.emit(mark.bookmark)
+            return
         topic = self.topic_at(event.position().y())
         if topic and event.position().x() < self._plot().left():
             self.opened.emit(topic)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        """Of a bookmark; by the keyboard of the one at the playhead."""
+        bookmark, place = None, event.globalPos()
+        if event.reason() == QContextMenuEvent.Reason.Keyboard:
+            bookmark = self._replay.bookmark_here() if self._replay is not None else None
+            if bookmark is not None:
+                corner = QPoint(round(self.x_of(bookmark.at_ns)), round(self._theme.scaled(RULER)))
+                place = self.viewport().mapToGlobal(corner)
+        elif (mark := self.mark_at(QPointF(event.pos()))) is not None:
+            bookmark = mark.bookmark
+        if bookmark is not None:
+            self.menu_wanted.emit(bookmark, place)
+            event.accept()
+
+    def rename(self, bookmark: Bookmark, take: Callable[[str], bool]) -> None:
+        """Let a person type another name where the bookmark is; ``take`` says whether it can be."""
+        if self.field is not None:
+            return
+        if self.scale is not None:
+            self.set_scale(self.scale.with_time(bookmark.at_ns))
+        scaled, view = self._theme.scaled, self.viewport()
+        wide = min(round(scaled(FIELD_WIDE)), view.width())
+        left = max(0, min(round(self.x_of(bookmark.at_ns)), view.width() - wide))
+        place = QRect(left, round(scaled(RULER)), wide, round(scaled(MARKS)))
+        self.field = RenameField(self._theme, view, place, bookmark.name, take, _("Name of the bookmark"))
+        self.field.ended.connect(self._renamed)
+
+    def _renamed(self) -> None:
+        had = self.field is not None and self.field.hasFocus()
+        self.field = None
+        if had:
+            self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """All keys are the panel's; a scroll area would take the arrows."""
@@ -478,9 +561,8 @@ class TimelineCanvas(QAbstractScrollArea):
         if replay is None or self.scale is None:
             return ""
         if not topic:
-            near = (each for each in replay.bookmarks if abs(self.x_of(each.at_ns) - at.x()) <= GRIP)
-            mark = next(near, None) if at.y() >= self._theme.scaled(RULER) else None
-            return mark.name if mark is not None else ""
+            mark = self.mark_at(at)
+            return mark.words if mark is not None else ""
         losses = replay.densities.losses.get(topic, ()) if replay.densities is not None else ()
         lost = sum(each.count for each in losses if abs(self.x_of(each.at_ns) - at.x()) <= GRIP)
         if at.x() >= self._plot().left() and lost:

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.recording.replay.replay import STEP_NS, Replay
 from app.ui.panels.base import PanelContext, PanelWidget
+from app.ui.panels.row_actions import RowAction, filled
 from app.ui.panels.timeline.canvas import TimelineCanvas
 from app.ui.panels.timeline.transport import TransportRow
 from app.ui.widgets import Chip, EmptyAction, EmptyState, Segments, Separator
+from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.menus import Menu
+from nep.errors import RecordingError
 from nep.i18n import _, pgettext
+from nep.recordings.bookmarks import Bookmark
 
 START, CLOCK = "start", "clock"
 ZOOM = 1.5
@@ -50,6 +55,8 @@ class TimelinePanel(PanelWidget):
         self.ruler.changed.connect(self._choose_ruler)
         self.canvas.chosen.connect(self._choose)
         self.canvas.opened.connect(self.context.open_topic)
+        self.canvas.rename_wanted.connect(self.rename_bookmark)
+        self.canvas.menu_wanted.connect(self._show_menu)
         self.transport.bookmark_wanted.connect(self._bookmark)
         self._say()
 
@@ -73,7 +80,7 @@ class TimelinePanel(PanelWidget):
         state = (replay.chosen, tuple(replay.bookmarks))
         if is_new or state != self._state:
             self._state = state
-            self.canvas.renew()
+            self.canvas.fit()
         self.transport.show_replay(replay, player)
         self.canvas.move_to(player.position_ns, player.loop if player.is_looping else None)
 
@@ -133,6 +140,19 @@ class TimelinePanel(PanelWidget):
     def _bookmark(self) -> None:
         self.context.run("replay.bookmark")
 
+    def event(self, event: QEvent) -> bool:
+        """Wherever the keyboard is in here, F2 and Delete are about the bookmark at the playhead."""
+        if isinstance(event, QKeyEvent) and event.key() in BOOKMARK_KEYS and is_plain(event):
+            if event.type() == QEvent.Type.ShortcutOverride and self._shown is not None:
+                event.accept()
+                return True
+            if event.type() == QEvent.Type.KeyPress and self._shown is not None:
+                self._of_bookmark_here(
+                    self.rename_bookmark if event.key() == Qt.Key.Key_F2 else self.delete_bookmark
+                )
+                return True
+        return super().event(event)
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self._shown is None or not self._key(event, self._shown):
             super().keyPressEvent(event)
@@ -175,10 +195,67 @@ class TimelinePanel(PanelWidget):
             place = topics.index(replay.chosen) if replay.chosen in topics else 0
             self.show_topic(topics[max(0, min(len(topics) - 1, place + by))])
 
+    # -- bookmarks -------------------------------------------------------------------------------------------
+
+    def _of_bookmark_here(self, do: Callable[[Bookmark], object]) -> None:
+        mark = self._shown.bookmark_here() if self._shown is not None else None
+        if mark is not None:
+            do(mark)
+        else:
+            self.context.toast(_("No bookmark is at the playhead: press one, or B to make one"))
+
+    def _show_menu(self, mark: Bookmark, place: QPoint) -> None:
+        """What can be done with a bookmark."""
+        menu = Menu(self.theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        actions = (
+            RowAction(_("Rename"), "pencil", lambda: self.rename_bookmark(mark)),
+            RowAction(_("Delete"), "trash-2", lambda: self.delete_bookmark(mark)),
+        )
+        filled(menu, self.theme, actions).popup(place)
+
+    def rename_bookmark(self, mark: Bookmark) -> None:
+        """Let a person type another name where it is."""
+        replay = self._shown
+        if replay is not None and not self._is_note(mark):
+            self.canvas.rename(
+                mark, lambda name: self._try(lambda: replay.rename_bookmark(mark, name.strip()))
+            )
+
+    def delete_bookmark(self, mark: Bookmark) -> None:
+        """Take it away, with Undo."""
+        replay = self._shown
+        if replay is None or self._is_note(mark) or not self._try(lambda: replay.remove_bookmark(mark)):
+            return
+        words = _("Deleted the bookmark “{name}”").format(name=mark.name) if mark.name else ""
+        self.context.toast(
+            words or _("Deleted the bookmark"),
+            _("Undo"),
+            lambda: self._try(lambda: replay.put_back_bookmark(mark)),
+        )
+
+    def _is_note(self, mark: Bookmark) -> bool:
+        if mark.is_note:
+            self.context.toast(_("It was made while it was recorded, and stands in the file: it stays"))
+        return mark.is_note
+
+    def _try(self, change: Callable[[], object]) -> bool:
+        """Change a bookmark; why it can't be is said."""
+        try:
+            change()
+        except RecordingError as error:
+            self.context.toast(_("The bookmark can't be kept: {reason}").format(reason=error.reason))
+            return False
+        except ValueError:  # it is gone already
+            return True
+        return True
+
     def more_actions(self) -> list[QAction]:
         made = []
+        path = self._shown.path if self._shown is not None else None
         rows = (
             (_("Open a recording"), "folder-open", "replay.open"),
+            *([(_("Export a part of it"), "download", f"recording.export:{path}")] if path else []),
             (_("Back to live"), "radio-tower", "replay.live"),
         )
         for words, icon, command in rows:
@@ -193,6 +270,7 @@ class TimelinePanel(PanelWidget):
     _listed: Sequence[QAction] = ()
 
 
+BOOKMARK_KEYS = {Qt.Key.Key_F2, Qt.Key.Key_Delete}
 NONE, SHIFT, CONTROL = (
     Qt.KeyboardModifier.NoModifier,
     Qt.KeyboardModifier.ShiftModifier,

@@ -46,6 +46,7 @@ class Commands:
         self.variables = VariableCommands(shell, session, self.files)
         self.replay = ReplayCommands(shell, session, asks)
         self.files.open_recording = self.replay.open
+        self.files.open_layout = self.view.open_layout
         self._do = Handlers(
             session,
             shell,

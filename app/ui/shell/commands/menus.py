@@ -19,7 +19,7 @@ from app.ui.text import plain
 from app.ui.widgets.menus import Menu, drop_below
 from nep.i18n import _
 
-ARRANGING = ("layout.keep", "layout.rename", "layout.delete")
+ARRANGING = ("layout.keep", "layout.rename", "layout.delete", "layout.export", "layout.open")
 
 
 class MenuLists:

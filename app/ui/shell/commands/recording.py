@@ -120,6 +120,14 @@ class RecordCommands:
             dock.panel.choose_file(path)
         self._shell.panel_focus.give(dock)
 
+    def show_for_export(self, path: Path) -> None:
+        """Show where a part of this recording is exported: the loop of the time line, when it is open."""
+        if path.parent == self._recordings.folder:
+            self.show(path)
+        else:
+            words = _("{file} is in another folder: choose that one for recordings")
+            self._shell.say(words.format(file=path.name), _("Choose a folder"), self.choose_folder)
+
     def choose_folder(self) -> None:
         """Ask where recordings are to go."""
         recordings = self._recordings
@@ -136,7 +144,11 @@ class RecordCommands:
             words = _("Kept the last seconds: {file}").format(file=path.stem)
         else:
             state = self._recordings.client.state
-            words = _("Recorded {file}: {length}, {size}").format(
+            words = {
+                "time": _("Recorded {file} for as long as you chose: {length}, {size}"),
+                "size": _("Recorded {file} until it was as large as you chose: {length}, {size}"),
+            }.get(state.limit, _("Recorded {file}: {length}, {size}"))
+            words = words.format(
                 file=path.stem, length=length_words(state.duration_s), size=size_words(state.size_bytes)
             )
         self._shell.say(words, _("Show"), lambda: self.show(path))

@@ -16,7 +16,9 @@ from PySide6.QtGui import QAction
 
 from app import resources
 from app.core.faults import log_folder
+from app.core.recording.choice import file_stem
 from app.core.session import Session
+from app.core.storage.atomic_file import read_whole, write_atomically
 from app.ui.other_programs import open_outside
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.shortcuts import Shortcuts
@@ -24,14 +26,17 @@ from app.ui.shell.commands.freeze import freeze_or_go_on
 from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.shell import START, Shell
 from app.ui.shell.dialogs.about import AboutSheet
+from app.ui.shell.docking.layout_file import MOST_BYTES, LayoutFileError, layout_bytes, read_layout
+from app.ui.shell.docking.layouts import layout_named
 from app.ui.shell.documents import DocumentController
 from app.ui.shell.hint_ring import HintRing
 from app.ui.speaker import has_voice_engine, voice_words
 from app.ui.theme.system import Preference
 from app.ui.theme.theme import Mode
+from app.ui.widgets.file_dialogs import LAYOUTS, FileKind
 from app.ui.widgets.lists.fuzzy import Entry
 from nep.errors import NepError
-from nep.i18n import _, language
+from nep.i18n import _, language, listed
 from nep.messages.fields import parse_path, pick
 from nep.programs.alarms import AlarmCondition
 from nep.programs.alarms.rule import NUMBER_KINDS
@@ -53,6 +58,7 @@ else:
     )
 
 TEXT_STEP = 25
+MOST_NAMED = 4
 
 
 @runtime_checkable
@@ -310,6 +316,62 @@ class ViewCommands:
                 else _("“{name}” comes back at the next start: the change can't be saved")
             )
             shell.say(words.format(name=name), _("Undo"), undo)
+
+    def export_layout(self) -> None:
+        """Save how the panels are now as a file that others can open."""
+        shell = self._shell
+        bench, base = shell.bench, shell.showing
+        if bench is None:
+            return
+        name = shell.saved_layouts.own(base) or _(layout_named(base).title)
+
+        def save(path: Path, _kind: FileKind) -> None:
+            try:
+                write_atomically(path, layout_bytes(name, base, bench.save()))
+            except OSError as error:
+                reason = (error.strerror or str(error)).lower()
+                shell.say(_("{file} can't be written: {reason}").format(file=path.name, reason=reason))
+            else:
+                shell.say(_("Saved the layout in {file}").format(file=path.name))
+
+        kind = FileKind(LAYOUTS[0], LAYOUTS[1].lstrip("*"))
+        suggestion = Path.home() / f"{file_stem(name)}{kind.ending}"
+        self._files.asks.save_as(_("Save this layout as a file"), suggestion, [kind], save)
+
+    def ask_layout(self) -> None:
+        """Let a person choose a layout's file, and show it."""
+        self._files.asks.open_layout(str(Path.home()), self.open_layout)
+
+    def open_layout(self, path: Path) -> None:
+        """Keep the layout of a file, and show it; why it can't be is said."""
+        shell = self._shell
+        try:
+            found = read_layout(read_whole(path, MOST_BYTES), path.stem, shell.panels)
+        except (OSError, LayoutFileError) as error:
+            reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
+            reason = f"{reason[:1].lower()}{reason[1:]}"
+            shell.say(_("{file} can't be opened: {reason}").format(file=path.name, reason=reason))
+            return
+        layouts, before = shell.saved_layouts, shell.saved_layouts.own(found.base)
+        if not layouts.fits(shell.show_layout(found.base), found.base, found.saved):
+            shell.say(_("{file} can't be opened: {reason}").format(file=path.name, reason=_("it is damaged")))
+            return
+        name, _is_kept = layouts.take_in(found.name, found.base, found.saved)
+        self.show_own_layout(name)
+
+        def undo() -> None:
+            bench = shell.bench if shell.showing == found.base else None
+            layouts.delete(bench, name)
+            if before and bench is not None:
+                layouts.use(bench, found.base, before)
+
+        words = _("Opened the layout “{name}”").format(name=name)
+        if found.unknown:
+            left_out = listed(list(found.unknown[:MOST_NAMED]))
+            words = _("{opened}, without what this Studio does not have: {panels}").format(
+                opened=words, panels=left_out
+            )
+        shell.say(words, _("Undo"), undo)
 
     def freeze(self) -> None:
         """Hold what shows, or let it go on."""

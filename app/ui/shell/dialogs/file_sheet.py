@@ -34,7 +34,6 @@ from app.core.documents.folder import (
     name_refusal,
     whole_path,
 )
-from app.core.storage.settings import RecentFile, Settings, home
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text import plain
 from app.ui.text.dates import when_words
@@ -74,10 +73,6 @@ SAVE = FileQuestion(lazy("Save the behaviour"), lazy("Save"), lazy("Nothing is i
 PICTURE = FileQuestion(
     lazy("Choose a picture"), lazy("Choose"), lazy("No pictures and no folders are in here."),
     endings=PICTURE_ENDINGS, icon="image",
-)  # fmt: skip
-RECORDING = FileQuestion(
-    lazy("Open a recording"), lazy("Open"), lazy("No recordings and no folders are in here."),
-    endings=(".mcap",), icon="film",
 )  # fmt: skip
 FOLDER = FileQuestion(lazy("Choose a folder"), lazy("Use this folder"), "", endings=(), wants_folder=True)
 
@@ -545,56 +540,3 @@ class FileSheet(Overlay):
         if event.key() == Qt.Key.Key_Up and event.modifiers() & Qt.KeyboardModifier.AltModifier:
             self.go_to(self.folder.parent)
         super().keyPressEvent(event)
-
-
-class StudioDialogs:
-    """Asks for files by our own sheet, which is made at the first question."""
-
-    def __init__(self, theme: Theme, window: QWidget, settings: Settings) -> None:
-        self._theme, self._window, self._settings = theme, window, settings
-        self._sheet: FileSheet | None = None
-
-    def open(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which file to open."""
-        self._made().ask_open(Path(folder or Path.home()), take)
-
-    def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        """Where to save."""
-        self._made().ask_save(Path(suggestion), take)
-
-    def save_as(
-        self,
-        title: str,
-        suggestion: Path,
-        kinds: Sequence[FileKind],
-        take: Callable[[Path, FileKind], None],
-    ) -> None:
-        """Where to save something that is no behaviour, and as what."""
-        self._made().ask_save_as(title, suggestion, kinds, take)
-
-    def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which picture to take."""
-        self._made().ask_picture(Path(folder or pictures_folder()), take)
-
-    def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which recording to play."""
-        self._made().ask_open(_nearest(folder), take, RECORDING)
-
-    def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which folder to keep pictures in."""
-        self._made().ask_folder(_nearest(folder), take)
-
-    def _made(self) -> FileSheet:
-        if self._sheet is None:
-            self._sheet = FileSheet(self._theme, self._window, self._places)
-        return self._sheet
-
-    def _places(self) -> tuple[FolderPlace, ...]:
-        recent: list[RecentFile] = self._settings.recent
-        return known_places(home() / "kept", [file.path for file in recent])
-
-
-def _nearest(folder: str) -> Path:
-    """The folder, or the nearest one above it that there is."""
-    wanted = Path(folder)
-    return next((each for each in (wanted, *wanted.parents) if each.is_dir()), Path.home())

@@ -12,12 +12,12 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QScrollArea, 
 from app.core.network.topics import Topic
 from app.core.recording.choice import (
     LEAST_GB,
+    LEAST_MIN,
     LEAST_S,
     MOST_GB,
+    MOST_MIN,
     MOST_S,
     RecordingChoice,
-    pattern_words,
-    read_patterns,
 )
 from app.core.recording.client import LOW_DISK_BYTES
 from app.ui.shell.dialogs.overlay import EDGE, Overlay
@@ -37,6 +37,7 @@ from app.ui.widgets import (
     set_role,
 )
 from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.pattern_field import PatternField
 from app.ui.widgets.menus import EditMenu
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
@@ -48,11 +49,11 @@ if TYPE_CHECKING:
     from app.ui.panels.base import ShowToast
     from nep.recordings.recorder import TopicSelection
 
-WIDE, HIGH, SIDE = 640, 760, 20
+WIDE, HIGH, SIDE = 640, 812, 20
 BESIDE_FROM = 1280  # px at 100 % text: from there on it lies over one column, without a scrim
 BELOW_BARS = 88
 LOOK_MS = 300
-ROWS_HIGH = 190
+ROWS_HIGH = 170
 LABEL_WIDE, NUMBER_WIDE, BAR_WIDE = 80, 84, 120
 LONG_S = 2 * 86_400.0
 """When a disk has room for longer, nobody needs to know for how long."""
@@ -116,14 +117,18 @@ class RecordSheet(Overlay):
         self.size_so_far = RecordMeter(_("Size so far"))
         self.unkept = RecordMeter(_("Lost in writing"))
         self.disk = RecordMeter(_("Disk left"))
+        self.at_end = RecordMeter(_("Will be"))
         self._meters = Card(self.theme)
         row = QHBoxLayout(self._meters)
         row.setContentsMargins(1, 1, 1, 1)
         row.setSpacing(0)
-        for place, meter in enumerate((self.length, self.size_so_far, self.unkept, self.disk)):
+        meters = (self.length, self.size_so_far, self.unkept, self.disk, self.at_end)
+        for place, meter in enumerate(meters):
             if place:
-                row.addWidget(Separator(self.theme, upright=True))
+                self._end_line = Separator(self.theme, upright=True)
+                row.addWidget(self._end_line)
             row.addWidget(meter, 1)
+        self._show_end(None)
 
     def _make_form(self) -> None:
         theme = self.theme
@@ -133,8 +138,8 @@ class RecordSheet(Overlay):
         self.mode = Segments(theme, options, check=True, name=_("Topics"))
         self.mode.changed.connect(self._choose_mode)
         self.count = label("", "small", role="textSecondary")
-        self.patterns = self._field(_("Patterns"), _("/arm/* *camera* not /arm/raw"))
-        self.patterns.textEdited.connect(self._take_patterns)
+        self.patterns = PatternField(theme, _("Patterns"), _("/arm/* *camera* not /arm/raw"))
+        self.patterns.changed.connect(self._take_patterns)
         self.wrong = label("", "small", role="error", wrap=True)
         self.model: TableModel[Topic] = TableModel(self._columns(), lambda topic: topic.name)
         self.table: TableView[Topic] = TableView(theme, self.model, "topic")
@@ -146,6 +151,17 @@ class RecordSheet(Overlay):
             _("New topics that fit are recorded from their first message."), "small", role="textTertiary",
             wrap=True,
         )  # fmt: skip
+
+        self.ends_min = NumberEdit(theme, LEAST_MIN, MOST_MIN, _("min"), 1, empty=True)
+        self.ends_min.setAccessibleName(_("Minutes after which it ends"))
+        self.ends_gb = NumberEdit(theme, LEAST_GB, MOST_GB, "GB", 1, empty=True)
+        self.ends_gb.setAccessibleName(_("GB at which it ends"))
+        for field, name in ((self.ends_min, "ends_min"), (self.ends_gb, "ends_gb")):
+            field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
+            field.number.connect(lambda value, name=name: self._change(**{name: value}))
+            field.emptied.connect(lambda name=name: self._change(**{name: None}))
+            field.problem.connect(self._ends_problem)
+        self.ends_words = label("", "small", role="textSecondary", wrap=True)
 
     def _field(self, name: str, example: str) -> QLineEdit:
         made = QLineEdit()
@@ -169,6 +185,8 @@ class RecordSheet(Overlay):
         for field in (self.seconds, self.size_gb):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
             field.problem.connect(self._ring_problem)
+        self.ring_topics = PatternField(theme, _("Topics that are kept"), _("all topics; or /arm/* *camera*"))
+        self.ring_topics.settled.connect(self._take_ring_topics)
         self.ring_bar = ValueBar(theme)
         self.ring_words = label("", "small", role="textSecondary", wrap=True)
         self.keep = Button(theme, "", "history", size="small")
@@ -200,6 +218,12 @@ class RecordSheet(Overlay):
         form.addWidget(self.wrong, 4, 1)
         return form
 
+    def _ends_row(self) -> Flow:
+        title = label(_("Ends"), "body", role="textSecondary")
+        title.setMinimumWidth(round(self.theme.scaled(LABEL_WIDE)))
+        words = [label(_("after")), label(_("or at"))]
+        return _flow(title, words[0], self.ends_min, words[1], self.ends_gb, self.ends_words)
+
     def _ring_box(self) -> Card:
         box = Card(self.theme, fill="sunken")
         rows = QVBoxLayout(box)
@@ -210,6 +234,7 @@ class RecordSheet(Overlay):
         wish = _flow(self.ring, words[0], self.seconds, words[1], self.size_gb, words[2])
         there = _flow(self.ring_bar, self.ring_words, self.keep)
         rows.addLayout(wish)
+        rows.addWidget(self.ring_topics)
         rows.addLayout(there)
         return box
 
@@ -223,6 +248,7 @@ class RecordSheet(Overlay):
         column.addLayout(self._form_rows())
         column.addWidget(self.table, 1)
         column.addWidget(self.later)
+        column.addLayout(self._ends_row())
         column.addWidget(self._ring_box())
         area = QScrollArea()
         area.setWidgetResizable(True)
@@ -347,11 +373,19 @@ class RecordSheet(Overlay):
     def _show_choice(self) -> None:
         choice, wish = self.choice, self._recordings.wish
         self.mode.set_value(choice.mode)
-        self.patterns.setText(pattern_words(choice))
+        self.patterns.show_patterns(choice.patterns, choice.left_out)
         self.patterns.setVisible(choice.mode == "pattern")
         problem = choice.problem if choice.mode == "pattern" else ""
         self._mark_patterns(problem)
+        for field, limit in ((self.ends_min, choice.ends_min), (self.ends_gb, choice.ends_gb)):
+            if limit is not None:
+                field.show_number(limit)
+            else:
+                field.clear()
+        self._ends_problem("")
         self.ring.setChecked(wish.is_on)
+        self.ring_topics.show_patterns(wish.patterns, wish.left_out)
+        self.ring_topics.set_wrong(bool(wish.problem))
         self.seconds.show_number(wish.seconds)
         self.size_gb.show_number(wish.size_gb)
         self._seen = None
@@ -359,11 +393,7 @@ class RecordSheet(Overlay):
     def _mark_patterns(self, problem: str) -> None:
         self.wrong.setText(problem)
         self.wrong.setVisible(bool(problem))
-        wanted = "true" if problem else "false"
-        if self.patterns.property("wrong") != wanted:
-            self.patterns.setProperty("wrong", wanted)
-            self.patterns.style().unpolish(self.patterns)
-            self.patterns.style().polish(self.patterns)
+        self.patterns.set_wrong(bool(problem))
 
     def show_state(self) -> None:
         """Say how it goes now."""
@@ -372,7 +402,7 @@ class RecordSheet(Overlay):
         self.record.set_word(_("Stop recording") if going else _("Record"))
         self.record.setEnabled(recordings.client.state.phase != "ending")
         self.bookmark.setEnabled(recordings.client.state.phase == "recording")
-        for field in (self.name, self.note, self.mode, self.patterns):
+        for field in (self.name, self.note, self.mode, self.patterns, self.ends_min, self.ends_gb):
             field.setEnabled(not going)
         self._show_meters()
         self._show_topics()
@@ -390,6 +420,7 @@ class RecordSheet(Overlay):
             self._written = self._speed = None
             for meter in (self.length, self.size_so_far, self.unkept, self.disk):
                 meter.say("")
+            self._show_end(None)
             return
         elapsed = recordings.elapsed_s
         if self._written is None or state.size_bytes < self._written[1]:
@@ -408,6 +439,7 @@ class RecordSheet(Overlay):
             _("the disk is too slow") if state.unkept else _("all is written"),
             "warn" if state.unkept else "ok",
         )
+        self._show_end(recordings.recorded.end(elapsed, state.size_bytes, speed))
         free = state.free_bytes
         if free is None:
             self.disk.say("")
@@ -415,6 +447,22 @@ class RecordSheet(Overlay):
         left_s = free / speed if speed else LONG_S
         full = _("full in {time}").format(time=age_words(left_s)) if left_s < LONG_S else ""
         self.disk.say(size_words(free), full, "warn" if free < LOW_DISK_BYTES else "textSecondary")
+
+    def _show_end(self, end: tuple[float, float] | None) -> None:
+        """How large it will be at its end; only where it has one, and that is known."""
+        for each in (self._end_line, self.at_end):
+            each.setVisible(end is not None)
+        if end is not None:
+            at_s, size_bytes = end
+            self.at_end.say(size_words(size_bytes), _("at {time}").format(time=length_words(at_s)))
+
+    def _ends_problem(self, sentence: str) -> None:
+        """What is wrong with a limit, else what the two mean."""
+        both = bool(self.ends_min.text() and self.ends_gb.text())
+        none = not (self.ends_min.text() or self.ends_gb.text())
+        usual = _("whichever comes first") if both else _("when you end it") if none else ""
+        self.ends_words.setText(sentence or usual)
+        set_role(self.ends_words, "error" if sentence else "textSecondary")
 
     def _show_topics(self) -> None:
         topics = sorted(self._session.topics.live(), key=lambda topic: topic.name)
@@ -476,8 +524,16 @@ class RecordSheet(Overlay):
         recordings.choose(replace(recordings.choice, topics=rest if topic in topics else (*topics, topic)))
         self.show_state()
 
-    def _take_patterns(self, text: str) -> None:
-        wanted, unwanted = read_patterns(text)
+    def _change(self, **changes: float | None) -> None:
+        """Another limit: it is for the next recording."""
+        recordings = self._recordings
+        choice = replace(recordings.choice, **changes)  # type: ignore[arg-type]
+        if choice != recordings.choice and not recordings.is_recording:
+            recordings.choose(choice)
+        self._ends_problem("")
+
+    def _take_patterns(self) -> None:
+        wanted, unwanted = self.patterns.patterns()
         choice = replace(self._recordings.choice, patterns=wanted, left_out=unwanted)
         self._mark_patterns(choice.problem)
         self._recordings.choose(choice)
@@ -492,6 +548,15 @@ class RecordSheet(Overlay):
         if wish != recordings.wish:
             recordings.set_wish(wish)
         self._show_ring()
+
+    def _take_ring_topics(self) -> None:
+        wanted, unwanted = self.ring_topics.patterns()
+        problem = replace(self._recordings.wish, patterns=wanted, left_out=unwanted).problem
+        self.ring_topics.set_wrong(bool(problem))
+        if problem:
+            self._ring_problem(problem)
+        else:
+            self._wish(patterns=wanted, left_out=unwanted)
 
     def _ring_problem(self, sentence: str) -> None:
         self.ring_words.setText(sentence or self.ring_words.text())

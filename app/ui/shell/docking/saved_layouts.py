@@ -111,6 +111,29 @@ class SavedLayouts:
         self._choose(base, name.strip())
         return kept
 
+    def fits(self, bench: Workbench, base: str, saved: Mapping[str, object]) -> bool:
+        """Whether an arrangement of others can be shown: tried before anything of it is kept."""
+        self.keep(bench, base)
+        try:
+            return bench.restore(saved)
+        except Exception as error:  # noqa: BLE001  whatever was in the file, the window stays
+            self._complain(f"{type(error).__name__}: {error}")
+            return False
+        finally:
+            self.bring_back(bench, base)
+
+    def take_in(self, name: str, base: str, saved: Mapping[str, object]) -> tuple[str, bool]:
+        """Keep an arrangement that came from a file: its name here, and whether it could be written.
+
+        A name that is taken, or can't be, gets a number.
+        """
+        name = name.strip()[:LONGEST].strip()
+        free, number = name, 2
+        while self.refusal(free):
+            ending = f" {number}"
+            free, number = f"{name[: LONGEST - len(ending)]}{ending}", number + 1
+        return free, self._state.keep_layouts({OWN + free: {**saved, "base": base}})
+
     def rename(self, old: str, new: str) -> None:
         """Give an own layout another name."""
         found = self.named(old)

@@ -74,15 +74,27 @@ class FilterField(SearchField):
 
 
 class NumberEdit(QLineEdit):
-    """A number with its unit inside; a wrong one stays as it was typed and says what is wrong."""
+    """A number with its unit inside; a wrong one stays as it was typed and says what is wrong.
+
+    Where it may be ``empty``, `emptied` says that it is.
+    """
 
     number = Signal(float)
+    emptied = Signal()
     problem = Signal(str)
 
     def __init__(
-        self, theme: Theme, minimum: float | None, maximum: float | None, unit: str = "", decimals: int = 0
+        self,
+        theme: Theme,
+        minimum: float | None,
+        maximum: float | None,
+        unit: str = "",
+        decimals: int = 0,
+        *,
+        empty: bool = False,
     ) -> None:
         super().__init__()
+        self._may_be_empty = empty
         self._theme, self._unit, self._decimals = theme, unit, decimals
         self._minimum, self._maximum = minimum, maximum
         self.sentence = ""
@@ -107,6 +119,10 @@ class NumberEdit(QLineEdit):
         return number_text(value, f".{self._decimals}f")
 
     def _read(self) -> None:
+        if self._may_be_empty and not self.text().strip():
+            self._judge("")
+            self.emptied.emit()
+            return
         try:
             value = float(self.text().strip().replace(",", "."))
         except ValueError:

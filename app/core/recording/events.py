@@ -1,0 +1,132 @@
+"""Which behaviours run and which alarms are on, told to the recorder: they stand in each recording."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from itertools import count
+from typing import Protocol
+
+from app.core.alarms import severity_of
+from app.core.run.view import RunState
+from nep.i18n import _
+from nep.programs.alarms import AlarmEvent
+from nep.programs.alarms.sentences import what_words
+
+MOST_PRESENT = 200
+"""Alarms that are on at once and are told again and again; those beyond are told once."""
+MOST_LETTERS = 200
+_GOES_ON = frozenset({"running", "paused"})
+
+
+class Say(Protocol):
+    """Gives something to the recorder."""
+
+    def __call__(self, role: str, value: Mapping[str, object], to: str = "") -> object:
+        """The role of a channel ("runs", "alarms"), what stands in it; "recording" or "ring": that alone."""
+
+
+class RecordedEvents:
+    """Tells what happens as it happens. One thread uses it (the window's).
+
+    What goes on is told again (`repeat`): to a recording that begins later, and once a second to the flight
+    recorder, so that it stands in what is kept of the last seconds. In a long recording it stands only where
+    it changes: to read it there the whole file would have to be read.
+    """
+
+    def __init__(self, say: Say, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
+        """``say`` gives it to the recorder; ``clock_ns`` tells ns since 1970, as the recorder's does."""
+        self._say, self._clock_ns = say, clock_ns
+        self._numbers = count(1)
+        self._present: dict[str, tuple[str, Mapping[str, object]]] = {}
+        self._run: RunState | None = None
+        self._run_told: dict[str, object] = {}
+
+    def repeat(self, to: str) -> None:
+        """Tell the "recording" or the "ring" once more what goes on."""
+        for role, told in self._present.values():
+            self._say(role, told, to)
+
+    # ---- behaviours
+
+    def follow_run(self, run: RunState) -> None:
+        """Look at how the run is now; asked at each tick."""
+        before, self._run = self._run, run
+        if run is before:
+            return
+        was_on, is_on = before is not None and before.state in _GOES_ON, run.state in _GOES_ON
+        is_same = was_on and before is not None and _is_same(before, run)
+        if was_on and not (is_on and is_same):
+            self._end_run(run if is_same else None)
+        elif self._run_told and not is_on:
+            self._tell_result(run)
+        if is_on and not is_same:
+            self._run_told = self._new(f"run-{next(self._numbers)}", run.trying or run.name)
+            self._put("runs", self._run_told)
+
+    def _end_run(self, run: RunState | None) -> None:
+        """It has ended; of one whose end nobody saw (``run`` is None) it is not known how."""
+        self._run_told["until_ns"] = self._clock_ns()
+        self._present.pop(str(self._run_told.get("id")), None)
+        if run is None:
+            self._say("runs", dict(self._run_told))
+            self._run_told = {}
+        else:
+            self._tell_result(run)
+
+    def _tell_result(self, run: RunState) -> None:
+        """How it ended; told again with how long the robots took when they have answered."""
+        told = {**self._run_told, **_result(run)}
+        if told != self._run_told:
+            self._run_told = told
+            self._say("runs", dict(told))
+        if run.state in {"proven", "ready"}:
+            self._run_told = {}
+
+    # ---- alarms
+
+    def take_alarm(self, event: AlarmEvent) -> None:
+        """An alarm came on, went off, or is still on."""
+        key = f"alarm-{event.rule.id}"
+        known = self._present.get(key)
+        if event.kind == "off":
+            if known is not None:
+                del self._present[key]
+                self._say("alarms", {**known[1], "until_ns": self._clock_ns()})
+            return
+        if known is not None:
+            return
+        condition = event.rule.condition
+        told = self._new(f"{key}-{next(self._numbers)}", what_words(condition, event.seen))
+        told["severity"] = severity_of(condition)
+        told["topic"] = "" if condition.is_about_node else condition.name
+        self._put("alarms", told, key)
+
+    # ---- inside
+
+    def _new(self, id: str, name: str) -> dict[str, object]:
+        since_ns = self._clock_ns()
+        return {"id": f"{id}-{since_ns}", "name": name[:MOST_LETTERS], "since_ns": since_ns, "until_ns": None}
+
+    def _put(self, role: str, told: Mapping[str, object], key: str = "") -> None:
+        self._say(role, dict(told))
+        if len(self._present) < MOST_PRESENT:
+            self._present[key or str(told["id"])] = (role, told)
+
+
+def _is_same(before: RunState, run: RunState) -> bool:
+    """Whether it is the same run: its clock is set once more when its scripts begin, and never else."""
+    return run.started_s == before.started_s or (run.begun and not before.begun)
+
+
+def _result(run: RunState) -> dict[str, object]:
+    """How it ended: "ended" by itself, "failed" at a block, or "stopped"."""
+    if run.errors:
+        return {"result": "failed", "words": next(iter(run.errors.values()))[:MOST_LETTERS]}
+    if run.finished:
+        return {"result": "ended", "words": ""}
+    report = run.report
+    if report is None or not report.proven or not report.robots:
+        return {"result": "stopped", "words": ""}
+    elapsed = max(1, round(report.elapsed_ms))
+    return {"result": "stopped", "words": _("Stop, {elapsed} ms").format(elapsed=elapsed)}

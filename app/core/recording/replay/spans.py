@@ -1,0 +1,140 @@
+"""What went on for some time while it was recorded: behaviours that ran, and alarms. Reads; changes nothing.
+
+They stand in the recorder's own channels, as Studio told it (`app.core.recording.events`), in what was kept
+of a flight recorder again and again; and as the graph's alerts changed. Of a file of others, or a damaged
+one, anything may stand there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from nep.recordings.reader import Recording
+
+MOST_SPANS = 2_000
+"""Of each lane; those beyond are counted."""
+_MOST_LETTERS = 200
+RESULTS = ("ended", "stopped", "failed")
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedSpan:
+    """From ``start_ns`` to ``end_ns``, within the recording; ``is_over`` when its end is in it, too.
+
+    ``name`` is the behaviour, or the alarm in words. ``result`` of a run is one of `RESULTS`, "" while it is
+    not known; ``words`` say more of it. ``topic`` is what an alarm is about, "" when it is none.
+    """
+
+    start_ns: int
+    end_ns: int
+    name: str
+    is_over: bool = False
+    result: str = ""
+    words: str = ""
+    is_error: bool = False
+    topic: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedSpans:
+    """Those of a recording, the earliest first, and how many more there are."""
+
+    runs: Sequence[RecordedSpan] = ()
+    alarms: Sequence[RecordedSpan] = ()
+    left_out: int = 0
+
+    def starts(self) -> list[int]:
+        """When each of them begins."""
+        return sorted(each.start_ns for each in (*self.runs, *self.alarms))
+
+
+class _Lane:
+    """Spans by their ids: what is said of one last counts."""
+
+    def __init__(self, first_ns: int, last_ns: int) -> None:
+        self._first_ns, self._last_ns = first_ns, last_ns
+        self._by_id: dict[str, RecordedSpan] = {}
+        self._left_out: set[str] = set()
+
+    @property
+    def left_out(self) -> int:
+        return len(self._left_out)
+
+    def sorted(self) -> tuple[RecordedSpan, ...]:
+        return tuple(sorted(self._by_id.values(), key=lambda span: (span.start_ns, span.end_ns)))
+
+    def put(self, id: str, span: RecordedSpan) -> None:
+        """Say this of it; its beginning is the earliest that was said."""
+        known = self._by_id.get(id)
+        if known is None and len(self._by_id) >= MOST_SPANS:
+            if len(self._left_out) < MOST_SPANS:
+                self._left_out.add(id)
+            return
+        start_ns = self._within(span.start_ns if known is None else min(known.start_ns, span.start_ns))
+        end_ns = max(start_ns, self._within(span.end_ns))
+        self._by_id[id] = replace(span, start_ns=start_ns, end_ns=end_ns)
+
+    def end(self, id: str, at_ns: int) -> None:
+        """It is over since then."""
+        known = self._by_id.get(id)
+        if known is not None:
+            self._by_id[id] = replace(known, end_ns=max(known.start_ns, self._within(at_ns)), is_over=True)
+
+    def _within(self, at_ns: int) -> int:
+        return max(self._first_ns, min(at_ns, self._last_ns))
+
+
+def spans_of(recording: Recording) -> RecordedSpans:
+    """The runs and alarms of a recording. What does not fit is passed over."""
+    first_ns, last_ns = recording.start_ns, recording.end_ns
+    runs, alarms = _Lane(first_ns, last_ns), _Lane(first_ns, last_ns)
+    for lane, role in ((runs, "runs"), (alarms, "alarms")):
+        for at_ns, told in recording.said(role):
+            if isinstance(told, Mapping) and isinstance(told.get("id"), str):
+                lane.put(told["id"], _span(told, at_ns, last_ns))
+    _read_alerts(recording, alarms)
+    return RecordedSpans(runs.sorted(), alarms.sorted(), runs.left_out + alarms.left_out)
+
+
+def _span(told: Mapping[str, object], at_ns: int, last_ns: int) -> RecordedSpan:
+    since, until = told.get("since_ns"), told.get("until_ns")
+    is_over = type(until) is int
+    result = _text(told, "result")
+    return RecordedSpan(
+        since if type(since) is int and since <= at_ns else at_ns,
+        until if type(until) is int else last_ns,
+        _text(told, "name"),
+        is_over,
+        result if result in RESULTS else "",
+        _text(told, "words"),
+        told.get("severity") == "error",
+        _text(told, "topic"),
+    )
+
+
+def _read_alerts(recording: Recording, lane: _Lane) -> None:
+    """The graph's alerts: each time they change all that there are are said."""
+    present: dict[str, str] = {}
+    for at_ns, told in recording.said("alerts"):
+        listed = told.get("alerts") if isinstance(told, Mapping) else None
+        there = {
+            _text(each, "id"): each
+            for each in (listed if isinstance(listed, list) else ())[:MOST_SPANS]
+            if isinstance(each, Mapping) and _text(each, "id")
+        }
+        for gone in [id for id in present if id not in there]:
+            lane.end(present.pop(gone), at_ns)
+        for id, each in there.items():
+            if id not in present:
+                present[id] = f"alert-{id}-{at_ns}"
+                _kind, _colon, topic = id.partition(":")
+                lane.put(
+                    present[id],
+                    RecordedSpan(at_ns, recording.end_ns, _text(each, "sentence") or id, topic=topic),
+                )
+
+
+def _text(told: Mapping[str, object], key: str) -> str:
+    value = told.get(key)
+    return value[:_MOST_LETTERS] if isinstance(value, str) else ""

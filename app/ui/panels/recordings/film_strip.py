@@ -1,0 +1,241 @@
+"""The film strip: a recording's time with some of its pictures, and two handles that choose a part of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.core.recording.film_strip import FilmStripLook
+from app.core.recording.replay.scale import span_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from nep.i18n import _
+
+HIGH, LABELS, HANDLE = 71, 18, 8
+STEP_NS, FAR_NS = 1_000_000_000, 10_000_000_000
+FAINT = 0.35
+
+
+class StripHandle(QWidget):
+    """One end of the part. Arrows move it by a second, with Shift by ten; `moved` tells by how much."""
+
+    moved = Signal(object)
+    dragged = Signal(float)
+    reset = Signal()
+
+    def __init__(self, theme: Theme, strip: QWidget, name: str) -> None:
+        super().__init__(strip)
+        self._theme = theme
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setCursor(Qt.CursorShape.SplitHCursor)
+        self.setAccessibleName(name)
+        self.setProperty("focusRadius", theme.radius("small"))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        far = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+        step = FAR_NS if far else STEP_NS
+        if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
+            self.moved.emit(-step if event.key() == Qt.Key.Key_Left else step)
+        elif event.key() in {Qt.Key.Key_Home, Qt.Key.Key_End}:
+            self.moved.emit(-(2**62) if event.key() == Qt.Key.Key_Home else 2**62)
+        else:
+            super().keyPressEvent(event)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        event.accept()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self.dragged.emit(self.mapToParent(event.position()).x())
+
+    def mouseDoubleClickEvent(self, _event: QMouseEvent) -> None:
+        self.reset.emit()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        paint.box(painter, QRectF(self.rect()), 3, self._theme.colour("accent"))
+        middle = QRectF(self.width() / 2 - 1, self.height() / 2 - 7, 2, 14)
+        painter.fillRect(middle, self._theme.colour("onAccent"))
+        painter.end()
+
+
+class FilmStrip(QWidget):
+    """One recording's; `changed` when another part of it is chosen."""
+
+    changed = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.look: FilmStripLook | None = None
+        self._images: Sequence[QImage | None] = ()
+        self.begin_ns = self.end_ns = 0
+        self.begin = StripHandle(theme, self, _("Begin of the part"))
+        self.end = StripHandle(theme, self, _("End of the part"))
+        self.begin.moved.connect(lambda by_ns: self.set_part(self.begin_ns + by_ns, self.end_ns))
+        self.end.moved.connect(lambda by_ns: self.set_part(self.begin_ns, self.end_ns + by_ns))
+        self.begin.dragged.connect(lambda x: self.set_part(self._time(x), self.end_ns))
+        self.end.dragged.connect(lambda x: self.set_part(self.begin_ns, self._time(x)))
+        for handle in (self.begin, self.end):
+            handle.reset.connect(self.choose_all)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        theme.changed.connect(self._arrange)
+
+    # ---- what it shows
+
+    def show_look(self, look: FilmStripLook | None, images: Sequence[QImage | None] = ()) -> None:
+        """Show a recording, all of it chosen."""
+        self.look, self._images = look, images
+        self.choose_all()
+        self.setVisible(look is not None)
+
+    def choose_all(self) -> None:
+        """Choose all of it."""
+        if self.look is not None:
+            self.set_part(self.look.start_ns, self.look.end_ns)
+
+    def set_part(self, begin_ns: int, end_ns: int) -> None:
+        """Choose a part; one that is none, or beyond the recording, becomes the nearest that can be."""
+        look = self.look
+        if look is None:
+            return
+        begin_ns = max(look.start_ns, min(begin_ns, look.end_ns))
+        end_ns = max(look.start_ns, min(end_ns, look.end_ns))
+        if begin_ns > end_ns:  # a handle stops at the other one
+            begin_ns, end_ns = (end_ns, end_ns) if begin_ns != self.begin_ns else (begin_ns, begin_ns)
+        self.begin_ns, self.end_ns = begin_ns, end_ns
+        for handle, at_ns in ((self.begin, begin_ns), (self.end, end_ns)):
+            handle.setAccessibleDescription(span_words(at_ns - look.start_ns, digits=1))
+        self._arrange()
+        self.changed.emit()
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all of it is chosen."""
+        look = self.look
+        return look is None or (self.begin_ns, self.end_ns) == (look.start_ns, look.end_ns)
+
+    # ---- where things are
+
+    def sizeHint(self) -> QSize:
+        return QSize(360, round(self._theme.scaled(HIGH) + self._theme.scaled(LABELS)))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(120, self.sizeHint().height())
+
+    def _film(self) -> QRectF:
+        """The pictures: between the two handles when all is chosen."""
+        high = self._theme.scaled(HIGH)
+        return QRectF(HANDLE, 0, max(1.0, self.width() - 2 * HANDLE), high)
+
+    def _x(self, at_ns: int) -> float:
+        film, look = self._film(), self.look
+        if look is None or look.end_ns <= look.start_ns:
+            return film.left()
+        return film.left() + (at_ns - look.start_ns) / (look.end_ns - look.start_ns) * film.width()
+
+    def _time(self, x: float) -> int:
+        film, look = self._film(), self.look
+        if look is None:
+            return 0
+        return look.start_ns + round((x - film.left()) / film.width() * (look.end_ns - look.start_ns))
+
+    def _arrange(self) -> None:
+        high = round(self._film().height())
+        begin, end = self._x(self.begin_ns), self._x(self.end_ns)
+        if self.look is not None and self.look.end_ns <= self.look.start_ns:
+            end = self._film().right()
+        self.begin.setGeometry(round(begin) - HANDLE, 0, HANDLE, high)
+        self.end.setGeometry(round(end), 0, HANDLE, high)
+        self.updateGeometry()
+        self.update()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._arrange()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """The nearer handle comes there."""
+        if self.look is None or event.button() != Qt.MouseButton.LeftButton:
+            return
+        x = event.position().x()
+        is_begin = abs(x - self._x(self.begin_ns)) <= abs(x - self._x(self.end_ns))
+        handle = self.begin if is_begin else self.end
+        handle.setFocus(Qt.FocusReason.MouseFocusReason)
+        handle.dragged.emit(x)
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.EnabledChange:
+            self.update()
+
+    # ---- painting
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        look, theme = self.look, self._theme
+        if look is None:
+            return
+        painter, film = QPainter(self), self._film()
+        painter.fillRect(film, theme.colour("sunken"))
+        if any(image is not None for image in self._images):
+            self._paint_pictures(painter, film)
+        else:
+            self._paint_counts(painter, film, look.counts)
+        veil = QColor(theme.colour("panel"))
+        veil.setAlphaF(1.0 - FAINT)
+        begin, end = float(self.begin.geometry().right() + 1), float(self.end.geometry().left())
+        painter.fillRect(QRectF(film.left(), 0, max(0.0, begin - film.left()), film.height()), veil)
+        painter.fillRect(QRectF(end, 0, max(0.0, film.right() - end), film.height()), veil)
+        if not self.is_whole:
+            for y in (0.0, film.height() - 2):
+                painter.fillRect(QRectF(begin, y, max(0.0, end - begin), 2), theme.colour("accent"))
+        self._paint_labels(painter, film, look)
+        painter.end()
+
+    def _paint_pictures(self, painter: QPainter, film: QRectF) -> None:
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        count = len(self._images)
+        for place, image in enumerate(self._images):
+            if image is None or image.isNull():
+                continue
+            wide = film.width() / count
+            box = QRectF(film.left() + place * wide, 0, wide - 1, film.height())
+            share = box.width() / box.height()
+            across = min(float(image.width()), image.height() * share)
+            down = min(float(image.height()), image.width() / share)
+            middle = QRectF((image.width() - across) / 2, (image.height() - down) / 2, across, down)
+            painter.drawImage(box, image, middle)
+
+    def _paint_counts(self, painter: QPainter, film: QRectF, counts: Sequence[int]) -> None:
+        peak = max(counts, default=0)
+        if not peak:
+            return
+        wide, colour = film.width() / len(counts), self._theme.colour("textTertiary")
+        for place, count in enumerate(counts):
+            high = count / peak * (film.height() - 8)
+            painter.fillRect(
+                QRectF(film.left() + place * wide, film.height() - 4 - high, max(1.0, wide - 1), high), colour
+            )
+
+    def _paint_labels(self, painter: QPainter, film: QRectF, look: FilmStripLook) -> None:
+        """The ends, and where the part begins and ends, as far as they do not lie over each other."""
+        theme, font = self._theme, self._theme.font("small")
+        high = theme.scaled(LABELS)
+        taken: list[tuple[float, float]] = []
+        digits = 0 if look.end_ns - look.start_ns > STEP_NS else 3
+        for at_ns, role in (
+            (self.begin_ns, "accentText"), (self.end_ns, "accentText"),
+            (look.start_ns, "textSecondary"), (look.end_ns, "textSecondary"),
+        ):  # fmt: skip
+            words = span_words(at_ns - look.start_ns, digits=digits)
+            wide = paint.width_of(font, words) + 2
+            left = max(0.0, min(self.width() - wide, self._x(at_ns) - wide / 2))
+            if any(left < end + 6 and left + wide > begin - 6 for begin, end in taken):
+                continue
+            taken.append((left, left + wide))
+            is_end = at_ns in {look.start_ns, look.end_ns}
+            ink = theme.colour("textSecondary" if is_end else role)
+            paint.words(painter, QRectF(left, film.height(), wide, high), words, font, ink)

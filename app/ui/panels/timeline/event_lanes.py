@@ -1,0 +1,207 @@
+"""The lanes above those of topics: bookmarks, behaviours that ran, alarms; what is there can be pressed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QPainter, QPen
+
+from app.core.recording.replay.replay import Replay
+from app.core.recording.replay.scale import span_words
+from app.core.recording.replay.spans import RecordedSpan
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from nep.i18n import _, lazy
+from nep.recordings.bookmarks import Bookmark
+
+BOOKMARKS, RUNS, ALARMS = "bookmarks", "runs", "alarms"
+NAMES = {
+    BOOKMARKS: ("bookmark", lazy("Bookmarks")),
+    RUNS: ("blocks", lazy("Behaviours")),
+    ALARMS: ("bell", lazy("Alarms")),
+}
+"""Icon and name of each lane."""
+RESULTS = {
+    "ended": ("circle-check", "ok", lazy("ended")),
+    "stopped": ("square", "textSecondary", lazy("stopped")),
+    "failed": ("circle-x", "error", lazy("failed")),
+}
+"""Icon, colour and words of how a run ended."""
+LEAST = 3.0
+"""However short it was, it can be seen."""
+ICON, GAP, LEAST_WORDS, LONGEST_NAME, FLAG = 13, 4, 34, 160, 8
+
+
+@dataclass(frozen=True, slots=True)
+class LaneMark:
+    """Something that can be pressed: where it is painted, where it leads, what it is in words."""
+
+    box: QRectF
+    at_ns: int
+    words: str
+    bookmark: Bookmark | None = None
+
+
+def shown_lanes(replay: Replay | None) -> tuple[str, ...]:
+    """Which lanes there are: that of bookmarks, and those that have something."""
+    spans = replay.densities.spans if replay is not None and replay.densities is not None else None
+    if spans is None:
+        return (BOOKMARKS,)
+    return (BOOKMARKS, *([RUNS] if spans.runs else []), *([ALARMS] if spans.alarms else []))
+
+
+class EventLanes:
+    """Paints the lanes of one replay into a plot's part of the time."""
+
+    def __init__(self, theme: Theme, painter: QPainter, plot: QRectF, x_of: Callable[[int], float]) -> None:
+        """``x_of`` tells where a time is."""
+        self._theme, self._painter, self._plot, self._x_of = theme, painter, plot, x_of
+
+    def paint(self, lane: str, replay: Replay, top: float, high: float) -> list[LaneMark]:
+        """One of `NAMES`, from ``top`` on; what can be pressed in it."""
+        plot = self._plot
+        box = QRectF(plot.left(), top, plot.width(), high)
+        spans = replay.densities.spans if replay.densities is not None else None
+        self._painter.save()
+        self._painter.setClipRect(box)
+        if lane == BOOKMARKS:
+            made = self._bookmarks(replay, box)
+        elif spans is None:
+            made = []
+        elif lane == RUNS:
+            made = [self._run(span, box, replay.start_ns) for span in self.seen(spans.runs)]
+        else:
+            made = self._alarms(list(self.seen(spans.alarms)), box, replay.start_ns)
+        self._painter.restore()
+        return made
+
+    def seen(self, spans: Iterable[RecordedSpan]) -> Iterator[RecordedSpan]:
+        """Those that are in the plot; of very many only some: none that would hide in the one before it."""
+        plot, free = self._plot, -1.0
+        for span in spans:
+            left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
+            if right < plot.left() - 1 or left > plot.right() + 1 or max(right, left + LEAST) < free:
+                continue
+            free = max(right, left + LEAST) + 1
+            yield span
+
+    # ---- bookmarks
+
+    def _bookmarks(self, replay: Replay, box: QRectF) -> list[LaneMark]:
+        theme, painter, marks = self._theme, self._painter, replay.bookmarks
+        font, ink = theme.font("small"), theme.colour("accentText")
+        if not marks:
+            tertiary = theme.colour("textTertiary")
+            paint.words(painter, box.adjusted(FLAG, 0, 0, 0), _("B makes one"), font, tertiary)
+        made, free = [], box.left() - 1.0
+        for mark in marks:
+            x = self._x_of(mark.at_ns)
+            if not box.left() - 1 <= x <= box.right() + 1:
+                continue
+            painter.setPen(QPen(ink, 1.5))
+            painter.drawLine(QPointF(x, box.top() + 3), QPointF(x, box.bottom() - 3))
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(ink)
+            painter.drawRect(QRectF(x, box.top() + 4, FLAG, 7))
+            wide = 0.0
+            if x >= free and mark.name:
+                wide = min(paint.width_of(font, mark.name), theme.scaled(LONGEST_NAME))
+                place = QRectF(x + 12, box.top(), wide, box.height())
+                paint.words(painter, place, mark.name, font, theme.colour("text"))
+                free = x + 16 + wide
+            pressed = QRectF(x - GAP, box.top(), FLAG + 2 * GAP + wide, box.height())
+            made.append(LaneMark(pressed, mark.at_ns, mark.name or _("Bookmark"), mark))
+        return made
+
+    # ---- behaviours
+
+    def bar(self, span: RecordedSpan, top: float, high: float) -> QRectF:
+        """Where a run is."""
+        left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
+        return QRectF(left, top + 3, max(LEAST, right - left), high - 6)
+
+    def _run(self, span: RecordedSpan, box: QRectF, start_ns: int) -> LaneMark:
+        bar = self.bar(span, box.top(), box.height())
+        self.paint_run(span, bar, "sunken", "controlBorder")
+        return LaneMark(bar, span.start_ns, run_words(span, start_ns))
+
+    def paint_run(self, span: RecordedSpan, bar: QRectF, fill: str, edge: str) -> None:
+        """A run with its name at the left and its end at the right, as far as there is room."""
+        theme, painter = self._theme, self._painter
+        paint.box(painter, bar, theme.radius("small"), theme.colour(fill), theme.colour(edge))
+        seen = bar.intersected(QRectF(self._plot.left(), bar.top(), self._plot.width(), bar.height()))
+        inside = seen.adjusted(6, 0, -6, 0)
+        if inside.width() < theme.scaled(LEAST_WORDS):
+            return
+        font, side = theme.font("small"), theme.scaled(ICON)
+        self._icon("blocks", inside.left(), inside, "textTertiary")
+        inside.adjust(side + GAP, 0, 0, 0)
+        icon, role, result = RESULTS.get(span.result, ("", "", ""))
+        words = span.words or (_(result) if result else "")
+        wide = side + GAP + paint.width_of(font, words)
+        name = min(paint.width_of(font, span.name), theme.scaled(LONGEST_NAME))
+        if icon and name + 2 * GAP + wide <= inside.width():
+            self._icon(icon, inside.right() - wide, inside, role)
+            paint.words(painter, inside, words, font, theme.colour(role), paint.RIGHT)
+            inside.adjust(0, 0, -wide - GAP, 0)
+        elif icon and name + 2 * GAP + side <= inside.width():
+            self._icon(icon, inside.right() - side, inside, role)
+            inside.adjust(0, 0, -side - GAP, 0)
+        paint.words(painter, inside, span.name, font, theme.colour("text"))
+
+    def _icon(self, name: str, left: float, row: QRectF, role: str) -> None:
+        side = self._theme.scaled(ICON)
+        square = QRectF(left, row.center().y() - side / 2, side, side)
+        paint_icon(self._painter, square, name, self._theme.colour(role))
+
+    # ---- alarms
+
+    def _alarms(self, spans: list[RecordedSpan], box: QRectF, start_ns: int) -> list[LaneMark]:
+        """A bar each, and its words up to the next one."""
+        made, theme = [], self._theme
+        font, side = theme.font("small"), theme.scaled(ICON)
+        for place, span in enumerate(spans):
+            role = "error" if span.is_error else "warn"
+            left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
+            bar = QRectF(left, box.top() + 5, max(LEAST, right - left), box.height() - 10)
+            paint.box(self._painter, bar, 1.5, theme.colour(role))
+            words = alarm_words(span)
+            until = self._x_of(spans[place + 1].start_ns) if place + 1 < len(spans) else box.right()
+            begin = max(bar.right(), box.left()) + 5
+            room = min(until, box.right()) - begin - side - GAP
+            pressed = bar.adjusted(-3, -3, 3, 3)
+            if room >= theme.scaled(LEAST_WORDS):
+                wide = min(room, paint.width_of(font, words) + 1)
+                self._icon("circle-x" if span.is_error else "triangle-alert", begin, box, role)
+                text = QRectF(begin + side + GAP, box.top(), wide, box.height())
+                paint.words(self._painter, text, words, font, theme.colour(role))
+                pressed = pressed.united(text)
+            made.append(LaneMark(pressed, span.start_ns, _told(words, span, start_ns)))
+        return made
+
+
+def alarm_words(span: RecordedSpan) -> str:
+    """What was wrong, and for how long where that is known: "/distance: range is 0.36, below 0.4, 1.2 s"."""
+    name = span.name.rstrip(".")
+    name = f"{name[:1].upper()}{name[1:]}"
+    if not span.is_over:
+        return name
+    seconds = (span.end_ns - span.start_ns) / 1e9
+    return _("{alarm}, {seconds} s").format(alarm=name, seconds=f"{seconds:.1f}")
+
+
+def run_words(span: RecordedSpan, start_ns: int) -> str:
+    """The behaviour, how it ended, and when."""
+    known = RESULTS.get(span.result)
+    words = span.words or (_(known[2]) if known is not None else "")
+    return _told(f"{span.name}: {words}" if words else span.name, span, start_ns)
+
+
+def _told(words: str, span: RecordedSpan, start_ns: int) -> str:
+    begin, end = (span_words(each - start_ns, digits=1) for each in (span.start_ns, span.end_ns))
+    if not span.is_over:
+        return _("{what}\nfrom {begin} on").format(what=words, begin=begin)
+    return _("{what}\n{begin} to {end}").format(what=words, begin=begin, end=end)

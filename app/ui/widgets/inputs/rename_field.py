@@ -1,0 +1,56 @@
+"""A field that lies over a name while a person types another one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QRect, Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent
+from PySide6.QtWidgets import QLineEdit, QWidget
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.menus import EditMenu
+
+
+class RenameField(QLineEdit):
+    """The name of one thing, where it stands. ``take`` gets it and says whether it can be."""
+
+    ended = Signal()
+
+    def __init__(
+        self, theme: Theme, place: QWidget, rect: QRect, name: str, take: Callable[[str], bool], said: str
+    ) -> None:
+        """``said`` is what it is called for people who hear it."""
+        super().__init__(name, place)
+        self._take, self._is_over = take, False
+        self.setAccessibleName(said)
+        self.setProperty("focusRadius", theme.radius("control"))
+        EditMenu(theme, self)
+        self.setGeometry(rect)
+        self.selectAll()
+        self.show()
+        self.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.leave()
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
+            if self._take(self.text()):
+                self.leave()
+        else:
+            super().keyPressEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_over:
+            self._take(self.text())
+            self.leave()
+
+    def leave(self) -> None:
+        """It goes; the name is as it was taken last."""
+        if not self._is_over:
+            self._is_over = True
+            self.hide()
+            self.ended.emit()
+            self.deleteLater()

@@ -1,0 +1,149 @@
+"""What the recorder is told of behaviours and alarms while they go on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import pytest
+
+from app.core.recording import events as events_module
+from app.core.recording.events import RecordedEvents
+from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.run.view import RunState
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from nep.programs.alarms import AlarmCondition, AlarmEvent, AlarmRule
+
+RUNNING = RunState("running", "Greeting", begun=False, started_s=1.0)
+
+
+class Told:
+    """What was said, at times that go on by 10 ns each time that somebody looks."""
+
+    def __init__(self) -> None:
+        self.now, self.said, self.to = 1000, list[tuple[str, dict[str, object]]](), set[str]()
+        self.events = RecordedEvents(self._say, clock_ns=self._clock)
+
+    def _clock(self) -> int:
+        self.now += 10
+        return self.now
+
+    def _say(self, role: str, value: Mapping[str, object], to: str = "") -> None:
+        self.said.append((role, dict(value)))
+        self.to.add(to)
+
+    def follow(self, *runs: RunState) -> list[dict[str, object]]:
+        """What is said of these states one after the other."""
+        self.said.clear()
+        for run in runs:
+            self.events.follow_run(run)
+        assert {role for role, _value in self.said} <= {"runs"}
+        return [value for _role, value in self.said]
+
+
+@pytest.fixture
+def told() -> Told:
+    return Told()
+
+
+def event(kind: str, name: str = "/camera", condition: str = "silent") -> AlarmEvent:
+    rule = AlarmRule(f"id of {name}", AlarmCondition(condition, name, for_s=2.0))
+    return AlarmEvent(kind, rule, 1.0, 4.0)
+
+
+def test_a_run_is_told_at_its_begin_its_end_and_with_the_time_of_its_stop(told):
+    begun = replace(RUNNING, begun=True, started_s=1.2)
+    stopping = replace(begun, state="stopping", says="x")
+    report = StopReport((RobotStop("Pepper", True, 41.0),), 41.2)
+    proven = replace(stopping, state="proven", report=report)
+    first, *rest = told.follow(RunState(), RUNNING, begun, replace(begun, state="paused"), begun)
+    assert (first["name"], first["since_ns"], first["until_ns"], rest) == ("Greeting", 1010, None, [])
+    ended, answered = told.follow(stopping, proven, replace(proven, last_words="still proven"))
+    assert (ended["id"], ended["until_ns"], ended["result"], ended["words"]) == (
+        first["id"], 1020, "stopped", "",
+    )  # fmt: skip
+    assert answered == {**ended, "words": "Stop, 41 ms"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "result", "words"),
+    [
+        ({"finished": True}, "ended", ""),
+        ({"errors": {"b": "wave failed"}}, "failed", "wave failed"),
+        ({}, "stopped", ""),
+    ],
+)
+def test_how_a_run_ended(told, changes, result, words):
+    *_begin, end = told.follow(RUNNING, replace(RUNNING, state="stopping", **changes))
+    assert (end["result"], end["words"]) == (result, words)
+
+
+def test_another_run_in_the_same_tick_is_another_one(told):
+    first, over, second = told.follow(RUNNING, replace(RUNNING, started_s=7.0, name="Tour"))
+    assert (over["id"], over["until_ns"], "result" in over) == (first["id"], 1020, False)
+    assert (second["name"], second["until_ns"]) == ("Tour", None)
+    assert second["id"] != first["id"]
+
+
+def test_what_is_tried_has_the_words_of_its_block(told):
+    (said,) = told.follow(replace(RUNNING, trying="wave"))
+    assert said["name"] == "wave"
+
+
+def test_an_alarm_is_told_on_and_off_once_each(told):
+    for kind in ("on", "still", "off", "off"):
+        told.events.take_alarm(event(kind))
+    (role, on), (_role, off) = told.said
+    assert role == "alarms"
+    assert (on["topic"], on["severity"], on["until_ns"]) == ("/camera", "error", None)
+    assert "/camera" in on["name"]
+    assert off == {**on, "until_ns": 1020}
+    told.events.take_alarm(event("on"))
+    assert told.said[-1][1]["id"] != on["id"]
+
+
+def test_an_alarm_about_a_node_names_no_topic(told):
+    told.events.take_alarm(event("on", "arm", "leaves"))
+    assert told.said[0][1]["topic"] == ""
+
+
+def test_what_goes_on_is_told_again_and_what_is_over_is_not(told):
+    told.events.take_alarm(event("on", "/a"))
+    told.events.take_alarm(event("on", "/b"))
+    told.events.follow_run(RUNNING)
+    told.events.take_alarm(event("off", "/a"))
+    assert told.to == {""}
+    told.said.clear()
+    told.events.repeat("ring")
+    assert told.to == {"", "ring"}
+    assert [role for role, _value in told.said] == ["alarms", "runs"]
+    assert all(value["until_ns"] is None for _role, value in told.said)
+
+
+def test_of_very_many_alarms_each_is_told_once_and_no_more_are_kept_than_fit(told, monkeypatch):
+    monkeypatch.setattr(events_module, "MOST_PRESENT", 3)
+    for number in range(5):
+        told.events.take_alarm(event("on", f"/{number}"))
+    assert len(told.said) == 5
+    told.said.clear()
+    told.events.repeat("recording")
+    assert len(told.said) == 3
+    told.events.take_alarm(event("off", "/4"))
+    assert len(told.said) == 3  # its end is not known, and nothing goes wrong
+
+
+def test_a_session_tells_its_recorder(tmp_path, monkeypatch):
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)  # never started
+    said: list[tuple[str, object]] = []
+
+    def say(role: str, told: Mapping[str, object], to: str = "") -> None:
+        said.append((role, told.get("topic", told["name"])))
+
+    monkeypatch.setattr(session.recordings.events, "_say", say)
+    session.alarms.on_event(event("on", "/camera"))
+    monkeypatch.setattr(session.runs, "_run", RUNNING)
+    session.tick()
+    assert said[:2] == [("alarms", "/camera"), ("runs", "Greeting")]
+    session.close()

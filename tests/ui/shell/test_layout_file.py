@@ -1,0 +1,119 @@
+"""A layout as a file: saved, opened by a question and by a drop; what it is not is said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.docking.layout_file import LayoutFileError, layout_bytes, read_layout
+from app.ui.shell.main_window import MainWindow
+from tests.ui.shell_parts import Answers
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+SAVED = {"open": ["topics", "plot", "plot#2"], "docks": "", "panels": {"topics": {"filter": "/arm"}}}
+PANELS = ("topics", "inspector", "plot")
+
+
+def changed(**values: object) -> bytes:
+    return json.dumps({**json.loads(layout_bytes("Mine", "developer", SAVED)), **values}).encode()
+
+
+def test_what_is_written_is_read():
+    found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", PANELS)
+    assert (found.name, found.base, found.saved, found.unknown) == ("Mine", "developer", SAVED, ())
+
+
+def test_panels_that_are_not_there_are_named_once_and_left_out():
+    found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", ("topics",))
+    assert (found.saved["open"], found.unknown) == (["topics"], ("plot",))
+    found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", ("plot",))
+    assert (found.saved["open"], found.saved["panels"], found.unknown) == (
+        ["plot", "plot#2"],
+        {},
+        ("topics",),
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [("  two\n words\u202e ", "two words"), ("x" * 50, "x" * 40), ("", "the file"), (7, "the file"),
+     ("\x00", "the file")],
+)  # fmt: skip
+def test_a_name_is_one_line_that_fits(name, shown):
+    assert read_layout(changed(name=name), "the file", PANELS).name == shown
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (b"", "it is damaged, or no layout of Studio"),
+        (b"\xff\xfe", "it is damaged, or no layout of Studio"),
+        (b"[" * 100_000, "it is damaged, or no layout of Studio"),
+        (b"[]", "it is no layout of Studio"),
+        (b'{"format": "another"}', "it is no layout of Studio"),
+        (changed(arrangement={**SAVED, "docks": "AAAA"}), "it is damaged"),
+        (changed(sum=None), "it is damaged"),
+        (changed(version=2), "a newer Studio has made it; update this one"),
+        (changed(version=0), "it is damaged"),
+        (changed(version="1"), "it is damaged"),
+        (changed(base="start"), "it arranges a layout that this Studio does not have"),
+        (changed(base=["developer"]), "it arranges a layout that this Studio does not have"),
+        (changed(arrangement=[]), "it is damaged"),
+        (changed(arrangement={"open": 3, "docks": ""}), "it is damaged"),
+        (changed(arrangement={"open": [], "docks": 3}), "it is damaged"),
+    ],
+)
+def test_what_is_no_layout_is_a_sentence(data, sentence):
+    with pytest.raises(LayoutFileError, match=f"^{sentence}$"):
+        read_layout(data, "file", PANELS)
+
+
+def test_a_layout_goes_out_and_comes_back_and_can_be_undone(
+    window: MainWindow, commands: Commands, answers: Answers, tmp_path: Path
+):
+    window.show()
+    commands.run("layout.developer")
+    for name in set(window.bench.open_names()) - {"topics", "console"}:
+        window.bench.docks[name].close()
+    file = tmp_path / "Mine.nep-layout"
+    answers.path = file
+    commands.run("layout.export")
+    assert window.toast.text == "Saved the layout in Mine.nep-layout"
+    commands.run("layout.reset")
+    before = set(window.bench.open_names())
+    assert before > {"topics", "console"}
+    commands.run("layout.open")
+    assert answers.asked[-1].startswith("layout ")
+    assert set(window.bench.open_names()) == {"topics", "console"}
+    assert window.toast.text == "Opened the layout “Developer 2”"  # that name is the built-in one's
+    window.toast.button.click()
+    assert set(window.bench.open_names()) == before
+    assert window.saved_layouts.all() == ()
+    saved = json.loads(file.read_bytes())["arrangement"]
+    saved["open"].append("teleport")
+    file.write_bytes(layout_bytes("Arm", "developer", saved))
+    for name in ("Arm", "Arm 2"):
+        commands.files.open_all([file])  # a drop, or the command line
+        assert (
+            window.toast.text
+            == f"Opened the layout “{name}”, without what this Studio does not have: teleport"
+        )
+        assert set(window.bench.open_names()) == {"topics", "console"}
+    file.write_bytes(layout_bytes("Arm", "developer", {**saved, "docks": ""}))  # Qt has nothing to put back
+    commands.files.open_all([file])
+    assert window.toast.text == "Mine.nep-layout can't be opened: it is damaged"
+    assert set(window.bench.open_names()) == {"topics", "console"}
+    assert [each.name for each in window.saved_layouts.all()] == ["Arm", "Arm 2"]
+    file.write_bytes(b"nothing of the kind")
+    commands.files.open_all([file])
+    assert window.toast.text == "Mine.nep-layout can't be opened: it is damaged, or no layout of Studio"
+    commands.files.open_all([tmp_path / "gone.nep-layout"])
+    assert window.toast.text == "gone.nep-layout can't be opened: no such file or directory"
+    answers.path = tmp_path / "a file" / "x.nep-layout"
+    answers.path.parent.write_bytes(b"in its place")
+    commands.run("layout.export")
+    assert window.toast.text.startswith("x.nep-layout can't be written: ")
