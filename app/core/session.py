@@ -171,8 +171,11 @@ class Session:
                 self.settings, self.alerts, self.address, self._mailbox.post_event, clock=clock
             ),
         )
-        self.alarms.keep, self.alarms.on_event = self.recordings.carry, self.recordings.events.take_alarm
-        self.runs.also_stops = self.acting.disarm
+        self.alarms.keep, self.alarms.on_event, self.runs.also_stops = (
+            self.recordings.carry,
+            self.recordings.events.take_alarm,
+            self.acting.disarm,
+        )
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, self._mailbox.post_event)

@@ -46,12 +46,6 @@ SETTLE_MS, RESTS = 15, 3  # a turn, and in how many of them nothing moves when a
 BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _text_as_before(qapp: object) -> Iterator[None]:
-    yield
-    Theme("light").apply()
-
-
 @pytest.fixture
 def window(qtbot, theme: Theme) -> Iterator[MainWindow]:
     """The window with its real panels, a robot and everything that it tells."""
