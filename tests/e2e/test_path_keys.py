@@ -65,13 +65,13 @@ def look_at_topics(studio: Studio, film: Film, fingers: Fingers) -> None:
         fingers.do("developer", "Developer layout")
         studio.row("Topics", "/Pepper/state")
     with film.step("Arrow keys choose a topic, Enter shows its newest message"):
-        fingers.until_on("F6", name="Topics", kind="TableView")
+        fingers.until_on("F6", name="Topics", kind="TopicsTable")
         fingers.press("Down", "Down", "Down", "Return")
         until(lambda: studio.values("Newest message"), "the inspector shows it")
     with film.step("F6: the Inspector; Ctrl+F finds a value in it"):
         fingers.until_on("F6", **{"in": "inspector"})
         fingers.press("f", held=["Ctrl"])
-        studio.find("Find a key or value", focus=True)
+        studio.find("Find a key or value, or $ and a path", focus=True)
         studio.screen.type("count")
         studio.says("1 of 1")
 

@@ -257,7 +257,8 @@ class TimelineCanvas(QAbstractScrollArea):
             painter.drawLine(QPointF(x, high - 6), QPointF(x, high))
             from_start = span_words(at_ns - scale.first_ns, digits=digits)
             words = clock_words(at_ns, digits=digits) if self.by_clock else from_start
-            paint.words(painter, QRectF(x + 3, 0, theme.scaled(MARK_PX), high - 4), words, font, ink)
+            if x + 3 + paint.width_of(font, words) <= plot.right():  # else it lies on what is beside
+                paint.words(painter, QRectF(x + 3, 0, theme.scaled(MARK_PX), high - 4), words, font, ink)
         paint.hairline(
             painter, QRectF(0, 0, self.viewport().width(), high), Qt.Edge.BottomEdge, theme.colour("border")
         )

@@ -18,7 +18,7 @@ from app.ui.panels.row_actions import RowAction, copies, show_messages, topic_ac
 from app.ui.panels.table_panel import TableWords
 from app.ui.panels.topics.columns import columns
 from app.ui.text.numbers import grouped
-from app.ui.widgets import EmptyAction, IconButton, label
+from app.ui.widgets import ElidedLabel, EmptyAction, IconButton
 from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
@@ -80,7 +80,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
             self.theme, "list-tree", _("As a tree by the slashes in the names"), checkable=True, size=26
         )
         self.as_tree.toggled.connect(lambda _on: self.rebuild())
-        self.count = label("", "small", role="textSecondary")
+        self.count = ElidedLabel("small", "textSecondary", least=60)
         self.header.insert(0, self.count)
         self.header.append(self.as_tree)
         column = QVBoxLayout(self)
