@@ -186,16 +186,16 @@ class SessionActing:
 
     def problem_of(self, message: KeptMessage) -> str:
         """Why a message can't be sent, as a sentence; empty when it can, once it is armed."""
-        if not message.topic.strip():
-            return _("Choose a topic first.")
         if not is_written(message.msg_type):
             said = _("Messages of the type {type} can't be written by hand.")
             return said.format(type=message.msg_type)
-        if is_plain(message.msg_type):
+        read = None if is_plain(message.msg_type) else read_json(message.text)
+        if read is not None and read.fault is not None:
+            return read.fault.sentence  # before the topic: its line is red
+        if not message.topic.strip():
+            return _("Choose a topic first.")
+        if read is None:
             return ""
-        read = read_json(message.text)
-        if read.fault is not None:
-            return read.fault.sentence
         typed = {name for name, value in message.values if value.strip()}
         missing = [name for name in read.to_fill if name not in typed]
         return _("Fill in “{name}” first.").format(name=missing[0]) if missing else ""

@@ -1,0 +1,88 @@
+"""Publishing and calling by hand in the real window, heard by real programs; Stop ends it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import pytest
+
+import nep
+from tests.e2e.fingers import Fingers
+from tests.e2e.person import middle
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = [pytest.mark.long, pytest.mark.timeout(240)]
+
+
+@dataclass
+class Lamp:
+    """What a program with a lamp heard."""
+
+    heard: list[object] = field(default_factory=list)
+    asked: list[object] = field(default_factory=list)
+
+
+@contextmanager
+def lamp(address: str) -> Iterator[Lamp]:
+    """Listens to /lamp and serves `colour_of`."""
+    made = Lamp()
+
+    def answer(request: dict[str, object]) -> dict[str, object]:
+        made.asked.append(request)
+        return {"colour": "amber", "of": request["name"]}
+
+    with nep.node("lamp", master=address) as node:
+        node.new_callback("/lamp", "json", made.heard.append)
+        node.new_server("colour_of", answer, threads=1)
+        thread = threading.Thread(target=node.spin)
+        thread.start()
+        try:
+            yield made
+        finally:
+            node.stop_spin()
+            thread.join()
+
+
+def write(studio: Studio, fingers: Fingers, name: str, words: str, **wanted: object) -> None:
+    """Click a field of the form and write into it."""
+    studio.screen.click(*middle(studio.find(name, enabled=True, **wanted)["rect"]))
+    fingers.write(words)
+
+
+def test_a_message_is_written_armed_and_sent_until_stop(studio: Studio, address: str) -> None:
+    fingers = Fingers(studio)
+    studio.find("Use the virtual robot", enabled=True)
+    studio.screen.key("2", held=["Alt"])
+    studio.says(f"Master {address}", 40)
+    with lamp(address) as seen:
+        fingers.do("publish a mess", "Publish a message")
+        write(studio, fingers, "Name of the message", "Warm light")
+        write(studio, fingers, "Topic", "/lamp", kind="TopicEdit")
+        fingers.press("Escape")  # what is offered
+        write(studio, fingers, "The message", '{"level": 0.4 "on": true}')
+        studio.says("Line 1 needs a comma between two values.")
+        assert seen.heard == []
+        studio.click("Put it right")
+        studio.click("Arm and send")
+        until(lambda: seen.heard == [{"level": 0.4, "on": True}], lambda: f"heard once: {seen.heard}")
+
+        studio.click("Start sending")
+        until(lambda: len(seen.heard) > 10, "it is sent again and again")
+        fingers.press("F12")
+        until(lambda: not studio.all("End sending"), "Stop ends it")
+        count = len(seen.heard)
+        studio.find("Arm and send", enabled=True)
+
+        fingers.do("call a serv", "Call a service")
+        studio.says("1 service of 1 node")
+        studio.click("JSON")  # nothing is known of what it takes
+        write(studio, fingers, "The request", '{"name": "Aiko"}')
+        studio.click("Arm and call")
+        until(lambda: seen.asked == [{"name": "Aiko"}], lambda: f"called once: {seen.asked}")
+        studio.says("answered in ")
+        assert len(seen.heard) == count
+    assert studio.quit() == 0
