@@ -85,6 +85,8 @@ def is_wanted(name: str) -> bool:
         return not {*UNUSED_OF_PYQTGRAPH, "maps"} & set(
             parts[1:3]
         )  # maps of colours have licences of their own
+    if parts[:1] == ("zstandard",) and path.name.startswith("_cffi."):
+        return False  # a second build of the library, for Pythons that are not CPython
     if parts[:2] == ("cv2", "data"):
         return path.suffix != ".xml"  # trained classifiers, which nothing here reads
     if path.name.startswith("opencv_videoio_ffmpeg"):  # Windows; elsewhere: film_libraries.py

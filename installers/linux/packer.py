@@ -32,6 +32,10 @@ DESCRIPTION = """see what robots say, and tell them what to do
 """
 
 
+WITH_DEBUG_INFO = ("lz4", "msgpack", "zstandard")
+"""Packages whose wheels for Linux hold more words for debuggers than program (zstandard: 10 of 11 MB)."""
+
+
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
     """The packages. Raises `PackageError`."""
     if not (keep_frozen and context.frozen.is_dir()):
@@ -51,13 +55,16 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
 def strip(context: Context) -> None:
     """Take from Python's own libraries what only a debugger reads: two thirds of them where it was built.
 
-    Other libraries come stripped, and some are damaged by doing it again.
+    So it is with the parts of the few packages that come with it (`WITH_DEBUG_INFO`). Other libraries come
+    stripped, and some are damaged by doing it again.
     """
     tool = shutil.which("strip")
     inside = context.frozen / "_internal"
     if tool is None:
         return
-    for path in (*inside.glob("libpython3*.so*"), *inside.glob("python3*/lib-dynload/*.so")):
+    pythons = (*inside.glob("libpython3*.so*"), *inside.glob("python3*/lib-dynload/*.so"))
+    packages = (path for name in WITH_DEBUG_INFO for path in (inside / name).rglob("*.so"))
+    for path in (*pythons, *packages):
         if not path.is_symlink():
             context.run(tool, "--strip-unneeded", path)
 

@@ -46,12 +46,15 @@ WANTED = [
     "libsqlite3.so.0",
     "nep_studio-0.1.0.dist-info/METADATA",
     "pyqtgraph/icons/invisibleEye.svg",
+    "zstandard/backend_c.cpython-311-x86_64-linux-gnu.so",
     "pyqtgraph-0.14.0.dist-info/METADATA",
 ]
 
 UNWANTED = [
     "nep_studio-0.1.0.dist-info/direct_url.json",
     "nep_studio-0.1.0.dist-info/RECORD",
+    "zstandard/_cffi.cpython-311-x86_64-linux-gnu.so",
+    "zstandard\\_cffi.cp311-win_amd64.pyd",
     "PySide6/Qt/lib/libQt63DRender.so.6",
     "PySide6/Qt/lib/libQt6Quick3D.so.6",
     "PySide6/Qt/lib/libQt6Designer.so.6",
