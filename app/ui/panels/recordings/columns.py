@@ -168,5 +168,5 @@ def columns(
         Column("messages", lazy("Messages"), 84,
                lambda facts: Cell(grouped(facts.message_count) if facts.message_count else ""),
                key=lambda facts: facts.message_count, figures=True, yields=4),
-        Column("lost", lazy("Lost"), 72, lost, key=lambda facts: facts.lost, figures=True, yields=3),
+        Column("lost", lazy("Lost"), 92, lost, key=lambda facts: facts.lost, figures=True, yields=3),
     )  # fmt: skip

@@ -102,7 +102,9 @@ def loss_cell(topic: Topic) -> Cell:
         return Cell("0", role=_ink(topic, "text"))
     share = topic.loss_ratio
     return Cell(
-        number(share, ".1%").replace("%", " %") if share is not None else str(topic.lost),
+        str(topic.lost)
+        if share is None
+        else number(share, ".1%" if share < 0.0995 else ".0%").replace("%", " %"),  # whole, also at 100 %
         "triangle-alert",
         "warn",
     )
@@ -178,7 +180,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
         stretch=True,
         tip=lambda t: t.name,
     ),
-    Column("type", lazy("Type"), 90, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
+    Column("type", lazy("Type"), 78, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
     Column(
         "publishers",
         lazy("Publishers"),
@@ -213,7 +215,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
     ),
     Column("age", lazy("Age"), 58, age_cell, lambda t: t.age_s, figures=True, tip=_not_told, yields=2),
     Column(
-        "loss", lazy("Loss"), 62, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1
+        "loss", lazy("Loss"), 74, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1
     ),
 )
 
