@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 import threading
 import time
 import weakref
@@ -187,6 +188,7 @@ def test_a_sink_may_make_publishers_and_subscribers_and_ask_for_the_graph(node: 
     assert made == [((True, "sure"), True), ()]
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
 def test_at_the_end_of_the_interpreter_all_nodes_deliver_at_once(master: Master) -> None:
     """The first has a subscriber that hangs; what the second published arrives all the same."""
     hung = """
