@@ -28,11 +28,12 @@ NAMES = (
     "studio_images",
     "studio_topics",
     "studio_plot",
+    "studio_graph",
     "studio_start",
     "blocks_editor",
     "studio_tabs",
 )
-ASKED = ("nep_tail", "nep_ros", "paper", "soak", "ways", "film", "package_start")
+ASKED = ("nep_tail", "nep_ros", "paper", "soak", "ways", "film", "package_start", "recorder")
 """These run only when they are asked for: they take long, need ROS 1 or a package, or time nothing."""
 
 
