@@ -6,8 +6,8 @@ import datetime as dt
 from collections.abc import Iterable, Mapping, Sequence
 
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QAction, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.core.network.topics import split_key
 from app.core.network.watches import Suspendable, Watch
@@ -21,8 +21,9 @@ from app.ui.panels.publish.message_form import MessageForm
 from app.ui.panels.publish.shelf_list import ShelfList, state_cell
 from app.ui.panels.row_actions import RowAction, filled
 from app.ui.text.numbers import grouped, rate_words
-from app.ui.widgets import Button, EmptyAction, EmptyState, Separator, label
+from app.ui.widgets import Button, EmptyAction, EmptyState, label
 from app.ui.widgets.inputs.fields import FilterField
+from app.ui.widgets.lists.list_beside import ListBeside
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.paint import show_when
@@ -83,52 +84,26 @@ class PublishPanel(PanelWidget):
         form.template_wanted.connect(self.take_template)
 
     def _arrange(self) -> None:
-        self._left = QWidget()
-        left = QVBoxLayout(self._left)
-        left.setContentsMargins(0, 8, 0, 0)
-        left.setSpacing(6)
-        find = QHBoxLayout()
-        find.setContentsMargins(8, 0, 8, 0)
-        find.addWidget(self.filter)
-        left.addLayout(find)
-        left.addWidget(self.list, 1)
         scroll = ScrollColumn(_("The chosen message"))
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.column.insertWidget(0, self.form)
         scroll.column.setStretchFactor(self.form, 1)
         scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
-        self._upright = Separator(self.theme, upright=True)
-        inside = QWidget()
-        self._sides = QBoxLayout(QBoxLayout.Direction.LeftToRight, inside)
-        self._sides.setContentsMargins(0, 0, 0, 0)
-        self._sides.setSpacing(0)
-        self._sides.addWidget(self._left)
-        self._sides.addWidget(self._upright)
-        self._sides.addWidget(scroll, 1)
+        self._sides = ListBeside(
+            self.theme,
+            (self.filter, self.list, scroll),
+            list_px=LIST_PX,
+            list_high_px=LIST_HIGH_PX,
+            narrow_px=SIDE_BY_SIDE_PX,
+        )
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
-        self.pages.addWidget(inside)
+        self.pages.addWidget(self._sides)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self.strip)
         column.addWidget(self.pages, 1)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        """The list beside the message, or above it where there is little room."""
-        beside = self.width() >= self.theme.scaled(SIDE_BY_SIDE_PX)
-        way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
-        self._sides.setDirection(way)
-        self._upright.setVisible(beside)
-        most = 16_777_215
-        wide = round(min(self.theme.scaled(LIST_PX), self.width() * 0.4))
-        self._left.setMinimumWidth(wide if beside else 0)
-        self._left.setMaximumWidth(wide if beside else most)
-        self._left.setMaximumHeight(most if beside else round(self.theme.scaled(LIST_HIGH_PX)))
 
     # -- what it shows ------------------------------------------------------------------------------------
 
@@ -369,7 +344,7 @@ class PublishPanel(PanelWidget):
 
     def theme_changed(self) -> None:
         self.list.fit_rows()
-        self._fit()
+        self._sides.fit()
 
     def save_state(self) -> dict[str, object]:
         return {"message": self.list.chosen_key() or ""}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QAction, QGuiApplication, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtGui import QAction, QGuiApplication
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.run.acting.arming import Target
 from app.core.run.acting.calling import LEAST_S, MOST_S, TIMEOUT_S, CallRecord
@@ -32,6 +32,7 @@ from app.ui.widgets import (
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.inputs.json_edit import JsonEdit
+from app.ui.widgets.lists.list_beside import ListBeside
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import Cell, Column, TableModel
@@ -134,26 +135,16 @@ class ServicesPanel(PanelWidget):
         self.calls.menu_wanted.connect(self._show_call_menu)
 
     def _arrange(self) -> None:
-        find = QHBoxLayout()
-        find.setContentsMargins(8, 0, 8, 0)
-        find.addWidget(self.filter)
-        self._left = QWidget()
-        left = QVBoxLayout(self._left)
-        left.setContentsMargins(0, 8, 0, 0)
-        left.setSpacing(6)
-        left.addLayout(find)
-        left.addWidget(self.list, 1)
-        self._upright = Separator(self.theme, upright=True)
-        inside = QWidget()
-        self._sides = QBoxLayout(QBoxLayout.Direction.LeftToRight, inside)
-        self._sides.setContentsMargins(0, 0, 0, 0)
-        self._sides.setSpacing(0)
-        self._sides.addWidget(self._left)
-        self._sides.addWidget(self._upright)
-        self._sides.addWidget(self._right_side(), 1)
+        self._sides = ListBeside(
+            self.theme,
+            (self.filter, self.list, self._right_side()),
+            list_px=LIST_PX,
+            list_high_px=LIST_HIGH_PX,
+            narrow_px=SIDE_BY_SIDE_PX,
+        )
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
-        self.pages.addWidget(inside)
+        self.pages.addWidget(self._sides)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -199,22 +190,6 @@ class ServicesPanel(PanelWidget):
             scroll.column.setStretch(place, stretch)
         scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
         return scroll
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        """The list beside the service, or above it where there is little room."""
-        beside = self.width() >= self.theme.scaled(SIDE_BY_SIDE_PX)
-        way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
-        self._sides.setDirection(way)
-        self._upright.setVisible(beside)
-        most = 16_777_215
-        wide = round(min(self.theme.scaled(LIST_PX), self.width() * 0.4))
-        self._left.setMinimumWidth(wide if beside else 0)
-        self._left.setMaximumWidth(wide if beside else most)
-        self._left.setMaximumHeight(most if beside else round(self.theme.scaled(LIST_HIGH_PX)))
 
     # -- what it shows ------------------------------------------------------------------------------------
 
@@ -454,7 +429,7 @@ class ServicesPanel(PanelWidget):
 
     def theme_changed(self) -> None:
         self.list.fit_rows()
-        self._fit()
+        self._sides.fit()
 
     def save_state(self) -> dict[str, object]:
         return {"service": self.service}

@@ -1,0 +1,62 @@
+"""A list with its filter beside what is chosen in it, or above that where there is little room."""
+
+from __future__ import annotations
+
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets.labels import Separator
+
+LIST_SHARE = 0.4
+NO_LIMIT = 16_777_215
+"""Qt's own measure of a widget that may be as large as it likes."""
+
+
+class ListBeside(QWidget):
+    """The list is ``list_px`` wide, two fifths at most; below ``narrow_px`` it is ``list_high_px`` high."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        parts: tuple[QWidget, QWidget, QWidget],
+        *,
+        list_px: float,
+        list_high_px: float,
+        narrow_px: float,
+    ) -> None:
+        """``parts`` are the filter, the list, and what shows what is chosen."""
+        super().__init__()
+        self._theme, (find, listed, chosen) = theme, parts
+        self._list_px, self._list_high_px, self._narrow_px = list_px, list_high_px, narrow_px
+        self._side = QWidget()
+        side = QVBoxLayout(self._side)
+        side.setContentsMargins(0, 8, 0, 0)
+        side.setSpacing(6)
+        row = QHBoxLayout()
+        row.setContentsMargins(8, 0, 8, 0)
+        row.addWidget(find)
+        side.addLayout(row)
+        side.addWidget(listed, 1)
+        self._upright = Separator(theme, upright=True)
+        self._sides = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._sides.setContentsMargins(0, 0, 0, 0)
+        self._sides.setSpacing(0)
+        self._sides.addWidget(self._side)
+        self._sides.addWidget(self._upright)
+        self._sides.addWidget(chosen, 1)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.fit()
+
+    def fit(self) -> None:
+        """Share the room out anew: also after the size of letters has changed."""
+        beside = self.width() >= self._theme.scaled(self._narrow_px)
+        way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        self._sides.setDirection(way)
+        self._upright.setVisible(beside)
+        wide = round(min(self._theme.scaled(self._list_px), self.width() * LIST_SHARE))
+        self._side.setMinimumWidth(wide if beside else 0)
+        self._side.setMaximumWidth(wide if beside else NO_LIMIT)
+        self._side.setMaximumHeight(NO_LIMIT if beside else round(self._theme.scaled(self._list_high_px)))
