@@ -77,7 +77,6 @@ class Key(NamedTuple):
 def template(root: Path = ROOT) -> Catalog:
     """All sentences that the sources have."""
     # not above: hatch_build.py compiles where only what builds the project is installed
-    from nep.cli.app import app as nep_command  # noqa: PLC0415
     from nep.cli.app import docstrings  # noqa: PLC0415
 
     made = Catalog(project="NEP Studio", creation_date=_MADE, header_comment=_HEADER, fuzzy=False)
@@ -91,7 +90,7 @@ def template(root: Path = ROOT) -> Catalog:
                 made.add(_id(ids), locations=[(place, 0)], auto_comments=comments, context=context)
     for english in FOREIGN:
         made.add(english, locations=[("typer", 0)])
-    for _command, english in docstrings(nep_command):
+    for _command, english in docstrings():
         made.add(english, locations=[("nep/cli", 0)])
     for english, place in sentences_of_robots(root):
         made.add(english, locations=[(place, 0)], context="robot")

@@ -61,7 +61,7 @@ class _RunByItself(TranslatedGroup):
         return super().parse_args(ctx, args)
 
 
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     cls=_RunByItself,
     help=_("What is known of the world, and how old it is: run a blackboard, look into one."),
 )

@@ -15,7 +15,9 @@ from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, NodeInfo
 from nep.text import escaped
 
-app = typer.Typer(cls=TranslatedGroup, no_args_is_help=True, help=_("The programs that are there."))
+app: typer.Typer = typer.Typer(
+    cls=TranslatedGroup, no_args_is_help=True, help=_("The programs that are there.")
+)
 _COLUMNS = (
     TextColumn(lazy("node"), style="bold", is_whole=True),
     TextColumn(lazy("language")),

@@ -29,7 +29,7 @@ from nep.patterns.parameters.remote import RemoteParameters, node_with_parameter
 from nep.system.replace_file import replace_file
 from nep.text import escaped, shortened
 
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
     help=_("Values of a node that can be set while it runs."),

@@ -36,7 +36,7 @@ else:  # the other commands need not wait for it, nor have what it needs
     reader = lazy_module("nep.recordings.reader")
     repairs = lazy_module("nep.recordings.repair")
 
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
     help=_("What was recorded: look into it, mend it, make other files of it."),

@@ -25,7 +25,7 @@ from nep.protocol.graph_view import GraphView, ServiceInfo
 from nep.protocol.service_wire import check_service
 from nep.text import escaped, shortened
 
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
     help=_("Who answers calls: list the services, look into one, call it."),

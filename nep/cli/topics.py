@@ -19,7 +19,7 @@ from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.text import escaped
 
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
     help=_("What is published: list it, look into it, measure it, publish."),

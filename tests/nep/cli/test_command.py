@@ -334,6 +334,19 @@ def test_the_command_starts_without_loading_rich():
     assert subprocess.run([sys.executable, "-c", code], env=environment(), check=False).returncode == 0
 
 
+def test_a_command_line_imports_its_own_command_alone():
+    code = (
+        "import sys\n"
+        "from nep.cli.app import run\n"
+        "sys.argv = ['nep', 'doctor', '--timeout', 'x']\n"
+        "assert run() == 2\n"
+        "assert 'nep.cli.doctor' in sys.modules\n"
+        "others = ('masters', 'topics', 'recordings', 'watch', 'bridge')\n"
+        "assert not [name for name in others if f'nep.cli.{name}' in sys.modules]\n"
+    )
+    assert subprocess.run([sys.executable, "-c", code], env=environment(), check=False).returncode == 0
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
