@@ -8,7 +8,7 @@ million cost no more than some thousands. It is appended to; what comes late is 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 
 import numpy as np
@@ -79,6 +79,36 @@ class _Level:
         self.built = kept
 
 
+@dataclass(slots=True)
+class _Peaks:
+    """The least and greatest of pixels that were drawn, by their number and what lay in them then.
+
+    A plot that moves on draws nearly the same pixels again; most need not be looked through once more.
+    """
+
+    width_s: float = 0.0
+    rewritten: int = 0
+    keys: Floats = field(default_factory=lambda: np.empty(0))
+    starts: Indexes = field(default_factory=lambda: np.empty(0, dtype=np.intp))  # absolute, as the ends
+    ends: Indexes = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    low: Floats = field(default_factory=lambda: np.empty(0))
+    high: Floats = field(default_factory=lambda: np.empty(0))
+
+    def forget_from(self, time_s: float) -> None:
+        """Forget the pixels that reach beyond a time."""
+        kept = int(np.searchsorted((self.keys + 1) * self.width_s, time_s, side="right"))
+        for name in ("keys", "starts", "ends", "low", "high"):
+            setattr(self, name, getattr(self, name)[:kept])
+
+    def places(self, keys: Floats, starts: Indexes, ends: Indexes) -> tuple[Indexes, NDArray[np.bool_]]:
+        """Where each of these pixels stands, and whether it has just the same in it."""
+        if not len(self.keys):
+            return np.zeros(len(keys), dtype=np.intp), np.zeros(len(keys), dtype=bool)
+        at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        same = (self.keys[at] == keys) & (self.starts[at] == starts) & (self.ends[at] == ends)
+        return at, same
+
+
 class Samples:
     """Times in s, never falling, and finite values. One thread uses it.
 
@@ -94,6 +124,7 @@ class Samples:
         self._times, self._values = np.empty(_FIRST_ROOM), np.empty(_FIRST_ROOM)
         self._gaps = np.zeros(_FIRST_ROOM, dtype=bool)
         self._levels = tuple(_Level(shift) for shift in SHIFTS)
+        self._drawn = _Peaks()
         self._rewrites: deque[tuple[int, float]] = deque(maxlen=_REWRITES_KEPT)
         self.rewritten = 0
         self._gap_wanted = False
@@ -324,16 +355,17 @@ class Samples:
 
     def _peaks(self, begin_s: float, end_s: float, columns: int, part: tuple[int, int]) -> Line:
         width = (end_s - begin_s) / columns
-        edges = width * (
-            np.floor(begin_s / width) + np.arange(columns + 2)
-        )  # the same while the plot moves on
+        if 1e-30 < width < 1e30:  # rounded, so that pixels have the same edges while the plot moves on
+            width = float(np.float32(width))
+        keys = np.floor(begin_s / width) + np.arange(columns + 2)
+        edges = width * keys
         places = part[0] + np.searchsorted(self._times[part[0] : part[1]], edges)
         places[0] = part[0]
         places[-1] = part[1]
         starts, ends = places[:-1], places[1:]
         there = ends > starts
         starts, ends, middles = starts[there], ends[there], (edges[:-1] + width / 2)[there]
-        low, high, _total = self._reduced(starts, ends)
+        low, high = self._peaks_of(width, keys[:-1][there], starts, ends)
         values = np.column_stack([low, high]).ravel()
         rising = self._values[ends - 1] < self._values[starts]  # nearer to how the line really runs
         values[0::2], values[1::2] = np.where(rising, high, low), np.where(rising, low, high)
@@ -344,6 +376,26 @@ class Samples:
         points = part[1] - part[0]
         times = np.insert(times, broken, times[broken])
         return Line(times, np.insert(values, broken, np.nan), points, is_whole=False)
+
+    def _peaks_of(
+        self, width_s: float, keys: Floats, starts: Indexes, ends: Indexes
+    ) -> tuple[Floats, Floats]:
+        """The least and greatest of each pixel; what was drawn before, and has not changed, is known."""
+        drawn = self._drawn
+        changed_s = self.rewritten_from(drawn.rewritten)
+        if drawn.width_s != width_s:
+            drawn = self._drawn = _Peaks(width_s)
+        elif changed_s is not None:
+            drawn.forget_from(changed_s)
+        drawn.rewritten = self.rewritten
+        absolute = starts + self.begun, ends + self.begun
+        at, known = drawn.places(keys, *absolute)
+        low, high = np.empty(len(keys)), np.empty(len(keys))
+        low[known], high[known] = drawn.low[at[known]], drawn.high[at[known]]
+        if not known.all():
+            low[~known], high[~known], _total = self._reduced(starts[~known], ends[~known])
+        drawn.keys, (drawn.starts, drawn.ends), drawn.low, drawn.high = keys, absolute, low, high
+        return low, high
 
     def _reduced(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats, Floats]:
         """The least, greatest and sum of each range of indexes; none is empty. Exact: no bucket is cut."""

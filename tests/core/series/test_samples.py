@@ -228,6 +228,29 @@ def test_columns_stay_where_they_are_while_the_plot_moves_on() -> None:
     assert len(points[0] & points[1]) > 900
 
 
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([20_000, 1 << 20]), st.sampled_from([30, 200]))
+def test_what_was_drawn_before_is_drawn_as_if_for_the_first_time(seed, limit, columns) -> None:
+    random = np.random.default_rng(seed)
+    samples, now_s = Samples(limit), 0.0
+    for _turn in range(12):
+        count = int(random.integers(1, 6000))
+        times = now_s + np.cumsum(random.exponential(0.001, count))
+        samples.extend(times, random.normal(size=count), random.random(count) < 0.001)
+        now_s = float(times[-1])
+        if random.random() < 0.3:
+            samples.add(now_s - random.uniform(0, LATE_S), 50.0 * random.normal())  # late
+        if random.random() < 0.15:
+            now_s -= 2 * LATE_S + random.exponential(5)
+            samples.add(now_s, 1.0)  # a clock was set back
+        span_s = float(random.choice([10.0, 10.0, 3.0, 1e-40]))
+        fresh = Samples()
+        fresh.extend(samples.times.copy(), samples.values.copy(), samples.gaps.copy())
+        one, two = (each.line(now_s - span_s, now_s, columns) for each in (samples, fresh))
+        assert np.array_equal(one.times, two.times)
+        assert np.array_equal(one.values, two.values, equal_nan=True)
+
+
 def test_the_oldest_go_and_are_counted_and_figures_stay_right() -> None:
     samples = Samples(limit=8192)
     random = np.random.default_rng(1)
