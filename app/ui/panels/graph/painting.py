@@ -123,13 +123,14 @@ class _Painting:
             pen.setDashPattern([5 / width, 4 / width])
         self.painter.setPen(pen)
         self.painter.setBrush(Qt.BrushStyle.NoBrush)
-        path, arrows = item.drawn()
-        self.painter.drawPath(path)
         if self.is_tiny:
+            for way in item.plain():
+                self.painter.drawPolyline(way)
             return
+        self.painter.drawPath(item.path())
         self.painter.setPen(Qt.PenStyle.NoPen)
         self.painter.setBrush(colour)
-        for arrow in arrows:
+        for arrow in item.arrows():
             self.painter.drawPolygon(arrow)
 
     def _label(self, item: LineItem, rect: QRectF) -> None:

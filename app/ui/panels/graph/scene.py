@@ -71,16 +71,31 @@ class LineItem:
     is_placed: bool = False
     figures: LineFigures = field(default_factory=lambda: LineFigures("", 1.25))
     is_dim: bool = False
-    _drawn: tuple[QPainterPath, list[QPolygonF]] | None = None
+    _path: QPainterPath | None = None
+    _arrows: list[QPolygonF] | None = None
+    _plain: list[QPolygonF] | None = None
 
-    def drawn(self) -> tuple[QPainterPath, list[QPolygonF]]:
-        """The ways with round corners, and their arrows; made when they are first painted."""
-        if self._drawn is None:
-            path = QPainterPath()
+    # Each is made when it is first painted: all of a large graph at once would hold the window up.
+
+    def path(self) -> QPainterPath:
+        """The ways with round corners."""
+        if self._path is None:
+            self._path = QPainterPath()
             for points in self.ways.values():
-                _add_rounded(path, points)
-            self._drawn = path, [_arrow(points) for points in self.ways.values()]
-        return self._drawn
+                _add_rounded(self._path, points)
+        return self._path
+
+    def arrows(self) -> list[QPolygonF]:
+        """The arrow of each way."""
+        if self._arrows is None:
+            self._arrows = [_arrow(points) for points in self.ways.values()]
+        return self._arrows
+
+    def plain(self) -> list[QPolygonF]:
+        """The ways with sharp corners, for a size in which nobody sees the difference."""
+        if self._plain is None:
+            self._plain = [QPolygonF([QPointF(*at) for at in points]) for points in self.ways.values()]
+        return self._plain
 
 
 @dataclass(slots=True)
