@@ -342,10 +342,13 @@ def _facts_of(recording: Recording) -> tuple[frozenset[str], frozenset[str]]:
 def sent_words(sent: SentTopic) -> str:
     """How many were sent, and how many left out: "412 sent, 3 left out, being late"."""
     words = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
-    if not sent.skipped:
-        return words
-    late = ngettext("{count} left out, being late", "{count} left out, being late", sent.skipped)
-    return f"{words}, {late.format(count=sent.skipped)}"
+    return f"{words}, {late_words(sent.skipped)}" if sent.skipped else words
+
+
+def late_words(count: int) -> str:
+    """How many were left out: "3 left out, being late"."""
+    said = ngettext("{count} left out, being late", "{count} left out, being late", count)
+    return said.format(count=count)
 
 
 def _nothing() -> None:
