@@ -39,7 +39,6 @@ class ReplayStrip(ArmedStrip):
         self.change.setAccessibleName(_("Choose which topics are sent"))
         self.change.setToolTip(plain.tip(self.change.accessibleName()))
         self.change.clicked.connect(self.change_wanted)
-        self._flow.push()
         self._flow.addWidget(self.change)
 
     @property
