@@ -221,7 +221,8 @@ class Session:
         live = self.live
         self._end_replay()
         self._live = live
-        self.replay = opened = replay_module.Replay(path, self.settings, self.alerts, clock=self._clock)
+        opened = replay_module.Replay(path, self.settings, self.alerts, clock=self._clock, acting=self.acting)
+        self.replay = opened
         self.topics, self.nodes, self.networks = opened.topics, opened.nodes, opened.networks
         self.images, self.series, self.graph = opened.images, opened.series, None
         self.sources_shown += 1

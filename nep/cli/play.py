@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Collection, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Collection, Sequence
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -23,7 +23,6 @@ from nep.cli.screen import console, say
 from nep.cli.topic_wait import node_for
 from nep.errors import NepError
 from nep.i18n import _, listed, ngettext, number
-from nep.messages.codecs import codec_for
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
@@ -33,18 +32,12 @@ from nep.system.lazy_import import lazy_module
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from nep.recordings import player, reader, recorder
+    from nep.recordings import player, reader
 else:  # the other commands need not wait for it, nor have what it needs
     player = lazy_module("nep.recordings.player")
     reader = lazy_module("nep.recordings.reader")
-    recorder = lazy_module("nep.recordings.recorder")
 
 _LOOK_S = 0.2
-_COMMAND_TYPES = frozenset({"robot/command", "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
-_COMMAND_TOPICS = frozenset({"command", "robot_action", "cmd_vel"})
-"""By which robots are told what to do (docs/robots.md), or a base of ROS its speed: last parts of names."""
-_MOVING = ("command", "world")
-"""What a robot's description calls its topics by which it is moved, where it gives them names of its own."""
 
 
 def play(
@@ -76,11 +69,12 @@ def play(
     with --arm, and when they are named.
     """
     with reader.Recording(file) as recording:
-        moving = _moves_robots(recording)
+        moving = player.moving_topics(recording)
         chosen = _chosen(recording, topics or (), moving, publish_all=publish_all)
         names = _names(chosen, remap or ())
         # A robot's commands move it also under another name, where somebody may hear them.
-        moved = [each for each in (*chosen, *names.values()) if each in moving or _is_command_topic(each)]
+        sent = (*chosen, *names.values())
+        moved = [each for each in sent if each in moving or player.is_command_topic(each)]
         if moved and not arm:
             raise NepError(
                 _("'{topic}' moves a robot; add --arm when nobody is in its way").format(topic=moved[0])
@@ -114,25 +108,6 @@ def _chosen(
             said = _("'{topic}' moves a robot and is not sent; name it and add --arm to send it")
             say(said.format(topic=name))
     return [name for name in recording.topics if name not in moving or name in named]
-
-
-def _moves_robots(recording: reader.Recording) -> set[str]:
-    """The topics by which robots are moved, whether they are in the recording or not."""
-    by_type = {each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES}
-    kind = recorder.DESCRIPTION_TYPE
-    described = {each.name for each in recording.topics.values() if each.msg_type == kind}
-    named = set[str]()
-    for _at, message in recording.read(topics=described) if described else ():
-        with suppress(NepError):
-            description = message.payload
-            topics = description.get("rb:topics") if isinstance(description, Mapping) else None
-            if isinstance(topics, Mapping):
-                named.update(each for key in _MOVING if isinstance(each := topics.get(key), str))
-    return by_type | named | {name for name in recording.topics if _is_command_topic(name)}
-
-
-def _is_command_topic(topic: str) -> bool:
-    return topic.rsplit("/", 1)[-1] in _COMMAND_TOPICS
 
 
 def _names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
@@ -176,10 +151,7 @@ class _Sender:
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._node = node
         self.count = 0
-        latched = {
-            each.message.topic for each in recording.newest(recording.end_ns, chosen).values()
-            if each.message.is_latched
-        }  # fmt: skip
+        latched = player.latched_topics(recording, chosen)
         self._latched = {names.get(each, each) for each in latched}
         for topic in chosen:  # before the first message, so that who listens hears it
             self._publisher(names.get(topic, topic), recording.topics[topic].msg_type)
@@ -194,8 +166,8 @@ class _Sender:
     def send(self, messages: Sequence[Message]) -> None:
         """Publish their bytes as they were."""
         for each in messages:
-            kind = each.msg_type if codec_for(each.msg_type).name == each.codec else each.codec
-            self._publisher(each.topic, kind).publish_bytes(bytes(each.data), dict(each.extension) or None)
+            publisher = self._publisher(each.topic, player.published_type(each))
+            publisher.publish_bytes(bytes(each.data), dict(each.extension) or None)
             self.count += 1
 
     def __enter__(self) -> Self:

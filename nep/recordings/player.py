@@ -2,6 +2,7 @@
 
 `Playback` is the timing, with a clock that is passed in and nothing that waits. `Player` is a thread around
 it that gives what is due to a sink. Nothing is published by either: who wants that gives a sink that does.
+What such a sink has to know, above all which topics move robots, is here, too.
 """
 
 from __future__ import annotations
@@ -9,18 +10,33 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from nep.errors import NepError
 from nep.i18n import _
+from nep.messages.codecs import codec_for
 from nep.messages.message import UNDECODED, Message, MessageKind, new_message
 from nep.recordings.reader import RecordedMessage, Recording
+from nep.recordings.recorder import DESCRIPTION_TYPE
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["SPEED_MAX", "SPEED_MIN", "Due", "Playback", "Player", "PlayerStatus"]
+__all__ = [
+    "SPEED_MAX",
+    "SPEED_MIN",
+    "Due",
+    "Playback",
+    "Player",
+    "PlayerStatus",
+    "is_command_topic",
+    "latched_topics",
+    "moving_topics",
+    "published_type",
+]
 
 SPEED_MIN, SPEED_MAX = 0.1, 10.0
 _MOST_LAG_S = 0.25
@@ -29,6 +45,11 @@ _MOST_AT_ONCE = 2_000
 _MOST_WAIT_S = 0.05
 _MEASURED_S = 1.0
 _MOST_KINDS = 10_000
+_COMMAND_TYPES = frozenset({"robot/command", "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
+_COMMAND_TOPICS = frozenset({"command", "robot_action", "cmd_vel"})
+"""By which robots are told what to do (docs/robots.md), or a base of ROS its speed: last parts of names."""
+_MOVING = ("command", "world")
+"""What a robot's description calls its topics by which it is moved, where it gives them names of its own."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +73,14 @@ class Due:
     """What is to be given out now.
 
     `messages`: in their order. `is_jump`: they are the newest of each topic at another place, not what came
-    next. `wait_s`: until there is more to do, None when it is paused.
+    next. `wait_s`: until there is more to do, None when it is paused. `log_ns`: when each of them was
+    recorded, but for a jump.
     """
 
     messages: Sequence[Message]
     is_jump: bool
     wait_s: float | None
+    log_ns: Sequence[int] = ()
 
 
 class Playback:
@@ -220,7 +243,18 @@ class Playback:
         if self._position_ns >= self._last_ns():
             self._come_to_end()
         messages = [self._renamed(each.message) for each in due]
-        return Due(messages, is_jump=False, wait_s=self._wait_s())
+        return Due(messages, False, self._wait_s(), [each.log_ns for each in due])
+
+    def shown_first(self, topics: Collection[str]) -> Sequence[Message]:
+        """What lies at the very beginning of the part, when a jump has shown it and it will not come again.
+
+        Who acts on what is played, and on no jump, lacks it when it plays from the beginning.
+        """
+        first_ns = self._first_ns()
+        if self._position_ns != first_ns or self._from_ns != first_ns + 1:
+            return ()
+        there = self._recording.read(first_ns, first_ns + 1, topics)
+        return [self._renamed(each.message) for each in there]
 
     def _target(self) -> int:
         now = self._clock()
@@ -311,6 +345,36 @@ class Playback:
 
 def _log_ns(each: RecordedMessage) -> int:
     return each.log_ns
+
+
+def moving_topics(recording: Recording) -> frozenset[str]:
+    """The topics by which robots are moved, as far as a recording tells; they may not be in it themselves."""
+    by_type = {each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES}
+    described = {each.name for each in recording.topics.values() if each.msg_type == DESCRIPTION_TYPE}
+    named = set[str]()
+    for _at, message in recording.read(topics=described) if described else ():
+        with suppress(NepError):
+            description = message.payload
+            topics = description.get("rb:topics") if isinstance(description, Mapping) else None
+            if isinstance(topics, Mapping):
+                named.update(each for key in _MOVING if isinstance(each := topics.get(key), str))
+    return frozenset(by_type | named | {name for name in recording.topics if is_command_topic(name)})
+
+
+def is_command_topic(topic: str) -> bool:
+    """Whether robots are usually told what to do by a topic of this name."""
+    return topic.rsplit("/", 1)[-1] in _COMMAND_TOPICS
+
+
+def latched_topics(recording: Recording, topics: Iterable[str]) -> frozenset[str]:
+    """Those of these topics whose last message was kept for who comes later."""
+    newest = recording.newest(recording.end_ns, list(topics))
+    return frozenset(each.message.topic for each in newest.values() if each.message.is_latched)
+
+
+def published_type(message: Message) -> str:
+    """The type under which its bytes are published again, so that they are read as they were."""
+    return message.msg_type if codec_for(message.msg_type).name == message.codec else message.codec
 
 
 class Player:

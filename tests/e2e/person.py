@@ -90,10 +90,22 @@ class Person:
     # -- doing ------------------------------------------------------------------------------------
 
     def click(self, name: str = "", **wanted: object) -> Seen:
-        """Click on a widget when it can be clicked."""
-        seen = self.find(name, enabled=True, takes_mouse=True, **wanted)
+        """Click on a widget when it can be clicked and stands still: keys and mouse overtake a layout."""
+        before: list[object] = []
+
+        def resting() -> Seen | None:
+            seen = next(iter(self.all(name, enabled=True, takes_mouse=True, **wanted)), None)
+            stands, before[:] = seen is not None and before == [seen["rect"]], [seen and seen["rect"]]
+            return seen if stands else None
+
+        seen = until(resting, lambda: f"no {name} {wanted} that stands still; {self._alike(name)}")
         self.screen.click(*middle(seen["rect"]))
         return seen
+
+    def _alike(self, name: str) -> str:
+        """What a failure says of the widgets of this name: which there are, and whether they can be used."""
+        found = [(each["kind"], each["enabled"], each["rect"]) for each in self.all(name)] if name else []
+        return f"of this name (kind, enabled, place): {found}"
 
     def choose(self, menu: str, entry: str) -> None:
         """Choose an entry of a menu of the menu bar, once the menu before it has closed.

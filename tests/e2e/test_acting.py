@@ -48,9 +48,24 @@ def lamp(address: str) -> Iterator[Lamp]:
 
 
 def write(studio: Studio, fingers: Fingers, name: str, words: str, **wanted: object) -> None:
-    """Click a field of the form and write into it."""
+    """Click a field of the form, write into it, and see that it stands there: keys take their time."""
     studio.screen.click(*middle(studio.find(name, enabled=True, **wanted)["rect"]))
+    studio.find(name, focus=True, **wanted)
     fingers.write(words)
+    until(
+        lambda: studio.all(name, text=words, **wanted),
+        lambda: f"{name} says {words}: {[each['text'] for each in studio.all(name, **wanted)]}",
+    )
+
+
+def said(studio: Studio) -> str:
+    """What the window has to say of what is sent and called, for who reads a failure."""
+    kinds = ("Switch", "Button", "LinkButton")
+    buttons = [
+        (each["name"] or each["text"], each["enabled"]) for each in studio.look() if each["kind"] in kinds
+    ]
+    lines = [row["texts"] for row in studio.rows("What happened, newest first")][:8]
+    return f"buttons {buttons}; the Console {lines}"
 
 
 def test_a_message_is_written_armed_and_sent_until_stop(studio: Studio, address: str) -> None:
@@ -68,10 +83,13 @@ def test_a_message_is_written_armed_and_sent_until_stop(studio: Studio, address:
         assert seen.heard == []
         studio.click("Put it right")
         studio.click("Arm and send")
-        until(lambda: seen.heard == [{"level": 0.4, "on": True}], lambda: f"heard once: {seen.heard}")
+        until(
+            lambda: seen.heard == [{"level": 0.4, "on": True}],
+            lambda: f"heard once: {seen.heard}; {said(studio)}",
+        )
 
         studio.click("Start sending")
-        until(lambda: len(seen.heard) > 10, "it is sent again and again")
+        until(lambda: len(seen.heard) > 10, lambda: f"heard again: {len(seen.heard)}; {said(studio)}")
         fingers.press("F12")
         until(lambda: not studio.all("End sending"), "Stop ends it")
         count = len(seen.heard)
@@ -82,7 +100,7 @@ def test_a_message_is_written_armed_and_sent_until_stop(studio: Studio, address:
         studio.click("JSON")  # nothing is known of what it takes
         write(studio, fingers, "The request", '{"name": "Aiko"}')
         studio.click("Arm and call")
-        until(lambda: seen.asked == [{"name": "Aiko"}], lambda: f"called once: {seen.asked}")
+        until(lambda: seen.asked == [{"name": "Aiko"}], lambda: f"called once: {seen.asked}; {said(studio)}")
         studio.says("answered in ")
         assert len(seen.heard) == count
     assert studio.quit() == 0

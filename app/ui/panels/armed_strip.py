@@ -31,6 +31,9 @@ def left_words(seconds: float) -> str:
 class ArmedStrip(QWidget):
     """Stands on top of each panel from which something can be sent."""
 
+    for_replay = False
+    """Whether what it arms can be sent while a recording shows."""
+
     def __init__(self, context: PanelContext) -> None:
         super().__init__()
         self._context, self._theme = context, context.theme
@@ -43,7 +46,8 @@ class ArmedStrip(QWidget):
         self.tokens: list[LinkButton] = []
         self._flow_place = QWidget()
         self._flow = Flow(self._flow_place, gap=8, row_gap=4)
-        for widget in (self.switch, self.words, self._sends):
+        self.counts = label("", "small", role="textSecondary")
+        for widget in (self.switch, self.words, self._sends, self.counts):
             self._flow.addWidget(widget)
         self.question = label("", "small", role="warn", wrap=True)
         self.question.setMinimumWidth(0)
@@ -69,6 +73,7 @@ class ArmedStrip(QWidget):
         column.addLayout(inside)
         column.addWidget(Separator(self._theme))
         self._asks.hide()
+        self.counts.hide()
         self.refresh()
 
     @property
@@ -82,20 +87,21 @@ class ArmedStrip(QWidget):
         arming, question = acting.arming, acting.question
         left, replaying = left_words(arming.left_s), self._context.session.is_replaying
         targets = arming.targets if arming.is_on else ()
-        facts = (arming.is_on, left, targets, question, replaying)
+        more = self.more_words()
+        facts = (arming.is_on, left, targets, question, replaying, more)
         if facts == self._seen:
             return
         self._seen = facts
         self._is_on = arming.is_on
         self.switch.setChecked(arming.is_on)
-        self.switch.setEnabled(not replaying)
-        if replaying:
-            said = _("Nothing is sent while a recording shows")
-        else:
-            said = _("{time} left").format(time=left) if arming.is_on else _("Nothing is sent")
-        self.words.setText(said)
+        can_arm = self.for_replay or not replaying
+        self.switch.setEnabled(can_arm or arming.is_on)
+        nothing = _("Nothing is sent") if can_arm else _("Nothing is sent while a recording shows")
+        self.words.setText(_("{time} left").format(time=left) if arming.is_on else nothing)
         set_role(self.words, "warn" if arming.is_on else "textSecondary")
         self._sends.setVisible(bool(targets))
+        self.counts.setVisible(bool(more))
+        self.counts.setText(more)
         self._show_tokens(targets)
         said = question.sentence if question is not None else ""
         self._asks.setVisible(question is not None)
@@ -103,6 +109,14 @@ class ArmedStrip(QWidget):
             self.question.setText(said)
             paint.announce(self, said)
         self.update()
+
+    def more_words(self) -> str:
+        """What has been sent so far, where the panel does not say it itself."""
+        return ""
+
+    def token_words(self, target: Target) -> str:
+        """What stands for something that is sent to."""
+        return target.name
 
     def _show_tokens(self, targets: tuple[Target, ...]) -> None:
         if [token.property("target") for token in self.tokens] == [each.name for each in targets]:
@@ -113,13 +127,15 @@ class ArmedStrip(QWidget):
             token.deleteLater()
         self.tokens = []
         for target in targets:
-            token = LinkButton(self._theme, target.name, "x")
+            token = LinkButton(self._theme, self.token_words(target), "x")
             token.setProperty("target", target.name)
             token.setAccessibleName(_("Send nothing to {name} any more").format(name=target.name))
             token.setToolTip(plain.tip(token.accessibleName()))
             token.clicked.connect(lambda _on=False, target=target: self.acting.forbid(target))
             self._flow.addWidget(token)
             self.tokens.append(token)
+        self._flow.removeWidget(self.counts)
+        self._flow.addWidget(self.counts)  # behind them
 
     def _switched(self) -> None:
         if self.acting.arming.is_on:

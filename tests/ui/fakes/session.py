@@ -154,14 +154,15 @@ class Session(session_module.Session):
         self.ticks += 1
         self.clock.now += TICK_S
         now_ns = self.clock.ns()
-        for topic in self.topics.live():
+        for topic in self.live.topics.live():
             if topic.rate_hz:
                 topic.last_stamp_ns = now_ns - round(self.ticks * 0.033 % (1 / topic.rate_hz) * 1e9)
         if self.ticks % 3 == 0:
             self.source.send(self._message("/blackboard", sample_data.blackboard(self.ticks / 30)))
-        for stream in self.images.streams:
+        pictures: Images = self.live.images  # also while a recording shows
+        for stream in pictures.streams:
             if not stream.resting:
-                self.images.look(stream.topic)
+                pictures.look(stream.topic)
         super().tick()
 
     def put(self, topic: Topic) -> Topic:

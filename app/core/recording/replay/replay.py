@@ -16,7 +16,9 @@ from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import Networks
 from app.core.recording.replay.density import Densities
 from app.core.recording.replay.opening import OpenedRecording
+from app.core.recording.replay.sending import ReplaySending
 from app.core.recording.replay.source import Handed, ReplaySource, ReplayStatus
+from app.core.run.acting.acting import SessionActing
 from app.core.series.feed import SeriesFeed
 from app.core.storage.settings import Settings
 from nep.i18n import _, ngettext
@@ -51,8 +53,9 @@ class Replay:
         alerts: Alerts,
         *,
         clock: Callable[[], float] = time.monotonic,
+        acting: SessionActing | None = None,
     ) -> None:
-        """Nothing is read before `start`."""
+        """Nothing is read before `start`. Without ``acting`` nothing of it can be sent."""
         self.path = path
         self.opened: OpenedRecording | None = None
         self._watches = Watches(self._begin_watch, self._end_watch)
@@ -65,6 +68,9 @@ class Replay:
         self.graph: GraphView | None = None
         self.densities: Densities | None = None
         self.chosen = ""
+        self.sending = ReplaySending(acting) if acting is not None else None
+        if self.sending is not None:
+            self.sending.on_change = self._forward
         self._logs: list[Watch] = []
         self._alerts, self._has_failed, self._damaged = alerts, False, 0
         for id in (FAILED, REPAIRED, DAMAGED):
@@ -79,7 +85,9 @@ class Replay:
         return self._watches.open([topic])
 
     def end(self) -> None:
-        """Let its threads end, and wait for nothing; `close` waits."""
+        """Send nothing any more, let its threads end, and wait for nothing; `close` waits."""
+        if self.sending is not None:
+            self.sending.end()
         self.source.end()
 
     @property
@@ -282,11 +290,21 @@ class Replay:
         if handed.figures:
             self.topics.set_figures({name: (x.rate_hz, x.newest_ns) for name, x in handed.figures.items()})
         self.topics.age(now, self._position_ns())
+        if self.sending is not None:
+            self.sending.tick()
+
+    def _forward(self) -> None:
+        """Other topics are sent than before."""
+        if self.sending is not None:
+            outbox = self.sending.outbox
+            self.source.forward({sent.route.recorded for sent in outbox.going}, outbox.offer)
 
     def _opened(self, opened: OpenedRecording, now: float) -> None:
         self.opened = opened
         recording = opened.recording
         self.series.origin_ns = recording.start_ns
+        if self.sending is not None:
+            self.sending.open(opened)
         self.graph = graph_of(recording.topics, opened.figures)
         self.topics.update(self.graph, now)
         self.chosen = next(iter(recording.topics), "")

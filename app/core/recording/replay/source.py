@@ -20,7 +20,7 @@ from app.core.network.mailbox import Drained, Mailbox
 from app.core.recording.replay.opening import OpenedRecording, Stage, open_recording
 from nep.errors import NepError
 from nep.messages.message import Message, new_message
-from nep.recordings.player import Playback, PlayerStatus
+from nep.recordings.player import Due, Playback, PlayerStatus
 from nep.recordings.reader import Recording
 
 RATE_S = 2.0
@@ -38,6 +38,8 @@ OWN_BYTES = 65_536
 
 ReplayStage = Literal["reading", "repairing", "there", "failed"]
 Order = Callable[[Playback], object]
+Forward = Callable[[Sequence[Message], Sequence[float]], object]
+"""Given what is played just now, and by each how many seconds too late; in the replay's thread."""
 
 
 class PictureSink(Protocol):
@@ -104,6 +106,9 @@ class ReplaySource:
         self._watched: set[str] = set()
         self._deep: dict[str, int] = {}
         self._chosen: frozenset[str] = frozenset()
+        self._sent: frozenset[str] = frozenset()
+        self._played: frozenset[str] = frozenset()
+        self._forward: Forward | None = None
         self._mailbox = Mailbox()
         self._handed = Handed()
         self._status = ReplayStatus("reading")
@@ -159,6 +164,12 @@ class ReplaySource:
             is_watched = topic in self._watched
         if room is not None and is_watched:  # else it has its history when it is watched
             self.order(f"history {topic}", lambda playback: self._look_back(playback, [topic]))
+
+    def forward(self, topics: Collection[str], to: Forward | None) -> None:
+        """Give these topics' messages to ``to`` as they are played; nothing of a jump."""
+        with self._changed:
+            self._sent, self._forward = frozenset(topics), to
+        self.order("choose", self._choose)
 
     def take(self) -> Handed:
         """What came since the last time."""
@@ -227,8 +238,12 @@ class ReplaySource:
             return None
         with self._changed:
             orders, self._orders = self._orders, []
+        was_playing = playback.status().is_playing
         for _kind, change in orders:
             change(playback)
+        if not was_playing and playback.status().is_playing and self._sent:
+            first = playback.shown_first(self._sent)
+            self._forward_on(first, [0.0] * len(first))
         due = playback.advance()
         if due.is_jump:
             self._jump(due.messages)
@@ -237,7 +252,9 @@ class ReplaySource:
                 deep = frozenset(self._deep)
             self._look_back(playback, deep & self._chosen)
         else:
-            self._hand(due.messages)
+            if self._sent:
+                self._forward_on(due.messages, late_of(due, playback.status()))
+            self._hand([each for each in due.messages if each.topic in self._chosen])
             self._tell(playback)
         is_due = playback.status().is_playing and not self._figures and self._clock() >= self._next_figures
         if due.is_jump or is_due:
@@ -251,10 +268,16 @@ class ReplaySource:
 
     def _choose(self, playback: Playback) -> None:
         with self._changed:
-            wanted, deep = frozenset(self._watched), frozenset(self._deep)
-        new = (wanted - self._chosen) & deep
-        self._chosen = wanted
-        self._hand([each for each in playback.choose(wanted) if each.topic not in new])
+            wanted, deep, sent = frozenset(self._watched), frozenset(self._deep), self._sent
+        seen = wanted - self._chosen  # by a panel, from now on
+        new = seen & deep
+        newest = list(playback.choose(wanted | sent))
+        played = (seen & self._played) - new  # for who listens on the network: no panel has its newest
+        if played and self.opened is not None:
+            before = self.opened.recording.newest(playback.status().position_ns, played)
+            newest += [each.message for each in before.values()]
+        self._hand([each for each in newest if each.topic in seen - new])
+        self._chosen, self._played = wanted, wanted | sent
         self._look_back(playback, new)
 
     def _hand(self, messages: Sequence[Message]) -> None:
@@ -266,8 +289,15 @@ class ReplaySource:
             for topic, some in groupby(sorted(own, key=_topic), key=_topic):
                 self._mailbox.post(topic, list(some))
 
+    def _forward_on(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
+        with self._changed:
+            topics, to = self._sent, self._forward
+        some = [each for each in zip(messages, late_s, strict=True) if each[0].topic in topics]
+        if some and to is not None:
+            to([message for message, _late in some], [late for _message, late in some])
+
     def _jump(self, messages: Sequence[Message]) -> None:
-        own = [_own(message) for message in messages]
+        own = [_own(message) for message in messages if message.topic in self._chosen]
         pictures = [each for each in own if each.codec == "image"]
         self._pictures.rewind([each.topic for each in pictures])
         self._pictures.offer(pictures)
@@ -350,6 +380,11 @@ class ReplaySource:
 
 class _ClosingError(Exception):
     """It is closed while it is opened."""
+
+
+def late_of(due: Due, status: PlayerStatus) -> list[float]:
+    """By message how many seconds after its time it is played, of the time of who listens."""
+    return [(status.position_ns - at_ns) / 1e9 / status.speed for at_ns in due.log_ns]
 
 
 def _topic(message: Message) -> str:

@@ -1,6 +1,7 @@
 """What a person sends and calls by hand in this session: the shelf, the switch, what goes on.
 
-Everything goes to the live network. While a recording shows nothing can be armed.
+Everything goes to the live network. While a recording shows nothing is written and called by hand: what it
+plays can be sent then (`app.core.recording.replay.sending`).
 """
 
 from __future__ import annotations
@@ -70,8 +71,11 @@ class ArmQuestion:
 
     @property
     def sentence(self) -> str:
-        """What would move."""
+        """What would move; no names: a robot that the recording knows, or any that listens."""
         said = _("{topic} moves {robots}. See that nobody stands in the way; Stop is F12.")
+        if not self.robots:
+            said = _("{topic} tells robots what to do. See that nobody stands in the way; Stop is F12.")
+            return said.format(topic=self.topic)
         return said.format(topic=self.topic, robots=listed(list(self.robots)))
 
 
@@ -88,9 +92,12 @@ class SessionActing:
         """Read what was kept beside the settings; without a ``path`` it is kept in memory alone."""
         self._session, self._clock = session, clock
         self.arming = Arming(clock)
-        submit = session.source.submit
-        self.outbox = Outbox(self.arming, submit, clock)
-        self.calls = ServiceCalls(self.arming, submit, clock, clock_s)
+        self.submit = session.source.submit
+        """Gives Studio's node on the live network to a job."""
+        self.outbox = Outbox(self.arming, self.submit, clock)
+        self.calls = ServiceCalls(self.arming, self.submit, clock, clock_s)
+        self.recorded_commands: frozenset[str] = frozenset()
+        """Topics by which robots are told what to do, as a recording says; until it is switched off."""
         self.question: ArmQuestion | None = None
         """What a person is to answer before a robot's topic is armed."""
         self.last: dict[str, SendResult] = {}
@@ -108,9 +115,12 @@ class SessionActing:
 
     # ---- the switch
 
-    def arm(self) -> str:
-        """Switch it on for `armed_s`; why it can't be, as a sentence."""
-        if self._session.is_replaying:
+    def arm(self, *, for_replay: bool = False) -> str:
+        """Switch it on for `armed_s`; why it can't be, as a sentence.
+
+        While a recording shows only who sends ``for_replay`` can.
+        """
+        if self._session.is_replaying and not for_replay:
             return _("A recording shows: go back to live to send.")
         was_on = self.arming.is_on
         self.arming.arm(self.armed_s)
@@ -122,7 +132,7 @@ class SessionActing:
     def disarm(self) -> None:
         """Switch it off, and end all sending; from when this returns on nothing is sent."""
         was_on = self.arming.disarm()
-        self.question = None
+        self.question, self.recorded_commands = None, frozenset()
         self.outbox.end_all()
         if was_on:
             self.revision += 1
@@ -135,9 +145,8 @@ class SessionActing:
 
         A topic that moves robots is asked for again: then `question` stands, unless the person ``is_sure``.
         """
-        moved = self._moved(target)
-        if moved and not is_sure and not self.arming.is_confirmed(target.name):
-            names = tuple(robot.name for robot in moved)
+        if not is_sure and self.asks(target):
+            names = tuple(robot.name for robot in self._moved(target))
             self.question = ArmQuestion(
                 target.name, names, partial(self._allow_surely, target, self.arming.turn, then)
             )
@@ -168,6 +177,17 @@ class SessionActing:
             if each.order.target == target:
                 self.outbox.end(each.order.id)
         self.revision += 1
+
+    def asks(self, target: Target) -> bool:
+        """Whether a person has to be asked again before anything is sent there: it moves a robot."""
+        if target.kind != "topic" or self.arming.is_confirmed(target.name):
+            return False
+        return target.name in self.recorded_commands or bool(self._moved(target))
+
+    @property
+    def is_asking(self) -> bool:
+        """Whether a person is asked, here or before a real robot moves for the first time."""
+        return self.question is not None or self._session.fleet.permission.question is not None
 
     def _moved(self, target: Target) -> list[Robot]:
         if target.kind != "topic":
@@ -205,12 +225,12 @@ class SessionActing:
 
         While it is not armed it is armed first, with this topic alone; a robot's topic is asked for again.
         """
-        problem = self.problem_of(message)
+        problem = self.problem_of(message) or self._not_now()
         if problem:
             return problem
         go_on = partial(self.send, message, rate_hz=rate_hz)
         target = Target("topic", message.topic)
-        not_armed = self._ready(target, go_on)
+        not_armed = self.ready(target, go_on)
         if not_armed is not None:
             return not_armed
         order = SendOrder(message.id, message.name, message.topic, message.msg_type, message.payload)
@@ -221,14 +241,21 @@ class SessionActing:
         self.revision += 1
         return ""
 
-    def _ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
-        """None when something may be sent there now; else why not, or "" when a person is asked."""
+    def _not_now(self) -> str:
+        """Why nothing can be written or called by hand now: a recording shows, which can be armed itself."""
+        return _("A recording shows: go back to live to send.") if self._session.is_replaying else ""
+
+    def ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
+        """None when something may be sent there now; else why not.
+
+        "" when a person is asked, or ``go_on`` was called already.
+        """
         if not self.arming.is_on:
             why_not = self.arm()
             if why_not:
                 return why_not
         moved = self._moved(target)
-        if not self.arming.allows(target) or (moved and not self.arming.is_confirmed(target.name)):
+        if not self.arming.allows(target) or self.asks(target):
             return self.allow(target, go_on)
         turn = self.arming.turn
 
@@ -252,7 +279,10 @@ class SessionActing:
             request = read_json(text).filled({})
         except NepError as error:
             return str(error)
-        not_armed = self._ready(Target("service", service), partial(self.call, service, text, timeout_s))
+        not_now = self._not_now()
+        if not_now:
+            return not_now
+        not_armed = self.ready(Target("service", service), partial(self.call, service, text, timeout_s))
         if not_armed is not None:
             return not_armed
         try:
@@ -274,7 +304,7 @@ class SessionActing:
             self.disarm()
         for each in self.outbox.all_repeated:  # a robot may have come that this topic moves
             target = each.order.target
-            if self._moved(target) and not self.arming.is_confirmed(target.name):
+            if self.asks(target):
                 self.outbox.end(each.order.id)
                 self.allow(target)
         for result in self.outbox.take():
@@ -295,6 +325,11 @@ class SessionActing:
         self.revision += 1
         level = "warn" if result.kind == "failed" else "info"
         self._say(level, f"{order.topic}: {order.name}, {result_words(result)}")
+
+    def tell(self, level: str, target: Target, words: str) -> None:
+        """Write down what was sent, for who reads the Console later."""
+        self.revision += 1
+        self._say(level, f"{target.name}: {words}")
 
     def _say(self, level: str, words: str) -> None:
         self._session.console.add(level, "studio", words)

@@ -1,4 +1,7 @@
-"""Timeline: the transport row, the ruler, and a lane for each topic of the recording that is open."""
+"""Timeline: the transport row, the ruler, and a lane for each topic of the recording that is open.
+
+What is played can be sent on the live network (`sending`).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,14 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtGui import QAction, QKeyEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.recording.replay.replay import STEP_NS, Replay
+from app.ui.panels.armed_strip import ArmedMinutes
 from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.row_actions import RowAction, filled
 from app.ui.panels.timeline.canvas import TimelineCanvas
+from app.ui.panels.timeline.sending import ReplayStrip, SendChooser
 from app.ui.panels.timeline.transport import TransportRow
 from app.ui.widgets import Chip, EmptyAction, EmptyState, Segments, Separator
 from app.ui.widgets.keyboard import is_plain
@@ -47,9 +52,15 @@ class TimelinePanel(PanelWidget):
         column = QVBoxLayout(body)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
+        self.strip, self.chooser = ReplayStrip(context), SendChooser(theme)
+        self._minutes = ArmedMinutes(theme, self, context.session.acting)
+        self._below = QStackedWidget()
+        self._below.addWidget(self.canvas)
+        self._below.addWidget(self.chooser)
         column.addWidget(self.transport)
         column.addWidget(Separator(theme))
-        column.addWidget(self.canvas, 1)
+        column.addWidget(self.strip)
+        column.addWidget(self._below, 1)
         self.pages = self.show_one_of(self.empty, body)
         self.setFocusProxy(self.canvas)
         self.ruler.changed.connect(self._choose_ruler)
@@ -58,6 +69,10 @@ class TimelinePanel(PanelWidget):
         self.canvas.rename_wanted.connect(self.rename_bookmark)
         self.canvas.menu_wanted.connect(self._show_menu)
         self.transport.bookmark_wanted.connect(self._bookmark)
+        self.transport.arm_wanted.connect(self.choose_sent)
+        self.strip.change_wanted.connect(self.choose_sent)
+        self.chooser.left.connect(self._leave_chooser)
+        self.chooser.refused.connect(self.context.toast)
         self._say()
 
     # -- what it shows ---------------------------------------------------------------------------------------
@@ -82,6 +97,10 @@ class TimelinePanel(PanelWidget):
             self._state = state
             self.canvas.fit()
         self.transport.show_replay(replay, player)
+        self.strip.refresh()
+        self.transport.show_armed(is_armed=self.strip.isVisibleTo(self))
+        if self._below.currentWidget() is self.chooser:
+            self.chooser.refresh()
         self.canvas.move_to(player.position_ns, player.loop if player.is_looping else None)
 
     def _say(self) -> None:
@@ -118,6 +137,7 @@ class TimelinePanel(PanelWidget):
     def source_changed(self) -> None:
         self._shown = None
         self.canvas.show_replay(None)
+        self._below.setCurrentWidget(self.canvas)
 
     def theme_changed(self) -> None:
         self.canvas.renew()
@@ -195,6 +215,26 @@ class TimelinePanel(PanelWidget):
             place = topics.index(replay.chosen) if replay.chosen in topics else 0
             self.show_topic(topics[max(0, min(len(topics) - 1, place + by))])
 
+    # -- what is sent ----------------------------------------------------------------------------------------
+
+    def choose_sent(self) -> None:
+        """Let a person choose what is sent on the live network, and under which names."""
+        replay = self._shown
+        if replay is not None and replay.sending is not None:
+            counts = {name: topic.message_count for name, topic in replay.recorded.items()}
+            self._below.setCurrentWidget(self.chooser)
+            self.chooser.open(replay.sending, counts, replay.chosen)
+
+    def _leave_chooser(self) -> None:
+        self._below.setCurrentWidget(self.canvas)
+        self.refresh()
+        place = self.strip.switch if self.strip.isVisibleTo(self) else self.transport.armed
+        place.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def shut(self) -> None:
+        if self.session.is_replaying:
+            self.session.acting.disarm()
+
     # -- bookmarks -------------------------------------------------------------------------------------------
 
     def _of_bookmark_here(self, do: Callable[[Bookmark], object]) -> None:
@@ -265,7 +305,7 @@ class TimelinePanel(PanelWidget):
         for old in self._listed:
             old.deleteLater()
         self._listed = made
-        return made
+        return [*made, self._minutes.entry()] if path else made
 
     _listed: Sequence[QAction] = ()
 

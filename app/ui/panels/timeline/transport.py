@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 from app.core.recording.replay.replay import Replay
 from app.core.recording.replay.scale import clock_words, date_words, span_words
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, IconButton, ToggleButton, label
+from app.ui.widgets import Button, IconButton, Switch, ToggleButton, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.slider import Track
 from app.ui.widgets.labels import set_role
@@ -24,9 +24,10 @@ SLOW = 0.97
 
 
 class TransportRow(QWidget):
-    """Shows a replay's state and tells it what a person wants; `bookmark_wanted` is the window's."""
+    """Shows a replay's state and tells it what a person wants; the rest is the panel's."""
 
     bookmark_wanted = Signal()
+    arm_wanted = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -49,6 +50,8 @@ class TransportRow(QWidget):
         self.said = label("", "code", role="textSecondary")
         self.loop = ToggleButton(theme, _("Loop"), "repeat")
         self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="small")
+        self.armed = Switch(theme, _("Armed"))
+        self.nothing = label(_("Nothing is sent"), "small", role="textSecondary")
         self._build()
         self._connect()
 
@@ -60,8 +63,21 @@ class TransportRow(QWidget):
             self.speed, self.said, self.loop, self.bookmark,
         ):  # fmt: skip
             flow.addWidget(widget)
+        flow.push()
+        flow.addWidget(self.armed)
+        flow.addWidget(self.nothing)
+
+    def show_armed(self, *, is_armed: bool) -> None:
+        """While it is armed the strip below has the switch."""
+        self.armed.setVisible(not is_armed)
+        self.nothing.setVisible(not is_armed)
+
+    def _ask_arming(self) -> None:
+        self.armed.setChecked(False)  # it is on once something is chosen
+        self.arm_wanted.emit()
 
     def _connect(self) -> None:
+        self.armed.clicked.connect(self._ask_arming)
         self.previous.clicked.connect(lambda: self._do(lambda replay: replay.skip(forward=False)))
         self.next.clicked.connect(lambda: self._do(lambda replay: replay.skip(forward=True)))
         self.back.clicked.connect(lambda: self._do(lambda replay: replay.step(forward=False)))

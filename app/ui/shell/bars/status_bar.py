@@ -163,7 +163,13 @@ class StatusFacts:
             return NOTHING
         left = length_words(math.ceil(acting.arming.left_s))
         going = acting.outbox.all_repeated
-        if len(going) == 1:
+        replay = self._session.replay
+        played = replay.sending.outbox.going if replay is not None and replay.sending is not None else ()
+        if played:
+            said = ngettext("Sending {count} topic of the recording, armed {time}",
+                            "Sending {count} topics of the recording, armed {time}", len(played))  # fmt: skip
+            words = said.format(count=len(played), time=left)
+        elif len(going) == 1:
             words = _("Sending “{name}”, armed {time}").format(name=going[0].order.name, time=left)
         elif going:
             said = ngettext("Sending {count} message, armed {time}", "Sending {count} messages, armed {time}",

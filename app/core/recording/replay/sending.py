@@ -1,0 +1,355 @@
+"""What a recording plays on the live network again: topics that a person has chosen and armed, nothing else.
+
+Bytes and types are as they were recorded, the name is the topic's own or another one. What is late is left
+out and counted, never sent in a burst; a seek sends nothing of what lies between.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from app.core.documents.background_worker import BackgroundWorker
+from app.core.faults import error_words
+from app.core.network.source import Job
+from app.core.recording.replay.opening import OpenedRecording
+from app.core.run.acting.acting import SessionActing
+from app.core.run.acting.arming import MOST_NAMES, Arming, Target
+from nep.errors import BadTopicError, NepError
+from nep.i18n import _, ngettext
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.nodes.publisher import Publisher
+from nep.protocol.wire import check_topic
+from nep.recordings.player import is_command_topic, latched_topics, moving_topics, published_type
+from nep.recordings.reader import Recording
+
+LATE_S = 0.1
+"""What should have been sent longer ago is left out."""
+MOST_TYPES = 10
+"""So many types a topic may have in one recording; messages of further ones are left out."""
+Submit = Callable[[str, Job], None]
+
+
+class ReplayRoute(NamedTuple):
+    """A topic of the recording, and the name under which it is sent."""
+
+    recorded: str
+    name: str
+
+    @property
+    def target(self) -> Target:
+        """Where it is sent to."""
+        return Target("topic", self.name)
+
+
+@dataclass(slots=True, eq=False)
+class SentTopic:
+    """A topic that is sent. ``count`` messages were, ``skipped`` were left out; ``heard`` programs listen.
+
+    Publishers are those that are ready, by their type; ``problem`` is a sentence when it can't be sent.
+    """
+
+    route: ReplayRoute
+    turn: int
+    is_latched: bool
+    publishers: dict[str, Publisher] = field(default_factory=dict)
+    asked: set[str] = field(default_factory=set)
+    is_ready: bool = False
+    count: int = 0
+    skipped: int = 0
+    problem: str = ""
+
+    @property
+    def heard(self) -> int:
+        """How many programs listen to it now."""
+        return sum(publisher.subscribers for publisher in self.publishers.values())
+
+
+class ReplayOutbox:
+    """Publishes what is offered, while the switch is on. `offer` is the replay's thread, the rest any."""
+
+    def __init__(self, arming: Arming, submit: Submit) -> None:
+        """``submit`` gives Studio's node on the live network to a job."""
+        self._arming, self._submit = arming, submit
+        self._lock = threading.Lock()
+        self._going: dict[str, SentTopic] = {}
+
+    @property
+    def going(self) -> tuple[SentTopic, ...]:
+        """All that are sent now."""
+        with self._lock:
+            return tuple(self._going.values())
+
+    def begin(self, route: ReplayRoute, turn: int, msg_type: str, *, is_latched: bool) -> None:
+        """Send this topic from when its publisher is there, in the switch's ``turn``."""
+        made = SentTopic(route, turn, is_latched)
+        with self._lock:
+            old = self._going.get(route.recorded)
+            self._going[route.recorded] = made
+        if old is not None:
+            self._leave(old)
+        self._ask(made, msg_type)
+
+    def end(self, recorded: str) -> SentTopic | None:
+        """Send this topic no more; how it was."""
+        with self._lock:
+            ended = self._going.pop(recorded, None)
+        if ended is not None:
+            self._leave(ended)
+        return ended
+
+    def offer(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
+        """These were played just now; by each how many seconds too late."""
+        with self._lock:
+            going = dict(self._going)
+        for message, late in zip(messages, late_s, strict=True):
+            sent = going.get(message.topic)
+            if sent is not None and sent.is_ready and not sent.problem:
+                self._send(sent, message, late)
+
+    def _send(self, sent: SentTopic, message: Message, late_s: float) -> None:
+        kind = published_type(message)
+        publisher = sent.publishers.get(kind)
+        if publisher is None:
+            self._ask(sent, kind)
+        if publisher is None or late_s > LATE_S:
+            sent.skipped += 1
+            return
+        data, extension = bytes(message.data), dict(message.extension) or None
+        try:
+            if self._arming.if_armed(
+                sent.turn, sent.route.target, lambda: publisher.publish_bytes(data, extension)
+            ):
+                sent.count += 1
+        except Exception as error:  # noqa: BLE001 - the others, and the panels, go on
+            sent.problem = str(error) if isinstance(error, NepError) else error_words(error)
+
+    # ---- in the thread of the network
+
+    def _ask(self, sent: SentTopic, msg_type: str) -> None:
+        """Let a publisher of this type be made."""
+        if msg_type in sent.asked or len(sent.asked) >= MOST_TYPES:
+            return
+        sent.asked.add(msg_type)
+
+        def make(node: Node) -> None:
+            if not self._is_going(sent):
+                return
+            try:
+                made = node.new_pub(sent.route.name, msg_type, latched=sent.is_latched)
+            except Exception as error:  # noqa: BLE001 - whatever it is, it belongs to this topic
+                sent.problem = str(error) if isinstance(error, NepError) else error_words(error)
+                return
+            sent.publishers = {**sent.publishers, msg_type: made}  # anew: another thread reads it
+            sent.is_ready = True
+            if not self._is_going(sent):
+                self._close(sent)
+
+        self._submit("", make)
+
+    def _is_going(self, sent: SentTopic) -> bool:
+        with self._lock:
+            return self._going.get(sent.route.recorded) is sent
+
+    def _leave(self, sent: SentTopic) -> None:
+        self._submit("", lambda _node: self._close(sent))
+
+    @staticmethod
+    def _close(sent: SentTopic) -> None:
+        for publisher in sent.publishers.values():
+            publisher.close()
+
+
+class ReplaySending:
+    """What a person chooses to be sent of one recording. One thread uses it (the window's)."""
+
+    def __init__(self, acting: SessionActing) -> None:
+        self._acting = acting
+        self.outbox = ReplayOutbox(acting.arming, acting.submit)
+        self.routes: dict[str, str] = {}
+        """By topic of the recording the name under which it is to be sent; of those that are chosen."""
+        self.revision = 0
+        self._opened: OpenedRecording | None = None
+        self._moving: frozenset[str] | None = None
+        self._latched: frozenset[str] = frozenset()
+        self._asks: list[ReplayRoute] = []
+        self._waits = False
+        """Whether a person is asked about the first of them."""
+        self._worker: BackgroundWorker[tuple[frozenset[str], frozenset[str]]] | None = None
+        self.on_change: Callable[[], object] = _nothing
+        """Called when other topics are sent."""
+
+    def open(self, opened: OpenedRecording) -> None:
+        """This is what is played."""
+        self._opened = opened
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it is known which topics move robots: `learn` finds out, and takes a moment."""
+        return self._moving is not None
+
+    def learn(self) -> None:
+        """Find out, beside, which topics move robots."""
+        if self._opened is None or self._worker is not None:
+            return
+        recording = self._opened.recording
+        self._worker = BackgroundWorker("studio-moving")
+        self._worker.ask("topics", lambda: _facts_of(recording))
+
+    def moves(self, recorded: str, name: str) -> bool:
+        """Whether a robot is told what to do by it; also under another name, where one may hear it."""
+        known = self._moving or frozenset()
+        return recorded in known or name in known or is_command_topic(name)
+
+    def choose(self, recorded: str, name: str | None) -> str:
+        """Send this topic under a name ("" for its own) once it is armed, or not (None); why it can't be."""
+        if self._opened is None or recorded not in self._opened.recording.topics:
+            return ""
+        self.revision += 1
+        if name is None:
+            self.routes.pop(recorded, None)
+            return ""
+        wanted = name.strip() or recorded
+        if recorded not in self.routes and len(self.routes) >= MOST_NAMES:
+            return _("So many topics are sent that no more can be; take one away first.")
+        try:
+            check_topic(wanted)
+        except BadTopicError as error:
+            return str(error)
+        self.routes[recorded] = wanted
+        return ""
+
+    # ---- the switch
+
+    def arm(self) -> str:
+        """Switch it on for the chosen topics alone, and send them as they are played; why it can't be.
+
+        Topics that move robots are asked for, one after the other: `SessionActing.question`.
+        """
+        opened = self._opened
+        if opened is None or not self.routes:
+            return _("Choose a topic first.")
+        if not self.is_known:
+            return _("It is still being read which topics move robots; try again in a moment.")
+        why_not = self._acting.arm(for_replay=True)
+        if why_not:
+            return why_not
+        wanted = [ReplayRoute(recorded, name) for recorded, name in self.routes.items()]
+        for sent in self.outbox.going:
+            if sent.route not in wanted:
+                self._end(sent)
+                self._acting.forbid(sent.route.target)
+        self._acting.recorded_commands |= {
+            route.name for route in wanted if self.moves(route.recorded, route.name)
+        }
+        going = {sent.route for sent in self.outbox.going}
+        missing = [route for route in wanted if route not in going]
+        self._asks = sorted(missing, key=lambda route: self._acting.asks(route.target))
+        return self._go_on()
+
+    def _go_on(self) -> str:
+        """Begin what may be sent; ask for what moves a robot, one after the other."""
+        self._waits = False
+        while self._asks:
+            route, turn = self._asks[0], self._acting.arming.turn
+            not_armed = self._acting.ready(route.target, self._go_on)
+            if not_armed:
+                self._asks = []
+                return not_armed
+            if not_armed is not None:
+                self._waits = bool(self._asks)
+                break
+            self._asks.remove(route)
+            self._begin(route, turn)
+        return ""
+
+    def _begin(self, route: ReplayRoute, turn: int) -> None:
+        opened = self._opened
+        if opened is None:
+            return
+        topic = opened.recording.topics[route.recorded]
+        self.outbox.begin(route, turn, topic.msg_type, is_latched=route.recorded in self._latched)
+        self._say(route, _("is sent as it is played"))
+        self._changed()
+
+    def end(self) -> None:
+        """Send nothing any more: the recording closes."""
+        if self.outbox.going or self._asks:
+            self._acting.disarm()
+        self._end_all()
+        if self._worker is not None:
+            self._worker.close()
+
+    def _end_all(self) -> None:
+        self._asks = []
+        for sent in self.outbox.going:
+            self._end(sent)
+
+    def _end(self, sent: SentTopic) -> None:
+        if self.outbox.end(sent.route.recorded) is not None:
+            self._say(
+                sent.route, ", ".join(filter(None, (sent.problem, sent_words(sent)))), bool(sent.problem)
+            )
+            self._changed()
+
+    def _changed(self) -> None:
+        self.revision += 1
+        self.on_change()
+
+    def _say(self, route: ReplayRoute, words: str, is_bad: bool = False) -> None:
+        if route.name != route.recorded:
+            words = _("{topic} of the recording, {what}").format(topic=route.recorded, what=words)
+        self._acting.tell("warn" if is_bad else "info", route.target, words)
+
+    def tick(self) -> None:
+        """Take over what has happened: what is no longer allowed has ended, a robot may have come."""
+        self._take_facts()
+        arming = self._acting.arming
+        if not arming.is_on:
+            self._asks = []
+        for sent in self.outbox.going:
+            target = sent.route.target
+            if sent.problem or sent.turn != arming.turn or not arming.allows(target):
+                self._end(sent)
+            elif self._acting.asks(target):
+                self._end(sent)
+                self._asks.append(sent.route)
+        if self._asks and not self._acting.is_asking:
+            if self._waits:  # the answer was no
+                del self._asks[0]
+            self._go_on()
+
+    def _take_facts(self) -> None:
+        if self._worker is None or self._moving is not None or self._opened is None:
+            return
+        try:
+            taken = self._worker.take("topics")
+        except NepError:  # it can't be read: then every topic may be one that moves a robot
+            taken = (frozenset(self._opened.recording.topics), frozenset())
+        if taken is not None:
+            self._moving, self._latched = taken
+            self.revision += 1
+
+
+def _facts_of(recording: Recording) -> tuple[frozenset[str], frozenset[str]]:
+    """Which topics move robots, and which are kept for who comes later."""
+    return moving_topics(recording), latched_topics(recording, recording.topics)
+
+
+def sent_words(sent: SentTopic) -> str:
+    """How many were sent, and how many left out: "412 sent, 3 left out, being late"."""
+    words = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
+    return f"{words}, {late_words(sent.skipped)}" if sent.skipped else words
+
+
+def late_words(count: int) -> str:
+    """How many were left out: "3 left out, being late"."""
+    said = ngettext("{count} left out, being late", "{count} left out, being late", count)
+    return said.format(count=count)
+
+
+def _nothing() -> None:
+    """Nobody wants to know."""

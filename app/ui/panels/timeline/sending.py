@@ -1,0 +1,234 @@
+"""What of a recording is sent on the live network: the strip that tells it, and where a person chooses it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
+
+from app.core.recording.replay.sending import ReplaySending, late_words
+from app.core.run.acting.arming import Target
+from app.ui.panels.armed_strip import ArmedStrip
+from app.ui.panels.base import PanelContext
+from app.ui.text import plain
+from app.ui.text.numbers import grouped
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, label
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.table.model import Cell, Column, TableModel
+from app.ui.widgets.table.view import TableView
+from nep.i18n import _, lazy, ngettext
+
+LEAST_ROWS_PX = 96
+NAME_PX = 240
+
+
+class ReplayStrip(ArmedStrip):
+    """Shows itself while something of the recording is armed, or a person is asked; `change_wanted`."""
+
+    for_replay = True
+    change_wanted = Signal()
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context)
+        self.change = Button(context.theme, _("Topics"), "plus", kind="ghost", size="small")
+        self.change.setAccessibleName(_("Choose which topics are sent"))
+        self.change.setToolTip(plain.tip(self.change.accessibleName()))
+        self.change.clicked.connect(self.change_wanted)
+        self._flow.addWidget(self.change)
+
+    @property
+    def sending(self) -> ReplaySending | None:
+        """Of the recording that is open."""
+        replay = self._context.session.replay
+        return replay.sending if replay is not None else None
+
+    def refresh(self) -> None:
+        super().refresh()
+        self.setVisible(self.sending is not None and (self._is_on or self.acting.question is not None))
+
+    def more_words(self) -> str:
+        going = self.sending.outbox.going if self.sending is not None else ()
+        if not going:
+            return ""
+        count, skipped = sum(each.count for each in going), sum(each.skipped for each in going)
+        heard = max(each.heard for each in going)
+        sent = ngettext("{count} sent", "{count} sent", count).format(count=grouped(count))
+        late = [late_words(skipped)] if skipped else []
+        ears = ngettext("heard by {count}", "heard by {count}", heard).format(count=heard)
+        return ", ".join((sent, *late, ears if heard else _("nobody hears it")))
+
+    def token_words(self, target: Target) -> str:
+        routes = self.sending.routes if self.sending is not None else {}
+        recorded = [topic for topic, name in routes.items() if name == target.name != topic]
+        if not recorded:
+            return target.name
+        return _("{topic} as {name}").format(topic=recorded[0], name=target.name)
+
+
+class SendRow(NamedTuple):
+    """A topic of the recording as it can be chosen; ``name`` is under which it is sent, None: it is not."""
+
+    topic: str
+    messages: int
+    name: str | None
+    moves: bool
+
+
+class SendChooser(QWidget):
+    """In the place of the lanes: which topics are sent, and under which names. `left` when it is done."""
+
+    left = Signal()
+    refused = Signal(str)
+    """Why nothing could be armed, as a sentence."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._sending: ReplaySending | None = None
+        self._counts: dict[str, int] = {}
+        self._seen: object = None
+        self.model: TableModel[SendRow] = TableModel(_columns(), lambda row: row.topic)
+        self.table: TableView[SendRow] = TableView(theme, self.model, "topic")
+        self.table.setAccessibleName(_("Topics that can be sent"))
+        self.table.setMinimumHeight(round(theme.scaled(LEAST_ROWS_PX)))
+        self.words = label("", "small", role="textSecondary", wrap=True)
+        self.words.setMinimumWidth(0)
+        self.problem = label("", "small", role="error", wrap=True)
+        self.problem.setMinimumWidth(0)
+        self.name = QLineEdit()
+        self.name.setAccessibleName(_("Name under which it is sent"))
+        self.name.setProperty("focusRadius", theme.radius("control"))
+        self.name.setMinimumWidth(round(theme.scaled(NAME_PX) / 2))
+        self.name.setMaximumWidth(round(theme.scaled(NAME_PX)))
+        EditMenu(theme, self.name)
+        self.arm = Button(theme, _("Arm and send"), "lock", kind="primary", size="small")
+        self.cancel = Button(theme, _("Cancel"), size="small")
+        self.table.opened.connect(self._toggle)
+        self.table.order_changed.connect(self._show_rows)
+        self.table.selectionModel().currentRowChanged.connect(self._show_name)
+        self.name.textEdited.connect(self._type)
+        self.name.returnPressed.connect(self._arm)
+        self.arm.clicked.connect(self._arm)
+        self.cancel.clicked.connect(self.left)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        foot = Flow(gap=8, row_gap=6)
+        foot.addWidget(label(_("Sent as"), "small", role="textSecondary"))
+        for field in (self.name, self.arm, self.cancel):
+            foot.addWidget(field)
+        scroll = ScrollColumn(_("What is sent"), margins=(12, 8, 12, 8), gap=6)
+        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        below = QWidget()
+        below.setLayout(foot)
+        for place, widget in enumerate((self.words, self.table, self.problem, below)):
+            scroll.column.insertWidget(place, widget)
+        scroll.column.setStretchFactor(self.table, 1)
+        scroll.column.setStretch(scroll.column.count() - 1, 0)  # nothing is left for its end
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(scroll)
+
+    def open(self, sending: ReplaySending, counts: dict[str, int], chosen: str) -> None:
+        """Let a person choose of these topics, which have so many messages."""
+        self._sending, self._counts, self._seen = sending, counts, None
+        sending.learn()
+        self.problem.setText("")
+        self.refresh()
+        self.table.choose(chosen)
+        self._show_name()
+        self.table.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def refresh(self) -> None:
+        """Show what has changed."""
+        sending = self._sending
+        if sending is None or self._seen == (sending, sending.revision):
+            return
+        self._seen = (sending, sending.revision)
+        self._show_rows()
+        said = _("While it is armed, what is played of these topics is sent on the live network, too.")
+        moving = _("One that moves a robot is marked, and asked for again.")
+        reading = _("It is still being read which topics move robots.")
+        self.words.setText(f"{said} {moving if sending.is_known else reading}")
+        self.problem.setVisible(bool(self.problem.text()))
+        self.arm.setEnabled(bool(sending.routes) and sending.is_known)
+
+    def _show_rows(self) -> None:
+        sending = self._sending
+        if sending is None:
+            return
+        rows = []
+        for topic, count in self._counts.items():
+            name = sending.routes.get(topic)
+            rows.append(SendRow(topic, count, name, sending.moves(topic, name or topic)))
+        self.model.set_rows(self.table.order.sort(rows))
+        self.table.viewport().update()
+
+    def _toggle(self, topic: str) -> None:
+        sending = self._sending
+        if sending is not None:
+            self._say(sending.choose(topic, None if topic in sending.routes else ""))
+            self._show_name()
+
+    def _show_name(self) -> None:
+        """The field is about the chosen row."""
+        topic = self.table.chosen_key() or ""
+        routes = self._sending.routes if self._sending is not None else {}
+        name = routes.get(topic, "")
+        self.name.setEnabled(bool(topic))
+        self.name.setPlaceholderText(topic)
+        self.name.setText(name if name != topic else "")
+
+    def _type(self, text: str) -> None:
+        topic = self.table.chosen_key()
+        if topic and self._sending is not None:
+            self._say(self._sending.choose(topic, text))
+
+    def _say(self, problem: str) -> None:
+        self.problem.setText(problem)
+        self._seen = None
+        self.refresh()
+        if problem:
+            self.arm.setEnabled(False)
+
+    def _arm(self) -> None:
+        if self._sending is None or not self.arm.isEnabled():
+            return
+        why_not = self._sending.arm()
+        if why_not:
+            self.refused.emit(why_not)
+        else:
+            self.left.emit()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.left.emit()
+        elif event.key() not in {Qt.Key.Key_Tab, Qt.Key.Key_Backtab}:
+            event.accept()  # none of it is about the lanes, which are not there
+
+
+def _columns() -> tuple[Column[SendRow], ...]:
+    def is_sent(row: SendRow) -> Cell:
+        if row.name is not None:
+            return Cell(icon="check", role="accentText", said=_("is sent"))
+        return Cell(icon="minus", role="textTertiary", said=_("is not sent"))
+
+    def moves(row: SendRow) -> Cell:
+        return Cell(icon="triangle-alert", role="warn", said=_("moves a robot")) if row.moves else Cell()
+
+    return (
+        Column("sent", "", 40, is_sent, words=lazy("Is sent")),
+        Column("topic", lazy("Topic"), 170, lambda row: Cell(row.topic, mono=True),
+               key=lambda row: row.topic, stretch=True, tip=lambda row: row.topic),
+        Column("moves", "", 40, moves, words=lazy("Moves a robot"),
+               tip=lambda row: _("It moves a robot, and is asked for again.") if row.moves else ""),
+        Column("as", lazy("Sent as"), 190, lambda row: Cell(row.name or "", mono=True, role="accentText"),
+               tip=lambda row: row.name or ""),
+        Column("messages", lazy("Messages"), 90, lambda row: Cell(grouped(row.messages)),
+               key=lambda row: row.messages, figures=True, yields=1),
+    )  # fmt: skip

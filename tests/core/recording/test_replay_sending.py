@@ -1,0 +1,321 @@
+"""What a recording plays goes to the live network: what is armed, as it was, when it is played, or not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.recording.replay.sending import LATE_S, ReplayOutbox, ReplayRoute, sent_words
+from app.core.recording.replay.source import ReplaySource
+from app.core.run.acting.arming import MOST_NAMES, Arming, Target
+from app.core.session import Session
+from nep.errors import ClosedError
+from nep.messages.message import Message
+from nep.recordings.player import Playback
+from nep.recordings.reader import Recording
+from tests.core.recording.test_replay_source import Clock, Pictures
+from tests.core.waiting import tick_until
+from tests.nep.recordings.messages import json_message, kept, picture, record
+
+COUNT = 60
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """/a and /b by turns, 10 ms apart, a picture in the middle, a speed of a base at the end."""
+    path = tmp_path_factory.mktemp("recordings") / "a.mcap"
+    messages = [json_message(seq, topic=("/a", "/b")[seq % 2]) for seq in range(COUNT)]
+    messages[31] = picture(31)
+    messages[COUNT - 1] = json_message(COUNT - 1, "/base/cmd_vel")
+    record(path, [messages])
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(path: Path) -> list[tuple[int, Message]]:
+    with Recording(path) as recording:
+        return [(log_ns, message) for log_ns, message in recording.read()]
+
+
+class Played:
+    """A source without its thread, and what it gives to who sends."""
+
+    def __init__(self, path: Path, sent: set[str], watched: str = "") -> None:
+        self.clock = Clock()
+        self.source = ReplaySource(path, Pictures(), clock=self.clock)
+        if watched:
+            self.source.watch(watched)
+        self.source.open()
+        self.source.turn()
+        self.messages: list[Message] = []
+        self.late: list[float] = []
+        self.source.forward(sent, self._take)
+        self.source.turn()
+
+    def _take(self, messages: list[Message], late_s: list[float]) -> None:
+        self.messages += messages
+        self.late += late_s
+
+    def do(self, change: object) -> None:
+        self.source.order("test", change)  # type: ignore[arg-type]
+        self.source.turn()
+
+    def pass_time(self, seconds: float, step_s: float = 0.004) -> None:
+        end = self.clock.now + seconds
+        while self.clock.now < end:
+            self.source.turn()
+            self.clock.now += step_s
+
+    def taken(self) -> list[tuple[object, ...]]:
+        found, self.messages = [kept(each) for each in self.messages], []
+        return found
+
+
+@pytest.fixture
+def played(path: Path):
+    made: list[Played] = []
+
+    def begin(*topics: str, watched: str = "") -> Played:
+        made.append(Played(path, set(topics), watched))
+        return made[-1]
+
+    yield begin
+    for each in made:
+        each.source.close()
+
+
+def some(whole, *topics: str, begin: int = 0, end: int = COUNT):
+    return [kept(message) for _ns, message in whole[begin:end] if message.topic in topics]
+
+
+def test_all_of_a_topic_is_sent_from_its_first_message_on_and_panels_get_what_they_watch(played, whole):
+    sender = played("/a", "/camera", watched="/b")
+    assert sender.taken() == []  # what a panel shows at the beginning is not sent
+    sender.do(Playback.play)
+    sender.pass_time(2.0)
+    assert sender.taken() == some(whole, "/a", "/camera")
+    assert max(sender.late) < LATE_S
+    assert set(sender.source.take().drained.batches) == {"/b"}
+    sender.do(lambda playback: playback.seek(whole[0][0]))
+    sender.do(Playback.play)
+    sender.pass_time(2.0)
+    assert sender.taken() == some(whole, "/a", "/camera")
+
+
+def test_a_seek_sends_nothing_of_what_lies_between_and_a_pause_nothing_at_all(played, whole):
+    sender = played("/a", "/b")
+    sender.do(Playback.play)
+    sender.pass_time(0.1)
+    before = sender.taken()
+    assert before == some(whole, "/a", "/b")[: len(before)]
+    sender.do(lambda playback: playback.seek(whole[40][0]))
+    assert sender.taken() == []
+    sender.do(Playback.pause)
+    sender.pass_time(0.2)
+    sender.do(lambda playback: playback.step("/a", forward=True))
+    sender.pass_time(0.2)
+    assert sender.taken() == []
+    sender.do(lambda playback: playback.seek(whole[50][0]))
+    sender.do(Playback.play)
+    sender.pass_time(1.0)
+    assert sender.taken() == some(whole, "/a", "/b", begin=51)
+
+
+def test_a_loop_sends_its_part_again_and_again_and_nothing_of_the_rest(played, whole):
+    sender = played("/a", "/b")
+    begin, end = 10, 20
+    sender.do(lambda playback: playback.loop(whole[begin][0], whole[end][0]))
+    sender.do(Playback.play)
+    sender.pass_time(0.35)
+    part, sent = some(whole, "/a", "/b", begin=begin, end=end + 1), sender.taken()
+    assert len(sent) > 2 * len(part)
+    assert sent == (part * 4)[: len(sent)]
+
+
+def test_who_is_late_sends_no_burst_and_the_speed_is_the_replays(played):
+    sender = played("/a", "/b")
+    sender.do(Playback.play)
+    sender.pass_time(0.1)
+    sender.taken(), sender.late.clear()
+    sender.clock.now += 20.0  # a computer that slept
+    sender.source.turn()
+    assert max(sender.late) > LATE_S
+    assert 0 < sum(late <= LATE_S for late in sender.late) <= round(LATE_S / 0.01) + 1
+    quick = played("/a", "/b")
+    quick.do(lambda playback: setattr(playback, "speed", 10.0))
+    quick.do(Playback.play)
+    quick.pass_time(0.02)
+    assert 15 <= len(quick.messages) <= 25
+
+
+def test_a_panel_that_looks_at_what_is_sent_has_its_newest_message(played, whole):
+    sender = played("/a")
+    sender.do(Playback.play)
+    sender.pass_time(0.2)
+    sender.do(Playback.pause)
+    sender.source.take()
+    sender.source.watch("/a")
+    sender.source.turn()
+    shown = sender.source.take().drained.batches["/a"].messages
+    assert [kept(each) for each in shown] == [sender.taken()[-1]]
+
+
+class TestPublisher:
+    """Heard by two; writes down what is published."""
+
+    __test__ = False
+
+    def __init__(self, topic: str, msg_type: str, latched: bool) -> None:
+        self.made, self.sent, self.is_closed = (topic, msg_type, latched), [], False
+        self.subscribers = 2
+
+    def publish_bytes(self, data: bytes, extension: object) -> None:
+        if self.is_closed:
+            raise ClosedError("publisher")
+        self.sent.append((data, extension))
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+class TestNode:
+    """Makes such publishers; a topic named /bad can't be published."""
+
+    __test__ = False
+
+    def __init__(self) -> None:
+        self.made: list[TestPublisher] = []
+
+    def new_pub(self, topic: str, msg_type: str, *, latched: bool) -> TestPublisher:
+        if topic == "/bad":
+            raise ClosedError("node")
+        self.made.append(TestPublisher(topic, msg_type, latched))
+        return self.made[-1]
+
+
+def test_the_outbox_sends_what_is_allowed_in_its_turn_and_counts_what_it_leaves_out():
+    node, jobs, arming = TestNode(), [], Arming()
+    outbox = ReplayOutbox(arming, lambda _what, job: jobs.append(job))
+    arming.arm()
+    arming.allow(Target("topic", "/test"))
+    outbox.begin(ReplayRoute("/a", "/test"), arming.turn, "json", is_latched=True)
+    (sent,) = outbox.going
+    messages = [json_message(1, "/a"), json_message(2, "/b"), json_message(3, "/a")]
+    outbox.offer(messages, [0.0] * 3)
+    assert (sent.count, sent.skipped) == (0, 0)  # its publisher is not there yet: nothing has begun
+    jobs.pop()(node)
+    outbox.offer(messages, [0.0, 0.0, LATE_S + 0.01])
+    assert (sent.count, sent.skipped, sent.heard) == (1, 1, 2)
+    assert sent_words(sent) == "1 sent, 1 left out, being late"
+    assert node.made[0].made == ("/test", "json", True)
+    assert node.made[0].sent == [(bytes(messages[0].data), None)]
+    typed = Message("/a", b'{"x":1}', "json", "geometry_msgs/Point")
+    outbox.offer([typed], [0.0])
+    jobs.pop()(node)
+    outbox.offer([typed], [0.0])
+    assert [each.made[1] for each in node.made] == ["json", "geometry_msgs/Point"]
+    assert (sent.count, sent.skipped) == (2, 2)
+    arming.disarm()
+    outbox.offer(messages, [0.0] * 3)
+    arming.arm()
+    arming.allow(Target("topic", "/test"))
+    outbox.offer(messages, [0.0] * 3)  # another turn: what a person ended stays so
+    assert sent.count == 2
+    assert outbox.end("/a") is sent
+    assert outbox.end("/a") is None
+    jobs.pop()(node)
+    assert all(each.is_closed for each in node.made)
+    outbox.begin(ReplayRoute("/a", "/bad"), arming.turn, "json", is_latched=False)
+    jobs.pop()(node)
+    assert outbox.going[0].problem
+
+
+def open_and_know(session: Session, path: Path):
+    replay = session.open_recording(path)
+    tick_until(session, lambda: replay.opened is not None)
+    session.tick()  # another source shows: what was armed before has ended
+    sending = replay.sending
+    assert sending is not None
+    sending.learn()
+    tick_until(session, lambda: sending.is_known)
+    return replay, sending
+
+
+def heard_of(heard: list[Message]) -> list[Message]:
+    return [each for each in heard if each.topic in ("/test/a", "/camera")]
+
+
+def test_it_is_heard_on_the_network_under_its_new_name_until_stop(
+    session: Session, path: Path, whole
+) -> None:
+    acting = session.acting
+    with nep.node("hears") as node:
+        heard: list[Message] = []
+        node.new_sub("**", sink=heard.extend)
+        replay, sending = open_and_know(session, path)
+        assert acting.arm() == "A recording shows: go back to live to send."
+        assert sending.arm() == "Choose a topic first."
+        assert sending.choose("/a", "two words") != ""
+        assert sending.choose("/nowhere", "") == ""
+        assert sending.choose("/a", "/test/a") == sending.choose("/camera", "") == ""
+        replay.play()
+        tick_until(session, lambda: replay.player is not None and replay.player.is_at_end)
+        assert not [each for each in heard if each.topic in ("/a", "/test/a", "/camera")]
+        assert sending.arm() == ""
+        assert acting.arming.targets == (Target("topic", "/test/a"), Target("topic", "/camera"))
+        going = sending.outbox.going
+        tick_until(session, lambda: all(sent.is_ready and sent.heard for sent in going))
+        replay.play()
+        expected = [m for _ns, m in whole if m.topic in ("/a", "/camera")]
+        tick_until(session, lambda: sum(each.count + each.skipped for each in going) == len(expected))
+        tick_until(session, lambda: len(heard_of(heard)) == sum(each.count for each in going))
+        left = iter([(m.msg_type, bytes(m.data)) for m in expected])
+        came = [(m.msg_type, bytes(m.data)) for m in heard_of(heard)]
+        assert came
+        assert all(each in left for each in came)  # in their order; a computer that is slow leaves some out
+        assert not [m for m in heard if m.topic in ("/a", "/b")]
+        session.runs.stop()
+        assert not acting.arming.is_on
+        session.tick()
+        assert sending.outbox.going == ()
+    said = [each.text for each in session.console.records]
+    assert "/test/a: /a of the recording, is sent as it is played" in said
+    assert f"/test/a: /a of the recording, {sent_words(going[0])}" in said
+    assert f"/camera: {sent_words(going[1])}" in said
+
+
+def test_what_moves_robots_is_asked_for_again_also_under_another_name(session: Session, path: Path) -> None:
+    acting = session.acting
+    replay, sending = open_and_know(session, path)
+    for recorded, name in (("/base/cmd_vel", "/harmless"), ("/b", "/arm/command"), ("/a", "")):
+        assert sending.choose(recorded, name) == ""
+    assert sending.moves("/base/cmd_vel", "/harmless")
+    assert sending.arm() == ""
+    assert [sent.route.recorded for sent in sending.outbox.going] == ["/a"]
+    question = acting.question
+    assert question is not None
+    assert question.sentence.startswith("/harmless tells robots what to do.")
+    acting.answer(let=False)
+    session.tick()
+    question = acting.question
+    assert question is not None
+    assert question.topic == "/arm/command"
+    acting.answer(let=True)
+    assert [sent.route.name for sent in sending.outbox.going] == ["/a", "/arm/command"]
+    assert acting.question is None
+    session.tick()
+    assert acting.question is None  # the one that was not wanted is not asked for again
+    acting.forbid(Target("topic", "/a"))
+    session.tick()
+    assert [sent.route.name for sent in sending.outbox.going] == ["/arm/command"]
+    for place in range(MOST_NAMES + 5):
+        sending.choose("/a", None), sending.choose("/a", f"/x{place}")
+    assert len(sending.routes) == 3
+    assert sending.arm() == ""
+    assert acting.question is not None  # of what was chosen and not wanted before
+    session.back_to_live()
+    assert not acting.arming.is_on
+    assert sending.outbox.going == ()
+    assert replay.sending is sending
