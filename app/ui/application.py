@@ -159,7 +159,8 @@ def tell_of_crashes(session: Session, this_run: StudioRun) -> None:
 
 def keep_version(window: MainWindow, now_s: float) -> None:
     """Keep that this version runs here, when another one did so last: a report of a problem tells it."""
-    kept = studio_versions.with_this_version(window.session.settings.all(), now_s)
+    settings = window.session.settings
+    kept = studio_versions.with_this_version(settings.all(), now_s, is_first=settings.are_new)
     if kept is not None:
         window.state.keep(studio_versions.KEY, kept)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from nep.version import __version__
 
@@ -13,6 +13,8 @@ KEY = "studio_versions"
 MOST = 10
 PLAIN = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+-]{0,39}")
 """What a version looks like; nothing else is taken out of a file."""
+EARLIER = "earlier"
+"""Stands for the versions that kept settings, but not yet this; they began at no known time (0)."""
 _LATEST_S = 1e10
 """No time is later: a damaged file may have one that no calendar can show."""
 
@@ -28,18 +30,24 @@ def known(values: Mapping[str, object]) -> list[tuple[str, float]]:
     """The versions in the settings and their first starts (epoch s), the newest last; no damaged one."""
     entries = values.get(KEY)
     found = []
-    for entry in entries if isinstance(entries, Sequence) and not isinstance(entries, str) else ():
-        since = entry.get("since_s") if isinstance(entry, Mapping) else None
-        is_time = isinstance(since, int | float) and not isinstance(since, bool) and 0 <= since <= _LATEST_S
-        version = plain_version(entry.get("version")) if isinstance(entry, Mapping) else ""
-        if version and is_time:
+    for entry in entries if isinstance(entries, list) else ():
+        if not isinstance(entry, Mapping):
+            continue
+        version, since = plain_version(entry.get("version")), entry.get("since_s")
+        is_time = isinstance(since, int | float) and not isinstance(since, bool)
+        if version and is_time and 0 <= since <= _LATEST_S:
             found.append((version, float(since)))
     return found[-MOST:]
 
 
-def with_this_version(values: Mapping[str, object], now_s: float, version: str = __version__) -> Kept | None:
-    """What to keep now that this version runs; None when it ran last, too."""
-    before = known(values)
+def with_this_version(
+    values: Mapping[str, object], now_s: float, *, is_first: bool, version: str = __version__
+) -> Kept | None:
+    """What to keep now that this version runs; None when it ran last, too.
+
+    ``is_first``: no Studio ran here before.
+    """
+    before = known(values) or ([] if is_first else [(EARLIER, 0.0)])
     if before and before[-1][0] == version:
         return None
     return [{"version": each, "since_s": s} for each, s in [*before, (version, now_s)][-MOST:]]
@@ -48,7 +56,7 @@ def with_this_version(values: Mapping[str, object], now_s: float, version: str =
 def used_here(values: Mapping[str, object]) -> str:
     """The versions in one line, for developers: "0.0.9 since 2026-11-02, 0.1.0 since 2026-11-27"."""
     told = [
-        f"{version} since {time.strftime('%Y-%m-%d', time.gmtime(since_s))}"
+        f"{version} since {time.strftime('%Y-%m-%d', time.gmtime(since_s))}" if since_s else version
         for version, since_s in known(values)
     ]
     return ", ".join(told) or "not known"
