@@ -34,8 +34,12 @@ def known(values: Mapping[str, object]) -> list[tuple[str, float]]:
         if not isinstance(entry, Mapping):
             continue
         version, since = plain_version(entry.get("version")), entry.get("since_s")
-        is_time = isinstance(since, int | float) and not isinstance(since, bool)
-        if version and is_time and 0 <= since <= _LATEST_S:
+        if (
+            isinstance(since, int | float)
+            and not isinstance(since, bool)
+            and 0 <= since <= _LATEST_S
+            and version
+        ):
             found.append((version, float(since)))
     return found[-MOST:]
 
