@@ -22,11 +22,13 @@ import platformdirs
 
 from app.core.alerts import Alerts
 from nep.i18n import _
+from nep.version import __version__
 
 FILE_BYTES, FILES_KEPT = 1_000_000, 3
 FAULTS_KEPT = 500
 IN_CONSOLE: dict[str, object] = {"in_console": True}
 """The `extra` of a record that the Console has in words of its own: it is for the log file."""
+WRITER = "NEP Studio %s writes from here on"
 FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
 
 ALERT = "studio"
@@ -112,6 +114,7 @@ def _place(record: logging.LogRecord) -> tuple[object, ...] | None:
 class LogFile(RotatingFileHandler):
     """Warnings and errors with their tracebacks: ``studio.log`` and three older ones of a megabyte each.
 
+    The first line that a run writes, in each file, says its version: an update goes on in the same file.
     Only the user may read them. A disk that is full or read-only ends nothing: the line is lost.
     """
 
@@ -134,7 +137,10 @@ class LogFile(RotatingFileHandler):
         path = Path(self.baseFilename)
         path.parent.mkdir(0o700, parents=True, exist_ok=True)
         number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
-        return os.fdopen(number, "a", encoding="utf-8", errors="backslashreplace")
+        stream = os.fdopen(number, "a", encoding="utf-8", errors="backslashreplace")
+        begins = logging.LogRecord("studio", logging.INFO, "", 0, WRITER, (__version__,), None)
+        stream.write(f"{self.format(begins)}{self.terminator}")
+        return stream
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's name
         """Nothing: there is no better place to say it, and the Console has the line."""

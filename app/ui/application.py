@@ -7,6 +7,7 @@ import logging
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -20,6 +21,7 @@ from PySide6.QtWidgets import QApplication
 from app import resources
 from app.core.documents.journal import left_behind, of_newer
 from app.core.documents.versions import bring_here
+from app.core.reports import studio_versions
 from app.core.reports.crash_reports import CrashLog, CrashReports, offer
 from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
@@ -153,6 +155,14 @@ def tell_of_crashes(session: Session, this_run: StudioRun) -> None:
     for crash in this_run.left():
         reports.add(crash)
     offer(session.alerts, reports)
+
+
+def keep_version(window: MainWindow, now_s: float) -> None:
+    """Keep that this version runs here, when another one did so last: a report of a problem tells it."""
+    settings = window.session.settings
+    kept = studio_versions.with_this_version(settings.all(), now_s, is_first=settings.are_new)
+    if kept is not None:
+        window.state.keep(studio_versions.KEY, kept)
 
 
 def close_when_asked(window: MainWindow, this_run: StudioRun) -> None:
@@ -302,6 +312,7 @@ def _show(
         first.append(partial(tell_of_crashes, session, this_run))
     if not options.alone:
         meeting_place, turn = single
+        first.append(partial(keep_version, window, time.time()))
         first.append(
             lambda: single_instance.SingleInstanceServer(meeting_place, partial(open_asked, window), window)
         )

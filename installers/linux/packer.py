@@ -134,6 +134,7 @@ def debian_package(context: Context) -> Path:
         shutil.copyfile(HERE / each, control / each)
         (control / each).chmod(0o755)
     (control / "md5sums").write_text("".join(_sums(root, control)), "utf-8")
+    _give_one_time(root, context.epoch)
     made = context.dist / f"{NAME}_{context.version}_{_architecture(context)}.deb"
     context.run("dpkg-deb", "--root-owner-group", "-Zxz", "-z6", "--threads-max=2", "--build", root, made)
     return made
@@ -173,6 +174,12 @@ def _set_modes(root: Path) -> None:
         if not path.is_symlink():
             is_run = path.is_dir() or os.access(path, os.X_OK)
             path.chmod(0o755 if is_run else 0o644)
+
+
+def _give_one_time(root: Path, epoch: int) -> None:
+    """Let all be of the same time: dpkg-deb takes back what is newer, and leaves what is older."""
+    for path in [root, *root.rglob("*")]:
+        os.utime(path, (epoch, epoch), follow_symlinks=False)
 
 
 def _sums(root: Path, control: Path) -> Iterable[str]:

@@ -85,6 +85,29 @@ def test_the_file_is_the_users_own_and_bounded(log: logging.Logger, tmp_path: Pa
         assert {path.stat().st_mode & 0o777 for path in (tmp_path / "log").iterdir()} == {0o600}
 
 
+def test_an_update_writes_on_in_the_same_file_and_says_which_version_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for version in ("0.0.9", "0.1.0"):
+        monkeypatch.setattr(faults, "__version__", version)
+        handler = LogFile(tmp_path / "log")
+        for number in range(2):
+            handler.handle(logging.LogRecord("a", logging.ERROR, "", 0, f"{version} {number}", (), None))
+        handler.close()
+    lines = written(tmp_path).splitlines()
+    assert [line.partition(": ")[2] for line in lines] == [
+        "NEP Studio 0.0.9 writes from here on", "0.0.9 0", "0.0.9 1",
+        "NEP Studio 0.1.0 writes from here on", "0.1.0 0", "0.1.0 1",
+    ]  # fmt: skip
+
+
+def test_each_file_says_the_version(log: logging.Logger, tmp_path: Path) -> None:
+    for number in range(12):
+        log.error("%d %s", number, "x" * 100_000)
+    for path in (tmp_path / "log").iterdir():
+        assert f"NEP Studio {faults.__version__} writes" in path.read_text("utf-8").partition("\n")[0]
+
+
 def test_a_folder_that_can_not_be_made_ends_nothing(tmp_path: Path) -> None:
     (tmp_path / "log").write_text("a file", "utf-8")
     handler = LogFile(tmp_path / "log")

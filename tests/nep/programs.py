@@ -16,6 +16,8 @@ from time import monotonic
 import psutil
 
 ROOT = Path(__file__).parents[2]
+LETTERS = {"PYTHONIOENCODING": "utf-8"} if sys.platform == "win32" else {}
+"""On Windows a program writes into a pipe with the letters of the country's code page alone."""
 GREETINGS_S = 40.0
 """For how long the nodes of a test that uses the fixture `patient` wait for greetings."""
 
@@ -29,8 +31,9 @@ class Program:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
+            encoding="utf-8" if LETTERS else None,
             text=True,
-            env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+            env={**os.environ, "PYTHONPATH": str(ROOT), **LETTERS, **environment},
         )
 
     def line(self) -> str:

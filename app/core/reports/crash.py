@@ -10,6 +10,8 @@ import signal
 from dataclasses import dataclass
 from typing import Literal
 
+from nep.version import __version__
+
 Part = Literal["studio", "behaviour", "robot", "master", "editor"]
 PARTS: tuple[Part, ...] = ("studio", "behaviour", "robot", "master", "editor")
 
@@ -38,11 +40,15 @@ MAYBE_CAUGHT = "Windows fatal exception: code "
 
 @dataclass(frozen=True, slots=True)
 class Crash:
-    """One crash: the part that ended, how in a few English words, and what is known beside (a traceback)."""
+    """One crash: the part that ended, how in a few English words, and what is known beside (a traceback).
+
+    ``version`` is that of the Studio that crashed: after an update it is not the one that notices.
+    """
 
     part: Part
     how: str
     text: str = ""
+    version: str = __version__
 
 
 def crash_extra(part: Part, how: str, text: str = "") -> dict[str, object]:

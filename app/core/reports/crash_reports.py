@@ -14,6 +14,7 @@ from app.core.alerts import Alerts
 from app.core.faults import IN_CONSOLE, RepeatFilter, log_folder
 from app.core.reports.crash import PARTS, Crash, Part
 from app.core.reports.privacy import without_home
+from app.core.reports.studio_versions import PLAIN
 from app.core.storage.atomic_file import LARGEST_BYTES, read_whole, write_atomically
 from nep.i18n import _, lazy
 from nep.system.replace_file import replace_file
@@ -35,6 +36,8 @@ TITLES: dict[Part, str] = {
     "master": lazy("The master crashed last time."),
     "editor": lazy("The block editor crashed last time."),
 }
+HEADING = "Crash report of NEP Studio "
+OF_ANOTHER = lazy("That was NEP Studio {version}; this is {own}.")
 DETAIL = lazy("A report helps those who make Studio to mend it. Nothing is sent by itself.")
 
 _log = logging.getLogger("studio.crashes")
@@ -121,8 +124,12 @@ def offer(alerts: Alerts, reports: CrashReports) -> None:
     found = reports.take_new()
     if found:
         worst = min(found, key=lambda each: PARTS.index(each.part))
+        version = _version_of(worst)
+        told = [_(DETAIL)]
+        if version not in {"", __version__}:  # it may be mended already
+            told.insert(0, _(OF_ANOTHER).format(version=version, own=__version__))
         alerts.put(
-            ALERT, "warn", _(TITLES[worst.part]), _(DETAIL), button=_("Report a problem"), action=OFFER
+            ALERT, "warn", _(TITLES[worst.part]), " ".join(told), button=_("Report a problem"), action=OFFER
         )
 
 
@@ -135,15 +142,26 @@ def texts(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
     return found
 
 
+def _version_of(report: CrashReport) -> str:
+    """The version that crashed, as the report's first line has it; "" when it has none."""
+    try:
+        first = read_whole(report.path, LARGEST_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
+    except OSError:
+        return ""
+    found = first.removeprefix(HEADING).strip()
+    return found if first.startswith(HEADING) and PLAIN.fullmatch(found) else ""
+
+
 def _text(crash: Crash, now_s: float) -> str:
     """For developers, so in English."""
     noticed = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now_s))
+    by = "" if crash.version == __version__ else f" by NEP Studio {__version__}"
     lines = (
-        f"Crash report of NEP Studio {__version__}",
+        f"{HEADING}{crash.version or '(version not known)'}",
         "",
         f"part: {crash.part}",
         f"how: {crash.how}",
-        f"noticed: {noticed}",
+        f"noticed: {noticed}{by}",
         "",
         crash.text[-MOST_LETTERS:],
     )

@@ -26,6 +26,7 @@ from app.core.documents.file_format import FULL, SUFFIX
 from app.core.faults import error_words, log_folder
 from app.core.reports.crash_reports import CrashReports, texts
 from app.core.reports.privacy import shown_settings, without_home
+from app.core.reports.studio_versions import used_here
 from app.core.storage.atomic_file import read_whole, write_atomically
 from app.errors import ReportError
 from nep.i18n import _, language, listed, ngettext, number
@@ -110,7 +111,7 @@ def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] 
     files: list[tuple[str, bytes]] = [
         ("README.txt", READ_ME.format(version=__version__).encode()),
         ("what-happened.txt", (happened.strip() or "(nothing was written)").encode("utf-8", "replace")),
-        ("versions.txt", _private(_versions(parts.facts))),
+        ("versions.txt", _private(_versions(parts))),
         ("settings.json", _private(_settings(parts.settings))),
         ("doctor.txt", _private(parts.doctor())),
     ]
@@ -198,8 +199,9 @@ def _named(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
     return list(found.items())
 
 
-def _versions(facts: Facts) -> str:
-    lines = [f"{name}: {value}" for name, value in (*_own_facts(), *facts)]
+def _versions(parts: ReportParts) -> str:
+    used = ("versions used here", used_here(parts.settings))
+    lines = [f"{name}: {value}" for name, value in (*_own_facts(), used, *parts.facts)]
     return "\n".join([*lines, "", "packages:", *_packages()]) + "\n"
 
 

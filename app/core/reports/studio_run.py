@@ -22,6 +22,7 @@ from typing import IO, TYPE_CHECKING
 from app.core.faults import IN_CONSOLE, error_words, log_folder
 from app.core.reports.crash import Crash, fatal_line
 from app.core.reports.crash_reports import CrashReports
+from app.core.reports.studio_versions import plain_version
 from app.core.storage.atomic_file import private_folder, read_whole, write_atomically
 from app.core.storage.file_lock import FileLock
 from app.core.storage.settings import state_home
@@ -174,8 +175,9 @@ class StudioRun:
                 return None
             how = WITHOUT_A_WORD
         began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began_s))
-        text = f"It was version {entry.get('version')}, begun {began}.\n\n{trace}\n{self._end_of_log()}"
-        return Crash("studio", how, text)
+        version = plain_version(entry.get("version"))
+        text = f"It was version {version or 'not known'}, begun {began}.\n\n{trace}\n{self._end_of_log()}"
+        return Crash("studio", how, text, version)
 
     def _trace_of(self, mark: Path) -> str:
         try:

@@ -12,6 +12,7 @@ import pytest
 from app.core.alerts import Alerts
 from app.core.reports.crash import PARTS, Crash, crash_extra
 from app.core.reports.crash_reports import ALERT, MOST, CrashLog, CrashReports, offer, texts
+from nep.version import __version__
 from tests.pseudo import untranslated
 
 
@@ -143,10 +144,38 @@ def test_the_next_start_offers_the_worst_once(reports: CrashReports) -> None:
     assert not again.active
 
 
+def test_a_crash_of_the_version_before_an_update_is_said_to_be_of_that(reports: CrashReports) -> None:
+    path = reports.add(Crash("studio", "how", "text", "0.0.9"))
+    assert path is not None
+    told = path.read_text("utf-8")
+    assert told.startswith("Crash report of NEP Studio 0.0.9\n")
+    assert f" by NEP Studio {__version__}\n" in told
+    alerts = Alerts()
+    offer(alerts, reports)
+    assert alerts.active[0].detail == (
+        f"That was NEP Studio 0.0.9; this is {__version__}. "
+        "A report helps those who make Studio to mend it. Nothing is sent by itself."
+    )
+
+
+@pytest.mark.parametrize(
+    "first", ["", "Crash report of NEP Studio \x1b[2J", "Crash report of NEP Studio " + "9" * 99]
+)
+def test_a_report_whose_first_line_is_damaged_is_offered_without_a_version(
+    reports: CrashReports, first: str
+) -> None:
+    path = reports.add(Crash("robot", "how"))
+    assert path is not None
+    path.write_text(f"{first}\nand so on", "utf-8")
+    alerts = Alerts()
+    offer(alerts, reports)
+    assert alerts.active[0].detail.startswith("A report helps")
+
+
 @pytest.mark.parametrize("part", PARTS)
 def test_every_part_is_told_in_the_language_of_the_person(pseudo: None, reports: CrashReports, part) -> None:
     alerts = Alerts()
-    reports.add(Crash(part, "how"))
+    reports.add(Crash(part, "how", version="0.0.9"))
     offer(alerts, reports)
     told = alerts.active[0]
     assert untranslated(f"{told.title} {told.detail} {told.button}") == []

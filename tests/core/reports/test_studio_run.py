@@ -124,6 +124,16 @@ def entry(place: Place, **other: object) -> Path:
     return mark
 
 
+@pytest.mark.parametrize(("kept", "version"), [("0.0.9", "0.0.9"), (None, ""), ("9\n9", ""), (["9"], "")])
+def test_a_crash_of_a_version_before_an_update_has_its_version(
+    place: Place, kept: object, version: str
+) -> None:
+    entry(place, version=kept)
+    (crash,) = place.run().left()
+    assert crash.version == version
+    assert f"It was version {version or 'not known'}, begun " in crash.text
+
+
 def test_what_the_restart_of_the_computer_ended_is_no_crash(place: Place) -> None:
     entry(place)
     assert len(place.run().left()) == 1

@@ -95,7 +95,7 @@ def test_whether_a_process_has_ended_is_known_of_this_computer_only(
     identity = Identity("n", "Turtle", HERE, process.pid)
     assert not known.has_ended(identity)
     process.kill()
-    psutil.Process(process.pid).wait(10)
+    process.wait(10)
     assert known.has_ended(identity)
     assert not known.has_ended(replace(identity, host="another-computer"))
     assert not known.has_ended(replace(identity, pid=None))

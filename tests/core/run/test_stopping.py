@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import threading
 
+import psutil
 import pytest
 
 import nep
@@ -167,10 +168,7 @@ def test_robots_stop_whatever_the_program_does(master, stopper, robots, how):
     with robots[0].changed:
         assert robots[0].changed.wait_for(lambda: bool(robots[0].heard("invoke")), LONG_S)
     if how == "was killed":
-        import os
-        import signal
-
-        os.kill(runner.pid, signal.SIGKILL)
+        psutil.Process(runner.pid).kill()  # on Windows, too
     stopper.send_stop()
     runner.stop()
     report = stopper.stop_all()

@@ -89,6 +89,8 @@ def test_between_processes_every_message_is_accounted_for(file, nodes):
         assert taken(back, 1) == ["from b"]
         report = when(program, lambda it: way(it, "b")["received"] == 1)
         assert way(report, "b")["sent"] == 1
+        if sys.platform == "win32":  # where a process is asked to end by no signal
+            return
         program.signal(signal.SIGTERM)
         out, err = program.end()
         assert program.process.returncode == 0
@@ -97,6 +99,7 @@ def test_between_processes_every_message_is_accounted_for(file, nodes):
         assert (thinned["sent"], thinned["waiting"]) in {(1, 1), (2, 0)}
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_ends_it_without_a_word_and_its_nodes_are_gone(file, nodes):
     on_a, on_b = nodes
     with running(COMMAND, "bridge", file('[[topics]]\na = "/t"\n')) as program:

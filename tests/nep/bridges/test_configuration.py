@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from contextlib import suppress
 
 import pytest
@@ -139,12 +140,16 @@ def test_words_of_a_back_end_for_quality_are_known(monkeypatch):
     )
 
 
+A_FOLDER = "permission denied" if sys.platform == "win32" else "is a directory"  # as the system says it
+NUL = "character" if sys.platform == "win32" else "byte"  # as Python says it there
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [
         (lambda path: path, "cannot be read: no such file"),
-        (lambda path: path.parent, "cannot be read: is a directory"),
-        (lambda path: path.with_name("x\0y"), "cannot be read: embedded null byte"),
+        (lambda path: path.parent, f"cannot be read: {A_FOLDER}"),
+        (lambda path: path.with_name("x\0y"), f"cannot be read: embedded null {NUL}"),
         (lambda path: written(path, b"name = 1 \xff"), "line 1 of "),
         (lambda path: written(path, b"# \n# \xff"), "is no UTF-8; save it as UTF-8"),
         (lambda path: written(path, b"#" * 1_000_001), "is larger than 1000000 bytes, so it is no file of"),

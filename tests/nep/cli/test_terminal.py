@@ -110,6 +110,7 @@ def test_what_the_stream_has_no_letters_for_is_written_all_the_same(tmp_path: Pa
     assert path.read_bytes() == b"\\u25cf \\u201c\\xe9\\u201d" + os.linesep.encode()
 
 
+@pytest.mark.skipif(not hasattr(os, "set_blocking"), reason="Windows has it from Python 3.12 on")
 def test_a_pipe_that_somebody_made_non_blocking_gets_everything() -> None:
     reading, writing = os.pipe()
     os.set_blocking(writing, False)

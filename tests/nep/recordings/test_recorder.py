@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import random
 import subprocess
 import sys
@@ -251,6 +252,7 @@ def test_a_recording_ends_by_itself_after_so_long_or_with_so_many_bytes(master, 
         assert recording.message_count == 1
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows removes no file that is open")
 def test_what_ends_by_itself_is_told_and_something_new_may_begin(master, tmp_path, monkeypatch):
     events: list[dict[str, object]] = []
 

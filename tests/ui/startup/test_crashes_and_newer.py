@@ -10,13 +10,15 @@ from pathlib import Path
 
 import pytest
 
+from app.core.reports import studio_versions
 from app.core.reports.crash import Crash
 from app.core.reports.crash_reports import ALERT, CrashReports
 from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui.application import close_when_asked, tell_of_crashes, tell_of_what_was_found
+from app.ui.application import close_when_asked, keep_version, tell_of_crashes, tell_of_what_was_found
 from app.ui.shell.main_window import MainWindow
+from nep.version import __version__
 from tests.pseudo import untranslated
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -69,6 +71,14 @@ def test_work_and_settings_of_a_newer_studio_are_told_in_the_persons_words(pseud
 def test_where_nothing_is_newer_nothing_is_told(session: Session) -> None:
     tell_of_what_was_found(session)
     assert not session.alerts.active
+
+
+def test_the_first_start_of_another_version_keeps_that_it_ran(window: MainWindow, home: Path) -> None:
+    window.state.keep(studio_versions.KEY, [{"version": "0.0.9", "since_s": 1000.0}])
+    keep_version(window, 2000.0)
+    keep_version(window, 3000.0)
+    told = [("0.0.9", 1000.0), (__version__, 2000.0)]
+    assert studio_versions.known(Settings(home).all()) == told
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")

@@ -181,6 +181,8 @@ class _Room:
 
 def room_bytes() -> int:
     """How much room there is where shared memory lives; 0 when that is not known (Linux)."""
+    if sys.platform == "win32":  # whose Python knows no statvfs
+        return 0
     try:
         found = os.statvfs(_MEMORY)
     except OSError:

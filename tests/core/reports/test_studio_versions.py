@@ -1,0 +1,78 @@
+"""Which versions ran here: kept when another one runs, told in a report, and safe to read from any file."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from app.core.reports.crash_reports import CrashReports
+from app.core.reports.problem_report import ReportParts, make_report
+from app.core.reports.studio_versions import KEY, MOST, known, used_here, with_this_version
+from app.core.storage.settings import Settings
+from nep.version import __version__
+from tests.core.reports.test_problem_report import opened
+
+DAY_S = 86_400.0
+OLDER = {"version": "0.0.9", "since_s": 1_700_000_000.0}
+
+
+def test_a_version_is_kept_when_another_one_ran_last() -> None:
+    kept = with_this_version({}, 1_700_000_000.0, is_first=True, version="0.0.9")
+    assert kept == [OLDER]
+    assert with_this_version({KEY: kept}, 1_800_000_000.0, is_first=False, version="0.0.9") is None
+    both = with_this_version({KEY: kept}, 1_700_000_000.0 + DAY_S, is_first=False, version="0.1.0")
+    assert used_here({KEY: both}) == "0.0.9 since 2023-11-14, 0.1.0 since 2023-11-15"
+    back = with_this_version({KEY: both}, 1_700_000_000.0 + 2 * DAY_S, is_first=False, version="0.0.9")
+    assert [version for version, _since in known({KEY: back})] == ["0.0.9", "0.1.0", "0.0.9"]
+
+
+def test_versions_that_did_not_keep_this_are_told_as_earlier_ones() -> None:
+    kept = with_this_version({"theme": "dark"}, 1_700_000_000.0, is_first=False, version="0.1.0")
+    assert used_here({KEY: kept}) == "earlier, 0.1.0 since 2023-11-14"
+    assert with_this_version({KEY: kept}, 1_800_000_000.0, is_first=False, version="0.1.0") is None
+
+
+def test_of_many_the_newest_are_kept() -> None:
+    values: dict[str, object] = {}
+    for number in range(MOST + 5):
+        values[KEY] = with_this_version(values, float(number), is_first=True, version=f"1.{number}")
+    assert [version for version, _since in known(values)] == [f"1.{number}" for number in range(5, MOST + 5)]
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    [
+        None, "0.0.9", 7, {"version": "0.0.9"}, [None], ["0.0.9"], [{}], [{"version": "0.0.9"}],
+        [{"version": 9, "since_s": 1.0}], [{"version": "0.0.9\nPython: 9", "since_s": 1.0}],
+        [{"version": "9" * 41, "since_s": 1.0}], [{"version": "", "since_s": 1.0}],
+        [{"version": "0.0.9", "since_s": each}
+         for each in (-1, math.nan, math.inf, 2**64 - 1, 1e300, True, "1")],
+    ],
+)  # fmt: skip
+def test_what_is_damaged_is_no_version(damaged: object) -> None:
+    assert known({KEY: damaged}) == []
+    assert used_here({KEY: damaged}) == "not known"
+    assert with_this_version({KEY: damaged}, 1.0, is_first=True, version="0.1.0") == [
+        {"version": "0.1.0", "since_s": 1.0}
+    ]
+
+
+def test_what_is_kept_goes_through_the_settings_file(tmp_path: Path) -> None:
+    Settings(tmp_path).set(KEY, [OLDER])
+    settings = Settings(tmp_path)
+    settings.set(KEY, with_this_version(settings.all(), 1_800_000_000.0, is_first=False))
+    assert [version for version, _since in known(json.loads(settings.path.read_text()))] == [
+        "0.0.9",
+        __version__,
+    ]
+
+
+def test_a_report_after_an_update_tells_both_versions(tmp_path: Path) -> None:
+    values = {KEY: with_this_version({KEY: [OLDER]}, 1_800_000_000.0, is_first=False)}
+    parts = ReportParts((), values, lambda: "", tmp_path, CrashReports(tmp_path / "crashes"))
+    lines = opened(make_report(parts, ""))["versions.txt"].splitlines()
+    assert f"NEP Studio: {__version__}" in lines
+    assert f"versions used here: 0.0.9 since 2023-11-14, {__version__} since 2027-01-15" in lines
