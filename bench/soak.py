@@ -164,7 +164,9 @@ def soak(opened: Studio, seconds: float) -> list[Sample]:
 
 def begin_recording(session: Session) -> None:
     """Record everything, pictures too, for as long as it lives."""
-    session.recordings.set_folder(session.settings.path.parent / "Recordings")
+    folder = session.settings.path.parent / "Recordings"
+    folder.mkdir()
+    session.recordings.set_folder(folder)
     said = session.recordings.record("Soak")
     until(lambda: session.recordings.is_recording, f"it records {said}", 30.0)
 

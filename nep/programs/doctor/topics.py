@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 
-from nep.i18n import _, listed, ngettext, number
+from nep.i18n import _, listed, number
 from nep.programs.doctor.facts import PublisherFact, TopicFacts
 from nep.programs.doctor.finding import Finding, ago
 from nep.programs.doctor.network import NOT_SERVED
@@ -79,7 +79,7 @@ def _nobody(facts: TopicFacts) -> Iterator[Finding]:
         if not some:
             words = _("Start the program that does; nothing else is published, either.")
         more = len(known) - len(some)
-        names = [*some, ngettext("{count} more", "{count} more", more).format(count=more)] if more else some
+        names = [*some, _("{count} more").format(count=more)] if more else some
         yield Finding("topic:nobody", "error", sentence, words.format(topics=listed(names) if names else ""))
     if not facts.is_shared and is_loopback(facts.address):
         yield Finding(
@@ -104,8 +104,8 @@ def _publisher(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
         yield Finding(
             f"topic:version:{each.node}",
             "error",
-            _("“{node}” uses nep {generation}, which no other version understands.").format(
-                node=each.node, generation=each.generation
+            _("“{program}” uses nep {generation}, which no other version understands.").format(
+                program=each.node, generation=each.generation
             ),
             _("Install 0.5.4.8 or 0.5.4.5 for this program."),
             command="pip install nep==0.5.4.8",
