@@ -26,6 +26,9 @@ from pathlib import Path
 import psutil
 from studio_window import Studio, network, percentile, run_for, studio, until
 
+from app.core.session import Session
+from nep.recordings.reader import Recording
+
 ROOT = Path(__file__).resolve().parents[1]
 EVERY_S, STEP_S, HURRY_S, FIRST_S = 2.5, 2.0, 0.5, 18.0
 RISE_SHARE, RISE_MB, MORE = 0.06, 12.0, 8
@@ -159,6 +162,29 @@ def soak(opened: Studio, seconds: float) -> list[Sample]:
     return samples
 
 
+def begin_recording(session: Session) -> None:
+    """Record everything, pictures too, for as long as it lives."""
+    folder = session.settings.path.parent / "Recordings"
+    folder.mkdir()
+    session.recordings.set_folder(folder)
+    said = session.recordings.record("Soak")
+    until(lambda: session.recordings.is_recording, f"it records {said}", 30.0)
+
+
+def recorded_all(session: Session) -> bool:
+    """End the recording; whether it is whole, and has everything that came."""
+    session.recordings.stop()
+    until(lambda: not session.recordings.is_recording, "the recording has ended", 60.0)
+    (path,) = session.recordings.folder.glob("*.mcap")
+    with Recording(path) as recording:
+        unkept = sum(each.unkept for each in recording.figures().values())
+        print(
+            f"recorded {recording.message_count} messages of {len(recording.topics)} topics, "
+            f"{path.stat().st_size / 1e6:.1f} MB in {recording.duration_s:.0f} s; {unkept} not kept"
+        )
+        return recording.is_complete and recording.message_count > 0 and not unkept
+
+
 def rise(samples: Sequence[Sample], values: Sequence[float]) -> float:
     """How much a fitted line rises from the first of these samples to the last."""
     slope = statistics.linear_regression([sample.at_s for sample in samples], values).slope
@@ -215,14 +241,16 @@ def main() -> int:
         until(lambda: session.fleet.connected, "the virtual robot is there", 60.0)
         session.runs.run()
         until(lambda: session.runs.running_blocks, "the behaviour runs", 30.0)
+        begin_recording(session)
         samples = soak(opened, arguments.minutes * 60)
+        whole = recorded_all(session)
     arguments.csv.parent.mkdir(parents=True, exist_ok=True)
     with arguments.csv.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         names = [each.name for each in fields(Sample) if each.name != "sizes"]
         writer.writerow(names)
         writer.writerows([getattr(sample, name) for name in names] for sample in samples)
-    flat = judge(samples)
+    flat = judge(samples) and whole
     print(f"{len(samples)} samples in {arguments.csv}; {'flat' if flat else 'NOT flat'}")
     return 0 if flat else 1
 

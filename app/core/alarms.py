@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -16,9 +15,9 @@ from app.core.network.source import Source
 from app.core.network.watches import Watch
 from app.core.robots.voices import Notes, RobotVoices
 from app.core.run.control import Runs
-from app.core.storage.atomic_file import read_whole, write_atomically
+from app.core.storage.atomic_file import write_atomically
+from app.core.storage.kept_file import read_kept
 from app.core.storage.settings import Settings
-from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.messages.message import Message
 from nep.nodes.node import Node
@@ -30,7 +29,6 @@ from nep.programs.alarms.rule import EVENT_KINDS, Scalar, new_id, problem_of
 from nep.programs.alarms.rule_file import MOST_ALARMS, NewerAlarmsError, alarms_text, read_text
 from nep.programs.alarms.sentences import subject_words, time_words, what_words
 from nep.protocol.graph_view import GraphView
-from nep.system.replace_file import replace_file
 
 FILE = "alarms.json"
 SHOW = "panel:alarms"
@@ -336,42 +334,20 @@ class SessionAlarms:
 
     def _read(self, path: Path) -> AlarmFile:
         """What was kept; what is damaged is put aside, and said."""
-        try:
-            data = read_whole(path, _MOST_BYTES)
-        except (FileNotFoundError, NotADirectoryError):
-            return AlarmFile()
-        except OSError as error:
-            return self._damaged(path, error.strerror or str(error))
-        try:
-            found = read_text(data, path.name, lenient=True)
-        except NepError as error:
-            self._is_newer = isinstance(error, NewerAlarmsError)
-            return self._damaged(path, str(error))
-        return self._damaged(path, found.problems[0], data, found) if found.problems else found
 
-    def _damaged(
-        self, path: Path, reason: str, data: bytes | None = None, found: AlarmFile | None = None
-    ) -> AlarmFile:
-        """Keep the file beside, and say so; ``found`` is what could be read of its ``data``."""
-        beside = path.with_name("alarms.damaged.json")
-        said = _("The file is left as it is, and what you change is not kept: {reason}.")
-        if not self._is_newer:
-            said = _("The file is kept as “{file}”: {reason}.")
-            with suppress(OSError):
-                if data is None:
-                    replace_file(path, beside)
-                else:
-                    write_atomically(beside, data, durable=False, private=True)
-        title = _("Some alarms could not be read.") if found else _("The alarms could not be read.")
-        self._session.alerts.put(
-            "alarms:file",
-            "warn",
-            title,
-            said.format(file=beside.name, reason=reason),
-            button=_("Show the alarms"),
-            action=SHOW,
-        )
-        return found if found is not None else AlarmFile()
+        def parse(data: bytes) -> tuple[AlarmFile, str]:
+            found = read_text(data, path.name, lenient=True)
+            return found, next(iter(found.problems), "")
+
+        kept = read_kept(path, parse, NewerAlarmsError, _MOST_BYTES)
+        self._is_newer = kept.is_newer
+        if kept.problem:
+            some = kept.value is not None
+            title = _("Some alarms could not be read.") if some else _("The alarms could not be read.")
+            self._session.alerts.put(
+                "alarms:file", "warn", title, kept.problem, button=_("Show the alarms"), action=SHOW
+            )
+        return kept.value if kept.value is not None else AlarmFile()
 
 
 def _nobody(_event: AlarmEvent) -> None:

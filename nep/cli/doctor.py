@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, show_json
+from nep.i18n import _
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped
 
@@ -16,18 +17,25 @@ if TYPE_CHECKING:
 else:  # the other commands need not wait for it
     doctors = lazy_module("nep.programs.doctor")
 
+MissedArgument = Annotated[
+    str, typer.Argument(help=_("The topic that you miss."), metavar=_("TOPIC"), show_default=False)
+]
+
 _STYLES = {"error": "bold red", "warning": "bold yellow", "info": "dim", "ok": "green"}
 _SIGNS = dict(zip(_STYLES, "✗!·✓", strict=True))
 _PLAIN_SIGNS = dict(zip(_STYLES, "x!-+", strict=True))
 """For terminals and files that are not Unicode, as Windows has them."""
 
 
-def doctor(master: MasterOption = None, as_json: JsonOption = False) -> None:
+def doctor(master: MasterOption = None, as_json: JsonOption = False, topic: MissedArgument = "") -> None:
     """Look for what keeps programs from finding each other, and say what to do about it.
+
+    With a topic also why nothing is seen of it: a name that is written otherwise, a publisher that is silent,
+    that cannot be reached or sends what cannot be read.
 
     Ends with 0 when all is well, 1 with a warning, 2 when something is wrong.
     """
-    found = doctors.findings(doctors.collect_facts(master))
+    found = doctors.look(master, topic)
     if as_json:
         show_json(doctors.to_plain(found))
     else:

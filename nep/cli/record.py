@@ -13,7 +13,7 @@ import typer
 from nep.cli import interrupts
 from nep.cli.complete import complete_topic
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.recording_files import clock_text
+from nep.cli.recording_files import TopicsToRecord, clock_text
 from nep.cli.screen import console, say, show_json, size
 from nep.cli.topic_wait import node_for
 from nep.errors import RecordingError
@@ -30,15 +30,7 @@ _LOOK_S = 0.2
 
 
 def record(
-    topics: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar=_("TOPIC|PATTERN"),
-            help=_("What to record: topics, or patterns such as '/arm/*'; all when none is named."),
-            show_default=False,
-            autocompletion=complete_topic,
-        ),
-    ] = None,
+    topics: TopicsToRecord = None,
     output: Annotated[
         Path | None,
         typer.Option(

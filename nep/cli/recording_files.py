@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from datetime import datetime, time, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nep.cli.complete import complete_topic
 from nep.cli.screen import console
 from nep.errors import NepError, did_you_mean
 from nep.i18n import _
 from nep.protocol.topic_glob import glob_matches, is_glob
 from nep.system.lazy_import import lazy_module
+from nep.text import quotable
 
 if TYPE_CHECKING:
     from nep.recordings import reader
@@ -25,24 +28,43 @@ __all__ = [
     "FromOption",
     "RecordedTopicsArgument",
     "ToOption",
+    "TopicsToRecord",
     "chosen_topics",
     "clock_text",
     "progress_bar",
     "span_ns",
+    "time_ns",
 ]
 
 FileArgument = Annotated[
     Path, typer.Argument(metavar=_("FILE"), help=_("The recording."), show_default=False, dir_okay=False)
 ]
 FromOption = Annotated[
-    float | None,
+    str | None,
     typer.Option(
-        "--from", metavar=_("SECONDS"), help=_("So long after its start; 0 is its start."), show_default=False
+        "--from",
+        metavar=_("SECONDS|CLOCK"),
+        help=_("So long after its start (0 is its start), or from this time of day on: 15:04:05."),
+        show_default=False,
     ),
 ]
 ToOption = Annotated[
-    float | None,
-    typer.Option("--to", metavar=_("SECONDS"), help=_("Up to so long after its start."), show_default=False),
+    str | None,
+    typer.Option(
+        "--to",
+        metavar=_("SECONDS|CLOCK"),
+        help=_("Up to so long after its start, or to this time: 15:04:05.5, 2026-11-17T14:04:05Z."),
+        show_default=False,
+    ),
+]
+TopicsToRecord = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar=_("TOPIC|PATTERN"),
+        help=_("What to record: topics, or patterns such as '/arm/*'; all when none is named."),
+        show_default=False,
+        autocompletion=complete_topic,
+    ),
 ]
 
 
@@ -88,17 +110,56 @@ def chosen_topics(recording: reader.Recording, words: Sequence[str]) -> list[str
 
 
 def span_ns(
-    recording: reader.Recording, from_s: float | None, to_s: float | None
+    recording: reader.Recording, begin: str | float | None, end: str | float | None
 ) -> tuple[int | None, int | None]:
-    """Times in ns since 1970 of seconds after a recording's start. Raises `typer.BadParameter`."""
-    for each in (from_s, to_s):
-        if each is not None and not 0.0 <= each < 1e9:
-            raise typer.BadParameter(_("{given:g} is no time; give seconds, 0 or more").format(given=each))
-    if from_s is not None and to_s is not None and from_s >= to_s:
+    """Times in ns since 1970 of a part of a recording; see `time_ns`. Raises `typer.BadParameter`."""
+    first = None if begin is None else time_ns(str(begin), recording.start_ns, recording.end_ns)
+    last = None if end is None else time_ns(str(end), recording.start_ns, recording.end_ns)
+    if first is not None and last is not None and first >= last:
         raise typer.BadParameter(_("the part ends before it begins"))
-    start = None if from_s is None else recording.start_ns + int(from_s * 1e9)
-    end = None if to_s is None else recording.start_ns + int(to_s * 1e9)
-    return start, end
+    return first, last
+
+
+def time_ns(text: str, start_ns: int, end_ns: int) -> int:
+    """A time that a person writes, in ns since 1970, of a recording between two such times.
+
+    Seconds after its start ("12.5"), a time of day ("15:04:05", "15:04:05.250", "15:04:05Z") or that of a
+    date ("2026-11-17T15:04:05"): of this computer's clock, of UTC with a "Z", of another with "+02:00". A
+    time of day before the start means the next day when the recording goes on until then. Raises
+    `typer.BadParameter`.
+    """
+    words = text.strip()
+    try:
+        seconds = float(words)
+    except ValueError:
+        return _clock_ns(words, start_ns, end_ns)
+    if not 0.0 <= seconds < 1e9:
+        raise typer.BadParameter(_("{given:g} is no time; give seconds, 0 or more").format(given=seconds))
+    return start_ns + int(seconds * 1e9)
+
+
+def _clock_ns(words: str, start_ns: int, end_ns: int) -> int:
+    iso = f"{words[:-1]}+00:00" if words.endswith(("Z", "z")) else words
+    try:
+        try:
+            given = time.fromisoformat(iso)
+        except ValueError:
+            return _since_1970(datetime.fromisoformat(iso))
+        began = datetime.fromtimestamp(start_ns / 1e9, given.tzinfo)  # without one: of this computer
+        found = _since_1970(datetime.combine(began.date(), given))
+        later = _since_1970(datetime.combine(began.date() + timedelta(days=1), given))
+    except (ValueError, OverflowError, OSError) as error:
+        raise typer.BadParameter(
+            _("'{given}' is no time; give seconds after the start, or a clock time such as 15:04:05").format(
+                given=quotable(words)
+            )
+        ) from error
+    return later if found < start_ns and later <= end_ns else found
+
+
+def _since_1970(at: datetime) -> int:
+    """In ns; without a time zone by the clock of this computer. Raises as `datetime.timestamp` does."""
+    return int(at.replace(microsecond=0).timestamp()) * 1_000_000_000 + at.microsecond * 1000
 
 
 def clock_text(seconds: float) -> str:

@@ -17,7 +17,7 @@ import typer
 from nep.cli import interrupts
 from nep.cli.complete import complete_topic
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.recording_files import clock_text
+from nep.cli.recording_files import TopicsToRecord, clock_text
 from nep.cli.screen import console, say, show_json, size
 from nep.cli.topic_wait import node_for
 from nep.errors import NepError, RecordingError
@@ -91,15 +91,7 @@ class _Keeper:
 
 
 def ring(
-    topics: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar=_("TOPIC|PATTERN"),
-            help=_("What to keep: topics, or patterns such as '/arm/*'; all when none is named."),
-            show_default=False,
-            autocompletion=complete_topic,
-        ),
-    ] = None,
+    topics: TopicsToRecord = None,
     seconds: Annotated[
         float, typer.Option("--seconds", "-s", metavar=_("SECONDS"), help=_("How much of the past is there."))
     ] = 60.0,

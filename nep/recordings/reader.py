@@ -181,18 +181,31 @@ class Recording:
             made.update(each)
         return made
 
-    def figures_over_time(self) -> Iterator[tuple[int, dict[str, TopicFigures]]]:
-        """(time, figures of the topics that have new ones): where they grow, there something was lost."""
-        for log_ns, value in self.said("figures"):
+    def figure_pieces(self) -> Sequence[int]:
+        """The pieces of the file in which the recorder told figures, by time; nothing is read for that."""
+        channels = [number for number, each in self._decoders.items() if each.role == "figures"]
+        return sorted({number for channel in channels for number in self._in_chunks.get(channel, ())})
+
+    def figures_over_time(
+        self, pieces: Collection[int] | None = None
+    ) -> Iterator[tuple[int, dict[str, TopicFigures]]]:
+        """(time, figures of the topics that have new ones): where they grow, there something was lost.
+
+        Of all of the file, or of some of `figure_pieces`.
+        """
+        for log_ns, value in self.said("figures", pieces):
             topics = value.get("topics") if isinstance(value, dict) else None
             if isinstance(topics, dict):
                 made = {str(topic): read_figures(each) for topic, each in topics.items()}
                 yield log_ns, {topic: each for topic, each in made.items() if each is not None}
 
-    def said(self, role: Role) -> Iterator[tuple[int, object]]:
-        """(time, value) of what the recorder said: "alerts", "figures", "notes", "runs", "alarms"."""
+    def said(self, role: Role, pieces: Collection[int] | None = None) -> Iterator[tuple[int, object]]:
+        """(time, value) of what the recorder said: "alerts", "figures", "notes", "runs", "alarms".
+
+        Of all of the file, or of these pieces.
+        """
         channels = {number for number, each in self._decoders.items() if each.role == role}
-        for _decoder, raw in self._raw(None, None, channels):
+        for _decoder, raw in self._raw(None, None, channels, pieces):
             try:
                 yield raw.log_ns, orjson.loads(raw.data)
             except orjson.JSONDecodeError:
@@ -221,7 +234,11 @@ class Recording:
         }
 
     def _raw(
-        self, start_ns: int | None, end_ns: int | None, channels: Collection[int]
+        self,
+        start_ns: int | None,
+        end_ns: int | None,
+        channels: Collection[int],
+        pieces: Collection[int] | None = None,
     ) -> Iterator[tuple[ChannelDecoder, RawMessage]]:
         first = 0 if start_ns is None else bisect_left(self._latest_ends, max(0, start_ns))
         last = (
@@ -232,7 +249,8 @@ class Recording:
                 number
                 for channel in channels
                 for number in self._chunks_of(channel, first, last)
-                if start_ns is None or self._chunks[number].end_ns >= start_ns
+                if (start_ns is None or self._chunks[number].end_ns >= start_ns)
+                and (pieces is None or number in pieces)
             }
         )
         pending: list[RawMessage] = []

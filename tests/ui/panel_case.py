@@ -29,6 +29,7 @@ class Window:
     commands: list[str] = field(default_factory=list)
     plotted: list[tuple[str, str]] = field(default_factory=list)
     beside: list[str] = field(default_factory=list)
+    asked_why: list[tuple[PanelWidget, str]] = field(default_factory=list)
     answers: Answers = field(default_factory=Answers)
 
     def context(self) -> PanelContext:
@@ -41,6 +42,7 @@ class Window:
             self.answers,
             plot=lambda topic, path: self.plotted.append((topic, path)),
             open_beside=self.beside.append,
+            why=lambda panel, topic: self.asked_why.append((panel, topic)),
         )
 
     def say(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.core.network.topics import split_key
 from nep.i18n import _
 from nep.system.lazy_import import lazy_module
 
@@ -23,11 +24,12 @@ class Doctor:
     """Looks when it is asked. One thread uses it (the window's); the looking happens in another."""
 
     def __init__(
-        self, look: Callable[[], Sequence[doctor.Finding]], clock: Callable[[], float] = time.time
+        self, look: Callable[[str], Sequence[doctor.Finding]], clock: Callable[[], float] = time.time
     ) -> None:
-        """``look`` may take some seconds; ``clock`` gives epoch seconds."""
+        """``look`` gets the topic that is missed, and may take seconds; ``clock`` gives epoch seconds."""
         self._look, self._clock = look, clock
         self._thread: threading.Thread | None = None
+        self._missed = self._told_of = ""
         self._found: tuple[doctor.Finding, ...] = ()
         self._looked_s: float | None = None
         self.revision = 0
@@ -47,8 +49,23 @@ class Doctor:
         """When it was found (epoch seconds); None before the first time."""
         return self._looked_s
 
+    @property
+    def missed(self) -> str:
+        """The topic of which somebody sees nothing; "" for none in particular."""
+        return self._missed
+
+    @property
+    def told_of(self) -> str:
+        """The topic that was missed when `findings` were found."""
+        return self._told_of
+
+    def miss(self, topic: str) -> None:
+        """Look for what is wrong with this topic, from now on; "" for none in particular."""
+        self._missed = topic
+        self.look()
+
     def look(self) -> None:
-        """Look now; while it looks already, nothing."""
+        """Look now; while it looks already, that goes on, with what is missed now."""
         if self.looking:
             return
         self._thread = threading.Thread(target=self._run, name="studio-doctor", daemon=True)
@@ -68,18 +85,28 @@ class Doctor:
             self._thread.join(JOIN_S)
 
     def _run(self) -> None:
+        while True:  # whoever misses another topic meanwhile waits for that one
+            missed = self._missed
+            found = self._find(missed)
+            if missed == self._missed:
+                break
+        self._found, self._looked_s, self._told_of = found, self._clock(), missed
+        self.revision += 1
+
+    def _find(self, missed: str) -> tuple[doctor.Finding, ...]:
         try:
-            found = tuple(self._look())
+            return tuple(self._look(missed))
         except Exception as error:  # noqa: BLE001  a doctor that breaks off must say so, not vanish
             words = _("The doctor could not finish: {kind}: {error}.").format(
                 kind=type(error).__name__, error=error
             )
-            found = (doctor.Finding("doctor", "error", words, _("Tell the people who make NEP Studio.")),)
-        self._found, self._looked_s = found, self._clock()
-        self.revision += 1
+            return (doctor.Finding("doctor", "error", words, _("Tell the people who make NEP Studio.")),)
 
 
 def doctor_of(address: str, folder: Path) -> Doctor:
-    """A doctor for the master at this address, who also looks at Studio's own folder."""
+    """A doctor for the master at this address, who also looks at Studio's own folder.
+
+    What it knows of the topics of other networks it is not asked: it looks into Studio's own only.
+    """
     folders = [(_("Settings and unsaved work"), folder)]
-    return Doctor(lambda: doctor.findings(doctor.collect_facts(address, folders=folders)))
+    return Doctor(lambda key: doctor.look(address, "" if split_key(key)[0] else key, folders))

@@ -16,6 +16,7 @@ from PySide6.QtGui import QAction, QFont
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.theme.theme import Theme
+from app.ui.widgets.empty_state import EmptyAction
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _
 
@@ -52,6 +53,7 @@ class PanelContext:
     does one of the window's commands by its name (`app.ui.shell.commands.table`), ``files`` asks for files,
     ``keys_to_question`` gives the keyboard to what a running behaviour asks, if it asks something. ``plot``
     plots a field of a topic; without a path it asks which. ``open_beside`` shows a topic in one more panel.
+    ``why`` asks the connection doctor why a panel shows nothing of a topic, or ("") of any.
     """
 
     session: Session
@@ -63,6 +65,40 @@ class PanelContext:
     keys_to_question: Callable[[], None] = lambda: None
     plot: Callable[[str, str], None] = lambda _topic, _path: None
     open_beside: Callable[[str], None] = lambda _topic: None
+    why: Callable[[PanelWidget, str], None] = lambda _panel, _topic: None
+
+
+@dataclass(frozen=True, slots=True)
+class Hindrance:
+    """Something in a panel itself that keeps what comes from being shown, and the button that ends it.
+
+    ``sentence`` says what, ``mend`` what to do, ``button`` what ``run`` does: "Let it go on".
+    """
+
+    sentence: str
+    mend: str
+    button: str
+    run: Callable[[], object]
+
+
+def paused_hindrance(panel: str, go_on: Callable[[], object]) -> Hindrance:
+    """A panel of this title holds what it shows."""
+    return Hindrance(
+        _("{panel} is paused: it keeps what it shows, whatever comes.").format(panel=panel),
+        "",
+        _("Let it go on"),
+        go_on,
+    )
+
+
+def filter_hindrance(panel: str, words: str, clear: Callable[[], object]) -> Hindrance:
+    """A panel of this title shows only what has these words."""
+    return Hindrance(
+        _("{panel} shows only what has “{words}”.").format(panel=panel, words=words),
+        "",
+        _("Clear the filter"),
+        clear,
+    )
 
 
 def numbered(title: str, number: int) -> str:
@@ -194,6 +230,14 @@ class PanelWidget(QWidget):
     def focus_filter(self) -> bool:
         """Go to the panel's filter (`/`); False when it has none."""
         return False
+
+    def hindrances(self) -> Sequence[Hindrance]:
+        """What of the panel itself hides what comes: that it is paused, its filter."""
+        return ()
+
+    def why(self, topic: str = "") -> EmptyAction:
+        """The way to the connection doctor for when nothing is seen of a topic, or ("") of any."""
+        return EmptyAction(_("Why do I see nothing?"), lambda: self.context.why(self, topic), "stethoscope")
 
     def save_state(self) -> dict[str, object]:
         """What is to be as it was when the layout comes back."""

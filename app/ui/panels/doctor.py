@@ -1,35 +1,55 @@
-"""Connection doctor: what keeps programs from finding each other, each finding with its next step."""
+"""Connection doctor: why nothing is seen, of one topic or of any, each finding with its next step.
+
+What keeps programs from finding each other is found beside the window (`app.core.network.doctor`); what hides
+messages in Studio itself, a recording that is open, a panel that is paused, is looked at with every refresh.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 from PySide6.QtGui import QAction, QGuiApplication
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
-from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.widgets import Chip, EmptyState, IconButton
+from app.core.network.topics import split_key
+from app.core.networks.networks import LOOK_COMMAND, lost_words, topic_words
+from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget
+from app.ui.widgets import Button, Chip, ElidedLabel, EmptyState, IconButton, Separator, label
 from app.ui.widgets.cards import AlertRow
+from app.ui.widgets.inputs.combo_box import ComboBox
 from app.ui.widgets.lists.scroll_areas import PanelRows
-from nep.i18n import _, lazy
-from nep.programs.doctor import report
-
-if TYPE_CHECKING:
-    from nep.programs.doctor import Finding
+from nep.i18n import _, lazy, ngettext, number
+from nep.programs.doctor import Finding, in_order, report
 
 STATUS = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
 BAD = frozenset({"error", "warning"})
-STARTABLE = frozenset({"master:none"})
+MOST_OFFERED = 500
+"""Topics in the list of what may be missed; a longer one helps nobody."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The next step of a finding: its button's words, and what that does."""
+
+    words: str
+    run: Callable[[], object]
+    mends: bool = True
+    """Whether it ends what is wrong: then the doctor looks again."""
 
 
 class DoctorPanel(PanelWidget):
-    """Everything that was looked at, the worst first."""
+    """Everything that was looked at, the worst first; above it what is missed."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Connection doctor"))
         self._seen: tuple[object, ...] = ()
+        self._offered: tuple[object, ...] = ()
         self._master = ""
+        self._asker: PanelWidget | None = None
+        self._own: list[Hindrance] = []
+        self._told: tuple[object, ...] = ()
         self.rows: list[AlertRow] = []
         self.shown: list[Finding] = []  # each in the row of its place
         self.chip = Chip(self.theme)
@@ -43,7 +63,50 @@ class DoctorPanel(PanelWidget):
             self.theme, "stethoscope", _("Looking at the connections"), _("This takes a second or two.")
         )
         self.pages = PanelRows(self.empty, _("Connection doctor"))
-        self.pages.fill(self)
+        self.missed = ComboBox(self.theme, name=_("I miss"))
+        self.missed.activated.connect(self._choose_missed)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        about = label(_("I miss"), "body", role="textSecondary")
+        about.setBuddy(self.missed)
+        self.looked = ElidedLabel("small", "textTertiary", least=40)
+        top = QHBoxLayout()
+        top.setContentsMargins(12, 8, 12, 4)
+        top.setSpacing(8)
+        top.addWidget(about)
+        top.addWidget(self.missed, 1)
+        top.addWidget(self.looked, 1)
+        self.terminal = ElidedLabel("small", "textSecondary", least=40)
+        self.copy = Button(self.theme, _("Copy the report"), "copy", size="small")
+        self.copy.let_shrink()
+        self.copy.clicked.connect(self.copy_report)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(12, 5, 12, 6)
+        foot.setSpacing(8)
+        foot.addWidget(self.terminal, 1)
+        foot.addWidget(self.copy)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(top)
+        column.addWidget(self.pages, 1)
+        column.addWidget(Separator(self.theme))
+        column.addLayout(foot)
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def begin_for(self, asker: PanelWidget | None) -> None:
+        """Look also at what in this panel hides what comes; its topic was told to the doctor already."""
+        if self._asker is not None:
+            self._asker.destroyed.disconnect(self._forget_asker)
+        self._asker = asker
+        if asker is not None:
+            asker.destroyed.connect(self._forget_asker)
+        self.refresh()
+
+    def _forget_asker(self) -> None:
+        self._asker = None
 
     def refresh(self) -> None:
         doctor = self.session.doctor
@@ -51,24 +114,90 @@ class DoctorPanel(PanelWidget):
             # a master came or went while the panel is looked at: what was found is not true any more
             self._master = self.session.master.kind
             doctor.look()
-        now = (doctor.revision, doctor.looking)
+        elif doctor.told_of != doctor.missed and not doctor.looking:
+            doctor.look()
+        self._offer_topics()
+        own = list(self._hindrances())
+        told = tuple((each.sentence, each.button) for each in own)
+        now = (doctor.revision, doctor.looking, told)
         if now == self._seen:
             return
         self._seen = now
         self.again.setEnabled(not doctor.looking)
         if doctor.looked_s is None:
             return
-        if list(doctor.findings) != self.shown:
-            self._show(doctor.findings)
+        self._own = own
+        found = self._all(own)
+        if found != self.shown or told != self._told:
+            self._told = told
+            self._show(found)
         self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.looked_s)))
+        self._say_looked()
         self.pages.show_rows(bool(self.rows))
+
+    def _all(self, own: Sequence[Hindrance]) -> list[Finding]:
+        here = [
+            Finding(f"studio:{place}", "error", each.sentence, each.mend) for place, each in enumerate(own)
+        ]
+        return list(in_order([*here, *self.session.doctor.findings]))
+
+    def _hindrances(self) -> Iterator[Hindrance]:
+        """What hides messages in Studio itself; the panel that asked tells the rest."""
+        session, topic = self.session, self.session.doctor.missed
+        if session.replay is not None and (topic or self._asker is not None):
+            yield self._replay_hides(topic)
+        network = session.live.networks.get(split_key(topic)[0])
+        if network is not None:
+            yield from self._network_hides(topic, lost_words(network))
+        if self._asker is not None:
+            yield from self._asker.hindrances()
+
+    def _replay_hides(self, topic: str) -> Hindrance:
+        recorded = not topic or self.session.topics.get(topic) is not None
+        sentence = _("A recording is open, so panels show what was recorded, not what comes now.")
+        if not recorded:
+            sentence = _("A recording is open, and {topic} is not in it.").format(topic=topic_words(topic))
+        mend = _("What is found below is about the live network.")
+        return Hindrance(sentence, mend, _("Back to live"), lambda: self.context.run("replay.live"))
+
+    def _network_hides(self, topic: str, lost: str) -> Iterator[Hindrance]:
+        """What is known of a topic of another network, which this doctor can't look into."""
+        unread = self.session.live.networks.unread(topic)
+        words = lost or (f"{topic_words(topic)}: {unread}." if unread else "")
+        if words:
+            mend = _("Look at its address, and at its password or key where it asks for one.")
+            yield Hindrance(words, mend, _("Other networks"), lambda: self.context.run(LOOK_COMMAND))
+
+    def _offer_topics(self) -> None:
+        """Offer the topics that there are, and the one that is missed."""
+        live, missed = self.session.live, self.session.doctor.missed
+        facts = (live.topics.revision, live.networks.revision, missed)
+        if facts == self._offered or self.missed.view().isVisible():
+            return
+        self._offered = facts
+        names = [topic.key for topic in (*live.topics, *live.networks.topics)]
+        self.missed.clear()
+        self.missed.addItem(_("no topic in particular"), "")
+        for name in sorted({*names[:MOST_OFFERED], missed} - {""}):
+            self.missed.addItem(topic_words(name), name)
+        self.missed.set_value(missed)
+        command = f"nep doctor {missed}" if missed and not split_key(missed)[0] else "nep doctor"
+        self.terminal.setText(_("In a terminal: {command}").format(command=command))
+
+    def _say_looked(self) -> None:
+        count = len(self.shown)
+        words = ngettext("{count} thing looked at", "{count} things looked at", count)
+        self.looked.setText(words.format(count=number(count, ".0f")))
 
     def _show(self, found: Sequence[Finding]) -> None:
         for row in self.rows:
             self.pages.drop(row)
         self.shown = list(found)
-        self.rows = [self._row(finding) for finding in found]
+        steps = [self._step(finding) for finding in found]
+        mends = [place for place, step in enumerate(steps) if step is not None and step.mends]
+        self.rows = [self._row(finding, step) for finding, step in zip(found, steps, strict=True)]
         for place, row in enumerate(self.rows):
+            row.button.set_kind("primary" if place in mends[:1] else "plain")
             self.pages.put(place, row)
         bad = [each.severity for each in found if each.severity in BAD]
         if bad:
@@ -76,30 +205,80 @@ class DoctorPanel(PanelWidget):
         else:
             self.chip.set(_("all is well"), "ok")
 
-    def _row(self, finding: Finding) -> AlertRow:
+    def _row(self, finding: Finding, step: Step | None) -> AlertRow:
         row = AlertRow(self.theme, framed=finding.severity in BAD)
-        does = _("Copy the command") if finding.command else ""
         row.say(
             STATUS[finding.severity],
             finding.sentence,
             finding.mend,
             command=finding.command,
-            button=_("Start the master") if finding.id in STARTABLE else does,
+            button=step.words if step is not None else "",
         )
-        row.button.clicked.connect(lambda: self._mend(finding))
+        row.button.clicked.connect(lambda: self._do(finding, step))
         return row
 
-    def _mend(self, finding: Finding) -> None:
-        if finding.id in STARTABLE:
-            self.session.launcher.ensure_master()
-            self.context.toast(_("Starting the master"))
+    # -- the next steps -----------------------------------------------------------------------------------
+
+    def _step(self, finding: Finding) -> Step | None:
+        kind, _colon, rest = finding.id.partition(":")
+        if kind == "studio":
+            return Step(self._own[int(rest)].button, self._own[int(rest)].run)
+        if finding.id == "topic:near":
+            words = _("Use {topic}").format(topic=finding.instead)
+            return Step(words, lambda: self._use(finding.instead))
+        if kind == "topic" and finding.instead:
+            return Step(
+                _("Call {service}").format(service=finding.instead),
+                lambda: self.context.run(f"service.call:{finding.instead}"),
+            )
+        run = {
+            "topic:closed": (_("Let other computers connect"), "network.others"),
+            "topic:unreadable": (_("Look at its bytes"), f"inspect:{self.session.doctor.missed}"),
+            "topic:name": (_("Choose a topic"), "panel:topics"),
+        }.get(finding.id)
+        if run is not None:
+            return Step(run[0], lambda: self.context.run(run[1]), mends=finding.severity in BAD)
+        if finding.id == "master:none":
+            return Step(_("Start the master"), self._start_master)
+        if finding.command:
+            return Step(_("Copy the command"), lambda: self._copy_command(finding.command), mends=False)
+        return None
+
+    def _do(self, finding: Finding, step: Step | None) -> None:
+        if step is None:
             return
-        QGuiApplication.clipboard().setText(finding.command)
-        self.context.toast(_("Copied “{command}”").format(command=finding.command))
+        step.run()
+        if finding.id.startswith("studio:"):
+            self.session.doctor.look()
+            self.context.toast(_("Done, looking again"))
+
+    def _use(self, topic: str) -> None:
+        """Show the topic that was meant where the other one was missed."""
+        if self._asker is not None:
+            self._asker.show_topic(topic)
+        else:
+            self.context.open_topic(topic)
+        self.session.doctor.miss(topic)
+        self.context.toast(_("Showing {topic}, looking again").format(topic=topic))
+
+    def _start_master(self) -> None:
+        self.session.launcher.ensure_master()
+        self.context.toast(_("Starting the master"))
+
+    def _copy_command(self, command: str) -> None:
+        QGuiApplication.clipboard().setText(command)
+        self.context.toast(_("Copied “{command}”").format(command=command))
+
+    def _choose_missed(self) -> None:
+        """A person says what they miss: no panel asks any more."""
+        self.session.doctor.miss(self.missed.value)
+        self.begin_for(None)
 
     def copy_report(self) -> None:
         """Put everything that was found on the clipboard, to be sent to somebody."""
-        QGuiApplication.clipboard().setText(report(self.session.doctor.findings))
+        missed = self.session.doctor.missed
+        about = _("Missed: {topic}").format(topic=topic_words(missed)) + "\n" if missed else ""
+        QGuiApplication.clipboard().setText(about + report(self.shown))
         self.context.toast(_("Copied the report"))
 
     def more_actions(self) -> Sequence[QAction]:

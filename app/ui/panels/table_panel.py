@@ -10,7 +10,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.ui.panels.base import Density, PanelContext, PanelWidget
+from app.ui.panels.base import Density, Hindrance, PanelContext, PanelWidget, filter_hindrance
 from app.ui.panels.row_actions import RowAction, filled
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ElidedLabel, EmptyAction, EmptyState, Separator, label
@@ -64,7 +64,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         self.foot.setMinimumWidth(0)
         self.line = Separator(theme)
         self.empty = EmptyState(theme, icon, "", "")
-        self.doctor = DoctorLine(theme, context.run)
+        self.doctor = DoctorLine(theme, lambda: context.why(self, ""))
         self.pages = QStackedWidget()
         self.pages.addWidget(self.table)
         self.pages.addWidget(self.empty)
@@ -116,7 +116,9 @@ class TablePanel(PanelWidget, Generic[Row]):
         if filtered:
             words = self._words
             self.empty.say(_(words.nothing_fits), _(words.clear_the_filter), "search")
-            self.empty.set_actions([EmptyAction(_("Clear the filter"), self.filter.clear, "x")])
+            clear = EmptyAction(_("Clear the filter"), self.filter.clear, "x")
+            wanted = self.missed_topic()
+            self.empty.set_actions([clear, self.why(wanted)] if wanted else [clear])
         elif self.session.replay is not None and self._words.not_recorded:
             self.doctor.hide()
             self.empty.say(_(self._words.not_recorded), "", "film")
@@ -128,6 +130,14 @@ class TablePanel(PanelWidget, Generic[Row]):
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
         else:
             self.say_empty()
+
+    def missed_topic(self) -> str:
+        """The topic that a person types into the filter, and that is not there; "" where that is none."""
+        return ""
+
+    def hindrances(self) -> list[Hindrance]:
+        words = self.filter.text().strip()
+        return [filter_hindrance(self.title(), words, self.filter.clear)] if words else []
 
     def say_empty(self) -> None:
         """Say in `empty` that there is nothing yet: a master is there, or is looked for."""
@@ -156,20 +166,17 @@ class TablePanel(PanelWidget, Generic[Row]):
         self.table.restore(state)
 
 
-COMMAND = "help.doctor"
-
-
 class DoctorLine(QWidget):
     """``Expected to see something?`` with its button."""
 
-    def __init__(self, theme: Theme, run: Callable[[str], None]) -> None:
-        """``run`` does a command of the window by its name."""
+    def __init__(self, theme: Theme, ask: Callable[[], object]) -> None:
+        """``ask`` opens the connection doctor."""
         super().__init__()
         words = ElidedLabel("small", "textSecondary")
         words.setText(_("Expected to see something?"))
         self.button = LinkButton(theme, _("Open the connection doctor"))
         self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.button.clicked.connect(lambda: run(COMMAND))
+        self.button.clicked.connect(ask)
         row = QHBoxLayout()
         row.setContentsMargins(12, 3, 12, 3)
         row.setSpacing(6)

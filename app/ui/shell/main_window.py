@@ -17,7 +17,7 @@ from app.core.documents.titles import recent_titles
 from app.core.faults import log_errors
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
-from app.ui.panels.base import Panel, PanelContext, ShowToast
+from app.ui.panels.base import Panel, PanelContext, PanelWidget, ShowToast
 from app.ui.shell.bars.app_bar import AppBar, robots_chip
 from app.ui.shell.bars.banner import AlertBanner, BannerSpacer
 from app.ui.shell.bars.developer_tools import DeveloperTools
@@ -111,6 +111,7 @@ class MainWindow(QMainWindow):
         self.context = PanelContext(
             session, theme, self.open_topic, self.say, self._run, files, asked, self.plot,
             partial(self.open_topic, beside=True),
+            self._why,
         )  # fmt: skip
         self.ring = FocusRing(theme, self)
         self.timer = QTimer(self)
@@ -121,6 +122,9 @@ class MainWindow(QMainWindow):
         self.commands = Commands(self, session, files)
         self._connect()
         self.show_start()
+
+    def _why(self, panel: PanelWidget, topic: str) -> None:
+        self.commands.view.open_doctor(panel, topic)
 
     def _build(self, examples: Sequence[Example]) -> None:
         theme = self.theme

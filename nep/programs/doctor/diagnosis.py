@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
 from typing import Literal
 
@@ -11,7 +11,7 @@ from nep.programs.doctor.facts import Facts, FolderFact
 from nep.programs.doctor.finding import Finding, Severity
 from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, originals, ports
 
-__all__ = ["findings", "report", "to_plain", "worst"]
+__all__ = ["findings", "in_order", "report", "to_plain", "worst"]
 
 FEWEST_FILES = 1024
 NEARLY = 0.8
@@ -29,7 +29,11 @@ def findings(facts: Facts) -> tuple[Finding, ...]:
         loopback, masters, ports, _packages, originals, master_alerts, _files, _programs, _folders, clocks,
         _clock, _versions,
     )  # fmt: skip
-    found = [finding for part in parts for finding in part(facts)]
+    return in_order(finding for part in parts for finding in part(facts))
+
+
+def in_order(found: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The worst first; what is as bad stays in its order."""
     return tuple(sorted(found, key=lambda finding: _ORDER[finding.severity]))
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from nep.programs.doctor.installs import Install
-from nep.protocol.graph_view import GraphView
+from nep.protocol.graph_view import Alert, GraphView
 
 __all__ = [
     "ClockFact",
@@ -17,7 +18,14 @@ __all__ = [
     "PortFact",
     "ProcessFact",
     "ProgramFact",
+    "PublisherFact",
+    "Reach",
+    "TopicFacts",
 ]
+
+Reach = Literal["", "elsewhere", "refused", "timeout", "unknown"]
+"""Why a publisher's address is not reached from here: only its own computer reaches it, nobody listens there,
+nothing answers, or another reason that the system gives; "" when it is reached, or was not tried."""
 
 
 @dataclass(frozen=True)
@@ -123,3 +131,51 @@ class Facts:
     master_install: Install | None = None
     programs: tuple[ProgramFact, ...] = ()
     is_known: bool = True
+
+
+@dataclass(frozen=True)
+class PublisherFact:
+    """Who publishes the topic that somebody misses.
+
+    `node` and `host` are its node's and its computer's names. `sent` is how many messages it has sent, None
+    where nobody counts them (the original NEP); `last_s` when the newest was sent, in s since 1970 by the
+    clock of this computer, None before the first. `endpoint` is where programs here connect to it ("" where
+    nobody needs to), and `reach` why that fails. `remedies` are services of its node that are there to mend
+    it.
+    """
+
+    node: str
+    host: str
+    generation: str = "native"
+    sent: int | None = None
+    last_s: float | None = None
+    endpoint: str = ""
+    reach: Reach = ""
+    remedies: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class TopicFacts:
+    """What is known of a topic that somebody misses; `now_s` is the time in s since 1970.
+
+    `address` is the master's, `is_shared` whether it serves other computers. `others` are the topics that
+    are published, each with its messages a second (None: unknown); `services` the names of services.
+    `alerts` are the master's about this topic. `listened_s` is how long somebody listened to it here,
+    `received` what came meanwhile, `refused` how much of what came was no message of this version, and
+    `unreadable` why the newest message can't be decoded ("" when it can). `bad_name` says why no topic can
+    be called so.
+    """
+
+    topic: str
+    now_s: float
+    address: str
+    is_shared: bool = False
+    publishers: tuple[PublisherFact, ...] = ()
+    others: Mapping[str, float | None] = field(default_factory=dict)
+    services: tuple[str, ...] = ()
+    alerts: tuple[Alert, ...] = ()
+    listened_s: float = 0.0
+    received: int = 0
+    refused: int = 0
+    unreadable: str = ""
+    bad_name: str = ""

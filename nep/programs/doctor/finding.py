@@ -17,6 +17,7 @@ class Finding:
     """One thing that was looked at: how bad it is, a sentence, and what to do next ("" when nothing).
 
     `id` begins with what it is about ("master:none", "port:7000"). `command` can be typed in a terminal.
+    `instead` is the name that would do: of the topic that is meant, of the service to be called.
     """
 
     id: str
@@ -24,6 +25,7 @@ class Finding:
     sentence: str
     mend: str = ""
     command: str = ""
+    instead: str = ""
 
     @property
     def as_error(self) -> str:

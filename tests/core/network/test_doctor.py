@@ -15,7 +15,7 @@ def test_it_looks_beside_the_window_and_keeps_what_it_found() -> None:
     go_on = threading.Event()
     looks = []
 
-    def look() -> list[Finding]:
+    def look(_topic: str) -> list[Finding]:
         looks.append(threading.current_thread().name)
         go_on.wait(5)
         return [FINE]
@@ -32,8 +32,39 @@ def test_it_looks_beside_the_window_and_keeps_what_it_found() -> None:
     assert doctor.revision == 2
 
 
+def test_whoever_misses_another_topic_while_it_looks_is_told_of_that_one() -> None:
+    began, go_on = threading.Event(), threading.Event()
+    asked = []
+
+    def look(topic: str) -> list[Finding]:
+        asked.append(topic)
+        began.set()
+        go_on.wait(30)
+        return [Finding("topic", "ok", topic)]
+
+    doctor = Doctor(look)
+    doctor.miss("/a")
+    assert began.wait(30)
+    doctor.miss("/b")
+    assert (doctor.missed, doctor.told_of) == ("/b", "")
+    go_on.set()
+    doctor.close()
+    assert asked == ["/a", "/b"]
+    assert (doctor.told_of, doctor.findings[0].sentence) == ("/b", "/b")
+
+
+def test_topics_of_other_networks_are_not_looked_for_in_this_one(tmp_path) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    doctor = doctor_of(address, tmp_path)
+    doctor.miss("ros2 /camera")
+    doctor.close()
+    assert not any(finding.id.startswith("topic") for finding in doctor.findings)
+
+
 def test_a_doctor_that_breaks_off_says_so() -> None:
-    def look() -> list[Finding]:
+    def look(_topic: str) -> list[Finding]:
         raise ValueError("no such luck")
 
     doctor = Doctor(look)

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
+from datetime import datetime, timezone
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ import typer
 
 import nep
 from nep.cli.app import app
+from nep.cli.recording_files import time_ns
 from nep.cli.ring import has_ring
 from nep.errors import NepError, RecordingError, RecordingsUnavailableError, ServiceError
 from nep.recordings.reader import Recording
@@ -248,3 +250,54 @@ def test_nothing_of_recordings_is_imported_before_it_is_asked_for_and_a_missing_
     assert done.returncode == 1
     assert done.stderr == "nep: recordings need what is not installed; pip install 'nep-studio[recordings]'\n"
     assert issubclass(RecordingsUnavailableError, NepError)
+
+
+START = 1_795_000_000 * 10**9
+HOUR = 3600 * 10**9
+
+
+@pytest.mark.parametrize(
+    ("text", "after_s"),
+    [
+        ("0", 0.0),
+        (" 12.5 ", 12.5),
+        ("{clock}", 90.0),
+        ("{clock}.250", 90.25),
+        ("{day}T{clock}", 90.0),
+        ("{day} {clock}", 90.0),
+        ("{utc}Z", 90.0),
+        ("{utc}+00:00", 90.0),
+    ],
+)
+def test_a_part_begins_by_seconds_or_by_the_clock(text, after_s):
+    utc = datetime.fromtimestamp(START / 1e9 + 90, timezone.utc)
+    at = utc.astimezone()
+    given = text.format(clock=f"{at:%H:%M:%S}", day=f"{at:%Y-%m-%d}", utc=f"{utc:%H:%M:%S}")
+    assert time_ns(given, START, START + HOUR) == START + round(after_s * 1e9)
+
+
+def test_a_time_of_day_after_midnight_is_the_next_days():
+    at = datetime.fromtimestamp(START / 1e9, timezone.utc).astimezone()
+    midnight = at.replace(hour=23, minute=59, second=50, microsecond=0)
+    start = int(midnight.timestamp()) * 10**9
+    assert time_ns("00:00:05", start, start + 60 * 10**9) == start + 15 * 10**9
+    assert time_ns("00:00:05", start, start + 10**9) < start  # it has ended before
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "noon",
+        "25:00:00",
+        "-1",
+        "1e9",
+        "nan",
+        "inf",
+        "2026-13-01T00:00:00",
+        "1" * 400,
+    ],
+)
+def test_what_is_no_time_is_said(text):
+    with pytest.raises(typer.BadParameter, match="is no time"):
+        time_ns(text, START, START + HOUR)

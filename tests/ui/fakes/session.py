@@ -65,7 +65,7 @@ class Doctor(doctor_module.Doctor):
     looking = False  # type: ignore[assignment]  # what a test says instead of a thread
 
     def __init__(self) -> None:
-        super().__init__(lambda: self.found, lambda: 1_795_164_093.0)
+        super().__init__(lambda _topic: self.found, lambda: 1_795_164_093.0)
         self.looked = 0
         self.found: tuple[Finding, ...] = ()
 

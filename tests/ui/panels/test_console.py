@@ -234,3 +234,40 @@ def test_larger_text_makes_rows_and_the_way_back_grow(qtbot, panel, window) -> N
     after = (panel.list.visualRect(panel.model.index(5, 0)).height(), panel.newer.width())
     assert after[0] == 2 * before[0]
     assert after[1] >= panel.newer.sizeHint().width() > before[1]
+
+
+def test_twenty_thousand_lines_scroll_and_only_what_is_seen_is_painted(qtbot, qapp, monkeypatch) -> None:
+    session = Session()
+    session.console = Console(capacity=20_000)
+    for number in range(20_000):
+        session.console.add("info", "arm", f"line {number}")
+    panel = Window(session).make(PANEL, (446, 200))
+    qtbot.addWidget(panel)
+    assert isinstance(panel, ConsolePanel)
+    assert panel.model.rowCount() == 20_000
+    painted: list[int] = []
+    paint_one = LineDelegate.paint
+
+    def counted(self, painter, option, index) -> None:
+        painted.append(index.row())
+        paint_one(self, painter, option, index)
+
+    monkeypatch.setattr(LineDelegate, "paint", counted)
+    bar = panel.list.verticalScrollBar()
+    in_view = panel.list.viewport().height() // panel.list.sizeHintForRow(0) + 2
+    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+        bar.setValue(round(share * bar.maximum()))
+        painted.clear()
+        panel.list.grab()
+        top = round(share * (20_000 - in_view))
+        assert 0 < len(set(painted)) <= in_view
+        assert all(abs(row - top) <= in_view + 2 for row in painted)
+    assert lines(panel)[-1] == "info arm line 0"
+    before = panel.list.indexAt(panel.list.viewport().rect().center()).data()
+    session.console.add("info", "arm", "the newest")  # the oldest leaves, what is read stays in place
+    bar.setValue(bar.maximum() // 2)
+    here = panel.list.indexAt(panel.list.viewport().rect().center()).data()
+    panel.refresh()
+    assert panel.list.indexAt(panel.list.viewport().rect().center()).data() == here
+    assert panel.model.rowCount() == 20_000
+    assert before is not None

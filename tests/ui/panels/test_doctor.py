@@ -1,14 +1,20 @@
 from __future__ import annotations
 
+import importlib
+
 import pytest
+import shiboken6
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 
 from app.core.network.master import MasterState
+from app.ui.panels import console
+from app.ui.panels.base import Hindrance, PanelWidget, paused_hindrance
 from app.ui.panels.doctor import PANEL, DoctorPanel
+from app.ui.widgets import Button
 from nep.programs.doctor import Finding
 from tests.ui.fakes import Session
-from tests.ui.panel_case import Window
+from tests.ui.panel_case import Window, press, ticks
 from tests.ui.sample_data import FOUND
 
 
@@ -79,6 +85,204 @@ def test_while_it_looks_the_button_waits_and_the_last_findings_stay(panel, windo
     window.session.doctor.looking = False
     panel.refresh()
     assert panel.again.isEnabled()
+
+
+NEAR = Finding(
+    "topic:near",
+    "error",
+    "Nobody publishes /robot/deph.",
+    "Did you mean /robot/depth?",
+    instead="/robot/depth",
+)
+
+
+class Asker(PanelWidget):
+    """A panel that sees nothing, and is paused."""
+
+    def __init__(self, context) -> None:
+        super().__init__(context, "Depth")
+        self.paused = True
+        self.asked: list[str] = []
+
+    def show_topic(self, name: str) -> None:
+        self.asked.append(name)
+
+    def hindrances(self) -> list[Hindrance]:
+        return [paused_hindrance(self.title(), self.go_on)] if self.paused else []
+
+    def go_on(self) -> None:
+        self.paused = False
+
+
+@pytest.fixture
+def asker(qtbot, window) -> Asker:
+    made = Asker(window.context())
+    qtbot.addWidget(made)
+    return made
+
+
+def names(panel) -> list[str]:
+    return [row.button.accessibleName() for row in panel.rows if row.button.isVisibleTo(row)]
+
+
+def test_the_name_that_was_meant_is_used_by_the_panel_that_asked(qtbot, panel, window, asker) -> None:
+    window.session.doctor.found = (NEAR,)
+    window.session.doctor.miss("/robot/deph")
+    asker.paused = False
+    panel.begin_for(asker)
+    assert panel.missed.value == "/robot/deph"
+    assert panel.terminal.text() == "In a terminal: nep doctor /robot/deph"
+    assert names(panel) == ["Use /robot/depth"]
+    window.session.doctor.found = (Finding("topic", "ok", "Messages of /robot/depth come here."),)
+    qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
+    panel.refresh()
+    assert (asker.asked, window.session.doctor.missed) == (["/robot/depth"], "/robot/depth")
+    assert window.toasts == ["Showing /robot/depth, looking again"]
+    assert panel.chip.accessibleName() == "all is well"
+
+
+def test_without_a_panel_that_asked_the_topic_is_opened_where_it_fits(qtbot, panel, window) -> None:
+    window.session.doctor.found = (NEAR,)
+    window.session.doctor.miss("/robot/deph")
+    panel.refresh()
+    qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
+    assert window.opened == ["/robot/depth"]
+
+
+def test_a_panel_that_is_paused_is_the_first_reason_and_goes_on(qtbot, panel, window, asker) -> None:
+    window.session.doctor.found = (NEAR,)
+    window.session.doctor.miss("/robot/deph")
+    panel.begin_for(asker)
+    assert panel.rows[0].accessibleName().startswith("error: Depth is paused")
+    assert names(panel) == ["Let it go on", "Use /robot/depth"]
+    qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
+    assert not asker.paused
+    assert window.toasts == ["Done, looking again"]
+    panel.refresh()
+    assert names(panel) == ["Use /robot/depth"]
+
+
+def test_a_panel_that_was_closed_is_asked_nothing(qtbot, panel, window) -> None:
+    asker = Asker(window.context())
+    panel.begin_for(asker)
+    assert "paused" in panel.rows[0].accessibleName()
+    shiboken6.delete(asker)
+    panel.refresh()
+    assert "paused" not in panel.rows[0].accessibleName()
+
+
+def test_a_recording_that_is_open_hides_the_live_topic(qtbot, panel, window, tmp_path) -> None:
+    window.session.open_recording(tmp_path / "none.mcap")
+    try:
+        panel.refresh()
+        assert "recording" not in panel.rows[0].accessibleName()  # nobody misses a topic
+        window.session.doctor.miss("/robot/camera")
+        panel.refresh()
+        said = panel.rows[0].accessibleName()
+        assert said.startswith("error: A recording is open, and /robot/camera is not in it.")
+        qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
+        assert window.commands == ["replay.live"]
+    finally:
+        window.session.back_to_live()
+    panel.refresh()
+    assert "recording" not in panel.rows[0].accessibleName()
+
+
+@pytest.mark.parametrize(
+    ("finding", "button", "command"),
+    [
+        (
+            Finding("topic:closed", "info", "This computer only."),
+            "Let other computers connect",
+            "network.others",
+        ),
+        (Finding("topic:unreadable", "error", "No JSON."), "Look at its bytes", "inspect:/x"),
+        (Finding("topic:name", "error", "No name."), "Choose a topic", "panel:topics"),
+        (
+            Finding("topic:silent:cam", "error", "Silent.", instead="restart"),
+            "Call restart",
+            "service.call:restart",
+        ),
+        (Finding("topic:service", "error", "A service.", instead="/x"), "Call /x", "service.call:/x"),
+    ],
+)
+def test_each_reason_has_one_button(qtbot, panel, window, finding, button, command) -> None:
+    window.session.doctor.found = (finding,)
+    window.session.doctor.miss("/x")
+    panel.refresh()
+    assert names(panel) == [button]
+    qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
+    assert window.commands == [command]
+
+
+def test_a_person_says_what_they_miss(panel, window, asker) -> None:
+    panel.begin_for(asker)
+    panel.missed.set_value("/odom")
+    panel.missed.activated.emit(panel.missed.currentIndex())
+    assert window.session.doctor.missed == "/odom"
+    assert "paused" not in panel.rows[0].accessibleName()
+    panel.copy.click()
+    assert QGuiApplication.clipboard().text().startswith("Missed: /odom\n")
+
+
+def test_a_topic_of_a_network_that_does_not_answer(panel, window) -> None:
+    network = window.session.networks.get("ros2")
+    network.state, network.sentence = "lost", "no daemon answers"
+    window.session.doctor.miss("ros2 /camera")
+    panel.refresh()
+    assert panel.rows[0].accessibleName().startswith("error: ROS 2: no daemon answers.")
+    assert names(panel)[0] == "Other networks"
+    assert panel.terminal.text() == "In a terminal: nep doctor"
+
+
+def test_every_panel_that_may_be_empty_leads_here_with_its_topic(qtbot, qapp) -> None:
+    window = Window(Session())
+    window.session.master = MasterState("connected", "127.0.0.1:7780")
+    for name in ("inspector", "image", "console", "services"):
+        made = window.make(importlib.import_module(f"app.ui.panels.{name}").PANEL)
+        qtbot.addWidget(made)
+        made.show_topic("/nothing")
+        ticks(window, made, 2)
+        empty = made.body.empty if name == "inspector" else made.empty
+        press(empty.findChildren(Button)[-1])  # those before may not be gone yet
+        wanted = "/nothing" if name in {"inspector", "image"} else ""
+        assert window.asked_why.pop() == (made, wanted)
+        made.shut()
+
+
+def test_panels_tell_that_they_are_paused(qtbot, window) -> None:
+    for name in ("inspector", "image", "plot"):
+        made = window.make(importlib.import_module(f"app.ui.panels.{name}").PANEL)
+        qtbot.addWidget(made)
+        assert list(made.hindrances()) == []
+        made.freeze.setChecked(True)
+        (hindrance,) = made.hindrances()
+        assert "paused" in hindrance.sentence
+        hindrance.run()
+        assert not made.freeze.isChecked()
+        made.shut()
+
+
+def test_the_console_tells_what_it_leaves_out(qtbot, window) -> None:
+    made = window.make(console.PANEL)
+    qtbot.addWidget(made)
+    assert list(made.hindrances()) == []
+    made.set_level("error")
+    (hindrance,) = made.hindrances()
+    assert hindrance.sentence == "Console shows only what has “Errors only”."
+    hindrance.run()
+    assert made.level == "all"
+
+
+def test_a_plot_of_nothing_leads_here(qtbot, window) -> None:
+    made = window.make(importlib.import_module("app.ui.panels.plot").PANEL, (900, 600))
+    qtbot.addWidget(made)
+    made._add_typed("/odom.speed", False)
+    ticks(window, made, 6)
+    assert made.advice.topic == "/odom"
+    press(made.advice.why)
+    assert window.asked_why == [(made, "/odom")]
+    made.shut()
 
 
 def test_before_the_first_answer_it_says_that_it_looks(qtbot, qapp) -> None:

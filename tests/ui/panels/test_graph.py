@@ -566,7 +566,7 @@ def test_nobody_is_here_says_what_to_do(qtbot, qapp) -> None:
     qtbot.addWidget(made)
     assert isinstance(made, GraphPanel)
     press(button(made, "Open the connection doctor"))
-    assert window.commands == ["help.doctor"]
+    assert window.asked_why == [(made, "")]
     assert made.picture() == b""
     made.save(Path("nowhere.svg"), SVG)
     assert window.toasts == []

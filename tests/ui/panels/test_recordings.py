@@ -10,6 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QMenu
 
 from app.core.recording.client import RecorderState
+from app.core.recording.replay.scale import clock_words
 from app.ui.panels.alarms import panel as alarms
 from app.ui.panels.recordings import PANEL
 from app.ui.panels.recordings import panel as panel_module
@@ -244,6 +245,30 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
     window.toasts.clear()
     details.export.click()
     assert window.toasts == ["No topic of it fits"]
+    details.topics.show_patterns((), ())
+    details.topics.changed.emit()
+    details.pick.setChecked(True)  # the same from a list
+    assert [details.list.model.key_of(topic) for topic in details.list._shown()] == ["/a", "/b", "/camera"]
+    details.list.table.opened.emit("/a")
+    assert details.topics.patterns() == ((), ("/a",))
+    assert details.part_words.text().endswith("2 of 3 topics")
+    details.list.filter.setText("b")
+    details.list.none.click()
+    assert details.topics.patterns() == (("/camera",), ())
+    assert details.part().topics == ["/camera"]
+    details.list.filter.clear()
+    details.list.none.click()
+    assert (details.part(), details.part_words.text()) == (None, "No topic of it fits")
+    details.list.all.click()
+    assert details.part().topics is None
+    details.topics.show_patterns(("/a",), ())
+    details.topics.changed.emit()  # what is typed is checked in the list
+    assert details.list._names == {"/a"}
+    details.times.set_value("clock")
+    details.times.changed.emit("clock")
+    begin, end = (clock_words(at_ns, digits=1) for at_ns in (strip.begin_ns, strip.end_ns))
+    assert details.part_words.text() == f"{begin} to {end}, 1 of 3 topics"
+    assert strip.begin.accessibleDescription() == begin
     QTest.keyClick(strip.end, Qt.Key.Key_Home)  # a handle stops at the other one
     assert strip.begin_ns == strip.end_ns
     QTest.mouseDClick(strip.begin, Qt.MouseButton.LeftButton)

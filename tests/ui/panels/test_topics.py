@@ -8,6 +8,7 @@ from PySide6.QtTest import QSignalSpy, QTest
 from app.core.network.master import MasterState
 from app.ui.panels.topics.columns import age_cell, curve_cell, loss_cell, name_cell, nodes_cell, type_cell
 from app.ui.panels.topics.panel import PANEL, TopicsPanel
+from app.ui.widgets import Button
 from app.ui.widgets.table.model import CELL_ROLE
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
@@ -252,7 +253,19 @@ def test_an_empty_panel_leads_to_the_connection_doctor(qtbot, panel, window) -> 
     assert isinstance(bare, TopicsPanel)
     assert bare.doctor.isVisible()
     press(bare.doctor.button)
-    assert empty.commands == ["help.doctor"]
+    assert empty.asked_why == [(bare, "")]
+
+
+def test_a_topic_that_is_typed_and_not_there_leads_there_too(panel, window) -> None:
+    panel.filter.setText("no topic")
+    assert [each.accessibleName() for each in panel.empty.findChildren(Button)] == ["Clear the filter"]
+    panel.filter.setText("/robot/deph")
+    press(button(panel, "Why do I see nothing?"))
+    assert window.asked_why == [(panel, "/robot/deph")]
+    (hidden,) = panel.hindrances()
+    assert hidden.sentence == "Topics shows only what has “/robot/deph”."
+    hidden.run()
+    assert (panel.filter.text(), list(panel.hindrances())) == ("", [])
 
 
 def test_a_topic_that_was_asked_for_is_chosen_as_soon_as_it_is_listed(panel, window) -> None:

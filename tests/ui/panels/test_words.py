@@ -150,6 +150,7 @@ def data_of(session: Session) -> Iterator[str]:
         yield from (alert.title, alert.detail, alert.button or "")
     for finding in session.doctor.findings:
         yield from (finding.sentence, finding.mend, finding.command)
+    yield "nep doctor"  # what is typed into a terminal
     yield from named_in(session.alarms.rules)
     for document in session.documents:
         yield from (document.name, "NAO")

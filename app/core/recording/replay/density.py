@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.recording.replay.spans import RecordedSpans, spans_of
+from nep.recordings.figures import TopicFigures
 from nep.recordings.reader import Recording
 
 MOST_MARKS = 2_000
@@ -93,9 +94,9 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
     """Where the recorder's figures of each topic grew: there something was lost, or was not kept."""
     found: dict[str, list[LossMark]] = {}
     before: dict[str, int] = {}
-    for at_ns, figures in recording.figures_over_time():
+    for at_ns, figures in _figures_that_grow(recording):
         for topic, each in figures.items():
-            missing = (each.lost or 0) + each.unkept
+            missing = _missing(each)
             grown = missing - before.get(topic, 0)
             before[topic] = missing
             if grown <= 0:
@@ -106,3 +107,34 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
             else:
                 marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + grown)
     return {topic: tuple(marks) for topic, marks in found.items()}
+
+
+def _figures_that_grow(recording: Recording) -> Iterator[tuple[int, Mapping[str, TopicFigures]]]:
+    """The figures at every time when more was missing than before, found by halving.
+
+    What is missing only grows, and how much it is at the end stands in the file: between two times at which
+    it is the same nothing is read. So of a long recording that lost little, little is read; of one that was
+    not ended all of them.
+    """
+    if not recording.is_complete:
+        yield from recording.figures_over_time()
+        return
+    pieces = recording.figure_pieces()
+    told: dict[int, list[tuple[int, dict[str, TopicFigures]]]] = {}
+    final = {topic: _missing(each) for topic, each in recording.figures().items()}
+    spans: list[tuple[int, int, Mapping[str, int], Mapping[str, int]]] = [(-1, len(pieces), {}, final)]
+    while spans:
+        first, last, least, most = spans.pop()
+        if last - first < 2 or all(least.get(topic, 0) >= count for topic, count in most.items()):
+            continue
+        middle = (first + last) // 2
+        told[middle] = list(recording.figures_over_time((pieces[middle],)))
+        there = {topic: _missing(each) for _at_ns, figures in told[middle] for topic, each in figures.items()}
+        spans.append((first, middle, least, {**most, **there}))
+        spans.append((middle, last, {**least, **there}, most))
+    for number in sorted(told):
+        yield from told[number]
+
+
+def _missing(figures: TopicFigures) -> int:
+    return (figures.lost or 0) + figures.unkept

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -34,11 +33,11 @@ from app.core.run.acting.shelf import (
     shelf_text,
 )
 from app.core.run.acting.templates import is_plain, is_written
-from app.core.storage.atomic_file import read_whole, write_atomically
+from app.core.storage.atomic_file import write_atomically
+from app.core.storage.kept_file import read_kept
 from app.core.storage.settings import Settings
 from nep.errors import NepError
 from nep.i18n import _, listed, ngettext
-from nep.system.replace_file import replace_file
 
 if TYPE_CHECKING:
     from app.robots.description.description import Robot
@@ -372,37 +371,18 @@ class SessionActing:
 
     def _read(self, path: Path) -> Shelf:
         """What was kept; what is damaged is put aside, and said."""
-        try:
-            data = read_whole(path, MOST_BYTES)
-        except (FileNotFoundError, NotADirectoryError):
-            return Shelf()
-        except OSError as error:
-            self._damaged(path, error.strerror or str(error))
-            return Shelf()
-        try:
-            shelf, unread = read_shelf(data)
-        except NepError as error:
-            self._is_newer = isinstance(error, NewerShelfError)
-            self._damaged(path, str(error))
-            return Shelf()
-        if unread:
-            said = ngettext("{count} message could not be read", "{count} messages could not be read", unread)
-            self._damaged(path, said.format(count=unread), data)
-        return shelf
 
-    def _damaged(self, path: Path, reason: str, data: bytes | None = None) -> None:
-        """Keep the file beside, and say so; ``data`` is it, where the rest of it is used."""
-        beside = path.with_name("messages.damaged.json")
-        said = _("The file is left as it is, and what you change is not kept: {reason}.")
-        if not self._is_newer:
-            said = _("The file is kept as “{file}”: {reason}.")
-            with suppress(OSError):
-                if data is None:
-                    replace_file(path, beside)
-                else:
-                    write_atomically(beside, data, durable=False, private=True)
-        title = _("Kept messages could not be read.")
-        self._session.alerts.put("messages:file", "warn", title, said.format(file=beside.name, reason=reason))
+        def parse(data: bytes) -> tuple[Shelf, str]:
+            shelf, unread = read_shelf(data)
+            said = ngettext("{count} message could not be read", "{count} messages could not be read", unread)
+            return shelf, said.format(count=unread) if unread else ""
+
+        kept = read_kept(path, parse, NewerShelfError, MOST_BYTES)
+        self._is_newer = kept.is_newer
+        if kept.problem:
+            title = _("Kept messages could not be read.")
+            self._session.alerts.put("messages:file", "warn", title, kept.problem)
+        return kept.value if kept.value is not None else Shelf()
 
 
 def result_words(result: SendResult) -> str:

@@ -10,7 +10,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout
 
-from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget, filter_hindrance
 from app.ui.panels.console.list import (
     LEVELS,
     RECORD_ROLE,
@@ -166,7 +166,7 @@ class ConsolePanel(PanelWidget):
         chosen = self.level in {"warn", "error"} or self.node or self.words.text()
         if not chosen:
             self.empty.say(_("Nothing happened yet"), _("What programs and robots say appears here."))
-            self.empty.set_actions([])
+            self.empty.set_actions([self.why()])
         elif self.node or self.words.text():
             self.empty.say(_("No line fits"), _("Show all lines again, or wait for one that fits."))
             self.empty.set_actions([EmptyAction(_("Show all lines"), self.show_all, "x")])
@@ -174,6 +174,15 @@ class ConsolePanel(PanelWidget):
             said = _("Choose “{everything}” to see all lines.").format(everything=_(FROM["all"]))
             self.empty.say(_("No problem was told"), said)
             self.empty.set_actions([])
+
+    def hindrances(self) -> list[Hindrance]:
+        chosen = [
+            self.words.text(),
+            self.node,
+            _(FROM[self.level]) if self.level in {"warn", "error"} else "",
+        ]
+        words = ", ".join(filter(None, chosen))
+        return [filter_hindrance(self.title(), words, self.show_all)] if words else []
 
     # ---- what a person chooses
 

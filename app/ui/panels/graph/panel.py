@@ -270,10 +270,7 @@ class GraphPanel(PanelWidget):
         said = _("Programs appear here as soon as they join the master.")
         self.empty.say(_("Nobody is here yet"), said, "workflow")
         doctor = EmptyAction(
-            _("Open the connection doctor"),
-            lambda: self.context.run("help.doctor"),
-            "stethoscope",
-            primary=True,
+            _("Open the connection doctor"), lambda: self.context.why(self, ""), "stethoscope", primary=True
         )
         self.empty.set_actions([doctor])
 

@@ -14,7 +14,7 @@ from app.core.messages import snapshots
 from app.core.messages.picture_look import PLAIN, PictureLook, restored
 from app.core.networks.networks import topic_words
 from app.ui.other_programs import open_outside
-from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget, paused_hindrance
 from app.ui.panels.image.actions import PictureActions
 from app.ui.panels.image.look_bar import LookBar
 from app.ui.panels.image.overlays import Overlays
@@ -173,7 +173,7 @@ class ImagePanel(PanelWidget):
         elif self._stream.error:
             self.empty.say(_("This can't be shown as a picture"), f"{self._stream.error}.", "circle-x")
             look = EmptyAction(_("Look at the message"), self._inspect, "list-tree")
-            self.empty.set_actions([look])
+            self.empty.set_actions([look, self.why(self._topic)])
         elif self.session.replay is not None and self._there:  # before the topic's first picture
             self.view.clear()
             self._say_nothing()
@@ -192,12 +192,12 @@ class ImagePanel(PanelWidget):
         if self._topic:
             words = _("The next picture on {topic} appears here.").format(topic=topic_words(self._topic))
             self.empty.say(_("No pictures yet"), words, "image")
-            self.empty.set_actions([])
+            self.empty.set_actions([self.why(self._topic)])
         else:
             words = _("Pictures appear here as soon as a camera publishes them.")
             self.empty.say(_("No pictures yet"), words, "image")
             robot = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
-            self.empty.set_actions([robot])
+            self.empty.set_actions([robot, self.why()])
         self._page(there=False)
 
     def _page(self, *, there: bool) -> None:
@@ -220,6 +220,10 @@ class ImagePanel(PanelWidget):
         self._fit_title()
 
     # -- what a person does -------------------------------------------------------------------------------
+
+    def hindrances(self) -> list[Hindrance]:
+        is_held = self.freeze.isChecked()
+        return [paused_hindrance(self.title(), lambda: self.freeze.setChecked(False))] if is_held else []
 
     def _freeze_or_not(self) -> None:
         self.freeze.setChecked(not self.freeze.isChecked())

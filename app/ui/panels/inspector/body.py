@@ -131,8 +131,8 @@ class InspectorBody(QWidget):
         if page in MODES:
             self.mode.set_value(MODES[page])
 
-    def say_waiting(self, topic: str, published: bool) -> None:
-        """There is no message of this topic yet, and perhaps nobody publishes it."""
+    def say_waiting(self, topic: str, published: bool, why: EmptyAction) -> None:
+        """There is no message of this topic yet, and perhaps nobody publishes it; ``why`` finds it out."""
         if published:
             words = _("The next message on {topic} appears here.")
         else:
@@ -141,21 +141,21 @@ class InspectorBody(QWidget):
         if words != self._waiting:
             self._waiting = words
             self.empty.say(_("No message yet"), words)
-            self.empty.set_actions([])
+            self.empty.set_actions([why])
 
-    def say_unread(self, topic: str, reason: str) -> None:
+    def say_unread(self, topic: str, reason: str, why: EmptyAction) -> None:
         """Messages of this topic can't be read, and why."""
         words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
         if words != self._waiting:
             self._waiting = words
             self.empty.say(_("It can't be read here"), words)
-            self.empty.set_actions([])
+            self.empty.set_actions([why])
 
-    def say_nothing(self, topic: str, choose: Callable[[], object]) -> None:
+    def say_nothing(self, topic: str, choose: Callable[[], object], why: EmptyAction) -> None:
         """There is no message: of which topic, or that none is chosen."""
         self._waiting = ""
         if topic:
-            self.say_waiting(topic, published=True)
+            self.say_waiting(topic, published=True, why=why)
         else:
             self.empty.say(_("Nothing chosen"), _("Click a topic to see its newest message."))
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])

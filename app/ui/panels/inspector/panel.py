@@ -15,7 +15,7 @@ from app.core.network.topics import split_key
 from app.core.networks.kinds import kind_named
 from app.core.networks.networks import topic_words
 from app.core.recording.replay.scale import clock_words
-from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
+from app.ui.panels.base import ANY_TYPE, Hindrance, Panel, PanelContext, PanelWidget, paused_hindrance
 from app.ui.panels.inspector.actions import InspectorActions
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TABLE, TREE, InspectorBody
 from app.ui.panels.inspector.diff import OFF, count_changes
@@ -170,9 +170,10 @@ class InspectorPanel(PanelWidget):
     def _say_waiting(self, topic: Topic | None) -> None:
         unread = self.session.networks.unread(self._topic)
         if unread:
-            self.body.say_unread(topic_words(self._topic), unread)
+            self.body.say_unread(topic_words(self._topic), unread, self.why(self._topic))
         else:
-            self.body.say_waiting(topic_words(self._topic), topic is not None and topic.publishers > 0)
+            published = topic is not None and topic.publishers > 0
+            self.body.say_waiting(topic_words(self._topic), published, self.why(self._topic))
 
     def _take(self, message: Message) -> None:
         large = message.size_bytes > LARGE_BYTES and message.codec != "image"
@@ -288,7 +289,8 @@ class InspectorPanel(PanelWidget):
         self.own.set_enabled(page == TREE)
 
     def _say_nothing(self) -> None:
-        self.body.say_nothing(topic_words(self._topic), lambda: self.context.run("panel:topics"))
+        choose = lambda: self.context.run("panel:topics")  # noqa: E731
+        self.body.say_nothing(topic_words(self._topic), choose, self.why(self._topic))
         if not self._topic:
             self.live.set("")
         for button in (self.freeze, self.pin):
@@ -311,6 +313,14 @@ class InspectorPanel(PanelWidget):
     def comparing(self) -> bool:
         """Whether the tree shows how the message differs from another one."""
         return (self.compare.isChecked() or self.pin.isChecked()) and not self.query.asking
+
+    def hindrances(self) -> list[Hindrance]:
+        return [paused_hindrance(self.title(), self._go_on)] if self.holds else []
+
+    def _go_on(self) -> None:
+        """Show the newest message again, and those that follow."""
+        self.history.go(None)
+        self.freeze.setChecked(False)
 
     def _pin(self, pinned: bool) -> None:
         self._pinned = self._value if pinned and self._value is not None else OFF

@@ -20,7 +20,8 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLay
 from app.core.series.curves import MOST_CURVES, Curve, Curves, topics_of
 from app.core.series.field_path import FieldPath
 from app.errors import CurveError
-from app.ui.panels.base import PanelContext, PanelWidget
+from app.ui.panels.base import Hindrance, PanelContext, PanelWidget, paused_hindrance
+from app.ui.panels.plot.advice import PlotAdvice
 from app.ui.panels.plot.canvas import PlotCanvas
 from app.ui.panels.plot.export import CSV, PNG, SVG, PlotExport
 from app.ui.panels.plot.lanes import StateLanes
@@ -145,9 +146,7 @@ class PlotPanel(PanelWidget):
         foot.setContentsMargins(12, 4, 12, 5)
         foot.addWidget(self.about, 1)
         foot.addWidget(self.points)
-        self.advice = label("", "small", role="warn", wrap=True)
-        self.advice.setContentsMargins(12, 2, 12, 2)
-        self.advice.setMinimumWidth(0)
+        self.advice = PlotAdvice(self.theme, lambda topic: self.context.why(self, topic))
         body = QWidget()
         column = QVBoxLayout(body)
         column.setContentsMargins(0, 0, 0, 0)
@@ -336,9 +335,7 @@ class PlotPanel(PanelWidget):
         points = ngettext("{count} point", "{count} points", count).format(count=grouped(count))
         words = _("{points}, all drawn") if whole else _("{points}, 2 per px")
         self.points.setText(words.format(points=points))
-        advice = next(filter(None, (self.curves.advice(each.curve) for each in self.shown)), "")
-        self.advice.setText(advice)
-        show_when(self.advice, bool(advice))
+        self.advice.show_for(self.curves, self.shown)
 
     def _changed(self) -> None:
         """Curves came or went, or look otherwise."""
@@ -371,6 +368,10 @@ class PlotPanel(PanelWidget):
         self.paused.set(_("paused, the data goes on") if paused else "", "off", "pause")
         self._say_span()
         self._soon()
+
+    def hindrances(self) -> list[Hindrance]:
+        go_on = lambda: self.freeze.setChecked(False)  # noqa: E731
+        return [paused_hindrance(self.title(), go_on)] if self.freeze.isChecked() else []
 
     def _zoom(self, factor: float, at_s: float) -> None:
         self.view.zoom(factor, at_s, (self.canvas.begin_s, self.canvas.end_s))

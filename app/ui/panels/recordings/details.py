@@ -12,11 +12,20 @@ from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripLook, part_of
 from app.core.recording.folder import RecordingFacts
-from app.core.recording.replay.scale import span_words
 from app.ui.panels.recordings.film_strip import FilmStrip
+from app.ui.panels.recordings.topic_list import TopicList, shortest_choice
 from app.ui.text.numbers import grouped
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, ElidedLabel, Segments, Separator, ValueBar, label, set_role
+from app.ui.widgets import (
+    Button,
+    ElidedLabel,
+    Segments,
+    Separator,
+    ToggleButton,
+    ValueBar,
+    label,
+    set_role,
+)
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.pattern_field import PatternField
 from nep.errors import BadTopicError
@@ -66,7 +75,16 @@ class RecordingDetails(QWidget):
         self.strip = FilmStrip(theme)
         self.strip.changed.connect(self._show_part)
         self.topics = PatternField(theme, _("Topics that are exported"), _("all topics; or /odom *camera*"))
-        self.topics.changed.connect(self._show_part)
+        self.topics.changed.connect(self._typed)
+        self._is_none_chosen = False
+        self.pick = ToggleButton(theme, _("From a list"), "list")
+        self.list = TopicList(theme)
+        self.list.hide()
+        self.pick.toggled.connect(self._show_list)
+        self.list.chosen.connect(self._choose_topics)
+        times = [("start", _("From start"), None), ("clock", _("Clock"), None)]
+        self.times = Segments(theme, times, size="small", name=_("Times"))
+        self.times.changed.connect(lambda value: self.strip.show_clock(value == "clock"))
         self.part_words = label("", "small", role="textSecondary", wrap=True)
         self.folder: Path | None = None
         self.into = ElidedLabel("small", "textSecondary", least=60)
@@ -76,7 +94,7 @@ class RecordingDetails(QWidget):
         acts, exports, places = (Flow(gap=8, row_gap=6) for _row in range(3))
         for button in (self.open, self.rename, self.show_file, self.delete):
             acts.addWidget(button)
-        for part in (label(_("Export as"), "small"), self.format, self.part_words):
+        for part in (label(_("Export as"), "small"), self.format, self.times, self.pick, self.part_words):
             exports.addWidget(part)
         for widget in (self.export, self.bar, self.progress, self.choose):
             places.addWidget(widget)
@@ -94,6 +112,7 @@ class RecordingDetails(QWidget):
         inside.addWidget(self.strip)
         inside.addLayout(exports)
         inside.addWidget(self.topics)
+        inside.addWidget(self.list)
         inside.addLayout(places)
         column.addLayout(inside)
 
@@ -118,6 +137,7 @@ class RecordingDetails(QWidget):
         """Show another recording's time, all of it chosen; None while it is not known."""
         self.strip.show_look(look, images)
         self.topics.show_patterns((), ())
+        self._is_none_chosen = False
         self.set_folder(None)
         self._show_part()
 
@@ -127,11 +147,17 @@ class RecordingDetails(QWidget):
         self.into.setText(str(folder) if folder is not None else "")
         self.into.setVisible(folder is not None)
 
+    def _typed(self) -> None:
+        self._is_none_chosen = False
+        self._show_part()
+
     def part(self) -> Part | None:
         """What is to be exported; None when no topic fits, or a pattern can be none."""
         look = self.strip.look
         if look is None:
             return ALL_OF_IT
+        if self._is_none_chosen:
+            return None
         wanted, unwanted = self.topics.patterns()
         try:
             made = part_of(look, self.strip.begin_ns, self.strip.end_ns, wanted, unwanted)
@@ -139,9 +165,24 @@ class RecordingDetails(QWidget):
             return None
         return made if made.topics is None or made.topics else None
 
+    def _show_list(self, shown: bool) -> None:
+        self.list.setVisible(shown)
+        self._show_part()
+
+    def _choose_topics(self, names: Sequence[str]) -> None:
+        """A person checked or unchecked topics in the list."""
+        look = self.strip.look
+        self._is_none_chosen = not names
+        if look is not None and names:
+            self.topics.show_patterns(*shortest_choice(look.topics, names))
+        self._show_part()
+
     def _show_part(self) -> None:
         """Say which part of the time, and how many of the topics."""
         look, part = self.strip.look, self.part()
+        if look is not None and not self.list.isHidden():
+            chosen = [each.name for each in look.topics] if part is not None and part.topics is None else ()
+            self.list.show_topics(look.topics, chosen if part is None else part.topics or chosen)
         self.topics.set_wrong(part is None)
         set_role(self.part_words, "error" if part is None else "textSecondary")
         if look is None:
@@ -155,7 +196,7 @@ class RecordingDetails(QWidget):
         words = said.format(count=grouped(count), all=grouped(len(look.topics)))
         if not self.strip.is_whole:
             ends = (self.strip.begin_ns, self.strip.end_ns)
-            begin, end = (span_words(at_ns - look.start_ns, digits=1) for at_ns in ends)
+            begin, end = (self.strip.time_words(at_ns, digits=1) for at_ns in ends)
             words = _("{begin} to {end}, {topics}").format(begin=begin, end=end, topics=words)
         self.part_words.setText(words)
 
@@ -163,7 +204,7 @@ class RecordingDetails(QWidget):
         """How far an export is; None while none goes on."""
         self._is_exporting = job is not None
         self.export.set_word(_("Cancel") if job is not None else _("Export"), "x" if job else "download")
-        for field in (self.format, self.strip, self.topics, self.choose):
+        for field in (self.format, self.strip, self.topics, self.choose, self.times, self.pick, self.list):
             field.setEnabled(job is None)
         self.bar.setVisible(job is not None)
         self.progress.setVisible(job is not None)

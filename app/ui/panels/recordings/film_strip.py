@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QImage, QKeyEvent, QMouseEvent, QPainter, QPai
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.core.recording.film_strip import FilmStripLook
-from app.core.recording.replay.scale import span_words
+from app.core.recording.replay.scale import clock_words, span_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _
@@ -73,6 +73,8 @@ class FilmStrip(QWidget):
         self.look: FilmStripLook | None = None
         self._images: Sequence[QImage | None] = ()
         self.begin_ns = self.end_ns = 0
+        self.by_clock = False
+        """Whether times are those of the clock here, not from the recording's start."""
         self.begin = StripHandle(theme, self, _("Begin of the part"))
         self.end = StripHandle(theme, self, _("End of the part"))
         self.begin.moved.connect(lambda by_ns: self.set_part(self.begin_ns + by_ns, self.end_ns))
@@ -108,9 +110,21 @@ class FilmStrip(QWidget):
             begin_ns, end_ns = (end_ns, end_ns) if begin_ns != self.begin_ns else (begin_ns, begin_ns)
         self.begin_ns, self.end_ns = begin_ns, end_ns
         for handle, at_ns in ((self.begin, begin_ns), (self.end, end_ns)):
-            handle.setAccessibleDescription(span_words(at_ns - look.start_ns, digits=1))
+            handle.setAccessibleDescription(self.time_words(at_ns, digits=1))
         self._arrange()
         self.changed.emit()
+
+    def time_words(self, at_ns: int, *, digits: int) -> str:
+        """A time of the recording: from its start ("6:40.0") or by the clock here ("15:08:40.0")."""
+        if self.by_clock:
+            return clock_words(at_ns, digits=digits)
+        return span_words(at_ns - (self.look.start_ns if self.look is not None else 0), digits=digits)
+
+    def show_clock(self, by_clock: bool) -> None:
+        """Tell times by the clock, or from the start."""
+        self.by_clock = by_clock
+        self.set_part(self.begin_ns, self.end_ns)
+        self.update()
 
     @property
     def is_whole(self) -> bool:
@@ -230,7 +244,7 @@ class FilmStrip(QWidget):
             (self.begin_ns, "accentText"), (self.end_ns, "accentText"),
             (look.start_ns, "textSecondary"), (look.end_ns, "textSecondary"),
         ):  # fmt: skip
-            words = span_words(at_ns - look.start_ns, digits=digits)
+            words = self.time_words(at_ns, digits=digits)
             wide = paint.width_of(font, words) + 2
             left = max(0.0, min(self.width() - wide, self._x(at_ns) - wide / 2))
             if any(left < end + 6 and left + wide > begin - 6 for begin, end in taken):

@@ -247,7 +247,7 @@ class ServicesPanel(PanelWidget):
         else:
             said = _("Services appear here as soon as a program makes a server.")
             self.empty.say(_("Nobody offers a service"), said, "spline")
-            self.empty.set_actions([])
+            self.empty.set_actions([self.why()])
 
     @property
     def service(self) -> str:

@@ -188,6 +188,10 @@ class TopicsPanel(NetworkTable[TreeRow]):
                 [EmptyAction(_("Use the virtual robot"), self._use_virtual, "bot", primary=True)]
             )
 
+    def missed_topic(self) -> str:
+        words = self.filter.text().strip()
+        return words if words.startswith("/") and len(words.split()) == 1 else ""
+
     def _use_virtual(self) -> None:
         self.context.run("robots.virtual")
 

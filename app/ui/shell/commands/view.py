@@ -43,6 +43,7 @@ from nep.programs.alarms.rule import NUMBER_KINDS
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
+    from app.ui.panels.base import PanelWidget
     from app.ui.shell.dialogs import command_palette, guide, shortcuts
     from app.ui.shell.dialogs import name as name_sheet
     from app.ui.shell.dialogs import settings as settings_sheet
@@ -67,6 +68,14 @@ class SupportsRobotChoice(Protocol):
 
     def choose(self, name: str) -> None:
         """Show the robot of that name."""
+
+
+@runtime_checkable
+class AnswersWhy(Protocol):
+    """The panel of the connection doctor."""
+
+    def begin_for(self, asker: PanelWidget | None) -> None:
+        """Tell the panel in which somebody misses something; None where that is none in particular."""
 
 
 @runtime_checkable
@@ -435,12 +444,14 @@ class ViewCommands:
             self._ring = HintRing(self._shell.theme, self._shell.surface)
         return self._ring.point_at(command)
 
-    def open_doctor(self) -> None:
-        """Look at the connection, and show what is found."""
-        self._session.doctor.look()
+    def open_doctor(self, asker: PanelWidget | None = None, topic: str = "") -> None:
+        """Look at the connection, first of all for why the ``asker`` shows nothing of a topic."""
+        self._session.doctor.miss(topic)
         if self._shell.bench is None:
             self.show_layout("developer")
-        self._shell.open_panel("doctor")
+        dock = self._shell.open_panel("doctor")
+        if dock is not None and isinstance(dock.panel, AnswersWhy):
+            dock.panel.begin_for(asker)
 
     def show_log(self) -> None:
         """Open the folder of the log files, which is there even when nothing was ever wrong."""

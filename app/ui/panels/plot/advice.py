@@ -1,0 +1,57 @@
+"""The line above a plot's table: why nothing of a curve can be drawn, and the way to find out more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+
+from app.core.series.curves import Curves, topics_of
+from app.ui.panels.plot.shown_curve import ShownCurve
+from app.ui.theme.theme import Theme
+from app.ui.widgets import label
+from app.ui.widgets.buttons import LinkButton
+from app.ui.widgets.paint import show_when
+from nep.i18n import _
+
+
+class PlotAdvice(QWidget):
+    """Hidden while something can be drawn of every curve."""
+
+    def __init__(self, theme: Theme, ask: Callable[[str], object]) -> None:
+        """``ask`` asks the connection doctor about a topic."""
+        super().__init__()
+        self.topic = ""
+        """The topic of which nothing comes; "" while something does."""
+        self._words = label("", "small", role="warn", wrap=True)
+        self._words.setMinimumWidth(0)
+        self.why = LinkButton(theme, _("Why do I see nothing?"))
+        self.why.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+        self.why.clicked.connect(lambda: ask(self.topic))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 2, 12, 2)
+        row.setSpacing(8)
+        row.addWidget(self._words, 1)
+        row.addWidget(self.why, 0, Qt.AlignmentFlag.AlignTop)
+
+    def text(self) -> str:
+        """What it says; "" when there is nothing to say."""
+        return self._words.text()
+
+    def show_for(self, curves: Curves, shown: Sequence[ShownCurve]) -> None:
+        """Say what is wrong with these curves of a plot, if something is."""
+        said = next(filter(None, (curves.advice(each.curve) for each in shown)), "")
+        empty = [each for each in shown if not said and not _has_any(each)]
+        topics = sorted(topics_of(empty[0].curve.source)) if shown and len(empty) == len(shown) else []
+        self.topic = topics[0] if topics else ""
+        if self.topic:
+            said = _("Nothing came yet that can be plotted.")
+        self._words.setText(said)
+        show_when(self.why, bool(self.topic))
+        show_when(self, bool(said))
+
+
+def _has_any(shown: ShownCurve) -> bool:
+    curve = shown.curve
+    return bool(len(curve.samples) or (curve.states is not None and len(curve.states)))

@@ -1,0 +1,123 @@
+"""Which topics of a recording are exported, from a list with checks: filtered, all, none."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.ui.text.numbers import grouped
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, ElidedLabel
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.fields import FilterField
+from app.ui.widgets.table.model import Cell, Column, TableModel
+from app.ui.widgets.table.view import TableView
+from nep.i18n import _, lazy, ngettext
+from nep.recordings.reader import RecordedTopic
+
+ROWS_HIGH = 150
+
+
+class TopicList(QWidget):
+    """`chosen` with the names of all that are checked, when a person checks or unchecks some."""
+
+    chosen = Signal(list)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._topics: Sequence[RecordedTopic] = ()
+        self._names: frozenset[str] = frozenset()
+        self.filter = FilterField(theme, _("Filter topics"))
+        self.filter.textChanged.connect(self._show_rows)
+        self.all = Button(theme, _("All"), "check", size="small")
+        self.none = Button(theme, _("None"), "minus", size="small")
+        self.all.clicked.connect(lambda: self._choose_shown(wanted=True))
+        self.none.clicked.connect(lambda: self._choose_shown(wanted=False))
+        self.count = ElidedLabel("small", "textSecondary", least=60)
+        self.model: TableModel[RecordedTopic] = TableModel(self._columns(), lambda topic: topic.name)
+        self.table: TableView[RecordedTopic] = TableView(theme, self.model, "topic")
+        self.table.setAccessibleName(_("Topics that are exported"))
+        self.table.opened.connect(self._toggle)
+        self.table.order_changed.connect(self._show_rows)
+        self.table.filter_wanted.connect(lambda: self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.table.setFixedHeight(round(theme.scaled(ROWS_HIGH)))
+        row = Flow(gap=8, row_gap=6)
+        for widget in (self.all, self.none):
+            row.addWidget(widget)
+        row.addWidget(self.filter)
+        row.add_elastic(self.count)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(6)
+        column.addLayout(row)
+        column.addWidget(self.table)
+
+    def _columns(self) -> tuple[Column[RecordedTopic], ...]:
+        def is_there(topic: RecordedTopic) -> Cell:
+            if topic.name in self._names:
+                return Cell(icon="check", role="accentText", said=_("is exported"))
+            return Cell(icon="minus", role="textTertiary", said=_("left out"))
+
+        def ink(topic: RecordedTopic) -> str:
+            return "text" if topic.name in self._names else "textTertiary"
+
+        return (
+            Column("has", "", 40, is_there, words=lazy("Is exported")),
+            Column("topic", lazy("Topic"), 150, lambda topic: Cell(topic.name, role=ink(topic), mono=True),
+                   key=lambda topic: topic.name, stretch=True, tip=lambda topic: topic.name),
+            Column("type", lazy("Type"), 110,
+                   lambda topic: Cell(topic.msg_type.rpartition("/")[2] or topic.codec, role="textSecondary"),
+                   key=lambda topic: topic.msg_type, yields=2, tip=lambda topic: topic.msg_type),
+            Column("messages", lazy("Messages"), 96,
+                   lambda topic: Cell(grouped(topic.message_count), role=ink(topic)),
+                   key=lambda topic: topic.message_count, figures=True, yields=1),
+        )  # fmt: skip
+
+    def show_topics(self, topics: Sequence[RecordedTopic], chosen: Collection[str]) -> None:
+        """Show these, and which of them are checked."""
+        self._names = frozenset(chosen)
+        if topics is not self._topics:
+            self._topics = topics
+            self.filter.clear()
+        self._show_rows()
+
+    def _shown(self) -> list[RecordedTopic]:
+        words = self.filter.text().casefold().split()
+        return [
+            topic
+            for topic in self._topics
+            if all(word in f"{topic.name} {topic.msg_type}".casefold() for word in words)
+        ]
+
+    def _show_rows(self) -> None:
+        self.model.set_rows(self.table.order.sort(self._shown()))
+        self.table.tell_visible_changed()
+        self.table.viewport().update()
+        count = sum(topic.message_count for topic in self._topics if topic.name in self._names)
+        words = ngettext("{count} message", "{count} messages", count)
+        self.count.setText(words.format(count=grouped(count)))
+
+    def _toggle(self, name: str) -> None:
+        self._choose(self._names ^ {name})
+
+    def _choose_shown(self, *, wanted: bool) -> None:
+        """All or none of those that the filter leaves."""
+        shown = {topic.name for topic in self._shown()}
+        self._choose(self._names | shown if wanted else self._names - shown)
+
+    def _choose(self, names: frozenset[str]) -> None:
+        self._names = names
+        self._show_rows()
+        self.chosen.emit([topic.name for topic in self._topics if topic.name in names])
+
+
+def shortest_choice(
+    topics: Sequence[RecordedTopic], names: Collection[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """(wanted, left out): these topics in as few words as possible; all of them need none."""
+    wanted = tuple(topic.name for topic in topics if topic.name in names)
+    unwanted = tuple(topic.name for topic in topics if topic.name not in names)
+    return ((), unwanted) if len(unwanted) < len(wanted) else (wanted, ())

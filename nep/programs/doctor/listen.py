@@ -1,0 +1,155 @@
+"""Gathering what the doctor judges of one topic: who publishes it, whether they are reached, what comes."""
+
+from __future__ import annotations
+
+import os
+import platform
+import socket
+import time
+from collections.abc import Mapping
+
+import zmq
+
+import nep.errors
+from nep.i18n import _
+from nep.nodes.node import Node
+from nep.programs.doctor.facts import PublisherFact, Reach, TopicFacts
+from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
+from nep.protocol.wire import check_topic
+from nep.system.addresses import master_address, nearest
+
+__all__ = ["collect_topic", "reach_of"]
+
+_ASK_S = 1.0
+_LISTEN_S = 1.5
+_CONNECT_S = 0.7
+_MOST_TRIED = 4
+"""So many publishers' addresses are tried; each that does not answer takes `_CONNECT_S`."""
+_REMEDIES = ("restart", "reset", "start")
+"""How the names of services begin that are there to set a program going again."""
+
+
+def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
+    """Look at a topic, and listen to it for a second and a half at most; None when no master answers."""
+    chosen = master_address(address)
+    try:
+        check_topic(topic)
+    except nep.errors.NepError as error:
+        return TopicFacts(topic, time.time(), chosen, bad_name=str(error))
+    try:
+        with Node(f"nep-doctor-topic-{os.getpid()}", master=chosen) as node:
+            return _look(node, topic, chosen)
+    except (nep.errors.NepError, zmq.ZMQError, OSError):
+        return None
+
+
+def reach_of(endpoint: str) -> Reach:
+    """Whether a publisher's endpoint can be connected to from here, by connecting once."""
+    place, colon, port = endpoint.removeprefix("tcp://").rpartition(":")
+    if not endpoint.startswith("tcp://") or not colon:
+        return ""
+    try:
+        with socket.create_connection((place, int(port)), timeout=_CONNECT_S):
+            return ""
+    except TimeoutError:
+        return "timeout"
+    except ConnectionRefusedError:
+        return "refused"
+    except (OSError, ValueError, OverflowError):
+        return "unknown"
+
+
+def _look(node: Node, topic: str, address: str) -> TopicFacts:
+    view = node.graph(_ASK_S)
+    info = view.topics.get(topic)
+    others = {name: each.rate_hz for name, each in view.topics.items() if each.publishers}
+    if info is None or not info.publishers:
+        return TopicFacts(
+            topic, time.time(), address, bool(view.listens), others=others, services=tuple(view.services)
+        )
+    received, refused, unreadable, listened_s = _listen(node, info)
+    view = node.graph(_ASK_S)  # what was noticed meanwhile
+    info = view.topics.get(topic, info)
+    return TopicFacts(
+        topic,
+        time.time(),
+        address,
+        bool(view.listens),
+        _publishers(view, info, address),
+        others,
+        tuple(view.services),
+        tuple(each for each in view.alerts if each.id in {f"type:{topic}", f"encode:{topic}"}),
+        listened_s,
+        received,
+        refused,
+        unreadable,
+    )
+
+
+def _listen(node: Node, info: TopicInfo) -> tuple[int, int, str, float]:
+    """(received, refused, why the newest can't be read, seconds): until one came, or the time is over."""
+    began = time.monotonic()
+    with node.new_sub(info.name, info.msg_type, wildcards=False) as ear:
+        message, unreadable = ear.receive(_LISTEN_S), ""
+        if message is not None:
+            try:
+                message.kind.decode(message.raw, message.extension)
+            except nep.errors.NepError as error:
+                unreadable = str(error)
+        return ear.received, ear.refused, unreadable, time.monotonic() - began
+
+
+def _publishers(view: GraphView, info: TopicInfo, address: str) -> tuple[PublisherFact, ...]:
+    tried: dict[str, Reach] = {}
+    return tuple(_publisher(view, each, address, tried) for each in info.publishers)
+
+
+def _publisher(view: GraphView, each: PublisherInfo, address: str, tried: dict[str, Reach]) -> PublisherFact:
+    node = view.nodes.get(each.node_id)
+    is_native = node is None or node.generation == "native"
+    endpoint, reach = _reached(each, address, tried) if is_native else ("", "")
+    services = [
+        name
+        for name, service in view.services.items()
+        if any(server.node_id == each.node_id for server in service.servers)
+    ]
+    return PublisherFact(
+        node.name if node is not None else _("a program that has left"),
+        node.host if node is not None else "",
+        node.generation if node is not None else "native",
+        each.count if is_native else None,
+        _last_s(view, each),
+        endpoint,
+        reach,
+        tuple(name for name in services if name.rpartition("/")[2].lower().startswith(_REMEDIES)),
+    )
+
+
+def _reached(each: PublisherInfo, address: str, tried: dict[str, Reach]) -> tuple[str, Reach]:
+    """Where a program here connects to it, and why that fails; the same place is tried once."""
+    if not each.endpoints:
+        return "", ""
+    endpoint = nearest(each.endpoints, address)
+    if not endpoint:
+        return each.endpoints[0], "elsewhere"
+    if endpoint not in tried and len(tried) < _MOST_TRIED:
+        tried[endpoint] = reach_of(endpoint)
+    return endpoint, tried.get(endpoint, "")
+
+
+def _last_s(view: GraphView, each: PublisherInfo) -> float | None:
+    """When its newest message was sent, by the clock of this computer."""
+    if each.last_stamp_ns is None:
+        return None
+    theirs = _offsets(view)
+    offset_ns = theirs.get(each.node_id, 0)
+    here = next((theirs[id] for id, node in view.nodes.items() if id in theirs and _is_own(node.host)), 0)
+    return (each.last_stamp_ns + offset_ns - here) / 1e9
+
+
+def _offsets(view: GraphView) -> Mapping[str, int]:
+    return {id: node.clock_offset_ns for id, node in view.nodes.items() if node.clock_offset_ns is not None}
+
+
+def _is_own(host: str) -> bool:
+    return host == platform.node()

@@ -1,0 +1,70 @@
+"""Where messages were lost is found without reading the recording."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import pytest
+
+from app.core.recording.replay.density import losses_of
+from nep.recordings import reader
+from nep.recordings.reader import Recording
+from nep.recordings.writer import RecordingWriter
+from tests.nep.recordings.messages import TestClock, json_message, limits
+
+PIECES, EACH = 128, 60  # with figures after each
+
+
+def numbers(gaps: dict[int, int]) -> Iterator[int]:
+    """Numbers of messages, with so many missing before each of these."""
+    number = 0
+    for place in itertools.count():
+        number += 1 + gaps.get(place, 0)
+        yield number
+
+
+def recording(path, gaps: dict[int, int]) -> None:
+    made = numbers(gaps)
+    with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.0)) as writer:
+        for _piece in range(PIECES):
+            for _each in range(EACH):
+                writer.post([json_message(next(made), "/a")])
+            assert writer.flush()
+
+
+@pytest.fixture
+def read_bytes(monkeypatch) -> list[int]:
+    """The lengths of the pieces that are read."""
+    lengths: list[int] = []
+    read = reader.read_chunk
+
+    def counted(file, chunk):
+        lengths.append(chunk.length)
+        return read(file, chunk)
+
+    monkeypatch.setattr(reader, "read_chunk", counted)
+    return lengths
+
+
+def test_of_a_recording_that_lost_nothing_nothing_is_read(tmp_path, read_bytes) -> None:
+    recording(tmp_path / "a.mcap", {})
+    with Recording(tmp_path / "a.mcap") as made:
+        assert len(made.figure_pieces()) > PIECES // 2
+        assert losses_of(made) == {}
+    assert read_bytes == []
+
+
+def test_of_one_that_lost_little_little_is_read_and_every_loss_found(tmp_path, read_bytes) -> None:
+    path = tmp_path / "a.mcap"
+    recording(path, {1: 2, 3000: 3, 3003: 1, 7_600: 7})
+    with Recording(path) as made:
+        found = losses_of(made)
+    assert sum(mark.count for mark in found["/a"]) == 13
+    assert len(found["/a"]) in {3, 4}
+    few = sum(read_bytes)
+    assert 0 < few < path.stat().st_size // 4
+    with Recording(path) as made:
+        made.is_complete = False  # then all of it is read
+        assert losses_of(made) == found
+    assert sum(read_bytes) - few > 3 * few

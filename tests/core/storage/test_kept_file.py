@@ -1,0 +1,78 @@
+"""What a person made is read as far as it can be, and what can't be is kept beside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.core.storage.kept_file import KeptFile, read_kept
+from nep.errors import NepError
+
+
+class NewerError(NepError):
+    """Of a newer Studio."""
+
+
+def words(data: bytes) -> tuple[list[str], str]:
+    """Letters, apart from figures; "!" is nothing at all, "9" is newer."""
+    if data == b"!":
+        raise NepError("it is no text")
+    if data == b"9":
+        raise NewerError("it is of a newer Studio")
+    kept = [each for each in data.decode() if each.isalpha()]
+    return kept, "" if len(kept) == len(data) else "there are figures in it"
+
+
+def read(path: Path, most_bytes: int = 100) -> KeptFile[list[str]]:
+    return read_kept(path, words, NewerError, most_bytes)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "words.json"
+
+
+def beside(path: Path) -> Path:
+    return path.with_name("words.damaged.json")
+
+
+def test_what_is_whole_is_read_and_what_is_not_there_is_nothing(path: Path) -> None:
+    assert read(path) == KeptFile()
+    assert read(path / "below") == KeptFile()
+    path.write_bytes(b"ab")
+    assert read(path) == KeptFile(["a", "b"])
+    assert not beside(path).exists()
+
+
+def test_of_a_damaged_file_the_rest_is_used_and_a_copy_kept(path: Path) -> None:
+    path.write_bytes(b"a1b")
+    found = read(path)
+    assert found.value == ["a", "b"]
+    assert found.problem == "The file is kept as “words.damaged.json”: there are figures in it."
+    assert (path.read_bytes(), beside(path).read_bytes()) == (b"a1b", b"a1b")
+
+
+def test_what_is_no_such_file_is_put_aside(path: Path) -> None:
+    path.write_bytes(b"!")
+    found = read(path)
+    assert (found.value, "it is no text" in found.problem, found.is_newer) == (None, True, False)
+    assert (path.exists(), beside(path).read_bytes()) == (False, b"!")
+
+
+def test_what_is_too_large_or_no_file_is_put_aside_too(path: Path) -> None:
+    path.write_bytes(b"a" * 101)
+    assert "MB" in read(path).problem
+    assert beside(path).stat().st_size == 101
+    beside(path).unlink()
+    path.mkdir()
+    assert read(path).value is None
+    assert beside(path).is_dir()
+
+
+def test_a_newer_file_is_left_as_it_is(path: Path) -> None:
+    path.write_bytes(b"9")
+    found = read(path)
+    assert (found.value, found.is_newer) == (None, True)
+    assert found.problem.startswith("The file is left as it is, and what you change is not kept: it is of")
+    assert (path.read_bytes(), beside(path).exists()) == (b"9", False)

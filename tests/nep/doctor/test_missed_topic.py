@@ -1,0 +1,205 @@
+"""Why nothing is seen of one topic: the judgement over made-up facts, and a real master's topics."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from dataclasses import replace
+from unittest.mock import Mock
+
+import pytest
+import typer
+
+import nep
+from nep.cli.doctor import doctor
+from nep.programs.doctor import TopicFacts, collect_topic, look, meant_topic, topic_findings
+from nep.programs.doctor.facts import PublisherFact
+from nep.programs.doctor.listen import reach_of
+from nep.protocol.graph_view import Alert
+
+NOW = 1_800_000_000.0
+CAMERA = PublisherFact("camera_driver", "lab", sent=18_204, last_s=NOW - 4)
+MISSED = TopicFacts(
+    "/robot/camera", NOW, "192.168.1.20:7780", is_shared=True, publishers=(CAMERA,),
+    others={"/robot/camera": 30.0, "/robot/depth": 60.0, "/once": None}, listened_s=1.5,
+)  # fmt: skip
+
+
+def found(**changes):
+    """The findings of a silent camera with these changes, by id."""
+    return {each.id: each for each in topic_findings(replace(MISSED, **changes))}
+
+
+def publisher(**changes):
+    return {"publishers": (replace(CAMERA, **changes),)}
+
+
+def test_a_publisher_that_is_silent_is_told_with_since_when_and_what_it_offers():
+    (one,) = found().values()
+    at = time.strftime("%H:%M:%S", time.localtime(NOW - 4))
+    assert (one.id, one.severity, one.instead) == ("topic:silent:camera_driver", "error", "")
+    assert one.sentence == "“camera_driver” is there, but has sent nothing on /robot/camera for 4 s."
+    assert one.mend.startswith(f"Its last message was number 18204, at {at}.")
+    (one,) = found(**publisher(remedies=("restart_camera",))).values()
+    assert one.instead == "restart_camera"
+    assert one.mend.endswith("It offers the service “restart_camera”.")
+    (one,) = found(**publisher(sent=0, last_s=None)).values()
+    assert one.sentence == "“camera_driver” is there, but has sent nothing on /robot/camera yet."
+    (one,) = found(**publisher(sent=None, generation="B")).values()  # nobody numbers what it sends
+    assert "number" not in one.mend
+    assert at in one.mend
+
+
+def test_a_name_that_nobody_publishes_is_told_with_the_one_that_is_meant():
+    one = found(topic="/robot/deph", publishers=())["topic:near"]
+    assert one.sentence == "Nobody publishes /robot/deph."
+    assert one.mend == "Did you mean /robot/depth? Its publishers send 60 messages a second."
+    assert one.instead == "/robot/depth"
+    assert found(topic="/onc", publishers=())["topic:near"].mend == "Did you mean /once?"
+
+
+@pytest.mark.parametrize(
+    ("missed", "meant"),
+    [
+        ("camera", "/camera"),
+        ("/Camera", "/camera"),
+        ("/depth", "/robot/depth"),
+        ("/robot/dpeth", "/robot/depth"),
+        ("/speech", None),
+        ("/", None),
+    ],
+)
+def test_which_name_is_meant(missed, meant):
+    assert meant_topic(missed, ["/camera", "/robot/depth"]) == meant
+
+
+def test_what_ends_alike_is_meant_only_when_there_is_one():
+    assert meant_topic("/pose", ["/left/pose", "/right/pose"]) in {"/left/pose", "/right/pose", None}
+    assert meant_topic("/pose", []) is None
+    assert meant_topic("/pose", ["/pose"]) is None
+
+
+def test_who_is_not_there_at_all():
+    nobody = found(topic="/speech", publishers=(), is_shared=False, address="127.0.0.1:7780")
+    assert nobody["topic:nobody"].mend.endswith(
+        "what is published now: /once, /robot/camera and /robot/depth."
+    )
+    assert nobody["topic:closed"].severity == "info"
+    many = {f"/t{number}": None for number in range(40)} | {"/nep/log": None}
+    assert found(topic="/x", publishers=(), others=many)["topic:nobody"].mend.endswith("/t12 and 35 more.")
+    alone = found(topic="/speech", publishers=(), others={})
+    assert alone["topic:nobody"].mend == "Start the program that does; nothing else is published, either."
+    assert "topic:closed" not in alone  # it serves other computers
+    service = found(topic="/restart", publishers=(), services=("/restart",))["topic:service"]
+    assert service.instead == "/restart"
+
+
+@pytest.mark.parametrize(
+    ("reach", "sentence", "mend"),
+    [
+        ("elsewhere", "“camera_driver” publishes for its own computer, lab, only.", "NEP_MASTER"),
+        ("timeout", "Nothing answers at 10.0.0.7:41000 (lab), where “camera_driver” publishes.", "firewall"),
+        (
+            "refused",
+            "Nobody listens at 10.0.0.7:41000 (lab) any more, where “camera_driver” published.",
+            "Start it again",
+        ),
+        ("unknown", "There is no way to 10.0.0.7:41000 (lab), where “camera_driver” publishes.", "network"),
+    ],
+)
+def test_an_address_that_is_not_reached(reach, sentence, mend):
+    (one,) = found(**publisher(endpoint="tcp://10.0.0.7:41000", reach=reach)).values()
+    assert (one.id, one.severity, one.sentence) == ("topic:address:camera_driver", "error", sentence)
+    assert mend in one.mend
+
+
+def test_versions_that_do_not_fit():
+    (one,) = found(**publisher(generation="0.5.4.6")).values()
+    assert (one.id, one.command) == ("topic:version:camera_driver", "pip install nep==0.5.4.8")
+    (wire,) = found(refused=12, **publisher(last_s=NOW)).values()
+    assert wire.sentence == "What comes on /robot/camera is of a version of NEP that this one does not read."
+    assert "camera_driver (lab)" in wire.mend
+
+
+def test_what_comes_and_can_or_cannot_be_read():
+    assert [each.severity for each in found(received=1, **publisher(last_s=NOW)).values()] == ["ok"]
+    bad = found(received=1, unreadable="it is no JSON", **publisher(last_s=NOW))["topic:unreadable"]
+    assert bad.sentence == "Messages of /robot/camera come, but can't be read: it is no JSON."
+    blocked = found(**publisher(last_s=NOW))["topic:blocked"]
+    assert blocked.sentence.startswith("/robot/camera is sent by camera_driver (lab), but nothing came here")
+
+
+def test_what_the_master_noticed_of_the_topic_is_an_error_here():
+    alert = Alert("type:/robot/camera", "The topic “/robot/camera” has 2 types", "Use the same type.")
+    one = found(received=1, alerts=(alert,))["type:/robot/camera"]
+    assert (one.severity, one.sentence[-1], one.mend) == ("error", ".", "Use the same type.")
+
+
+def test_a_name_that_no_topic_can_have(master):
+    for name in ("two words", "", "x" * 300, "a{b"):
+        (one,) = topic_findings(collect_topic(name, master.address))
+        assert (one.id, one.severity) == ("topic:name", "error")
+
+
+def test_addresses_are_tried(monkeypatch):
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        place = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        assert reach_of(place) == "refused"  # it is bound, and nobody listens
+        server.listen(1)
+        assert reach_of(place) == ""
+    assert reach_of("ipc://@nep-7780") == ""  # not by the network
+
+    for error, reach in ((TimeoutError(), "timeout"), (OSError("no route to host"), "unknown")):
+        monkeypatch.setattr(socket, "create_connection", Mock(side_effect=error))
+        assert reach_of("tcp://10.255.255.1:80") == reach
+
+
+def test_real_topics(master):
+    with nep.node("arm", master=master.address) as node:
+        node.new_pub("/arm/pose").publish({"x": 1})
+        numbers = node.new_pub("/arm/raw")
+        with nep.node("ear", master=master.address) as other:
+            ear = other.new_sub("/arm/raw")
+            numbers.publish({"x": 2})
+            assert ear.receive(30.0) is not None
+        facts = collect_topic("/arm/pose", master.address)
+        assert facts is not None
+        (one,) = facts.publishers
+        assert (one.node, one.reach) == ("arm", "")
+        assert one.endpoint.startswith("tcp://127.0.0.1:")
+        (silent,) = [each for each in topic_findings(facts) if each.severity == "error"]
+        assert silent.id in {"topic:silent:arm", "topic:blocked"}  # by how new the master's figures are
+        near = look(master.address, "/arm/posse")
+        assert (near[0].id, near[0].instead) == ("topic:near", "/arm/pose")
+        assert "master" in {each.id for each in near}
+
+
+def test_a_topic_that_cannot_be_decoded(master):
+    with nep.node("arm", master=master.address) as node:
+        node.new_pub("/pose", latched=True).publish_bytes(b"{no json")
+        facts = collect_topic("/pose", master.address)
+    assert facts is not None
+    (one,) = [each for each in topic_findings(facts) if each.id == "topic:unreadable"]
+    assert (facts.received, one.severity) == (1, "error")
+    assert "arm (" in one.mend
+
+
+def test_without_a_master_there_is_nothing_to_tell_of_a_topic():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    assert collect_topic("/camera", address) is None
+    told = {each.id for each in look(address, "/camera")}
+    assert "master:none" in told
+    assert not any(id.startswith("topic") for id in told)
+
+
+def test_the_command_takes_a_topic(master, capsys):
+    with pytest.raises(typer.Exit) as ended:
+        doctor(master.address, as_json=True, topic="/no/such")
+    told = json.loads(capsys.readouterr().out)
+    assert ended.value.exit_code == 2
+    assert told[0]["id"] == "topic:nobody"
+    assert {"id", "severity", "sentence", "mend", "command", "instead"} == set(told[0])
