@@ -30,7 +30,7 @@ MOST_OFFERED = 500
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class NextStep:
     """The next step of a finding: its button's words, and what that does."""
 
     words: str
@@ -205,7 +205,7 @@ class DoctorPanel(PanelWidget):
         else:
             self.chip.set(_("all is well"), "ok")
 
-    def _row(self, finding: Finding, step: Step | None) -> AlertRow:
+    def _row(self, finding: Finding, step: NextStep | None) -> AlertRow:
         row = AlertRow(self.theme, framed=finding.severity in BAD)
         row.say(
             STATUS[finding.severity],
@@ -219,15 +219,15 @@ class DoctorPanel(PanelWidget):
 
     # -- the next steps -----------------------------------------------------------------------------------
 
-    def _step(self, finding: Finding) -> Step | None:
+    def _step(self, finding: Finding) -> NextStep | None:
         kind, _colon, rest = finding.id.partition(":")
         if kind == "studio":
-            return Step(self._own[int(rest)].button, self._own[int(rest)].run)
+            return NextStep(self._own[int(rest)].button, self._own[int(rest)].run)
         if finding.id == "topic:near":
             words = _("Use {topic}").format(topic=finding.instead)
-            return Step(words, lambda: self._use(finding.instead))
+            return NextStep(words, lambda: self._use(finding.instead))
         if kind == "topic" and finding.instead:
-            return Step(
+            return NextStep(
                 _("Call {service}").format(service=finding.instead),
                 lambda: self.context.run(f"service.call:{finding.instead}"),
             )
@@ -237,14 +237,14 @@ class DoctorPanel(PanelWidget):
             "topic:name": (_("Choose a topic"), "panel:topics"),
         }.get(finding.id)
         if run is not None:
-            return Step(run[0], lambda: self.context.run(run[1]), mends=finding.severity in BAD)
+            return NextStep(run[0], lambda: self.context.run(run[1]), mends=finding.severity in BAD)
         if finding.id == "master:none":
-            return Step(_("Start the master"), self._start_master)
+            return NextStep(_("Start the master"), self._start_master)
         if finding.command:
-            return Step(_("Copy the command"), lambda: self._copy_command(finding.command), mends=False)
+            return NextStep(_("Copy the command"), lambda: self._copy_command(finding.command), mends=False)
         return None
 
-    def _do(self, finding: Finding, step: Step | None) -> None:
+    def _do(self, finding: Finding, step: NextStep | None) -> None:
         if step is None:
             return
         step.run()

@@ -234,15 +234,15 @@ def test_a_new_key_works_at_once_everywhere(
 ) -> None:
     choose(sheet, "Pause")
     press(sheet, Qt.Key.Key_Return)
-    press(sheet, Qt.Key.Key_F4)
-    assert sheet.said.text() == "“Pause” has F4 now."
-    assert commands.actions["run.pause"].shortcut() == QKeySequence("F4")
-    assert window.tool_bar.pause.toolTip() == "Pause (F4)"
+    press(sheet, Qt.Key.Key_F7)
+    assert sheet.said.text() == "“Pause” has F7 now."
+    assert commands.actions["run.pause"].shortcut() == QKeySequence("F7")
+    assert window.tool_bar.pause.toolTip() == "Pause (F7)"
     paused: list[str] = []
     commands.actions["run.pause"].triggered.connect(lambda: paused.append("pause"))
     press(sheet, Qt.Key.Key_Escape)
     assert not sheet.isVisible()
-    QTest.keyClick(window, Qt.Key.Key_F4)
+    QTest.keyClick(window, Qt.Key.Key_F7)
     QTest.keyClick(window, Qt.Key.Key_F8)
     assert paused == ["pause"]
     commands.view.open_palette()
@@ -250,7 +250,7 @@ def test_a_new_key_works_at_once_everywhere(
     assert palette is not None
     palette.field.setText("pause")
     assert palette.rows.entry is not None
-    assert palette.rows.entry.key == "F4"
+    assert palette.rows.entry.key == "F7"
 
 
 def test_a_conflict_names_the_other_and_swaps(sheet: ShortcutSheet, commands: Commands) -> None:
@@ -328,8 +328,8 @@ def test_ctrl_enter_in_the_palette_leads_here(
     assert sheet.isVisible()
     assert sheet.rows.entry is not None
     assert sheet.rows.entry.name == "file.save_as"
-    press(sheet, Qt.Key.Key_F4)
-    assert commands.shortcuts.of("file.save_as") == ("F4",)
+    press(sheet, Qt.Key.Key_F7)
+    assert commands.shortcuts.of("file.save_as") == ("F7",)
 
 
 def test_ctrl_f_finds_blocks_in_the_behaviour_layout_only(
