@@ -242,15 +242,7 @@ def originals(facts: Facts) -> Iterator[Finding]:
     nodes = [node for node in facts.view.nodes.values() if node.generation not in _NATIVE]
     for node in nodes:
         if node.generation in NOT_SERVED:
-            yield Finding(
-                f"original:{node.id}",
-                "error",
-                _("“{program}” uses nep {generation}, which no other version understands.").format(
-                    program=node.name, generation=node.generation
-                ),
-                _("Install 0.5.4.8 or 0.5.4.5 for this program."),
-                command="pip install nep==0.5.4.8",
-            )
+            yield not_served(f"original:{node.id}", node.name, node.generation)
     served = [node for node in nodes if node.generation not in NOT_SERVED]
     if served:
         names = ", ".join(f"{node.name} ({_wire(node.generation)})" for node in served)
@@ -308,3 +300,16 @@ def _who(holder: ProcessFact | None) -> str:
 
 def _other_port(number: str) -> int:
     return int(number) + 1 if number.isdigit() and int(number) < 65535 else 7781
+
+
+def not_served(finding_id: str, program: str, generation: str) -> Finding:
+    """A program uses a version of the original NEP that no other understands."""
+    return Finding(
+        finding_id,
+        "error",
+        _("“{program}” uses nep {generation}, which no other version understands.").format(
+            program=program, generation=generation
+        ),
+        _("Install 0.5.4.8 or 0.5.4.5 for this program."),
+        command="pip install nep==0.5.4.8",
+    )

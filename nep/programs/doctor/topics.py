@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from nep.i18n import _, listed, number
 from nep.programs.doctor.facts import PublisherFact, TopicFacts
 from nep.programs.doctor.finding import Finding, ago
-from nep.programs.doctor.network import NOT_SERVED
+from nep.programs.doctor.network import NOT_SERVED, not_served
 from nep.system.addresses import is_loopback
 
 __all__ = ["meant_topic", "topic_findings"]
@@ -101,15 +101,7 @@ def _near_words(facts: TopicFacts, near: str) -> str:
 def _publisher(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
     """What keeps the messages of one publisher from being here."""
     if each.generation in NOT_SERVED:
-        yield Finding(
-            f"topic:version:{each.node}",
-            "error",
-            _("“{program}” uses nep {generation}, which no other version understands.").format(
-                program=each.node, generation=each.generation
-            ),
-            _("Install 0.5.4.8 or 0.5.4.5 for this program."),
-            command="pip install nep==0.5.4.8",
-        )
+        yield not_served(f"topic:version:{each.node}", each.node, each.generation)
     elif each.reach:
         yield _unreached(each)
     elif not facts.received:
