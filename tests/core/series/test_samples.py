@@ -251,6 +251,18 @@ def test_what_was_drawn_before_is_drawn_as_if_for_the_first_time(seed, limit, co
         assert np.array_equal(one.values, two.values, equal_nan=True)
 
 
+def test_what_is_sent_again_at_the_same_times_is_drawn_anew() -> None:
+    samples, times = Samples(), np.arange(20_000) / 1000
+    none = np.zeros(len(times), dtype=bool)
+    samples.extend(times, np.zeros(len(times)), none)
+    assert samples.line(0, 20, 100).values.max() == 0
+    samples.truncate(10.0)
+    samples.extend(times[10_000:], np.ones(10_000), none[10_000:])
+    line = samples.line(0, 20, 100)
+    assert line.values[line.times < 9.5].max() == 0
+    assert line.values[line.times > 10.5].min() == 1
+
+
 def test_the_oldest_go_and_are_counted_and_figures_stay_right() -> None:
     samples = Samples(limit=8192)
     random = np.random.default_rng(1)
