@@ -32,6 +32,12 @@ _ENDPOINT = re.compile(r"(?:tcp|tls|quic|udp|ws|unixsock-stream|serial|vsock)/[^
 _SECURED = re.compile(r"\b(?:tls|quic)/")
 _FILES = (".json5", ".json", ".yaml", ".yml")
 _DEFAULT_LISTENS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]}
+_WAITS_S = 0.05
+"""So long may a message, or the first part of a large one, wait for room in a connection.
+
+Zenoh's own millisecond is over before its thread has run once on a busy computer. A subscriber that is halted
+costs its publisher this once: zenoh drops at once then, until there is room again.
+"""
 _LARGE_WAITS_S = 1.0
 """So long in all the parts of a large message may wait for room, before it is dropped and counts as lost.
 
@@ -163,7 +169,10 @@ def _open_as_told(path: Path) -> Any:  # noqa: ANN401 - zenoh's
 
 
 def _config(told: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh's
-    drop = {"max_wait_before_drop_fragments": round(1e6 * _LARGE_WAITS_S)}
+    drop = {
+        "wait_before_drop": round(1e6 * _WAITS_S),
+        "max_wait_before_drop_fragments": round(1e6 * _LARGE_WAITS_S),
+    }
     queue = {"queue": {"congestion_control": {"drop": drop}}}
     return library().Config.from_json5(json.dumps({**told, "transport": {"link": {"tx": queue}}}))
 
