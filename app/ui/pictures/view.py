@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QFont, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.pictures.annotations import paint_colour_bar, paint_drawn
@@ -27,8 +28,7 @@ if TYPE_CHECKING:
 SILENT_AFTER_S = 2.0
 LABEL_EDGE = 8
 SHARP_FROM = 2.0  # so many pixels of the screen for one of the picture: then it has edges
-AGE_EVERY = 8  # refreshes: nobody reads an age 30 times a second
-RATE_STAYS_S = 1.0
+FIGURES_STAY_S = 1.0  # nobody reads a rate or an age that is another one with every picture
 OLDEST_S = 3600.0
 COARSE = QSize(16, 12)
 DIMMED, SILENT = QColor(0, 0, 0, 110), QColor(0, 0, 0, 140)
@@ -58,7 +58,7 @@ class RateWords:
     def of(self, stream: ImageStream) -> str:
         """What to say now."""
         words, now = rate_sentence(stream.shown_hz, stream.arriving_hz), self._clock()
-        if words != self._words and (not self._words or not words or now - self._since >= RATE_STAYS_S):
+        if words != self._words and (not self._words or not words or now - self._since >= FIGURES_STAY_S):
             self._words, self._since = words, now
         return self._words
 
@@ -98,7 +98,7 @@ class PictureView(QWidget):
         self._rates = RateWords()
         self._silent = False  # the last picture is shown, and no new one comes
         self.mouse: QPointF | None = None  # where a person points, when it matters
-        self._takes = 0
+        self._aged_s = -FIGURES_STAY_S  # when its age was told
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(80, 60)
@@ -148,12 +148,12 @@ class PictureView(QWidget):
         drawn: Callable[[int, int], tuple[Drawn, ...]] | None = None,
     ) -> None:
         """Show what the stream has now; ``drawn`` is asked what lies on a picture of so many pixels."""
-        before = (self.words, self._boxes, self._drawn)
+        words, before = self.words, (self._boxes, self._drawn, self._silent, self._state)
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
-        self._takes += 1
         self._rate = self._rates.of(stream)
-        if picture is not None and (self._takes % AGE_EVERY == 1 or not self._age):
-            self._age = _age_of(picture)
+        now = time.monotonic()
+        if picture is not None and (now - self._aged_s >= FIGURES_STAY_S or not self._age):
+            self._age, self._aged_s = _age_of(picture), now
         self._silent = not stream.held and silent_s is not None and silent_s > SILENT_AFTER_S
         if stream.held:
             self._state = _("Frozen, {age} old").format(age=age_words(stream.age_s))
@@ -178,9 +178,12 @@ class PictureView(QWidget):
             shown = self._picture
             self._drawn = drawn(shown.width, shown.height) if drawn is not None and shown is not None else ()
         stream.want(self._wish())
-        if (self.words, self._boxes, self._drawn) != before:
-            self.setAccessibleDescription(self.words)
+        if (self._boxes, self._drawn, self._silent, self._state) != before:
             self.update()
+        if self.words != words:
+            self.setAccessibleDescription(self.words)
+            if self._labelled:
+                self.update(0, self._label_top(), self.width(), self.height() - self._label_top())
 
     def _wish(self) -> tuple[int, int] | None:
         """How many pixels the picture has on the screen; None when each of its own is wanted."""
@@ -270,9 +273,17 @@ class PictureView(QWidget):
         painter.drawImage(QRectF(0, 0, 1, 1), image)
         painter.restore()
 
-    def _paint_label(self, painter: QPainter) -> None:
+    def _label_font(self) -> QFont:
         font = self._theme.font("small")
         font.setWeight(font.Weight.Medium)
+        return font
+
+    def _label_top(self) -> int:
+        high = max(20.0, paint.height_of(self._label_font()) + 4)
+        return math.floor(self.height() - LABEL_EDGE - high)
+
+    def _paint_label(self, painter: QPainter) -> None:
+        font = self._label_font()
         high = max(20.0, paint.height_of(font) + 4)
         width = min(paint.width_of(font, self.words) + 16, self.width() - 2 * LABEL_EDGE)
         tag = QRectF(LABEL_EDGE, self.height() - LABEL_EDGE - high, width, high)
