@@ -80,12 +80,21 @@ def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
 class PictureView(QWidget):
     """The newest picture of a stream; `take` is called at each refresh and paints only what is new."""
 
-    def __init__(self, theme: Theme, *, fill: bool = False, labelled: bool = True) -> None:
+    def __init__(
+        self,
+        theme: Theme,
+        *,
+        fill: bool = False,
+        labelled: bool = True,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         """``fill`` lets the picture fill the view where its edges may be cut by a tenth; no black is by it.
 
-        Without a label (``labelled``) a person reads in its middle that no new picture comes.
+        Without a label (``labelled``) a person reads in its middle that no new picture comes. ``clock`` tells
+        seconds.
         """
         super().__init__()
+        self._clock = clock
         self._theme = theme
         self._fill, self._labelled = fill, labelled
         self.place = PicturePlace()
@@ -95,7 +104,7 @@ class PictureView(QWidget):
         self._boxes: tuple[DetectionBox, ...] = ()
         self._drawn: tuple[Drawn, ...] = ()
         self._rate = self._state = self._age = ""
-        self._rates = RateWords()
+        self._rates = RateWords(clock)
         self._silent = False  # the last picture is shown, and no new one comes
         self.mouse: QPointF | None = None  # where a person points, when it matters
         self._aged_s = -FIGURES_STAY_S  # when its age was told
@@ -151,7 +160,7 @@ class PictureView(QWidget):
         words, before = self.words, (self._boxes, self._drawn, self._silent, self._state)
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
         self._rate = self._rates.of(stream)
-        now = time.monotonic()
+        now = self._clock()
         if picture is not None and (now - self._aged_s >= FIGURES_STAY_S or not self._age):
             self._age, self._aged_s = _age_of(picture), now
         self._silent = not stream.held and silent_s is not None and silent_s > SILENT_AFTER_S

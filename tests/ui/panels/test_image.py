@@ -148,6 +148,33 @@ def test_a_camera_that_sees_the_same_is_not_painted_again(qtbot, camera_view, mo
     assert asked
 
 
+@pytest.mark.parametrize("labelled", [True, False])
+def test_an_age_is_told_once_a_second_and_paints_its_words_alone(qtbot, monkeypatch, labelled: bool) -> None:
+    clock = Clock()
+    view = PictureView(Theme("light"), labelled=labelled, clock=clock)
+    qtbot.addWidget(view)
+    view.resize(400, 300)
+    stream, first = stream_of(picture(320, 240)), picture(320, 240)
+    view.take(stream)
+    asked: list[tuple[int, ...]] = []
+    monkeypatch.setattr(view, "update", lambda *where: asked.append(where))
+
+    def takes(age_s: float) -> None:
+        stream.picture = replace(first, bgra=view.picture.bgra, stamp_ns=time.time_ns() - round(1e9 * age_s))
+        view.take(stream)
+
+    for n in range(30):
+        clock.now += 0.03
+        takes(60.0 + n)
+    words = view.words
+    assert asked == []
+    clock.now += 0.2
+    takes(600.0)
+    assert (words != view.words, "10 min" in view.words) == (True, True)
+    assert len(asked) == labelled
+    assert all(where[1] > 200 for where in asked), "not the picture above its words"
+
+
 def test_beside_the_cameras_picture_there_is_no_black(camera_view) -> None:
     camera_view.take(stream_of(picture(320, 240)))  # type: ignore[arg-type]
     assert camera_view.area().left() > 60
