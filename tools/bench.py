@@ -29,6 +29,8 @@ NAMES = (
     "studio_topics",
     "studio_plot",
     "studio_graph",
+    "studio_idle",
+    "studio_panels",
     "studio_start",
     "blocks_editor",
     "studio_tabs",

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
+from operator import is_
 from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSize
 
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.no_robot import NoRobot
@@ -11,13 +15,16 @@ from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.pictures.boxes import boxes_on, camera_of
 from app.ui.pictures.view import SILENT_AFTER_S, PictureView, RateWords
 from app.ui.text.numbers import age_words
-from app.ui.widgets import Chip, ElidedLabel, EmptyAction, EmptyState
+from app.ui.widgets import Chip, EmptyAction, EmptyState, SteadyLabel
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
     from app.core.network.watches import Suspendable
     from app.core.robots.robot_link import RobotLink
+
+LOOKS_EVERY_S = 0.1
+"""What no picture and no recognised thing tells of, such as the rate, is seen so often."""
 
 
 class CameraPanel(OneRobotPanel):
@@ -30,9 +37,13 @@ class CameraPanel(OneRobotPanel):
         self._topic = ""
         self._stream: ImageStream | None = None
         # It stays whole; the topic beside it is what can be shortened.
-        self.rate = ElidedLabel("body", "textSecondary", least=110)
+        self.rate = SteadyLabel("body", "textSecondary", least=110)
         self.header = [self.rate]
         self._rates = RateWords()
+        self._detecting: tuple[str, ...] = ()
+        self._seen: tuple[object, ...] = ()
+        self._size = QSize()
+        self._looks_s = 0.0
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.view = PictureView(self.theme, fill=True, labelled=False)
@@ -52,14 +63,29 @@ class CameraPanel(OneRobotPanel):
             self._no_robot.tell(self.session.coming)
         if self._stream is None or link is None:
             return
-        self.view.take(self._stream, boxes_on(link, self._topic))
         silent_s = self._stream.silent_s
+        seen, size, now = self._seen_now(link, silent_s), self.view.size(), time.monotonic()
+        if (
+            now < self._looks_s
+            and size == self._size
+            and len(seen) == len(self._seen)
+            and all(map(is_, seen, self._seen))
+        ):
+            return  # asked 60 times a second, there mostly is nothing new
+        self.view.take(self._stream, boxes_on(link, self._topic))
         silent = silent_s is not None and silent_s > SILENT_AFTER_S
         sentence = self._rates.of(self._stream)
         self.rate.setText("" if silent else sentence)
         self.chip.set(_("silent for {age}").format(age=age_words(silent_s)) if silent else "", "error")
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
+        self._seen, self._size, self._looks_s = seen, size, now + LOOKS_EVERY_S
+
+    def _seen_now(self, link: RobotLink, silent_s: float | None) -> tuple[object, ...]:
+        """All that is shown: each the same object as before when nothing about it is new."""
+        found = (link.values.get(name) for name in self._detecting)
+        picture = self._stream.picture if self._stream is not None else None
+        return (picture, None if silent_s is None else int(silent_s * 2), *found)
 
     def wanted_robot(self) -> RobotLink | None:
         """The first that has a camera; the one that a person chose to see goes before the others."""
@@ -73,6 +99,8 @@ class CameraPanel(OneRobotPanel):
 
     def show_robot(self, link: RobotLink) -> None:
         self._topic = _topic_of(link)
+        self._detecting = tuple(each.name for each in link.robot.sensors if each.kind == "detections")
+        self._seen = ()
         self._stream = self.session.live.images.stream(self._topic)
         self.view.clear()
         self._rates.clear()

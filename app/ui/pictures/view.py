@@ -189,10 +189,15 @@ class PictureView(QWidget):
         stream.want(self._wish())
         if (self._boxes, self._drawn, self._silent, self._state) != before:
             self.update()
-        if self.words != words:
-            self.setAccessibleDescription(self.words)
+        self._tell_words(words)
+
+    def _tell_words(self, before: str) -> None:
+        words = self.words
+        if words != before:
+            self.setAccessibleDescription(words)
             if self._labelled:
-                self.update(0, self._label_top(), self.width(), self.height() - self._label_top())
+                top = self._label_top()
+                self.update(0, top, self.width(), self.height() - top)
 
     def _wish(self) -> tuple[int, int] | None:
         """How many pixels the picture has on the screen; None when each of its own is wanted."""

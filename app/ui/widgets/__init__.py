@@ -29,6 +29,7 @@ from app.ui.widgets.inputs.switch import Switch as Switch
 from app.ui.widgets.labels import ElidedLabel as ElidedLabel
 from app.ui.widgets.labels import FixedWidthLabel as FixedWidthLabel
 from app.ui.widgets.labels import Separator as Separator
+from app.ui.widgets.labels import SteadyLabel as SteadyLabel
 from app.ui.widgets.labels import label as label
 from app.ui.widgets.labels import set_role as set_role
 from app.ui.widgets.lists.scroll_areas import Scrolled as Scrolled

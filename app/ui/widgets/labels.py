@@ -76,6 +76,28 @@ class FixedWidthLabel(ElidedLabel):
             self.update()
 
 
+class SteadyLabel(ElidedLabel):
+    """Words that change about once a second, in room for the longest of them: seldom laid out anew."""
+
+    def __init__(self, kind: str, role: str, least: int = 0) -> None:
+        self._words = ""
+        super().__init__(kind, role, least)
+
+    def text(self) -> str:
+        return self._words
+
+    def setText(self, text: str) -> None:
+        if text == self._words:
+            return
+        self._words = text
+        self.setAccessibleName(text)
+        metrics = self.fontMetrics()
+        if not text or metrics.horizontalAdvance(text) > metrics.horizontalAdvance(super().text()):
+            super().setText(text)
+        else:
+            self.update()
+
+
 class BoldInLine(QWidget):
     """``sentence`` with ``subject`` in bold where it stands in it."""
 

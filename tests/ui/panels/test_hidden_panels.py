@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from app.ui.theme.theme import Theme
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 from tests.ui.fakes.network import Network
+from tests.ui.sample_data import picture
 from tests.ui.shell_parts import PANELS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -348,3 +350,35 @@ def test_nothing_is_painted_again_that_has_not_changed(qtbot, case: Case, layout
     application.removeEventFilter(paints)
     told = {"MainWindow", "QWidget", "StatusBar", "StatusItem"}  # how long a tick takes is a new figure
     assert set(paints.of) <= told
+
+
+def test_a_camera_that_sees_the_same_paints_nothing(qtbot, case: Case, monkeypatch) -> None:
+    for module in ("app.ui.pictures.view", "app.ui.panels.camera"):
+        monkeypatch.setattr(f"{module}.SILENT_AFTER_S", 1e9)  # however busy the computer is
+    bench = case.window.show_layout("behaviour")
+    camera = bench.docks["camera"]
+    settle(qtbot, case, camera)
+    panel = camera.panel
+    assert isinstance(panel, CameraPanel)
+    shown = picture(32, 24).message
+    assert shown is not None
+
+    def sees(brightness: int) -> None:
+        last = panel.view.picture
+        data = bytes([brightness]) * len(shown.data)
+        stamp_ns = time.time_ns()
+        case.source.send(
+            Message(CAMERA, data, "image", "image", stamp_ns=stamp_ns, extension=shown.extension)
+        )
+        qtbot.waitUntil(lambda: case.tick() or panel.view.picture is not last)
+        QApplication.processEvents()
+
+    for _ in range(10):
+        sees(90)
+    paints = Paints()
+    panel.view.installEventFilter(paints)
+    for _ in range(10):
+        sees(90)
+    assert paints.of == []
+    sees(91)
+    assert paints.of == ["PictureView"]

@@ -22,6 +22,7 @@ from app.ui.widgets import (
     SliderWithUnit,
     Sparkline,
     StatusItem,
+    SteadyLabel,
     StopButton,
     Switch,
     ValueBar,
@@ -385,3 +386,17 @@ def test_tab_goes_through_rows_and_not_into_the_window_of_a_dropped_list(qtbot) 
     column.column.insertWidget(0, choice)  # a warning of Qt fails the test
     assert dropped.window() is not choice.window()
     assert stops_of(choice) == [choice]
+
+
+def test_a_steady_label_is_laid_out_anew_only_for_more_room(qtbot) -> None:
+    label = SteadyLabel("body", "text")
+    qtbot.addWidget(label)
+    label.setText("shown 15 of 15/s")
+    wide = label.sizeHint()
+    label.setText("1/s")
+    assert (label.text(), label.accessibleName(), label.sizeHint()) == ("1/s", "1/s", wide)
+    label.setText("shown 15 of 15/s, and more")
+    assert label.sizeHint().width() > wide.width()
+    label.setText("")
+    assert label.sizeHint().width() < 10
+    assert label.text() == ""
