@@ -427,6 +427,26 @@ def test_quiet_nodes_are_hidden_after_a_minute_and_shown_by_a_press(
     assert "RIZE" in names(panel)
 
 
+def test_a_scene_of_many_lines_is_made_in_one_tick_and_painted_in_the_next(
+    panel: GraphPanel, window: Window, qtbot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.ui.panels.graph.panel.MOST_AT_ONCE", 0)
+    before = panel.canvas.scene
+    show(window, graph(revision=2, nodes=NODES[:-1]))
+
+    def is_coming() -> bool:
+        panel.refresh()
+        return panel._coming is not None
+
+    qtbot.waitUntil(is_coming, timeout=20_000)
+    coming = panel._coming
+    assert panel.canvas.scene is before
+    panel.refresh()
+    assert (panel.canvas.scene, panel._coming) == (coming, None)
+    assert coming is not None
+    assert coming.graph == panel._asked
+
+
 def test_groups_open_and_close_and_g_and_s_are_keys(panel: GraphPanel, qtbot) -> None:
     scene = panel.canvas.scene
     assert scene is not None

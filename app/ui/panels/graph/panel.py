@@ -65,6 +65,8 @@ from nep.i18n import _, lazy, ngettext
 
 SVG = FileKind(lazy("Picture that stays sharp at any size"), ".svg")
 DOT = FileKind(lazy("Graph for other programs"), ".dot")
+MOST_AT_ONCE = 500
+"""Lines of a scene that are made and painted in one tick."""
 BESIDE_FROM = 700
 """From this width on, in px at 100 % text, the card stands beside the graph, else below it."""
 QUIET_EVERY = 30
@@ -85,6 +87,7 @@ class GraphPanel(PanelWidget):
         self._thread = LayoutThread()
         self._quiet, self._calls = QuietNodes(), CallRates()
         self._layout: GraphLayout | None = None
+        self._coming: GraphScene | None = None
         self._asked: NodeGraph | None = None
         self._sizes_asked = LayoutSizes()
         self._seen: tuple[object, ...] = ()
@@ -233,20 +236,24 @@ class GraphPanel(PanelWidget):
             self._thread.ask(graph, self._layout, self._sizes_asked)
 
     def _take_layout(self) -> None:
+        """Make the scene of a layout that was found; of many nodes it is shown, and painted, a tick later."""
+        scene, self._coming = self._coming, None
         made = self._thread.take()
-        if made is None:
-            return
-        graph, layout = made
-        self._layout = layout
-        self._show(graph, layout)
+        if made is not None:
+            graph, self._layout = made
+            scene = GraphScene(self.theme, graph, self._layout, self._sizes_asked, self._host)
+            if len(scene.lines) > MOST_AT_ONCE:
+                self._coming = scene
+                return
+        if scene is not None:
+            self._show(scene)
 
-    def _show(self, graph: NodeGraph, layout: GraphLayout) -> None:
-        scene = GraphScene(self.theme, graph, layout, self._sizes_asked, self._host)
+    def _show(self, scene: GraphScene) -> None:
         scene.dim(self.tools.words())
-        boxes = {node.entry_key: node.key for node in graph.nodes if node.entry_key}
+        boxes = {node.entry_key: node.key for node in scene.graph.nodes if node.entry_key}
         self._box_of = lambda entry: boxes.get(entry, "")
         self.canvas.show_scene(scene)
-        self._say_note(layout)
+        self._say_note(scene.layout)
         self._say_card()
 
     def _figures_of(self, line: GraphLine) -> LineFigures:
@@ -327,7 +334,7 @@ class GraphPanel(PanelWidget):
         self._choose(quiet_shown=self._choices.quiet_shown | {group})
 
     def _arrange_anew(self) -> None:
-        self._layout = self._asked = None
+        self._layout = self._asked = self._coming = None
         self._seen = ()
         self.canvas.show_all()
 
