@@ -62,6 +62,8 @@ class McapDoctor:
             self._record(opcode, at, body, is_summary)
             at += 9 + length
             if opcode == 0x0F:
+                (crc,) = struct.unpack_from("<I", body)
+                self._say(crc and zlib.crc32(data[: at - 9 - length]) != crc, "the data's CRC is wrong")
                 is_summary, summary_at = True, at
         self._say(opcodes[:1] != [0x01], "the first record is no header")
         self._say(opcodes[-1:] != [0x02], "the last record is no footer")
