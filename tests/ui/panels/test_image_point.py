@@ -16,6 +16,8 @@ from app.core.run.acting.picture_point import TYPES, PicturePoint
 from app.ui.panels.image.panel import PANEL, ImagePanel
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
+from tests.pseudo import untranslated_in
+from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
 from tests.ui.sample_data import Topic
@@ -224,3 +226,18 @@ def test_a_topic_that_moves_a_robot_asks_again_and_another_source_disarms(qtbot,
     window.session.sources_shown += 1
     ticks(window, panel)
     assert not points.is_armed
+
+
+def test_words_are_translated_and_fit(qtbot, pseudo, window, panel) -> None:
+    panel.resize(330, 400)
+    panel.actions_of["point"].trigger()
+    window.session.acting.arm()
+    ticks(window, panel)
+    assert panel.points.let.isVisible()
+    data = ("robot", "camera", "point", "json", "geometry_msgs/Point", "geometry_msgs/PointStamped")
+    assert untranslated_in(panel.points, *data) == []
+    assert clipped(panel.points) == []
+    window.session.acting.disarm()
+    ticks(window, panel)
+    assert untranslated_in(panel.points, *data) == []
+    assert clipped(panel.points) == []
