@@ -96,7 +96,7 @@ class ArmedStrip(QWidget):
         self.switch.setChecked(arming.is_on)
         can_arm = self.for_replay or not replaying
         self.switch.setEnabled(can_arm or arming.is_on)
-        nothing = _("Nothing is sent") if can_arm else _("Nothing is sent while a recording shows")
+        nothing = self.off_words() if can_arm else _("Nothing is sent while a recording shows")
         self.words.setText(_("{time} left").format(time=left) if arming.is_on else nothing)
         set_role(self.words, "warn" if arming.is_on else "textSecondary")
         self._sends.setVisible(bool(targets))
@@ -109,6 +109,14 @@ class ArmedStrip(QWidget):
             self.question.setText(said)
             paint.announce(self, said)
         self.update()
+
+    def off_words(self) -> str:
+        """What is so while it is switched off."""
+        return _("Nothing is sent")
+
+    def arm(self) -> str:
+        """Switch it on; why it can't be, as a sentence."""
+        return self.acting.arm()
 
     def more_words(self) -> str:
         """What has been sent so far, where the panel does not say it itself."""
@@ -141,7 +149,7 @@ class ArmedStrip(QWidget):
         if self.acting.arming.is_on:
             self.acting.disarm()
         else:
-            why_not = self.acting.arm()
+            why_not = self.arm()
             if why_not:
                 self._context.toast(why_not)
         self._seen = ()

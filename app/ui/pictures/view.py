@@ -228,16 +228,21 @@ class PictureView(QWidget):
         seen = self.place.seen_size(self.picture_size()).width()
         return self.area().width() / max(1.0, seen) * self.devicePixelRatioF()
 
+    def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
+        """Which pixel of the picture, as it was received, is at a point of the view; None beside it."""
+        picture = self._picture
+        if picture is None:
+            return None
+        share = self.place.to_picture(at, self.area())
+        if not (-1e-9 <= share.x() < 1 and -1e-9 <= share.y() < 1):
+            return None
+        x, y = int(share.x() * picture.width + 1e-6), int(share.y() * picture.height + 1e-6)
+        return min(x, picture.width - 1), min(y, picture.height - 1)
+
     def _under_mouse(self) -> str:
         picture = self._picture
-        if self.mouse is None or picture is None:
-            return ""
-        share = self.place.to_picture(self.mouse, self.area())
-        if not (-1e-9 <= share.x() < 1 and -1e-9 <= share.y() < 1):
-            return ""
-        x = min(int(share.x() * picture.width + 1e-6), picture.width - 1)
-        y = min(int(share.y() * picture.height + 1e-6), picture.height - 1)
-        return pixel_words(x, y, picture.pixel(x, y))
+        pixel = self.pixel_at(self.mouse) if self.mouse is not None else None
+        return pixel_words(*pixel, picture.pixel(*pixel)) if pixel is not None and picture is not None else ""
 
     # -- painting -----------------------------------------------------------------------------------------
 

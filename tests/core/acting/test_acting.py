@@ -26,6 +26,8 @@ def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Sessio
         tick_until(session, lambda: "sum" in getattr(session.live.graph, "services", {}))
         assert acting.send(STILL) == ""
         assert acting.arming.targets == (Target("topic", "/cmd_vel"),)
+        (armed,) = acting.sent.records
+        assert (armed.asker, armed.words) == ("switch", "armed for 5 min")
         is_there, first = heard.listen(timeout_s=20.0)
         assert is_there
         tick_until(session, lambda: "a" in acting.last)
@@ -35,6 +37,18 @@ def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Sessio
         assert acting.calls.records[-1].answer == {"sum": 5}
         assert call_words(acting.calls.records[-1]).startswith("answered in ")
         assert acting.shelf.requests["sum"] == '{"a": 2, "b": 3}'
+        sent, called = list(acting.sent.records)[1:]
+        assert (sent.asker, sent.name, sent.words) == ("publish", "/cmd_vel", "Stand still, heard by 1")
+        assert json.loads(sent.text) == first
+        assert (called.asker, called.name, called.is_bad) == ("service", "sum", False)
+        assert called.text == '{"a": 2, "b": 3}'
+        assert acting.sent.total == 2
+        assert acting.repeat(sent.number) == acting.repeat(called.number) == ""
+        is_there, again = heard.listen(timeout_s=20.0)
+        assert is_there
+        assert again["id"] != first["id"]
+        tick_until(session, lambda: acting.sent.total == 4)
+        assert acting.repeat(armed.number) == "This can't be sent again."
         assert acting.send(STILL, rate_hz=20.0) == ""
         is_there, second = heard.listen(timeout_s=20.0)
         assert is_there
@@ -44,7 +58,10 @@ def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Sessio
         assert acting.outbox.all_repeated == ()
         while heard.receive(0.0) is not None:
             pass
+        assert acting.repeat(sent.number) == "Not armed for /cmd_vel: nothing is sent."
+        assert not acting.arming.is_on
         assert heard.receive(0.1) is None
+        tick_until(session, lambda: any(" sent" in each.words for each in acting.sent.records))
     said = [each.text for each in session.console.records]
     assert "armed for 5 min" in said
     assert "/cmd_vel: Stand still, heard by 1" in said

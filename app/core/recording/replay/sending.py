@@ -290,19 +290,18 @@ class ReplaySending:
 
     def _end(self, sent: SentTopic) -> None:
         if self.outbox.end(sent.route.recorded) is not None:
-            self._say(
-                sent.route, ", ".join(filter(None, (sent.problem, sent_words(sent)))), bool(sent.problem)
-            )
+            words = ", ".join(filter(None, (sent.problem, sent_words(sent))))
+            self._say(sent.route, words, sent.count, is_bad=bool(sent.problem))
             self._changed()
 
     def _changed(self) -> None:
         self.revision += 1
         self.on_change()
 
-    def _say(self, route: ReplayRoute, words: str, is_bad: bool = False) -> None:
+    def _say(self, route: ReplayRoute, words: str, sent: int = 0, *, is_bad: bool = False) -> None:
         if route.name != route.recorded:
             words = _("{topic} of the recording, {what}").format(topic=route.recorded, what=words)
-        self._acting.tell("warn" if is_bad else "info", route.target, words)
+        self._acting.tell("warn" if is_bad else "info", route.target, words, sent)
 
     def tick(self) -> None:
         """Take over what has happened: what is no longer allowed has ended, a robot may have come."""

@@ -23,6 +23,7 @@ from app.core.run.acting.arming import ARMED_S, Arming, Target
 from app.core.run.acting.calling import CallRecord, ServiceCalls
 from app.core.run.acting.json_text import read_json
 from app.core.run.acting.sending import Outbox, SendOrder, SendResult
+from app.core.run.acting.sent_log import Asker, SentLog, SentRecord
 from app.core.run.acting.shelf import (
     MOST_BYTES,
     KeptMessage,
@@ -104,6 +105,8 @@ class SessionActing:
         self.armed_s = ARMED_S
         self.revision = 0
         self._clock_s = clock_s
+        self.sent = SentLog()
+        """What was sent and called since the start."""
         self.sent_at_s: dict[str, float] = {}
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-shelf")
         self._is_newer = False
@@ -125,7 +128,9 @@ class SessionActing:
         self.arming.arm(self.armed_s)
         self.revision += 1
         if not was_on:
-            self._say("warn", _("armed for {count} min").format(count=round(self.armed_s / 60)))
+            words = _("armed for {count} min").format(count=round(self.armed_s / 60))
+            self._say("warn", words)
+            self._log("switch", "", words)
         return ""
 
     def disarm(self) -> None:
@@ -135,7 +140,8 @@ class SessionActing:
         self.outbox.end_all()
         if was_on:
             self.revision += 1
-            self._say("info", _("no longer armed"))
+            self._say("info", words := _("no longer armed"))
+            self._log("switch", "", words)
 
     def allow(
         self, target: Target, then: Callable[[], object] | None = None, *, is_sure: bool = False
@@ -224,15 +230,22 @@ class SessionActing:
 
         While it is not armed it is armed first, with this topic alone; a robot's topic is asked for again.
         """
-        problem = self.problem_of(message) or self._not_now()
+        problem = self.problem_of(message)
         if problem:
             return problem
-        go_on = partial(self.send, message, rate_hz=rate_hz)
-        target = Target("topic", message.topic)
-        not_armed = self.ready(target, go_on)
+        order = SendOrder(
+            message.id, message.name, message.topic, message.msg_type, message.payload, source=message.source
+        )
+        return self.send_order(order, rate_hz=rate_hz)
+
+    def send_order(self, order: SendOrder, *, rate_hz: float = 0.0) -> str:
+        """Send what can be sent, as `send` does; why it can't be, as a sentence."""
+        not_now = self._not_now()
+        if not_now:
+            return not_now
+        not_armed = self.ready(order.target, partial(self.send_order, order, rate_hz=rate_hz))
         if not_armed is not None:
             return not_armed
-        order = SendOrder(message.id, message.name, message.topic, message.msg_type, message.payload)
         if not rate_hz:
             self.outbox.send(order)
         elif not self.outbox.begin(order, rate_hz):
@@ -264,6 +277,15 @@ class SessionActing:
 
         wanted = [(robot, [action.name for action in robot.actions]) for robot in moved]
         return None if self._session.fleet.permission.permits(wanted, still) else ""
+
+    def repeat(self, number: int) -> str:
+        """Do what an entry of `sent` tells of once more, while that is armed; why it can't be."""
+        record = self.sent.get(number)
+        if record is None or record.again is None:
+            return _("This can't be sent again.")
+        if not self.arming.allows(record.target):
+            return _("Not armed for {name}: nothing is sent.").format(name=record.name)
+        return record.again()
 
     def end(self, message_id: str) -> None:
         """Send it no longer."""
@@ -312,6 +334,7 @@ class SessionActing:
             self.revision += 1
             level = "info" if record.state == "answered" else "warn"
             self._say(level, f"{record.service}: {call_words(record)}")
+            self._log_call(record)
 
     def _take(self, result: SendResult) -> None:
         order = result.order
@@ -322,13 +345,38 @@ class SessionActing:
             for gone in [id for id in known if self.shelf.get(id) is None]:
                 del known[gone]
         self.revision += 1
-        level = "warn" if result.kind == "failed" else "info"
-        self._say(level, f"{order.topic}: {order.name}, {result_words(result)}")
+        is_bad = result.kind == "failed"
+        words = f"{order.name}, {result_words(result)}"
+        self._say("warn" if is_bad else "info", f"{order.topic}: {words}")
+        was_once = result.kind == "sent"
+        again = partial(self.send_order, order) if was_once or (is_bad and not result.count) else None
+        self._log(
+            order.asker, order.topic, words,
+            sent=1 if was_once else result.count, is_bad=is_bad, text=result.text, source=order.source,
+            again=again,
+        )  # fmt: skip
+        if order.told is not None:
+            order.told(result)
 
-    def tell(self, level: str, target: Target, words: str) -> None:
-        """Write down what was sent, for who reads the Console later."""
+    def _log_call(self, record: CallRecord) -> None:
+        self._log(
+            "service", record.service, call_words(record),
+            sent=1 if record.was_begun else 0, is_bad=record.state != "answered",
+            text=record.request, source=record.request,
+            again=partial(self.call, record.service, record.request, record.timeout_s),
+        )  # fmt: skip
+
+    def tell(self, level: str, target: Target, words: str, sent: int = 0) -> None:
+        """Write down what a recording sends; ``sent`` messages have gone out."""
         self.revision += 1
         self._say(level, f"{target.name}: {words}")
+        self._log("replay", target.name, words, sent=sent, is_bad=level == "warn")
+
+    def _log(
+        self, asker: Asker, name: str, words: str, *, sent: int = 0, is_bad: bool = False, text: str = "",
+        source: str = "", again: Callable[[], str] | None = None,
+    ) -> None:  # fmt: skip
+        self.sent.put(SentRecord(self._clock_s(), asker, name, words, is_bad, text, source, again), sent)
 
     def _say(self, level: str, words: str) -> None:
         self._session.console.add(level, "studio", words)

@@ -51,6 +51,8 @@ class CallRecord:
     text: str = ""
     is_cut: bool = False
     is_kept: bool = True
+    was_begun: bool = False
+    """Whether it went out."""
 
 
 @dataclass(slots=True, eq=False)
@@ -92,6 +94,7 @@ class ServiceCalls:
         self._lock = threading.Lock()
         self._ended: deque[_Ended] = deque(maxlen=HISTORY_KEPT)
         self._now: _UnderWay | None = None
+        self._done: list[CallRecord] = []
         self._clients: dict[str, Client] = {}
         self.revision = 0
 
@@ -128,20 +131,19 @@ class ServiceCalls:
         self._end_now("given up", _("given up; it may still be carried out"))
 
     def tick(self) -> list[CallRecord]:
-        """Take over how calls have ended; those that did."""
-        done = []
+        """Take over how calls have ended; those that did since the last time, also those given up."""
         while self._ended:
             ended = self._ended.popleft()
             place = next((i for i, each in enumerate(self._records) if each.number == ended.number), None)
             if place is None or self._records[place].state != "waiting":
                 continue
-            done.append(self._take(place, ended))
+            self._take(place, ended)
         waiting, now = self.waiting, self._now
         has_begun = now is None or now.future is not None  # then its client counts the time
         if waiting is not None and not has_begun and self.waited_s > waiting.timeout_s:
             said = _("no master was there within {time} s").format(time=number(waiting.timeout_s))
             self._end_now("failed", said)
-            done.append(self._records[-1])
+        done, self._done = self._done, []
         return done
 
     def clear(self) -> None:
@@ -166,7 +168,7 @@ class ServiceCalls:
                 self._records[place] = replace(self._records[place], answer=None, text="", is_kept=False)
         self.revision += 1
 
-    def _take(self, place: int, ended: _Ended) -> CallRecord:
+    def _take(self, place: int, ended: _Ended) -> None:
         made = replace(
             self._records[place],
             state=ended.state,
@@ -175,11 +177,12 @@ class ServiceCalls:
             answer=ended.answer,
             text=ended.text,
             is_cut=ended.is_cut,
+            was_begun=self._now is not None and self._now.future is not None,
         )
         self._records[place] = made
+        self._done.append(made)
         self._now = None
         self.revision += 1
-        return made
 
     def _end_now(self, state: State, sentence: str) -> None:
         now, waiting = self._now, self.waiting

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from app.core.faults import error_words
 from app.core.network.source import Job
 from app.core.run.acting.arming import Arming, Target
+from app.core.run.acting.json_text import pretty
+from app.core.run.acting.sent_log import KEPT_BYTES, Asker
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
@@ -31,13 +33,20 @@ RESULTS_KEPT = 200
 
 @dataclass(frozen=True, slots=True)
 class SendOrder:
-    """What is to be sent: ``make`` gives the message, each time anew, and raises `NepError` when it can't."""
+    """What is to be sent: ``make`` gives the message, each time anew, and raises `NepError` when it can't.
+
+    ``source`` is the message as a person wrote it, ``asker`` where they asked for it; ``told`` is called with
+    how it ended, by who takes the results.
+    """
 
     id: str
     name: str
     topic: str
     msg_type: str
     make: Callable[[], object]
+    source: str = ""
+    asker: Asker = "publish"
+    told: Callable[[SendResult], object] | None = None
 
     @property
     def target(self) -> Target:
@@ -49,7 +58,8 @@ class SendOrder:
 class SendResult:
     """How it ended: ``kind`` is "sent", "began", "ended" or "failed"; ``heard`` programs listen.
 
-    ``count`` messages were sent at a rate, ``skipped`` were left out because their time had gone by.
+    ``count`` messages were sent at a rate, ``skipped`` were left out because their time had gone by. ``text``
+    is the one that was sent once, "" of one that is too large to be kept.
     """
 
     order: SendOrder
@@ -58,6 +68,7 @@ class SendResult:
     heard: int = 0
     count: int = 0
     skipped: int = 0
+    text: str = ""
 
 
 @dataclass(slots=True, eq=False)
@@ -132,9 +143,11 @@ class Outbox:
 
         def send_it(node: Node) -> None:
             publisher = self._publisher(node, order)
-            made = codec_for(order.msg_type).encode(order.make())
+            value = order.make()
+            made = codec_for(order.msg_type).encode(value)
             if self._arming.if_armed(turn, order.target, lambda: publisher.publish(made)):
-                self._tell(SendResult(order, "sent", heard=publisher.subscribers))
+                text = _text_of(value) if len(made.data) <= KEPT_BYTES else ""
+                self._tell(SendResult(order, "sent", heard=publisher.subscribers, text=text))
             else:
                 self._tell(SendResult(order, "failed", _("not sent: it was no longer armed")))
 
@@ -294,3 +307,8 @@ class Outbox:
         late = max(0, int((time.monotonic() - each.due_s) / period_s))
         each.due_s += (1 + late) * period_s
         return late
+
+
+def _text_of(value: object) -> str:
+    """A message as a person reads it."""
+    return value if isinstance(value, str) else pretty(value)

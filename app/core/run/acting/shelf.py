@@ -52,6 +52,11 @@ class KeptMessage:
         typed = {name: value_typed(value) for name, value in self.values if value.strip()}
         return read_json(self.text).filled(typed)
 
+    @property
+    def source(self) -> str:
+        """What a person wrote, with the values that they typed."""
+        return "\n".join((self.text, *(f"{name}: {value}" for name, value in self.values)))
+
     def with_value(self, name: str, value: str) -> KeptMessage:
         """The same with another value in a place."""
         others = {**dict(self.values), name: value[:VALUE_LETTERS]}

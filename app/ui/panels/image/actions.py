@@ -37,11 +37,14 @@ ROWS: tuple[PictureRow, ...] = (
     PictureRow("freeze", lazy("Freeze this picture"), ("Space",), "snowflake", above=True, check=True),
     PictureRow("save", lazy("Save as PNG"), ("S",), "download"),
     PictureRow("copy", lazy("Copy the picture"), ("Ctrl+C",), "copy"),
+    PictureRow(
+        "point", lazy("Publish a point on click"), ("P",), "mouse-pointer-click", above=True, check=True
+    ),
 )
 
 
 class PictureActions(QObject):
-    """The QActions of `ROWS` for one view; ``own`` does what the view can't: freeze, save, copy."""
+    """The QActions of `ROWS` for one view; ``own`` does what the view can't: freeze, save, copy, point."""
 
     def __init__(self, theme: Theme, view: ZoomablePicture, own: Mapping[str, Callable[[], object]]) -> None:
         super().__init__(view)

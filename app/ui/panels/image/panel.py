@@ -18,10 +18,11 @@ from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget, paus
 from app.ui.panels.image.actions import PictureActions
 from app.ui.panels.image.look_bar import LookBar
 from app.ui.panels.image.overlays import Overlays
+from app.ui.panels.image.point_bar import PointBar
 from app.ui.panels.image.snapshot import SnapshotJob
 from app.ui.pictures.boxes import boxes_on, owner_of
+from app.ui.pictures.clicks import ClickablePicture
 from app.ui.pictures.placement import PicturePlace
-from app.ui.pictures.zoom import ZoomablePicture
 from app.ui.text import plain
 from app.ui.widgets import EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
@@ -57,7 +58,7 @@ class ImagePanel(PanelWidget):
         self.choose.setProperty("place", "start")
         self.choose.clicked.connect(self._show_menu)
         self.chips = [self.choose]
-        self.view = ZoomablePicture(self.theme)
+        self.view = ClickablePicture(self.theme)
         self.view.setAccessibleName(_("Picture"))
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.view.customContextMenuRequested.connect(self._show_actions)
@@ -68,15 +69,19 @@ class ImagePanel(PanelWidget):
         self._say_nothing()
 
     def _with_look_bar(self) -> QWidget:
-        """The picture with the bar below it."""
+        """The picture with the bar below it, and the one above it."""
         self.look_bar = LookBar(self.theme, lambda: self.view.picture)
         self.look_bar.changed.connect(self._set_look)
         self.look_bar.hide()
         self.tune.toggled.connect(self.look_bar.setVisible)
+        self.points = PointBar(self.context, self.view)
+        self.points.left.connect(lambda: self._publish_points(on=False))
+        self.view.clicked.connect(self.points.send)
         self.shown = QWidget()
         column = QVBoxLayout(self.shown)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
+        column.addWidget(self.points)
         column.addWidget(self.view, 1)
         column.addWidget(self.look_bar)
         return self.shown
@@ -88,7 +93,12 @@ class ImagePanel(PanelWidget):
                 self._stream.show_as(look)
 
     def _make_actions(self) -> None:
-        own = {"freeze": self._freeze_or_not, "save": self.save_picture, "copy": self.copy_picture}
+        own = {
+            "freeze": self._freeze_or_not,
+            "save": self.save_picture,
+            "copy": self.copy_picture,
+            "point": lambda: self._publish_points(on=not self.points.is_on),
+        }
         self.actions_of = PictureActions(self.theme, self.view, own)
         self._look_inside = QAction(self.theme.icon("list-tree"), _("Show in the inspector"), self)
         self._look_inside.triggered.connect(self._inspect)
@@ -107,7 +117,7 @@ class ImagePanel(PanelWidget):
         self.freeze.toggled.connect(self._hold)
         self.keep.clicked.connect(self.save_picture)
         tune = _("Brightness, contrast and colours")
-        self.tune = IconButton(self.theme, "sliders-horizontal", tune, checkable=True, size=26)
+        self.tune: IconButton = IconButton(self.theme, "sliders-horizontal", tune, checkable=True, size=26)
         self.layers = IconButton(self.theme, "layers", _("What messages draw on it"), size=26)
         self.layers.clicked.connect(self._show_layers)
         self.header = [self.fit, self.tune, self.layers, self.freeze, self.keep]
@@ -126,6 +136,7 @@ class ImagePanel(PanelWidget):
             self._show_place_of(name)
         self._topic = name
         self.view.clear()
+        self.points.show_pictures(name)
         self.freeze.setChecked(False)
         self.set_title(_("Image"), topic_words(name))
         if name:
@@ -161,6 +172,7 @@ class ImagePanel(PanelWidget):
             self.choose.setVisible(bool(there))
             if not self._topic and there:
                 self.show_topic(there[0])
+        self.points.refresh()
         if self._stream is None:
             return
         self._look_at_robot()
@@ -227,6 +239,11 @@ class ImagePanel(PanelWidget):
 
     def _freeze_or_not(self) -> None:
         self.freeze.setChecked(not self.freeze.isChecked())
+
+    def _publish_points(self, *, on: bool) -> None:
+        """Let a click in the picture publish its point, or no longer."""
+        self.points.turn(on)
+        self.actions_of["point"].setChecked(on)
 
     def _hold(self, held: bool) -> None:
         self.actions_of["freeze"].setChecked(held)
@@ -310,6 +327,7 @@ class ImagePanel(PanelWidget):
             "look": self.look_bar.look.saved(),
             "tune": self.tune.isChecked(),
             "layers": list(self.overlays.chosen),
+            "point": self.points.saved(),
         }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
@@ -321,6 +339,8 @@ class ImagePanel(PanelWidget):
         self._set_look(look := restored(state.get("look")))
         self.look_bar.show_look(look)
         self.tune.setChecked(state.get("tune") is True)
+        self.points.restore(state.get("point"))
+        self.actions_of["point"].setChecked(self.points.is_on)
         layers = state.get("layers")
         for name in layers if isinstance(layers, list) else ():
             if isinstance(name, str):
@@ -335,6 +355,7 @@ class ImagePanel(PanelWidget):
         return (self._stream, self._watch, *self.overlays.looks())
 
     def shut(self) -> None:
+        self.points.shut()
         self._leave_stream()
         self.overlays.close()
 

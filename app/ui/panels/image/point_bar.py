@@ -1,0 +1,238 @@
+"""The bar above a picture while a click publishes its point: where to, as what, and whether it is armed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
+
+from app.core.network.topics import split_key
+from app.core.run.acting.acting import heard_words
+from app.core.run.acting.arming import Target
+from app.core.run.acting.picture_point import TYPES, PicturePoint, topic_of
+from app.core.run.acting.sending import SendOrder, SendResult
+from app.ui.panels.armed_strip import ArmedStrip
+from app.ui.panels.base import PanelContext
+from app.ui.pictures.clicks import ClickablePicture
+from app.ui.widgets import Button, ComboBox, IconButton, label
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.menus import EditMenu
+from nep.errors import BadTopicError
+from nep.i18n import _, ngettext
+from nep.protocol.wire import check_topic
+
+TOPIC_PX, MOST_LETTERS = 130, 200
+
+
+class PointStrip(ArmedStrip):
+    """The switch, which arms the topic of this panel's points with it."""
+
+    def __init__(self, context: PanelContext, arm: Callable[[], str], said: Callable[[], str]) -> None:
+        """``arm`` switches it on, ``said`` tells what was sent."""
+        self._arm, self._said = arm, said
+        super().__init__(context)
+
+    def off_words(self) -> str:
+        return _("A click sends nothing until this is armed")
+
+    def arm(self) -> str:
+        return self._arm()
+
+    def more_words(self) -> str:
+        return self._said()
+
+
+class PointBar(QWidget):
+    """Publishes what is clicked in ``view``, while it is on, armed by this panel, and nothing replays.
+
+    It is armed by the panel's own switch or button: a layout that names a topic that is armed elsewhere
+    sends nothing. `left` when a person closes it.
+    """
+
+    left = Signal()
+
+    def __init__(self, context: PanelContext, view: ClickablePicture) -> None:
+        super().__init__()
+        self._context, self._view, self._acting = context, view, context.session.acting
+        self._pictures = ""
+        self.is_on = False
+        self._armed: tuple[int, Target] | None = None  # in which turn of the switch, for what
+        self.count = self.heard = 0
+        theme = context.theme
+        self.topic = QLineEdit()
+        self.topic.setAccessibleName(_("Topic of the points"))
+        self.topic.setMaxLength(MOST_LETTERS)
+        self.topic.setMinimumWidth(round(theme.scaled(TOPIC_PX)))
+        self.topic.setProperty("focusRadius", theme.radius("control"))
+        self.topic.textEdited.connect(lambda _text: self._changed())
+        EditMenu(theme, self.topic)
+        self.kind = ComboBox(theme, [(each, each) for each in TYPES], name=_("Type of the points"))
+        self.close_button = IconButton(theme, "x", _("Publish no points any more"), size=26)
+        self.close_button.clicked.connect(self.left)
+        self.problem = label("", "small", role="error", wrap=True)
+        self.problem.setMinimumWidth(0)
+        self.problem.setContentsMargins(12, 0, 12, 6)
+        self.let = Button(theme, "", "lock", size="small")
+        self.let.let_shrink()
+        self.let.clicked.connect(self._let_clicks)
+        self.strip = PointStrip(context, self.arm, self._count_words)
+        self._arrange()
+        self.hide()
+        self._changed()
+
+    def _arrange(self) -> None:
+        row = QWidget()
+        flow = Flow(row, gap=8, row_gap=4)
+        flow.setContentsMargins(12, 6, 6, 6)
+        flow.addWidget(label(_("A click publishes its point to"), "small", role="textSecondary"))
+        flow.add_elastic(self.topic, greedy=True)
+        for widget in (self.kind, self.let, self.close_button):
+            flow.addWidget(widget)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for part in (row, self.problem, self.strip):
+            column.addWidget(part)
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    @property
+    def target(self) -> Target:
+        """Where the points go."""
+        return Target("topic", self.topic.text().strip() or self.topic.placeholderText())
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether a click is published now."""
+        arming, target = self._acting.arming, self.target
+        return (
+            self.is_on
+            and not self._context.session.is_replaying
+            and self._armed == (arming.turn, target)
+            and arming.allows(target)
+        )
+
+    def refresh(self) -> None:
+        """Show what is so now; a click is taken only while it is published."""
+        self._view.takes_clicks = self.is_armed
+        if not self.is_on:
+            return
+        acting = self._acting
+        waits = acting.arming.is_on and not self.is_armed and acting.question is None
+        self.let.setVisible(waits and not self.problem.text() and not self._context.session.is_replaying)
+        self.strip.refresh()
+
+    def show_pictures(self, key: str) -> None:
+        """The pictures are of another topic."""
+        if key != self._pictures:
+            self._pictures = key
+            self._view.forget_click()
+            self.topic.setPlaceholderText(topic_of(split_key(key)[1]) if key else "")
+            self._changed()
+
+    def _changed(self) -> None:
+        """Points go elsewhere: that has to be armed anew."""
+        self._disarm()
+        self.count = self.heard = 0
+        try:
+            check_topic(self.target.name)
+            problem = ""
+        except BadTopicError as error:
+            problem = str(error) if self._pictures else ""
+        self.problem.setText(problem)
+        self.problem.setVisible(bool(problem))
+        self.let.set_word(_("Send them"), "lock")
+        self.let.setAccessibleName(_("Send the points to {topic}").format(topic=self.target.name))
+        self.refresh()
+
+    def _count_words(self) -> str:
+        if not self.count:
+            return ""
+        said = ngettext("{count} point sent", "{count} points sent", self.count).format(count=self.count)
+        return f"{said}, {heard_words(self.heard)}"
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def turn(self, on: bool) -> None:
+        """Let clicks publish points, once it is armed, or no longer."""
+        if on != self.is_on:
+            self.is_on = on
+            self.setVisible(on)
+            if not on:
+                self._disarm()
+            self.refresh()
+
+    def arm(self) -> str:
+        """Let points be sent to this topic, after asking if it moves a robot; why not, as a sentence."""
+        if self.problem.text():
+            return self.problem.text()
+        arming, target = self._acting.arming, self.target
+        why_not = self._acting.arm() if not arming.is_on else ""
+        return why_not or self._acting.allow(target, partial(self._let, arming.turn, target))
+
+    def _let(self, turn: int, target: Target) -> None:
+        if self.is_on and target == self.target:
+            self._armed = (turn, target)
+            self.refresh()
+
+    def _let_clicks(self) -> None:
+        why_not = self.arm()
+        if why_not:
+            self._context.toast(why_not)
+
+    def _disarm(self) -> None:
+        """Send no points any more; what else is armed stays so."""
+        armed, self._armed = self._armed, None
+        arming = self._acting.arming
+        if armed is None or armed[0] != arming.turn:
+            return
+        if set(arming.targets) <= {armed[1]}:
+            self._acting.disarm()
+        else:
+            self._acting.forbid(armed[1])
+
+    def send(self, point: PicturePoint) -> None:
+        """Publish a point that was clicked."""
+        if not self.is_armed:
+            return
+        payload = point.payload(split_key(self._pictures)[1], self.kind.value)
+        name = _("Point ({x}, {y})").format(x=point.x, y=point.y)
+        order = SendOrder(
+            "image", name, self.target.name, self.kind.value, lambda: payload, source=str(payload),
+            asker="image", told=partial(self._told, point),
+        )  # fmt: skip
+        why_not = self._acting.send_order(order)
+        if why_not:
+            self._context.toast(why_not)
+
+    def _told(self, point: PicturePoint, result: SendResult) -> None:
+        if result.kind != "sent":
+            self._context.toast(result.sentence)
+        elif result.order.target == self.target:
+            self.count, self.heard = self.count + 1, result.heard
+            self._view.mark(point)
+
+    # -- kept with the layout -----------------------------------------------------------------------------
+
+    def saved(self) -> dict[str, object]:
+        """For a layout; whether it is armed is never kept."""
+        return {"on": self.is_on, "topic": self.topic.text().strip(), "type": self.kind.value}
+
+    def restore(self, saved: object) -> None:
+        """Take over what `saved` gave; whatever does not fit is left out. Nothing is armed by it."""
+        if not isinstance(saved, Mapping):
+            return
+        topic, kind = saved.get("topic"), saved.get("type")
+        if isinstance(topic, str):
+            self.topic.setText(topic[:MOST_LETTERS])
+        if isinstance(kind, str):
+            self.kind.set_value(kind)
+        self._changed()
+        self.turn(saved.get("on") is True)
+
+    def shut(self) -> None:
+        """The panel closes."""
+        self._view.forget_click()
+        self._disarm()

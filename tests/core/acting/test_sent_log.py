@@ -1,0 +1,57 @@
+"""The list of what was sent: bounded, repeats in one entry, nothing large kept."""
+
+from __future__ import annotations
+
+from app.core.run.acting.sent_log import KEPT_BYTES, MOST_KEPT, SentLog, SentRecord
+
+
+def entry(at_s: float, words: str = "Still, heard by 1", text: str = "{}", source: str = "{}") -> SentRecord:
+    return SentRecord(at_s, "publish", "/cmd_vel", words, text=text, source=source, again=lambda: "")
+
+
+def test_the_same_again_is_one_entry_with_a_count_and_the_newest_message() -> None:
+    log = SentLog()
+    for at_s, text in ((1.0, '{"id": "a"}'), (2.0, '{"id": "b"}')):
+        log.put(entry(at_s, text=text, source='{"id": {new id}}'), 1)
+    (only,) = log.records
+    assert (only.number, only.count, only.at_s, only.text) == (1, 2, 2.0, '{"id": "b"}')
+    log.put(entry(3.0, "Still, nobody hears it", source='{"id": {new id}}'), 1)
+    log.put(entry(4.0, source='{"id": 7}'), 1)
+    log.put(entry(5.0, source='{"id": 8}'), 1)
+    assert [(each.number, each.count) for each in log.records] == [(1, 2), (2, 1), (3, 1), (4, 1)]
+    assert (log.total, log.since_s) == (5, 1.0)
+
+
+def test_switching_is_never_counted_together_nor_as_sent() -> None:
+    log = SentLog()
+    for _ in range(2):
+        log.put(SentRecord(1.0, "switch", "", "no longer armed"), 0)
+    assert [each.count for each in log.records] == [1, 1]
+    assert (log.total, log.since_s) == (0, None)
+
+
+def test_it_keeps_the_last_and_still_knows_how_many_there_were() -> None:
+    log = SentLog()
+    for number in range(MOST_KEPT + 50):
+        log.put(entry(float(number), f"{number}"), 1)
+    assert len(log.records) == MOST_KEPT
+    assert log.records[0].words == "50"
+    assert log.get(50) is None
+    assert log.get(51) is log.records[0]
+    revision = log.revision
+    log.clear()
+    assert list(log.records) == []
+    assert (log.total, log.since_s) == (MOST_KEPT + 50, 0.0)
+    assert log.revision > revision
+    log.put(entry(1.0), 1)
+    assert log.records[0].number == MOST_KEPT + 51, "a number is never used again"
+
+
+def test_a_large_message_is_listed_but_not_kept() -> None:
+    log = SentLog()
+    at_the_limit, over_it = "x" * KEPT_BYTES, "\N{EURO SIGN}" * (KEPT_BYTES // 2)
+    for text in (at_the_limit, over_it, over_it + "x"):
+        log.put(entry(1.0, text=text, source=text), 1)
+    kept, gone = log.records
+    assert (kept.text, kept.again is not None) == (at_the_limit, True)
+    assert (gone.text, gone.source, gone.again, gone.count) == ("", "", None, 2)

@@ -1,0 +1,243 @@
+"""A click in a picture publishes its point: once it is armed, and never by a drag or a double click."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from app.core.run.acting.arming import Target
+from app.core.run.acting.picture_point import TYPES, PicturePoint
+from app.ui.panels.image.panel import PANEL, ImagePanel
+from nep.messages.message import Message
+from nep.nodes.subscriber import Subscriber
+from tests.pseudo import untranslated_in
+from tests.ui.clipping import clipped
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, button, press, ticks
+from tests.ui.sample_data import Topic
+from tests.ui.test_accessible import unsaid
+
+pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+LEFT, MIDDLE, RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton, Qt.MouseButton.RightButton
+CAMERA, POINTS = "/robot/camera", "/robot/camera/point"
+STAMP_NS = 1_795_164_093_000_000_007
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    made = Window(Session.full())
+    made.session.images.camera = lambda _topic: None
+    return made
+
+
+@pytest.fixture
+def panel(qtbot, window) -> Iterator[ImagePanel]:
+    made = window.make(PANEL, (640, 560))
+    qtbot.addWidget(made)
+    assert isinstance(made, ImagePanel)
+    made.show_topic(CAMERA)
+    frame = np.zeros((240, 320, 3), np.uint8)
+    extension = {"shape": list(frame.shape), "encoding": "bgr8"}
+    sent = Message(CAMERA, frame.tobytes(), "image", "image", stamp_ns=STAMP_NS, extension=extension)
+    window.session.images.offer([sent])
+    ticks(window, made)
+    assert made.view.picture is not None
+    yield made
+    made.shut()
+
+
+def arm(window: Window, panel: ImagePanel) -> Subscriber:
+    """Let its clicks publish points, and listen to them."""
+    heard = window.session.source.listen(POINTS, "json")
+    panel.actions_of["point"].trigger()
+    press(panel.points.strip.switch)
+    ticks(window, panel)
+    assert panel.points.is_armed
+    return heard
+
+
+def at(panel: ImagePanel, x: float, y: float) -> QPoint:
+    """Where a place of the picture is in the view."""
+    view = panel.view
+    return view.place.to_view(view.area()).map(QPointF(x / 320, y / 240)).toPoint()
+
+
+def click(qtbot, window: Window, panel: ImagePanel, x: float, y: float, key=LEFT) -> PicturePoint:
+    """Click there, wait until it is known to be no double click, and let the session take the result."""
+    with qtbot.waitSignal(panel.view.clicked, timeout=20_000) as told:
+        QTest.mouseClick(panel.view, key, Qt.KeyboardModifier.NoModifier, at(panel, x, y))
+    ticks(window, panel)
+    return told.args[0]
+
+
+def test_it_says_what_to_arm_and_one_click_is_one_message(qtbot, window, panel) -> None:
+    session, points = window.session, panel.points
+    assert not points.isVisible()
+    QTest.keyClick(panel.view, Qt.Key.Key_P)
+    ticks(window, panel)
+    assert points.isVisible()
+    assert panel.actions_of["point"].isChecked()
+    assert points.target == Target("topic", POINTS)
+    assert points.strip.words.text() == "A click sends nothing until this is armed"
+    assert unsaid(panel) == []
+    QTest.mouseClick(panel.view, LEFT, Qt.KeyboardModifier.NoModifier, at(panel, 16, 8))
+    press(points.close_button)
+    assert not points.isVisible()
+    assert not panel.actions_of["point"].isChecked()
+
+    heard = arm(window, panel)
+    assert session.acting.arming.targets == (Target("topic", POINTS),)
+    point = click(qtbot, window, panel, 16.5, 8.5)
+    told = {"width": 320, "height": 240, "stamp": {"sec": 1_795_164_093, "nanosec": 7}, "topic": CAMERA}
+    assert heard.listen(timeout_s=20.0) == (True, {"x": 16, "y": 8, "button": "left", **told})
+    assert panel.view.marked == point
+    assert not panel.view.grab().isNull()
+    assert points.strip.counts.text() == "1 point sent, heard by 1"
+    entry = session.acting.sent.records[-1]
+    assert (entry.asker, entry.name, entry.words) == ("image", POINTS, "Point (16, 8), heard by 1")
+    qtbot.waitUntil(lambda: panel.view.marked is None, timeout=20_000)
+
+    panel.actions_of["right"].trigger()
+    panel.actions_of["across"].trigger()
+    panel.view.zoom_by(1.5)
+    click(qtbot, window, panel, 200.5, 100.5, MIDDLE)
+    assert heard.listen(timeout_s=20.0) == (True, {"x": 200, "y": 100, "button": "middle", **told})
+    assert points.strip.counts.text() == "2 points sent, heard by 1"
+    assert session.acting.repeat(entry.number) == ""
+    assert heard.listen(timeout_s=20.0)[1]["x"] == 16
+    session.runs.stop()
+    ticks(window, panel)
+    assert not panel.view.takes_clicks
+    assert session.acting.repeat(entry.number).startswith("Not armed for")
+
+
+def test_what_is_no_click_publishes_nothing(qtbot, window, panel) -> None:
+    heard, view = arm(window, panel), panel.view
+    told: list[PicturePoint] = []
+    view.clicked.connect(told.append)
+    none = Qt.KeyboardModifier.NoModifier
+    view.resize(view.width(), 600)
+    for place in (QPoint(5, 2), QPoint(view.width() - 2, view.height() - 2)):
+        assert view.pixel_at(QPointF(place)) is None
+        QTest.mouseClick(view, LEFT, none, place)
+    QTest.mouseClick(view, RIGHT, none, at(panel, 30, 30))
+    QTest.mouseClick(view, LEFT, none, at(panel, 40, 40))
+    QTest.mouseDClick(view, LEFT, none, at(panel, 40, 40))
+    assert view.place.zoom is not None, "a double click still zooms"
+    start = at(panel, 160, 120)
+    QTest.mousePress(view, LEFT, none, start)
+    QTest.mouseMove(view, start + QPoint(QApplication.startDragDistance() + 1, 0))
+    QTest.mouseMove(view, start)
+    QTest.mouseRelease(view, LEFT, none, start)
+    QTest.mousePress(view, LEFT, none, start)
+    turned = QWheelEvent(
+        QPointF(start), view.mapToGlobal(QPointF(start)), QPoint(), QPoint(0, 120), LEFT, none,
+        Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QApplication.sendEvent(view, turned)
+    QTest.mouseRelease(view, LEFT, none, start)
+    QTest.mouseClick(view, LEFT, none, at(panel, 100, 100))
+    panel.points.topic.setText("/elsewhere")
+    panel.points.topic.textEdited.emit("/elsewhere")
+    assert not view.takes_clicks, "what goes elsewhere is armed anew, also what was clicked before"
+    assert not window.session.acting.arming.is_on
+    panel.points.topic.setText("")
+    panel.points.topic.textEdited.emit("")
+    press(panel.points.strip.switch)
+    ticks(window, panel)
+    point = click(qtbot, window, panel, 150.5, 110.5)
+    assert told == [point]
+    assert heard.listen(timeout_s=20.0)[0]
+    assert heard.receive(0.0) is None
+
+
+def test_two_clicks_at_two_places_are_two_points(qtbot, window, panel) -> None:
+    arm(window, panel)
+    with qtbot.waitSignals([panel.view.clicked] * 2, timeout=20_000):
+        for x in (20, 300):
+            QTest.mouseClick(panel.view, LEFT, Qt.KeyboardModifier.NoModifier, at(panel, x + 0.5, 50.5))
+    ticks(window, panel)
+    words = [each.words for each in window.session.acting.sent.records if each.asker == "image"]
+    assert words == ["Point (20, 50), heard by 1", "Point (300, 50), heard by 1"]
+
+
+def test_what_is_armed_elsewhere_is_not_armed_here_and_closing_takes_it_away(qtbot, window, panel) -> None:
+    acting, points = window.session.acting, panel.points
+    acting.arm()
+    acting.allow(Target("topic", POINTS))
+    acting.allow(Target("topic", "/other"))
+    panel.restore_state({**panel.save_state(), "point": {"on": True, "topic": POINTS, "type": TYPES[1]}})
+    ticks(window, panel)
+    assert points.isVisible()
+    assert not points.is_armed
+    assert not panel.view.takes_clicks
+    press(button(panel, f"Send the points to {POINTS}"))
+    ticks(window, panel)
+    assert points.is_armed
+    heard = window.session.source.listen(POINTS, TYPES[1])
+    click(qtbot, window, panel, 16.5, 8.5)
+    assert heard.listen(timeout_s=20.0) == (True, {"x": 16.0, "y": 8.0, "z": 0.0})
+    kept = panel.save_state()
+    assert kept["point"] == {"on": True, "topic": POINTS, "type": TYPES[1]}
+    panel.shut()
+    assert acting.arming.targets == (Target("topic", "/other"),)
+    assert acting.arming.is_on
+    panel.restore_state(kept)
+    ticks(window, panel)
+    assert not points.is_armed, "a layout arms nothing"
+    for broken in (None, 7, {"on": 1, "topic": 3, "type": []}, {"type": "no type", "topic": "two words"}):
+        panel.restore_state({**kept, "point": broken})
+        ticks(window, panel)
+    assert points.problem.text()
+    assert points.arm() == points.problem.text()
+    assert points.kind.value == TYPES[1]
+
+
+def test_a_topic_that_moves_a_robot_asks_again_and_another_source_disarms(qtbot, window, panel) -> None:
+    acting, points = window.session.acting, panel.points
+    topic = window.session.fleet.connected[0].robot.topics.command
+    panel.restore_state({**panel.save_state(), "point": {"on": True, "topic": topic, "type": "json"}})
+    press(points.strip.switch)
+    ticks(window, panel)
+    assert acting.question is not None
+    assert topic in points.strip.question.text()
+    assert not points.is_armed
+    press(points.strip.cancel)
+    ticks(window, panel)
+    assert not points.is_armed
+    assert not panel.view.takes_clicks
+    press(points.let)
+    ticks(window, panel)
+    press(points.strip.let)
+    ticks(window, panel)
+    assert points.is_armed
+    acting.disarm()
+    points.topic.setText("")
+    points.topic.textEdited.emit("")
+    press(points.strip.switch)
+    ticks(window, panel)
+    assert points.is_armed
+    window.session.sources_shown += 1
+    ticks(window, panel)
+    assert not points.is_armed
+
+
+def test_words_are_translated_and_fit(qtbot, pseudo, window, panel) -> None:
+    panel.resize(330, 400)
+    panel.actions_of["point"].trigger()
+    window.session.acting.arm()
+    ticks(window, panel)
+    assert panel.points.let.isVisible()
+    data = ("robot", "camera", "point", "json", "geometry_msgs/Point", "geometry_msgs/PointStamped")
+    assert untranslated_in(panel.points, *data) == []
+    assert clipped(panel.points) == []
+    window.session.acting.disarm()
+    ticks(window, panel)
+    assert untranslated_in(panel.points, *data) == []
+    assert clipped(panel.points) == []

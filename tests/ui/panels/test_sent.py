@@ -1,0 +1,150 @@
+"""The panel Sent: every message and call in a row, copied, repeated while it is armed."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from PySide6.QtGui import QGuiApplication
+
+from app.core.run.acting.arming import Target
+from app.core.run.acting.sent_log import SentRecord
+from app.core.run.acting.shelf import KeptMessage
+from app.ui.panels.sent import PANEL, SentPanel
+from tests.pseudo import untranslated_in
+from tests.ui.clipping import clipped
+from tests.ui.fakes import Session
+from tests.ui.panel_case import OUT_OF_SIGHT, Window, button, press, ticks
+from tests.ui.test_accessible import unsaid
+
+pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+WORD = KeptMessage("a", "Word", "/words", "json", '{"word": "yes"}')
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+def made(qtbot, window: Window, size: tuple[int, int] = (640, 320)) -> SentPanel:
+    panel = window.make(PANEL, size)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, SentPanel)
+    return panel
+
+
+def rows(panel: SentPanel) -> list[list[str]]:
+    """What stands in the table, without the times."""
+    return [
+        [panel.table.cell_at(row, column).text for column in (2, 3, 4, 5)]
+        for row in range(panel.model.rowCount())
+    ]
+
+
+def sign(panel: SentPanel, row: int) -> str:
+    return panel.table.cell_at(row, 1).said
+
+
+def test_what_is_sent_is_listed_copied_and_sent_again_while_it_is_armed(qtbot, window) -> None:
+    session, panel = window.session, made(qtbot, window)
+    acting = session.acting
+    press(button(panel, "Publish a message"))
+    assert window.commands == ["publish.new"]
+    heard = session.source.listen("/words", "json")
+    assert acting.send(WORD) == ""
+    assert heard.listen(timeout_s=20.0)[0]
+    ticks(window, panel)
+    assert rows(panel) == [
+        ["/words", "Word, heard by 1", "", "Publish"],
+        ["Studio", "armed for 5 min", "", "Studio"],
+    ]
+    assert panel.total.text().startswith("1 since ")
+    assert unsaid(panel) == []
+    key = panel.model.key_of(panel.model.row_at(panel.model.index(0, 0)))
+    assert not panel.again.isEnabled()
+    panel.table.choose(key)
+    panel.refresh()
+    assert panel.again.isEnabled()
+    press(panel.again)
+    assert heard.listen(timeout_s=20.0) == (True, {"word": "yes"})
+    ticks(window, panel)
+    assert rows(panel)[0] == ["/words", "Word, heard by 1", "\u00d7 2", "Publish"]
+    assert panel.chosen() is not None, "what is chosen stays chosen"
+
+    panel.copy()
+    line = QGuiApplication.clipboard().text()
+    assert line.endswith("[Publish] /words 2 \u00d7 Word, heard by 1")
+    menu = panel.menu_of(key)
+    assert menu is not None
+    entries = {action.text(): action for action in menu.actions()}
+    assert list(entries) == ["Send again", "Copy the line", "Copy the message", "Show its messages"]
+    entries["Copy the message"].trigger()
+    assert json.loads(QGuiApplication.clipboard().text()) == {"word": "yes"}
+    entries["Show its messages"].trigger()
+    assert window.opened == ["/words"]
+
+    session.runs.stop()
+    ticks(window, panel, 7)
+    assert not panel.again.isEnabled()
+    assert rows(panel)[0][1] == "no longer armed"
+    menu = panel.menu_of(key)
+    assert menu is not None
+    again = menu.actions()[0]
+    assert (again.text(), again.isEnabled()) == ("Send again (not armed)", False)
+    panel.table.choose(key)
+    panel.repeat()
+    assert window.toasts[-1] == "Not armed for /words: nothing is sent."
+    assert heard.receive(0.0) is None
+    panel.filter.setText("image words")
+    assert rows(panel) == []
+    press(button(panel, "Clear the filter"))
+    panel.clear()
+    assert rows(panel) == []
+    assert panel.total.text().startswith("2 since ")
+
+
+def put_all(session: Session) -> None:
+    """One entry of each kind."""
+    sent = session.acting.sent
+    for number, (asker, name) in enumerate(
+        (("publish", "/words"), ("service", "remember_face"), ("replay", "/scan"), ("image", "/cam/point"))
+    ):
+        text = '{"n": 1}' if asker != "replay" else ""
+        again = str if asker != "replay" else None
+        sent.put(SentRecord(float(number), asker, name, "1", number % 2 > 0, text, text, again), 1)  # type: ignore[arg-type]
+    session.acting.arm()
+
+
+def test_calls_and_what_a_recording_sends_have_their_own_menus(qtbot, window) -> None:
+    panel, acting = made(qtbot, window), window.session.acting
+    put_all(window.session)
+    acting.allow(Target("service", "remember_face"))
+    ticks(window, panel)
+    assert [sign(panel, row) for row in range(5)] == ["Studio", "failed", "Replay", "failed", "Publish"]
+    entries = []
+    for row in range(5):
+        menu = panel.menu_of(panel.model.key_of(panel.model.row_at(panel.model.index(row, 0))))
+        assert menu is not None
+        entries.append([action.text() for action in menu.actions()])
+    assert entries == [
+        ["Copy the line"],
+        ["Send again (not armed)", "Copy the line", "Copy the message", "Show its messages"],
+        ["Copy the line", "Show its messages"],
+        ["Call again", "Copy the line", "Copy the request", "Show the service"],
+        ["Send again (not armed)", "Copy the line", "Copy the message", "Show its messages"],
+    ]
+    called = next(each for each in acting.sent.records if each.asker == "service")
+    panel.table.opened.emit(str(called.number))
+    assert window.commands[-1] == "service.call:remember_face"
+    panel.table.opened.emit("12345")
+    assert panel.menu_of("12345") is None
+
+
+@pytest.mark.parametrize("size", [(640, 320), (300, 200)], ids=["roomy", "narrow"])
+def test_words_are_translated_and_fit(qtbot, pseudo, window, size) -> None:
+    panel = made(qtbot, window, size)
+    assert untranslated_in(panel) == []
+    put_all(window.session)
+    ticks(window, panel, 2)
+    assert untranslated_in(panel, "words", "face", "remember", "scan", "cam", "point", "JSON") == []
+    assert [fault for fault in clipped(panel) if f"at {9 - OUT_OF_SIGHT}," not in fault] == []
