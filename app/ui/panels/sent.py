@@ -262,7 +262,7 @@ def _columns() -> tuple[Column[SentRecord], ...]:
         return "\n".join(filter(None, (record.words, record.text[:TIP_LETTERS])))
 
     return (
-        Column("at", lazy("Time"), 78, lambda each: Cell(clock_words(each), mono=True, role="textSecondary")),
+        Column("at", lazy("Time"), 92, lambda each: Cell(clock_words(each), mono=True, role="textSecondary")),
         Column("sign", "", 34, sign, words=lazy("Kind")),
         Column("name", lazy("Sent to"), 130, to, tip=lambda each: each.name),
         Column("what", lazy("What came of it"), 180, what, stretch=True, tip=tip),

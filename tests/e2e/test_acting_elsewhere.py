@@ -1,0 +1,126 @@
+"""A click in a picture, and a recording, send in the real window, to real programs: only what is armed."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nep
+from nep.messages.message import Message
+from nep.recordings.writer import RecordingWriter
+from tests.e2e.fingers import Fingers
+from tests.e2e.person import middle
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+from tests.nep.recordings.messages import START_NS, TestClock, limits
+
+pytestmark = [pytest.mark.long, pytest.mark.timeout(240)]
+WIDTH, HEIGHT = 320, 240
+LAMP, WHEELS = "/lamp", "/base/cmd_vel"
+
+
+@contextmanager
+def program(address: str, *topics: str, camera: str = "") -> Iterator[dict[str, list[object]]]:
+    """Listens to these topics, and shows a grey picture ten times a second where it has a camera."""
+    heard: dict[str, list[object]] = {topic: [] for topic in topics}
+    with nep.node("program", master=address) as node:
+        for topic in topics:
+            node.new_callback(topic, "json", heard[topic].append)
+        if camera:
+            pictures = node.new_pub(camera, "image")
+            grey = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
+            node.new_timer(0.1, lambda: pictures.publish(grey))
+        thread = threading.Thread(target=node.spin)
+        thread.start()
+        try:
+            yield heard
+        finally:
+            node.stop_spin()
+            thread.join()
+
+
+def texts(studio: Studio) -> list[str]:
+    """What the window says, for who reads a failure."""
+    return [each["text"] for each in studio.look() if each["text"]]
+
+
+def test_a_click_in_a_picture_is_heard_as_its_pixel_once_that_is_armed(studio: Studio, address: str) -> None:
+    studio.find("Use the virtual robot", enabled=True)
+    studio.screen.key("2", held=["Alt"])
+    studio.says(f"Master {address}", 40)
+    with program(address, "/webcam/point", camera="/webcam") as heard:
+        studio.row("Topics", "/webcam")
+        picture = until(lambda: studio.all("Picture", kind="ClickablePicture"), "a picture shows")[0]
+        studio.screen.click(*middle(picture["rect"]))
+        studio.screen.key("p")
+        studio.says("A click sends nothing until this is armed")
+        picture = studio.find("Picture", kind="ClickablePicture")
+        studio.screen.click(*middle(picture["rect"]))
+        studio.click(kind="Switch", name="Armed")
+        studio.says("left")
+        assert heard["/webcam/point"] == []
+        picture = studio.find("Picture", kind="ClickablePicture")
+        studio.screen.click(*middle(picture["rect"]))
+        (point,) = until(lambda: heard["/webcam/point"], "the point is heard")
+        assert isinstance(point, dict)
+        assert (point["width"], point["height"], point["topic"]) == (WIDTH, HEIGHT, "/webcam")
+        assert abs(point["x"] - WIDTH / 2) <= 2
+        assert abs(point["y"] - HEIGHT / 2) <= 2
+        studio.says("1 point sent, heard by 1")
+        Fingers(studio).press("F12")
+        studio.says("A click sends nothing until this is armed")
+        studio.screen.click(*middle(picture["rect"]))
+        Fingers(studio).do("sent", "Sent")
+        listed = until(lambda: studio.rows("What was sent, newest first"), "what was sent is listed")
+        words = [" ".join(row["texts"]) for row in listed]
+        assert [" /webcam/point Point (" in line for line in words] == [False, True, False]
+        assert len(heard["/webcam/point"]) == 1
+    assert studio.quit() == 0
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Light and wheels by turns, a tenth of a second apart."""
+    path = tmp_path / "Tour.mcap"
+    with RecordingWriter(path, clock=TestClock(START_NS, 100_000_000), limits=limits()) as writer:
+        for seq in range(120):
+            data = b'{"n": %d}' % seq
+            topic = (LAMP, WHEELS)[seq % 2]
+            stamp_ns = START_NS + seq * 100_000_000
+            writer.post([Message(topic, data, "json", "json", stamp_ns=stamp_ns, seq=seq, publisher=7)])
+    return path
+
+
+def test_a_recording_sends_what_was_chosen_and_a_robot_moves_only_after_asking(
+    start: Callable[..., Studio], address: str, path: Path
+) -> None:
+    studio = start(str(path))
+    studio.says(f"Master {address}", 60)
+    with program(address, LAMP, WHEELS) as heard:
+        studio.says("Nothing is sent", 60)
+        fingers = Fingers(studio)
+        studio.click(kind="Switch", name="Armed")
+        studio.find("Topics that can be sent", focus=True)
+        rows = [row["texts"] for row in studio.rows("Topics that can be sent")]
+        names = [name for name in itertools.chain(*rows) if name in heard]
+        assert sorted(names) == sorted(heard)
+        fingers.press("Return", "Down", "Return")
+        studio.click("Arm and send")
+        studio.says(f"{WHEELS} tells robots what to do.")
+        studio.click("Cancel")
+        until(lambda: not studio.all("Let it be sent"), "the question is answered")
+        studio.click("Play")
+        until(lambda: len(heard[LAMP]) >= 5, lambda: f"the lamp hears: {heard}; {texts(studio)}")
+        fingers.press("F12")
+        studio.says("Nothing is sent")
+        numbers = [each["n"] for each in heard[LAMP]]  # type: ignore[index]
+        assert numbers == sorted(set(numbers))
+        assert all(number % 2 == 0 for number in numbers)
+        assert heard[WHEELS] == []
+    assert studio.quit() == 0
