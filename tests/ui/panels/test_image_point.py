@@ -20,7 +20,6 @@ from tests.pseudo import untranslated_in
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
-from tests.ui.sample_data import Topic
 from tests.ui.test_accessible import unsaid
 
 pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)

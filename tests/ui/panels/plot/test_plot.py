@@ -75,6 +75,9 @@ def sine(begin: float, end: float, step: float = 0.05) -> list[tuple[float, obje
 
 def drawn(panel: PlotPanel, colour: QColor) -> list[int]:
     """The columns of the canvas in which a colour is painted."""
+    if panel.canvas.height() % 2:  # the middle of what is shown lies between two rows: none has its colour
+        panel.canvas.resize(panel.canvas.width(), panel.canvas.height() - 1)
+        panel._draw()
     image = panel.canvas.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     ratio = image.devicePixelRatio()
     area = panel.canvas.area
