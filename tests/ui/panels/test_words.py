@@ -136,7 +136,9 @@ def named_in(rules: Iterable[AlarmRule]) -> Iterator[str]:
 
 def data_of(session: Session) -> Iterator[str]:
     """What comes from elsewhere, in whatever language it is."""
+    yield from TYPES
     for topic in session.topics:
+        yield topic_of(topic.name)
         yield from (topic.name, topic.msg_type, topic.msg_type.rpartition("/")[2], *topic.publisher_nodes)
     for node in session.nodes:
         yield from (node.name, node.host, node.language)
