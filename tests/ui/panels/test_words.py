@@ -12,6 +12,7 @@ from PySide6.QtCore import QAbstractItemModel, QAbstractListModel, QModelIndex, 
 from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
 
+from app.core.run.acting.picture_point import TYPES, topic_of
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Robot
 from app.ui.panels.alarms.phrases import payload_text
