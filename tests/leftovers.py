@@ -112,6 +112,8 @@ class Allowances:
         _wait(lambda: not _named(before), deadline)
         if unnamed:
             _wait(lambda: not _unnamed(before), min(deadline, time.monotonic() + _CLOSED_SOON_S))
+            # What may not stay has all the time that there is: a busy computer closes late.
+            _wait(lambda: all(self._left[kind] > 0 for kind in _unnamed(before)), deadline)
             for kind in (unnamed := _unnamed(before)):
                 self._left[kind] -= 1
         spent = {kind for kind in unnamed if self._left[kind] < 0}
