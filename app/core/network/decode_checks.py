@@ -89,9 +89,14 @@ class Checks:
         found.sentence = _problem(newest, keep=True)  # always, and it stays decoded: panels show this one
         found.last_good = not found.sentence
         found.checked, found.bad = 1, int(not found.last_good)
-        now, began = self._refilled, self._work()
+        now = self._refilled
         if found.bad:
             self._suspects[topic] = now
+        if len(messages) > 1:  # else there is no clock to be read, which takes longer than the message
+            self._try_older(topic, messages, found, now)
+
+    def _try_older(self, topic: str, messages: Sequence[Message], found: Checked, now: float) -> None:
+        began = self._work()
         left = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVE_S)
         place, some, worked, older = 0, 1, 0.0, len(messages) - 1
         while place < older and worked < left:

@@ -97,7 +97,7 @@ class FieldPath:
         """The value in a decoded message; `MISSING` when it has none there."""
         here = payload
         for step in self.steps:
-            if isinstance(here, Mapping):
+            if type(here) is dict or isinstance(here, Mapping):  # which takes ten times as long to be asked
                 here = here.get(step, MISSING)
             elif isinstance(step, int) and is_list(here):
                 few: Sequence[object] = here  # type: ignore[assignment]

@@ -54,23 +54,27 @@ class FieldSeries:
         values: list[float] = []
         marks: list[bool] = []
         number_gap = state_gap = False
+        has_states = len(self.states) > 0
         for time_s, payload, gap in zip(times_s, payloads, gaps, strict=True):
-            number_gap, state_gap = number_gap or gap, state_gap or gap
+            if gap:
+                number_gap = state_gap = True
             value = MISSING if payload is UNREAD else find(payload)
             kind = type(value)
             if kind is float or kind is int:
                 times.append(time_s)
-                values.append(number_of(value))
+                values.append(value if kind is float else number_of(value))  # type: ignore[arg-type]
                 marks.append(number_gap)
                 number_gap = False
-                self._no_state(time_s)
+                if has_states:
+                    self.states.add(time_s, None)
             elif kind is str or kind is bool:
                 word = value if kind is str else "true" if value else "false"
                 self.states.add(time_s, str(word), gap=state_gap)
-                number_gap, state_gap = True, False
+                number_gap, state_gap, has_states = True, False, True
             else:
                 self.missing += 1
-                self._no_state(time_s)
+                if has_states:
+                    self.states.add(time_s, None)
                 number_gap = True
             if payload is not UNREAD:
                 self.last = value
@@ -85,10 +89,6 @@ class FieldSeries:
         self.states.clear()
         self.last = MISSING
         self.missing = 0
-
-    def _no_state(self, time_s: float) -> None:
-        if len(self.states):
-            self.states.add(time_s, None)
 
 
 def number_of(value: object) -> float:
@@ -133,12 +133,12 @@ class TopicSeries:
         gaps: list[bool] = []
         pending = self._gap or batch.dropped > 0
         for message in batch.messages:
-            jump = self._missed(message)
-            if message.publisher in seen:
-                lost += jump
-            else:
-                seen.add(message.publisher)
+            jump, publisher = self._missed(message), message.publisher
+            if publisher not in seen:
+                seen.add(publisher)
                 first_jumps += jump
+            elif jump:
+                lost += jump
             time_s = self._time_of(message, now_ns)
             pending = pending or jump > 0
             if time_s is None:
@@ -167,14 +167,15 @@ class TopicSeries:
 
     def _missed(self, message: Message) -> int:
         """How many messages of its publisher are missing right before this one."""
-        if message.seq is None:
+        seq, publisher = message.seq, message.publisher
+        if seq is None:
             return 0
-        before = self._seqs.get(message.publisher)
-        if len(self._seqs) >= MOST_PUBLISHERS and before is None:
+        before = self._seqs.get(publisher)
+        if before is None and len(self._seqs) >= MOST_PUBLISHERS:
             self._seqs.clear()
-        self._seqs[message.publisher] = message.seq
+        self._seqs[publisher] = seq
         # one that is latched comes again; one that begins anew has lost nothing
-        return message.seq - before - 1 if before is not None and message.seq > before else 0
+        return seq - before - 1 if before is not None and seq > before else 0
 
     def _time_of(self, message: Message, now_ns: int) -> float | None:
         stamp_ns = message.stamp_ns
@@ -200,6 +201,10 @@ class TopicSeries:
         if self._last_s is None:
             return False
         pause_s, usual_s = time_s - self._last_s, self._usual_s
+        if usual_s is not None and 0 < pause_s <= SILENCE_S:  # nearly always
+            self._silences = 0
+            self._usual_s = usual_s + 0.1 * (pause_s - usual_s)
+            return False
         if pause_s <= 0 or not isfinite(pause_s):
             return False
         if usual_s is not None and pause_s > max(SILENCE_S, SILENCES * usual_s):
