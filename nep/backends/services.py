@@ -7,7 +7,8 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -36,6 +37,7 @@ __all__ = [
     "fitting",
     "refusal",
     "too_large",
+    "woken_by",
 ]
 
 _logger = logging.getLogger("nep")
@@ -191,6 +193,21 @@ class CallQueue:
 
 Outcome = Reply | NepError
 """How a call ended: with what the server gave back, or without it."""
+
+
+@contextmanager
+def woken_by(calls: Sequence[CallQueue], wake: Callable[[], None]) -> Iterator[bool]:
+    """Inside of it `wake` is called for every call in one of `calls`; False when there is one already."""
+    entered: list[CallQueue] = []
+    try:
+        for queue in calls:
+            if not queue.enter_wait(wake):
+                break
+            entered.append(queue)
+        yield len(entered) == len(calls)
+    finally:
+        for queue in entered:
+            queue.leave_wait(wake)
 
 
 class OpenCall(Protocol):

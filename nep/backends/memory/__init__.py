@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
 from nep.backends.memory.services import MemoryClient, MemoryServer, MemoryServices, ServiceHub
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
 from nep.backends.waking import WakingSubscriber
 from nep.errors import NepError
 from nep.i18n import _
@@ -329,19 +329,12 @@ class MemoryTransport:
         """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
         mine = [each for each in subscribers if isinstance(each, MemorySubscriber)]
         before = self._wakes
-        entered: list[CallQueue] = []
-        try:
-            for queue in calls:
-                if not queue.enter_wait(self.wake):
-                    return
-                entered.append(queue)
-            with self.changed:
-                self.changed.wait_for(
-                    lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
-                )
-        finally:
-            for queue in entered:
-                queue.leave_wait(self.wake)
+        with woken_by(calls, self.wake) as is_empty:
+            if is_empty:
+                with self.changed:
+                    self.changed.wait_for(
+                        lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
+                    )
 
     def wake(self) -> None:
         """End all waits."""

@@ -19,7 +19,7 @@ from nep.backends.ros.queue_room import QueueRoom
 from nep.backends.ros.service_client import RosClient
 from nep.backends.ros.service_server import RosServer
 from nep.backends.ros.subscriber import RospySubscriber
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
 from nep.backends.zeromq.sockets import Refusals
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
@@ -253,19 +253,13 @@ class RospyTransport:
         """
         mine = [each for each in subscribers if isinstance(each, RospySubscriber)]
         before = self._wakes
-        entered: list[CallQueue] = []
-        try:
-            for queue in calls:
-                if not queue.enter_wait(self.wake):
-                    return
-                entered.append(queue)
+        with woken_by(calls, self.wake) as is_empty:
+            if not is_empty:
+                return
             with self.changed:
                 self.changed.wait_for(
                     lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
                 )
-        finally:
-            for queue in entered:
-                queue.leave_wait(self.wake)
         if any(each.process.is_over for each in self._servers):
             raise RosShutdownError
 

@@ -18,7 +18,7 @@ from nep.backends.ros2.publisher import Ros2Publisher
 from nep.backends.ros2.services.client import Ros2Client
 from nep.backends.ros2.services.server import Ros2Server
 from nep.backends.ros2.subscriber import Ros2Subscriber
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
@@ -173,20 +173,14 @@ class Ros2Transport:
         """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
         mine = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
         before = self._wakes
-        entered: list[CallQueue] = []
-        try:
-            for queue in calls:
-                if not queue.enter_wait(self.wake):
-                    return
-                entered.append(queue)
+        with woken_by(calls, self.wake) as is_empty:
+            if not is_empty:
+                return
             with self.changed:
                 self.changed.wait_for(
                     lambda: self._wakes != before or any(len(each.inbox) or each.is_closed for each in mine),
                     timeout_s,
                 )
-        finally:
-            for queue in entered:
-                queue.leave_wait(self.wake)
 
     def wake(self) -> None:
         """End all waits."""

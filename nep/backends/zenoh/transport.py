@@ -12,7 +12,7 @@ from typing import Any
 
 from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Direct
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
 from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zenoh.keys import ALL_CALLS, call_key
 from nep.backends.zenoh.library import library
@@ -230,16 +230,9 @@ class ZenohTransport:
         """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
         mine = [each for each in subscribers if isinstance(each, ZenohSubscriber)]
         before = self._inboxes.wakes
-        entered: list[CallQueue] = []
-        try:
-            for queue in calls:
-                if not queue.enter_wait(self.wake):
-                    return
-                entered.append(queue)
-            self._inboxes.wait(mine, timeout_s, before)
-        finally:
-            for queue in entered:
-                queue.leave_wait(self.wake)
+        with woken_by(calls, self.wake) as is_empty:
+            if is_empty:
+                self._inboxes.wait(mine, timeout_s, before)
 
     def wake(self) -> None:
         """End all waits."""
