@@ -25,6 +25,8 @@ from app.ui.pictures.view import PictureView, RateWords, pixel_words, rate_sente
 from app.ui.pictures.zoom import ZoomablePicture
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message
+from tests.nep.recordings.messages import picture as recorded
+from tests.nep.recordings.messages import record
 from tests.ui.fakes import Clock, Images, ImageStream, Session, on_topic
 from tests.ui.panel_case import Window
 from tests.ui.sample_data import Topic, pepper, picture
@@ -385,6 +387,24 @@ def test_as_many_pixels_are_wanted_as_are_shown_and_all_of_them_under_the_mouse(
     assert stream.wish is None
 
 
+def test_the_sequence_is_recorded_and_of_a_recording_saved_as_files(qtbot, qapp, tmp_path) -> None:
+    window = Window(Session.full())
+    panel = made(qtbot, window)
+    (action,) = [each for each in panel.more_actions() if each.text() == "Record the sequence"]
+    action.trigger()
+    assert window.commands == [f"record.topic:{panel._topic}"]
+    path = tmp_path / "Tour.mcap"
+    record(path, [[recorded(seq) for seq in range(3)]])
+    window.session.open_recording(path)
+    panel.more_actions()
+    assert action.text() == "Save the sequence as files"
+    action.trigger()
+    assert window.commands[1:] == [f"recording.export:{path}"]
+    panel.show_topic("")
+    panel.more_actions()
+    assert not action.isEnabled()
+
+
 def test_a_pixel_is_said_as_colour_or_number_or_not_at_all() -> None:
     assert pixel_words(1, 2, (255, 0, 16)) == "(1, 2)  255 0 16  #FF0010"
     assert pixel_words(1, 2, 820) == "(1, 2)  820"
@@ -413,7 +433,7 @@ def test_every_action_has_a_key_that_works_while_the_picture_has_the_keyboard(qt
     assert panel.freeze.isChecked()
     assert window.session.images.streams[0].held
     words = [action.text().partition("\t")[0] for action in panel.more_actions() if action.text()]
-    assert words == [*(row.words for row in ROWS), "Show in the inspector"]
+    assert words == [*(row.words for row in ROWS), "Record the sequence", "Show in the inspector"]
 
 
 def test_the_windows_shortcuts_wait_while_the_picture_has_the_keyboard(qtbot, qapp) -> None:
@@ -565,6 +585,6 @@ def test_a_narrow_title_keeps_its_name_and_the_menu_has_everything(qtbot, qapp) 
     assert not panel.fit.isHidden()
     panel.resize(220, 220)
     assert (panel.fit.isHidden(), panel.keep.isHidden(), panel.freeze.isHidden()) == (True, True, False)
-    assert len([action for action in panel.more_actions() if action.text()]) == len(ROWS) + 1
+    assert len([action for action in panel.more_actions() if action.text()]) == len(ROWS) + 2
     empty = made(qtbot, Window(Session()))
     assert (empty.fit.isHidden(), empty.freeze.isHidden()) == (True, True)

@@ -102,6 +102,8 @@ class ImagePanel(PanelWidget):
         self.actions_of = PictureActions(self.theme, self.view, own)
         self._look_inside = QAction(self.theme.icon("list-tree"), _("Show in the inspector"), self)
         self._look_inside.triggered.connect(self._inspect)
+        self._sequence = QAction(self.theme.icon("film"), _("Record the sequence"), self)
+        self._sequence.triggered.connect(self.save_sequence)
         self._line = QAction(self)
         self._line.setSeparator(True)
         self.job = SnapshotJob(self, lambda: snapshots.folder(self.session.settings))
@@ -256,6 +258,14 @@ class ImagePanel(PanelWidget):
         if message is not None:
             self.job.save(message)
 
+    def save_sequence(self) -> None:
+        """Record every picture from now on; of a recording, show where all of them become files."""
+        replay = self.session.replay
+        if replay is None:
+            self.context.run(f"record.topic:{self._topic}")
+        else:
+            self.context.run(f"recording.export:{replay.path}")
+
     def copy_picture(self) -> None:
         """Put what is shown on the clipboard, as large as it was received."""
         message = self._message()
@@ -317,8 +327,11 @@ class ImagePanel(PanelWidget):
         drop_below(menu, self.choose)
 
     def more_actions(self) -> list[QAction]:
-        self._look_inside.setEnabled(bool(self._topic))
-        return [*self.actions_of.listed(), self._line, self._look_inside]
+        for action in (self._look_inside, self._sequence):
+            action.setEnabled(bool(self._topic))
+        plays = self.session.replay is not None
+        self._sequence.setText(_("Save the sequence as files") if plays else _("Record the sequence"))
+        return [*self.actions_of.listed(), self._line, self._sequence, self._look_inside]
 
     def save_state(self) -> dict[str, object]:
         return {
