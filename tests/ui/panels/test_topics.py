@@ -132,7 +132,7 @@ def test_sorting_keeps_the_chosen_topic_and_figures_that_move_are_sorted_once_a_
     assert panel.model.data(panel.model.index(0, 0)) == "/touch"
 
 
-def test_ten_thousand_topics_cost_one_signal_over_the_visible_rows_each_third_tick(qtbot, qapp) -> None:
+def test_ten_thousand_topics_cost_one_signal_over_the_visible_rows_each_sixth_tick(qtbot, qapp) -> None:
     window = Window(Session())
     for number in range(10_000):
         window.session.put(Topic(f"/t{number:05}", rate_hz=10.0, age_s=0.1))
@@ -142,9 +142,9 @@ def test_ten_thousand_topics_cost_one_signal_over_the_visible_rows_each_third_ti
     told, moved = QSignalSpy(panel.model.dataChanged), QSignalSpy(panel.model.layoutChanged)
     inserted = QSignalSpy(panel.model.rowsInserted)
     ticks(window, panel, 30)
-    assert told.count() == 10
+    assert told.count() == 5
     assert moved.count() == inserted.count() == 0
-    rows = {(told.at(place)[0].row(), told.at(place)[1].row()) for place in range(10)}
+    rows = {(told.at(place)[0].row(), told.at(place)[1].row()) for place in range(5)}
     assert len(rows) == 1
     first, last = rows.pop()
     assert last - first < 30
@@ -322,7 +322,7 @@ def test_as_a_tree_topics_stand_in_folders_with_the_sums_of_their_rates(panel, w
     cell = panel.model.data(panel.model.index_of("/arm/left/speed"), CELL_ROLE)
     assert cell.indent > panel.model.data(panel.model.index_of("/arm/*"), CELL_ROLE).indent
     session.topics["/arm/left/speed"].rate_hz = 50.0
-    ticks(window, panel, 3)
+    ticks(window, panel, 6)
     assert row(panel, "/arm/*", ("rate",)) == ["52.5"]
     assert panel.count.text() == "2 of 15 topics, 7 nodes"
     press(panel.as_tree)

@@ -43,7 +43,7 @@ WORDS = TableWords(
     clear_the_filter=lazy("Clear the filter to see all topics."),
     not_recorded=lazy("There are no topics in the recording yet"),
 )
-FIGURES_EVERY = 3  # refreshes of 30 a second: figures are renewed ten times a second
+FIGURES_EVERY = 6  # refreshes of 30 a second: nobody reads figures that are others ten times a second
 SORT_EVERY = 30
 LIVELY = frozenset({"rate", "bandwidth", "age", "loss"})
 MOST_CLOSED = 1000
