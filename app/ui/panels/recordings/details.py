@@ -100,14 +100,7 @@ class RecordingDetails(QWidget):
         acts, says, exports, places = (Flow(gap=8, row_gap=6) for _row in range(4))
         for button in (self.open, self.rename, self.show_file, self.delete):
             acts.addWidget(button)
-        for part in (
-            label(_("Export as"), "small"),
-            self.format,
-            self.times,
-            self.pick,
-            self.part_words,
-            self.about,
-        ):
+        for part in (label(_("Export as"), "small"), self.format, self.times, self.pick):
             exports.addWidget(part)
         for widget in (self.export, self.bar, self.progress, self.choose):
             places.addWidget(widget)
@@ -130,7 +123,6 @@ class RecordingDetails(QWidget):
         inside.addWidget(self.topics)
         inside.addWidget(self.list)
         inside.addLayout(places)
-        inside.addStretch(1)  # room that is left over stands below, not between the rows
         column.addLayout(inside)
 
     def show_facts(self, facts: RecordingFacts, being_written: bool) -> None:
