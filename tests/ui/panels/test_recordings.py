@@ -19,6 +19,7 @@ from app.ui.panels.recordings.panel import RecordingsPanel
 from app.ui.panels.recordings.table import RecordingTable
 from app.ui.panels.topics import panel as topics
 from app.ui.text.numbers import grouped, size_words
+from app.ui.widgets import Button
 from nep.programs.alarms.history import AlarmDeed, AlarmRecord
 from nep.recordings.writer import RecordingWriter
 from tests.nep.recordings.messages import TestClock, json_message, limits, picture, record
@@ -310,6 +311,8 @@ def test_an_empty_folder_and_one_that_is_away_say_what_to_do(qtbot, panel, windo
     qtbot.waitUntil(lambda: says("is not there"))
     (tmp_path / "stick").mkdir()
     qtbot.waitUntil(lambda: says("No recordings yet"))
+    panel.empty.findChildren(Button)[-1].click()  # nothing to record: the connection doctor knows why
+    assert window.asked_why == [(panel, "")]
 
 
 def test_what_an_alarm_kept_is_opened_from_its_history(qtbot, window, folder):
