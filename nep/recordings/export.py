@@ -109,17 +109,21 @@ def export(
     return made
 
 
+def takes(kind: str, codec: str) -> bool:
+    """Whether messages of this codec are exported as this one of `FORMATS`."""
+    if kind in {"pictures", "mp4"}:
+        return codec == "image"
+    return kind == "mcap" or codec in {"json", "msgpack", "string"}
+
+
 def _wanted(
     recording: Recording, kind: str, part: Part, progress: Progress | None
 ) -> tuple[list[str], _Counted]:
     """The topics that have something for this format, and how far they are. Raises `RecordingError`."""
-    codecs = {"json", "msgpack", "string"}
-    if kind in {"pictures", "mp4"}:
-        codecs = {"image"}
     topics = [
         name
         for name, each in recording.topics.items()
-        if (part.topics is None or name in part.topics) and (kind == "mcap" or each.codec in codecs)
+        if (part.topics is None or name in part.topics) and takes(kind, each.codec)
     ]
     if not topics:
         reason = {

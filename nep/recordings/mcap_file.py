@@ -347,10 +347,14 @@ class FileWriter:
         crc = zlib.crc32(made + offsets + head)
         return data_end + made + offsets + head + crc.to_bytes(4, "little") + MAGIC
 
+    def _place_in_summary(self, number: int) -> tuple[bool, int]:
+        """Wrapped ones last: viewers read all of a topic's messages as those of its first channel there."""
+        return ("nep.form", "wrapped") in self.table.definitions[number].metadata, number
+
     def _groups(self) -> list[tuple[Opcode, bytes]]:
         schemas: dict[int, bytes] = {}
         channels = []
-        for number in sorted(self._written_channels):
+        for number in sorted(self._written_channels, key=self._place_in_summary):
             schema, channel = self.table.records(number)
             channels.append(packed(channel))
             if schema is not None:

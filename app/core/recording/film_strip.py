@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.core.messages.picture import Picture, Size, decode
@@ -13,13 +13,19 @@ from nep.recordings.export import Part
 from nep.recordings.reader import RecordedTopic, Recording
 from nep.recordings.recorder import TopicSelection
 
+SAMPLES = 4
+"""So many messages of a topic are looked at where nobody has counted its bytes."""
+MOST_SAMPLED = 200
+"""Topics of a recording of which that is done; of the others no size is known."""
+
 
 @dataclass(frozen=True)
 class FilmStripLook:
     """What is in a recording from ``start_ns`` to ``end_ns``.
 
     ``pictures`` are those in the middles of equal parts of its time, of the topic that has most, None where
-    one can't be read; none without such a topic. ``counts``: messages of all topics in each equal part.
+    one can't be read; none without such a topic. ``counts``: messages of all topics in each equal part;
+    ``by_topic``: of each. ``message_bytes``: of a message of each topic, on average, where it is known.
     """
 
     path: Path
@@ -28,6 +34,42 @@ class FilmStripLook:
     pictures: Sequence[Picture | None] = ()
     counts: Sequence[int] = ()
     topics: Sequence[RecordedTopic] = ()
+    by_topic: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    message_bytes: Mapping[str, float] = field(default_factory=dict)
+
+    def size_of(self, topic: RecordedTopic) -> float | None:
+        """About how many bytes all messages of a topic have; None where it is not known."""
+        each = self.message_bytes.get(topic.name)
+        return None if each is None else each * topic.message_count
+
+    def about(self, begin_ns: int, end_ns: int, topics: Collection[str]) -> tuple[float, float | None]:
+        """About how many messages of these topics came from a time to another, and their bytes.
+
+        Of a part of the time it is as exact as ``counts`` are fine. The bytes are None where those of one of
+        the topics are not known.
+        """
+        count = size = 0.0
+        is_known = True
+        for topic in self.topics:
+            if topic.name in topics:
+                share = self._share(self.by_topic.get(topic.name, ()), begin_ns, end_ns)
+                count += share * topic.message_count
+                its = self.size_of(topic)
+                is_known = is_known and its is not None
+                size += share * (its or 0.0)
+        return count, size if is_known else None
+
+    def _share(self, counts: Sequence[int], begin_ns: int, end_ns: int) -> float:
+        """How much of what is counted in equal parts is between two times, 0 to 1."""
+        if begin_ns <= self.start_ns and end_ns >= self.end_ns:
+            return 1.0
+        whole = sum(counts)
+        if not whole:
+            return 0.0
+        wide = (self.end_ns + 1 - self.start_ns) / len(counts)
+        first, last = (begin_ns - self.start_ns) / wide, (end_ns + 1 - self.start_ns) / wide
+        inside = (max(0.0, min(last, at + 1) - max(first, at)) for at in range(len(counts)))
+        return sum(part * count for part, count in zip(inside, counts, strict=True)) / whole
 
 
 def film_strip(path: Path, pictures: int, bars: int, fit: Size) -> FilmStripLook | None:
@@ -40,7 +82,9 @@ def film_strip(path: Path, pictures: int, bars: int, fit: Size) -> FilmStripLook
             counted = recording.densities(start_ns, end_ns + 1, bars)
             counts = tuple(map(sum, zip(*counted.values(), strict=True))) if counted else ()
             topics = tuple(recording.topics.values())
-            return FilmStripLook(path, start_ns, end_ns, _pictures(recording, pictures, fit), counts, topics)
+            made = _pictures(recording, pictures, fit)
+            sizes = _message_bytes(recording)
+            return FilmStripLook(path, start_ns, end_ns, made, counts, topics, counted, sizes)
     except (NepError, OSError):
         return None
 
@@ -57,6 +101,24 @@ def _pictures(recording: Recording, count: int, fit: Size) -> tuple[Picture | No
         found = recording.newest(at_ns, (topic,)).get(topic) or recording.after(at_ns, topic)
         made.append(decode(found.message, 0.0, fit)[0] if found is not None else None)
     return tuple(made)
+
+
+def _message_bytes(recording: Recording) -> dict[str, float]:
+    """By topic: what the recorder counted; of others those of a few messages along the time."""
+    figures = recording.figures()
+    made = {
+        topic: each.size_bytes / each.received
+        for topic, each in figures.items()
+        if each.received and topic in recording.topics
+    }
+    others = [topic for topic in recording.topics if topic not in made][:MOST_SAMPLED]
+    seen: dict[str, dict[int, int]] = {topic: {} for topic in others}
+    span = recording.end_ns - recording.start_ns
+    for place in range(SAMPLES if others else 0):
+        at_ns = recording.start_ns + (place + 1) * span // SAMPLES
+        for topic, found in recording.newest(at_ns, others).items():
+            seen[topic][found.log_ns] = found.message.size_bytes
+    return made | {topic: sum(sizes.values()) / len(sizes) for topic, sizes in seen.items() if sizes}
 
 
 def part_of(

@@ -32,7 +32,7 @@ from nep.programs.doctor.network import loopback, masters
 from nep.programs.gateway.portmap import default_file
 from nep.protocol.graph_view import GraphView
 from nep.system import descriptors
-from nep.system.addresses import host_of, master_address
+from nep.system.addresses import host_of, is_loopback, master_address
 from nep.system.lazy_import import lazy_module
 from nep.version import __version__
 
@@ -97,7 +97,14 @@ def collect_facts(
         installs.install_of(master_pid) if master_pid is not None else None,
         tuple(_programs(view)),
         is_known,
+        _answers_at(chosen) if view is None and master_port is not None and master_port.is_taken else "",
     )
+
+
+def _answers_at(address: str) -> str:
+    """Where at loopback a master answers that does not at this address of the network; "" when none does."""
+    own = f"127.0.0.1:{address.rpartition(':')[2]}"
+    return own if not is_loopback(address) and _ask(own)[0] is not None else ""
 
 
 def start_obstacle(address: str | None = None) -> Finding | None:

@@ -108,6 +108,8 @@ class Facts:
     each other, "" when they can. `master_install` is where the master that answers was started from, None
     when that is not known. `programs` are those of this computer that have nodes, as far as the system tells
     of their files. Not `is_known`: no computer has the name that the master's address begins with.
+    `answers_at` is the loopback address at which a master answers when none does at `address`, which is of
+    this computer, too; "" when none answers there, either.
     """
 
     now_s: float
@@ -131,6 +133,7 @@ class Facts:
     master_install: Install | None = None
     programs: tuple[ProgramFact, ...] = ()
     is_known: bool = True
+    answers_at: str = ""
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,8 @@ def masters(facts: Facts) -> Iterator[Finding]:
         yield from _of_another_version(facts, holder)
     elif not facts.is_known:
         yield _unknown_host(facts)
+    elif facts.answers_at:
+        yield _closed(facts)
     elif holder is not None and holder.is_master:
         yield _hung(facts, holder)
     elif port is not None and port.is_taken:
@@ -55,6 +57,21 @@ def _unknown_host(facts: Facts) -> Finding:
         "error",
         _("No computer is called “{host}” here, so no master is found.").format(host=host_of(facts.address)),
         _("Look for a typing error, or write its address in numbers."),
+    )
+
+
+def _closed(facts: Facts) -> Finding:
+    """It is asked by an address of the network and listens at loopback alone."""
+    return Finding(
+        "master:closed",
+        "error",
+        _("The master at {own} serves this computer only, so nobody reaches it at {address}.").format(
+            own=facts.answers_at, address=facts.address
+        ),
+        _(
+            "Let other computers connect, in the settings of the Studio that started it, or use {own} in "
+            "programs of this computer (NEP_MASTER)."
+        ).format(own=facts.answers_at),
     )
 
 

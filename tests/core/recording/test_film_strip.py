@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
+from mcap.writer import Writer
 
 from app.core.recording.film_strip import film_strip, part_of
 from nep.errors import BadTopicError
 from nep.messages.message import Message
 from nep.recordings.export import Part
+from nep.recordings.reader import Recording
 from tests.nep.recordings.messages import START_NS, STEP_NS, json_message, picture, record
 
 COUNT = 40
@@ -53,3 +57,40 @@ def test_a_part_has_both_its_ends_and_the_topics_that_fit(look):
     assert part_of(look, begin, end, ("/nowhere",), ()).topics == []
     with pytest.raises(BadTopicError):
         part_of(look, begin, end, ("two words",), ())
+
+
+def test_sizes_are_those_of_the_messages_and_of_a_part_about_its_share(look):
+    with Recording(look.path) as recording:
+        sizes: dict[str, list[int]] = {}
+        for _log_ns, message in recording.read():
+            sizes.setdefault(message.topic, []).append(message.size_bytes)
+    both = {"/odom", "/camera"}
+    for topic in look.topics:
+        assert look.size_of(topic) == pytest.approx(sum(sizes[topic.name]))
+    count, size = look.about(look.start_ns, look.end_ns, both)
+    assert (count, size) == (COUNT, pytest.approx(sum(map(sum, sizes.values()))))
+    middle = (look.start_ns + look.end_ns) // 2
+    halves = [look.about(*ends, both) for ends in ((0, middle), (middle, 2**64))]
+    assert [each[0] for each in halves] == [pytest.approx(COUNT / 2, abs=2)] * 2
+    assert sum(each[1] for each in halves) == pytest.approx(size)
+    assert look.about(look.start_ns, look.end_ns, ()) == (0, 0)
+    assert look.about(middle, middle - 1, both)[0] == pytest.approx(0)
+    assert look.about(2**64, 2**65, both) == (0, 0)
+
+
+def test_sizes_of_what_nobody_counted_are_those_of_some_messages(tmp_path):
+    path = tmp_path / "theirs.mcap"
+    with path.open("wb") as file:  # by another program: without figures
+        writer = Writer(file)
+        writer.start()
+        channels = [writer.register_channel(topic, "json", 0) for topic in ("/few", "/many", "/none")]
+        writer.add_message(channels[0], 5, b"{}", 5)
+        for at_ns in range(1, 100):
+            writer.add_message(channels[1], at_ns, b"1" * 50, at_ns)
+        writer.finish()
+    look = film_strip(path, 0, 10, (24, 16))
+    assert look is not None
+    assert [(each.name, look.size_of(each)) for each in look.topics] == [("/few", 2), ("/many", 99 * 50)]
+    unknown = replace(look, message_bytes={"/few": 2.0})
+    assert unknown.about(0, 100, ("/few",)) == (1, 2)
+    assert unknown.about(0, 100, ("/few", "/many")) == (100, None)

@@ -53,7 +53,9 @@ class McapDoctor:
         while at < len(data) - 8:
             opcode, length = struct.unpack_from("<BQ", data, at)
             body = data[at + 9 : at + 9 + length]
-            self._say(len(body) != length, f"record at {at} is cut")
+            if len(body) != length:
+                self._say(True, "a record is cut")
+                break
             opcodes.append(opcode)
             if is_summary:
                 if not self.groups or self.groups[-1][0] != opcode:
@@ -96,14 +98,15 @@ class McapDoctor:
         if opcode == 0x0B:
             self.statistics.append(Statistics.read(stream))
             told = self.statistics[-1].channel_message_counts.keys()
-            self._say(told - self.summary_channels.keys(), "counts of channels that come later")
+            needed = told | self.channels.keys() if told else set()
+            self._say(needed - self.summary_channels.keys(), "counts before the channels of the summary")
         elif opcode == 0x0D:
             index = MetadataIndex.read(stream)
             self._say(self.metadata.get(index.offset) != index.length, "a metadata index that is wrong")
         elif opcode == 0x0E:
             self._offset(SummaryOffset.read(stream))
         elif opcode not in {0x02, 0x0F}:
-            self._say(True, f"unknown opcode {opcode}")
+            self._say(True, "unknown opcode")
 
     def _schema(self, schema: Schema, is_summary: bool) -> None:
         known = self.schemas.get(schema.id)
@@ -126,16 +129,20 @@ class McapDoctor:
         (compressed,) = struct.unpack_from("<Q", body, 32 + letters)
         data = body[40 + letters :]
         self._say(compressed != len(data), "a chunk's data has another length")
-        if compression == "zstd":
-            data = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
-        elif compression == "lz4":
-            data = lz4.frame.decompress(data)
+        try:
+            data = _decompressed(data, compression, size)
+        except (zstandard.ZstdError, RuntimeError, ValueError):
+            self._say(True, "a chunk that cannot be decompressed")
+            return
         self._say(len(data) != size, "a chunk has another size")
         self._say(zlib.crc32(data) != crc, "a chunk's CRC is wrong")
         offset, times, entries = 0, [], {}
         while offset < len(data):
             opcode, length = struct.unpack_from("<BQ", data, offset)
-            self._say(opcode != 0x05, f"opcode {opcode} in a chunk")
+            if opcode != 0x05:
+                self._say(True, "another opcode in a chunk")
+                offset += 9 + length
+                continue
             channel, _sequence, log, _publish = struct.unpack_from("<HIQQ", data, offset + 9)
             self._say(channel not in self.channels, "a message before its channel")
             self._say(self.times and log < self.times[-1], "a message earlier than the one before")
@@ -144,7 +151,8 @@ class McapDoctor:
             entries.setdefault(channel, []).append((log, offset))
             self.counts[channel] = self.counts.get(channel, 0) + 1
             offset += 9 + length
-        self._say((start, end) != (min(times), max(times)), "a chunk's times are wrong")
+        self._say(not times, "a chunk without messages")
+        self._say(times and (start, end) != (min(times), max(times)), "a chunk's times are wrong")
         self.chunks[at] = {
             "length": len(body) + 9,
             "start": start,
@@ -163,7 +171,7 @@ class McapDoctor:
         start, offsets, crc = struct.unpack("<QQI", self.data[-28:-8])
         self._say(start != summary_at, "the footer's summary start is wrong")
         self._say(zlib.crc32(self.data[summary_at:-12]) != crc, "the summary's CRC is wrong")
-        self._say(self.data[offsets] != 0x0E, "the footer's offset start is wrong")
+        self._say(self.data[offsets : offsets + 1] != b"\x0e", "the footer's offset start is wrong")
         opcodes = [opcode for opcode, _at, _length in self.groups]
         self._say(len(opcodes) != len(set(opcodes)), "records of the summary are not grouped")
         self._say(self.channels.keys() != self.summary_channels.keys(), "the summary lacks a channel")
@@ -214,6 +222,17 @@ class McapDoctor:
         self._say(told.channel_count != len(self.channels), "the count of channels is wrong")
         self._say(told.schema_count != len(self.schemas), "the count of schemas is wrong")
         self._say(told.metadata_count != len(self.metadata), "the count of metadata is wrong")
+        self._say(told.attachment_count, "attachments that are not there")
         if self.times:
             self._say(told.message_start_time != min(self.times), "the start time is wrong")
             self._say(told.message_end_time != max(self.times), "the end time is wrong")
+
+
+def _decompressed(data: bytes, compression: str, size: int) -> bytes:
+    if compression == "zstd":
+        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+    if compression == "lz4":
+        return lz4.frame.decompress(data)
+    if compression:
+        raise ValueError(compression)
+    return data

@@ -18,6 +18,8 @@ from app.ui.panels.recordings.columns import badge_of
 from app.ui.panels.recordings.panel import RecordingsPanel
 from app.ui.panels.recordings.table import RecordingTable
 from app.ui.panels.topics import panel as topics
+from app.ui.text.numbers import grouped, size_words
+from app.ui.widgets import Button
 from nep.programs.alarms.history import AlarmDeed, AlarmRecord
 from nep.recordings.writer import RecordingWriter
 from tests.nep.recordings.messages import TestClock, json_message, limits, picture, record
@@ -219,6 +221,14 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
 
     qtbot.waitUntil(is_there)
     assert details.part_words.text() == "3 of 3 topics"
+    sizes = [sum(each.size_bytes for each in messages[first::2]) for first in range(2)]
+    whole, shown = picture(1).size_bytes, size_words(sum(sizes))
+    assert details.about.text() == f"{grouped(1000)} messages, about {shown}"  # a picture can be no table
+    details.format.set_value("mcap")
+    details.format.changed.emit("mcap")
+    assert details.about.text() == f"{grouped(1001)} messages, about {size_words(sum(sizes) + whole)}"
+    details.format.set_value("csv")
+    details.format.changed.emit("csv")
     assert strip.grab().toImage().pixelColor(strip.width() // 2, 30) != strip._theme.colour("sunken")
     assert strip._images.count(None) < len(strip._images)
     QTest.keyClick(strip.begin, Qt.Key.Key_Right)
@@ -229,6 +239,7 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
     strip.set_part(strip.begin_ns, strip.look.start_ns + 6 * 10**9)
     QTest.keyClicks(details.topics.edit, "/a ")
     assert details.part_words.text() == "0:02.0 to 0:06.0, 1 of 3 topics"
+    assert details.about.text() == f"about 200 messages, {size_words(sizes[0] * 200 / 500)}"
     window.answers.path = tmp_path
     details.choose.click()
     details.export.click()
@@ -249,6 +260,8 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
     details.topics.changed.emit()
     details.pick.setChecked(True)  # the same from a list
     assert [details.list.model.key_of(topic) for topic in details.list._shown()] == ["/a", "/b", "/camera"]
+    rows = [details.list.model.index(row, 4).data() for row in range(details.list.model.rowCount())]
+    assert rows == [size_words(each) for each in (*sizes, whole)]
     details.list.table.opened.emit("/a")
     assert details.topics.patterns() == ((), ("/a",))
     assert details.part_words.text().endswith("2 of 3 topics")
@@ -256,6 +269,7 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
     details.list.none.click()
     assert details.topics.patterns() == (("/camera",), ())
     assert details.part().topics == ["/camera"]
+    assert details.about.text() == "nothing of it can become that"
     details.list.filter.clear()
     details.list.none.click()
     assert (details.part(), details.part_words.text()) == (None, "No topic of it fits")
@@ -297,6 +311,8 @@ def test_an_empty_folder_and_one_that_is_away_say_what_to_do(qtbot, panel, windo
     qtbot.waitUntil(lambda: says("is not there"))
     (tmp_path / "stick").mkdir()
     qtbot.waitUntil(lambda: says("No recordings yet"))
+    panel.empty.findChildren(Button)[-1].click()  # nothing to record: the connection doctor knows why
+    assert window.asked_why == [(panel, "")]
 
 
 def test_what_an_alarm_kept_is_opened_from_its_history(qtbot, window, folder):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Signal
@@ -14,7 +14,8 @@ from app.core.recording.film_strip import FilmStripLook, part_of
 from app.core.recording.folder import RecordingFacts
 from app.ui.panels.recordings.film_strip import FilmStrip
 from app.ui.panels.recordings.topic_list import TopicList, shortest_choice
-from app.ui.text.numbers import grouped
+from app.ui.text import plain
+from app.ui.text.numbers import grouped, size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
     Button,
@@ -30,7 +31,7 @@ from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.pattern_field import PatternField
 from nep.errors import BadTopicError
 from nep.i18n import _, lazy, ngettext
-from nep.recordings.export import ALL_OF_IT, Part
+from nep.recordings.export import ALL_OF_IT, Part, takes
 
 BAR_PX = 120
 FORMAT_WORDS = {
@@ -85,20 +86,27 @@ class RecordingDetails(QWidget):
         times = [("start", _("From start"), None), ("clock", _("Clock"), None)]
         self.times = Segments(theme, times, size="small", name=_("Times"))
         self.times.changed.connect(lambda value: self.strip.show_clock(value == "clock"))
-        self.part_words = label("", "small", role="textSecondary", wrap=True)
+        self.part_words = ElidedLabel("small", "textSecondary", least=60)
+        self.about = label("", "small", role="textSecondary")
+        self.about.setToolTip(
+            plain.tip(_("What the messages have. The files can be smaller or larger than that."))
+        )
+        self.format.changed.connect(lambda _kind: self._show_part())
         self.folder: Path | None = None
         self.into = ElidedLabel("small", "textSecondary", least=60)
         self.choose = Button(theme, _("Into another folder"), "folder-open", size="small")
 
     def _arrange(self) -> None:
-        acts, exports, places = (Flow(gap=8, row_gap=6) for _row in range(3))
+        acts, says, exports, places = (Flow(gap=8, row_gap=6) for _row in range(4))
         for button in (self.open, self.rename, self.show_file, self.delete):
             acts.addWidget(button)
-        for part in (label(_("Export as"), "small"), self.format, self.times, self.pick, self.part_words):
+        for part in (label(_("Export as"), "small"), self.format, self.times, self.pick):
             exports.addWidget(part)
         for widget in (self.export, self.bar, self.progress, self.choose):
             places.addWidget(widget)
         places.add_elastic(self.into)
+        says.add_elastic(self.part_words, greedy=True)
+        says.addWidget(self.about)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -110,6 +118,7 @@ class RecordingDetails(QWidget):
         inside.addWidget(self.counts)
         inside.addLayout(acts)
         inside.addWidget(self.strip)
+        inside.addLayout(says)
         inside.addLayout(exports)
         inside.addWidget(self.topics)
         inside.addWidget(self.list)
@@ -182,9 +191,11 @@ class RecordingDetails(QWidget):
         look, part = self.strip.look, self.part()
         if look is not None and not self.list.isHidden():
             chosen = [each.name for each in look.topics] if part is not None and part.topics is None else ()
-            self.list.show_topics(look.topics, chosen if part is None else part.topics or chosen)
+            names = chosen if part is None else part.topics or chosen
+            self.list.show_topics(look.topics, names, look.size_of)
         self.topics.set_wrong(part is None)
         set_role(self.part_words, "error" if part is None else "textSecondary")
+        self._say_size(look, part)
         if look is None:
             self.part_words.setText("")
             return
@@ -199,6 +210,28 @@ class RecordingDetails(QWidget):
             begin, end = (self.strip.time_words(at_ns, digits=1) for at_ns in ends)
             words = _("{begin} to {end}, {topics}").format(begin=begin, end=end, topics=words)
         self.part_words.setText(words)
+
+    def _say_size(self, look: FilmStripLook | None, part: Part | None) -> None:
+        """About how much that is, of the topics that the format takes."""
+        words = ""
+        if look is not None and part is not None:
+            names = {
+                each.name
+                for each in look.topics
+                if (part.topics is None or each.name in part.topics) and takes(self.format.value, each.codec)
+            }
+            words = self._size_words(look, names) if names else _("nothing of it can become that")
+        self.about.setText(words)
+        self.about.setVisible(bool(words))
+
+    def _size_words(self, look: FilmStripLook, names: Collection[str]) -> str:
+        exact, size = look.about(self.strip.begin_ns, self.strip.end_ns, names)
+        count = round(exact if self.strip.is_whole else float(f"{exact:.2g}"))
+        messages = ngettext("{count} message", "{count} messages", count).format(count=grouped(count))
+        if size is None:
+            return messages if self.strip.is_whole else _("about {messages}").format(messages=messages)
+        words = _("{messages}, about {size}") if self.strip.is_whole else _("about {messages}, {size}")
+        return words.format(messages=messages, size=size_words(size))
 
     def show_export(self, job: RecordingExport | None) -> None:
         """How far an export is; None while none goes on."""

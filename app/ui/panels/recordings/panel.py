@@ -193,7 +193,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             record = EmptyAction(
                 _("Record"), lambda: self.context.run("recording.toggle"), "circle-dot", primary=True
             )
-            self.empty.set_actions([record])
+            self.empty.set_actions([record, self.why()])
 
     def _show_details(self) -> None:
         facts = self._chosen()

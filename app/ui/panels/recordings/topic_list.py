@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import grouped, size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel
 from app.ui.widgets.flow_layout import Flow
@@ -29,6 +29,7 @@ class TopicList(QWidget):
         super().__init__()
         self._topics: Sequence[RecordedTopic] = ()
         self._names: frozenset[str] = frozenset()
+        self._size_of: Callable[[RecordedTopic], float | None] = lambda _topic: None
         self.filter = FilterField(theme, _("Filter topics"))
         self.filter.textChanged.connect(self._show_rows)
         self.all = Button(theme, _("All"), "check", size="small")
@@ -74,11 +75,23 @@ class TopicList(QWidget):
             Column("messages", lazy("Messages"), 96,
                    lambda topic: Cell(grouped(topic.message_count), role=ink(topic)),
                    key=lambda topic: topic.message_count, figures=True, yields=1),
+            Column("size", lazy("Size"), 84,
+                   lambda topic: Cell(self._size_words(topic), role=ink(topic)),
+                   key=lambda topic: self._size_of(topic) or 0.0, figures=True, yields=3),
         )  # fmt: skip
 
-    def show_topics(self, topics: Sequence[RecordedTopic], chosen: Collection[str]) -> None:
-        """Show these, and which of them are checked."""
-        self._names = frozenset(chosen)
+    def _size_words(self, topic: RecordedTopic) -> str:
+        size = self._size_of(topic)
+        return "" if size is None else size_words(size)
+
+    def show_topics(
+        self,
+        topics: Sequence[RecordedTopic],
+        chosen: Collection[str],
+        size_of: Callable[[RecordedTopic], float | None],
+    ) -> None:
+        """Show these, which of them are checked, and how many bytes each has (None: not known)."""
+        self._names, self._size_of = frozenset(chosen), size_of
         if topics is not self._topics:
             self._topics = topics
             self.filter.clear()

@@ -1,0 +1,95 @@
+"""What keeps messages away, made with real programs and real sockets as far as one computer can."""
+
+from __future__ import annotations
+
+import socket
+import sys
+
+import psutil
+import pytest
+
+import nep
+from nep.masters.master import Master
+from nep.programs.doctor import collect_topic, look, topic_findings
+from nep.programs.doctor.listen import reach_of
+from tests.nep.programs import running
+
+SENDER = """
+    import sys, nep
+    node = nep.node("arm")
+    publisher = node.new_pub("/arm/pose")
+    publisher.publish({"x": 1})
+    print("there")
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def own() -> str:
+    """An address of this computer in a network."""
+    for addresses in psutil.net_if_addrs().values():
+        for each in addresses:
+            if each.family == socket.AF_INET and not each.address.startswith(("127.", "169.254.")):
+                return each.address
+    pytest.skip("this computer is in no network")
+
+
+def port_of(address: str) -> str:
+    return address.rpartition(":")[2]
+
+
+def topic_found(address: str) -> list[str]:
+    facts = collect_topic("/arm/pose", address)
+    assert facts is not None
+    return [each.id for each in topic_findings(facts) if each.severity == "error"]
+
+
+def test_a_publisher_that_only_its_own_computer_reaches(own: str) -> None:
+    with Master("0.0.0.0:0", learn_s=0.0) as master:
+        port = port_of(master.address)
+        with running(SENDER, NEP_MASTER=f"127.0.0.1:{port}") as program:
+            assert program.line() == "there"
+            facts = collect_topic("/arm/pose", f"{own}:{port}")
+            assert facts is not None
+            (found,) = [each for each in topic_findings(facts) if each.severity == "error"]
+    assert (found.id, facts.publishers[0].reach) == ("topic:address:arm", "elsewhere")
+    assert "for its own computer" in found.sentence
+
+
+def test_a_publisher_that_was_killed_is_not_reached_any_more(master: Master) -> None:
+    with running(SENDER) as program:
+        assert program.line() == "there"
+        with nep.node("ear", master=master.address) as node:
+            (place,) = [
+                each
+                for each in node.graph(30.0).topics["/arm/pose"].publishers[0].endpoints
+                if each.startswith("tcp://127.")
+            ]
+        assert reach_of(place) == ""
+        program.kill()
+        assert reach_of(place) == "refused"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a full queue refuses")
+def test_a_place_that_answers_nobody_is_a_timeout() -> None:
+    with socket.socket() as full:
+        full.bind(("127.0.0.2", 0))
+        full.listen(0)
+        place = full.getsockname()
+        waiting = [socket.socket() for _ in range(4)]
+        try:
+            for each in waiting:
+                each.setblocking(False)
+                each.connect_ex(place)
+            assert reach_of(f"tcp://{place[0]}:{place[1]}") == "timeout"
+        finally:
+            for each in waiting:
+                each.close()
+
+
+def test_a_master_that_serves_this_computer_only_does_not_hang(master: Master, own: str) -> None:
+    found = {each.id: each for each in look(f"{own}:{port_of(master.address)}", "/arm/pose")}
+    assert "master:hung" not in found
+    assert found["master:closed"].severity == "error"
+    assert f"127.0.0.1:{port_of(master.address)}" in found["master:closed"].sentence
+    assert "master" in {each.id for each in look(master.address)}
