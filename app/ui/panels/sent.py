@@ -264,8 +264,8 @@ def _columns() -> tuple[Column[SentRecord], ...]:
     return (
         Column("at", lazy("Time"), 92, lambda each: Cell(clock_words(each), mono=True, role="textSecondary")),
         Column("sign", "", 34, sign, words=lazy("Kind")),
-        Column("name", lazy("Sent to"), 130, to, tip=lambda each: each.name),
-        Column("what", lazy("What came of it"), 180, what, stretch=True, tip=tip),
+        Column("name", lazy("Sent to"), 112, to, tip=lambda each: each.name),
+        Column("what", lazy("What came of it"), 110, what, stretch=True, tip=tip),
         Column("count", lazy("Times"), 60, count, figures=True, yields=1),
         Column("asker", lazy("Asked in"), 90, asked, yields=2),
     )  # fmt: skip
