@@ -72,7 +72,8 @@ class ImageStream:
     arriving: Rate = field(default_factory=Rate)
     """... and how many come."""
     _shown: Rate = field(default_factory=Rate)
-    _looked_s: float = 0.0
+    looked_s: float = 0.0
+    """Since when a picture could have come: its silence is counted from there (for `Images`)."""
     _resting: bool = False
     closed: bool = False
 
@@ -98,12 +99,18 @@ class ImageStream:
         picture = self.picture
         if picture is None:
             return None
-        return self._images.clock() - max(picture.received_s, self._looked_s)
+        return self._images.clock() - max(picture.received_s, self.looked_s)
 
     @property
     def age_s(self) -> float | None:
         """How old the picture is: seconds since it arrived; None before the first."""
         return self._images.clock() - self.picture.received_s if self.picture is not None else None
+
+    @property
+    def stamped_s(self) -> float | None:
+        """How long ago its publisher says that the picture was taken; None where it does not say."""
+        stamp_ns = self.picture.stamp_ns if self.picture is not None else None
+        return None if stamp_ns is None else (self._images.now_ns() - stamp_ns) / 1e9
 
     def want(self, size: Size | None) -> None:
         """The picture is shown so large (pixels of the screen); None: every pixel is wanted.
@@ -136,7 +143,7 @@ class ImageStream:
         """Somebody looks again after a `rest`."""
         if self._resting and not self.closed:
             self._resting = False
-            self._looked_s = self._images.clock()
+            self.looked_s = self._images.clock()
             self._watch.wake()
             self._images.add(self)
 
@@ -154,6 +161,8 @@ class Images:
         """``watch(topic)`` subscribes until it is closed; ``clock`` gives monotonic seconds."""
         self._watch = watch
         self.clock = clock
+        self.now_ns: Callable[[], int] = time.time_ns
+        """What time it is for who looks (epoch nanoseconds): of a recording the playhead's."""
         self.lock = threading.Lock()
         self._arrived = threading.Condition(self.lock)
         self._streams: dict[str, list[ImageStream]] = {}
@@ -175,6 +184,14 @@ class Images:
             self._arrived.notify()  # one that is held may be wanted larger
             if self._thread is None and not self._closing:
                 self._thread = self._begin_decoding()
+
+    def stand_still(self) -> None:
+        """Nothing can come now, as of a recording that is paused: no stream is silent because of that."""
+        now = self.clock()
+        with self.lock:
+            for streams in self._streams.values():
+                for stream in streams:
+                    stream.looked_s = now
 
     def offer(self, messages: Sequence[Message], key: str = "") -> None:
         """A sink: keep the newest message of each topic that somebody looks at. Called in nep's thread.

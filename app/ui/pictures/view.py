@@ -162,7 +162,7 @@ class PictureView(QWidget):
         self._rate = self._rates.of(stream)
         now = self._clock()
         if picture is not None and (now - self._aged_s >= FIGURES_STAY_S or not self._age):
-            self._age, self._aged_s = _age_of(picture), now
+            self._age, self._aged_s = _age_words(stream.stamped_s), now
         self._silent = not stream.held and silent_s is not None and silent_s > SILENT_AFTER_S
         if stream.held:
             self._state = _("Frozen, {age} old").format(age=age_words(stream.age_s))
@@ -342,9 +342,6 @@ def paint_silent(painter: QPainter, theme: Theme, view: QRectF, words: str) -> N
     paint.words(painter, room, words, font, QColor("white"), paint.CENTRE)
 
 
-def _age_of(picture: Picture) -> str:
-    """How long ago it was taken, as its publisher's clock tells; blank when nobody tells."""
-    if picture.stamp_ns is None:
-        return ""
-    age_s = (time.time_ns() - picture.stamp_ns) / 1e9
-    return age_words(age_s) if 0 <= age_s < OLDEST_S else ""
+def _age_words(age_s: float | None) -> str:
+    """How long ago a picture was taken; blank when nobody tells, or a clock is wrong."""
+    return age_words(age_s) if age_s is not None and 0 <= age_s < OLDEST_S else ""

@@ -333,3 +333,18 @@ def test_a_picture_that_is_held_while_it_rests_can_still_be_wanted_larger(images
     stream.wake()
     until(lambda: stream.picture is not None and stream.picture.whole)
     assert (stream.picture.seq, stream.awaits_picture) == (1, True)
+
+
+def test_while_nothing_can_come_no_stream_is_silent(images: Images) -> None:
+    now = [10.0]
+    images.clock = lambda: now[0]
+    stream = images.stream("/camera")
+    assert stream.silent_s is None
+    images.offer([jpeg((10, 20, 30))])
+    until(lambda: stream.picture is not None)
+    now[0] += 5.0
+    assert stream.silent_s == 5.0
+    images.stand_still()
+    assert stream.silent_s == 0.0
+    now[0] += 1.5
+    assert (stream.silent_s, stream.age_s) == (1.5, 6.5)

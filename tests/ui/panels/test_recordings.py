@@ -229,7 +229,9 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
     assert details.about.text() == f"{grouped(1001)} messages, about {size_words(sum(sizes) + whole)}"
     details.format.set_value("csv")
     details.format.changed.emit("csv")
-    assert strip.grab().toImage().pixelColor(strip.width() // 2, 30) != strip._theme.colour("sunken")
+    qtbot.waitUntil(lambda: strip.height() == strip.sizeHint().height())
+    painted = strip.grab().toImage()
+    assert painted.pixelColor(painted.width() // 2, 30) != strip._theme.colour("sunken")
     assert strip._images.count(None) < len(strip._images)
     QTest.keyClick(strip.begin, Qt.Key.Key_Right)
     QTest.keyClick(strip.begin, Qt.Key.Key_Right)

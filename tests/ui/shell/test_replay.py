@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -121,6 +122,24 @@ def test_the_inspector_shows_exactly_the_message_of_the_playhead_and_then_live_a
     window.tick()
     assert inspected(window)._shown is after
     assert "timeline" not in window.bench.open_names()
+
+
+def test_a_picture_of_a_paused_recording_is_not_silent_and_as_old_as_it_was_then(
+    qtbot, window, session, path, whole
+):
+    window.show_layout("developer")
+    replay = opened(qtbot, window, path)
+    go_to(qtbot, window, whole[47][0])
+    image = window.bench.docks["image"].panel
+    image.show_topic("/camera")
+    until(qtbot, window, lambda: image.view.picture is not None)
+    stream, later = image._stream, time.monotonic() + 60.0
+    assert stream.stamped_s == pytest.approx((whole[47][0] - image.view.picture.stamp_ns) / 1e9, abs=1e-3)
+    replay.images.clock = lambda: later
+    assert stream.silent_s > 50.0
+    window.tick()
+    assert stream.silent_s == 0.0
+    assert "Last picture" not in image.view.words
 
 
 def test_robots_and_alarms_go_by_the_live_network_meanwhile(qtbot, window, session, path):

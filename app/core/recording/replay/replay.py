@@ -62,6 +62,7 @@ class Replay:
         self.topics, self.nodes = Topics(("", 0)), Nodes()
         self.networks = Networks(settings, (), lambda _event: None, alerts)
         self.images = Images(self.watch, clock)
+        self.images.now_ns = self._position_ns
         self.source = ReplaySource(path, self.images, clock=clock)
         self.series = SeriesFeed(self.watch, self._position_ns, self.source.set_deep)
         self.console = Console(lambda: self._position_ns() / 1e9)
@@ -290,6 +291,8 @@ class Replay:
         if handed.figures:
             self.topics.set_figures({name: (x.rate_hz, x.newest_ns) for name, x in handed.figures.items()})
         self.topics.age(now, self._position_ns())
+        if self.player is None or not self.player.is_playing:
+            self.images.stand_still()
         if self.sending is not None:
             self.sending.tick()
 

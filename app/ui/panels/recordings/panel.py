@@ -29,7 +29,7 @@ from app.ui.panels.recordings.table import RecordingTable
 from app.ui.panels.row_actions import RowAction
 from app.ui.panels.table_panel import TablePanel, TableWords
 from app.ui.text.numbers import grouped, size_words
-from app.ui.widgets import EmptyAction, label
+from app.ui.widgets import EmptyAction, Scrolled, label
 from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.table.model import TableModel
 from nep.i18n import _, lazy, ngettext
@@ -71,15 +71,16 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self.count = label("", "small", role="textSecondary")
         self.header.insert(0, self.count)
         self.details = RecordingDetails(self.theme)
+        self._below = Scrolled(self.details)
         self._connect()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget, stretch in ((self.pages, 1), (self.line, 0), (self.foot, 0), (self.details, 0)):
+        for widget, stretch in ((self.pages, 1), (self.line, 0), (self.foot, 0), (self._below, 0)):
             column.addWidget(widget, stretch)
         self.foot.hide()
         self.line.hide()
-        self.details.hide()
+        self._below.hide()
 
     def _connect(self) -> None:
         details = self.details
@@ -197,7 +198,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def _show_details(self) -> None:
         facts = self._chosen()
-        self.details.setVisible(facts is not None)
+        self._below.setVisible(facts is not None)
         if facts is not None:
             self.details.show_facts(facts, self._is_written(facts))
         self._want_strip(facts)
