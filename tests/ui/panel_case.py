@@ -30,6 +30,8 @@ class Window:
     plotted: list[tuple[str, str]] = field(default_factory=list)
     beside: list[str] = field(default_factory=list)
     asked_why: list[tuple[PanelWidget, str]] = field(default_factory=list)
+    panels: list[PanelWidget] = field(default_factory=list)
+    """Those that can be seen, besides the one that is made."""
     answers: Answers = field(default_factory=Answers)
 
     def context(self) -> PanelContext:
@@ -43,6 +45,7 @@ class Window:
             plot=lambda topic, path: self.plotted.append((topic, path)),
             open_beside=self.beside.append,
             why=lambda panel, topic: self.asked_why.append((panel, topic)),
+            panels=lambda: self.panels,
         )
 
     def say(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:

@@ -53,7 +53,8 @@ class PanelContext:
     does one of the window's commands by its name (`app.ui.shell.commands.table`), ``files`` asks for files,
     ``keys_to_question`` gives the keyboard to what a running behaviour asks, if it asks something. ``plot``
     plots a field of a topic; without a path it asks which. ``open_beside`` shows a topic in one more panel.
-    ``why`` asks the connection doctor why a panel shows nothing of a topic, or ("") of any.
+    ``why`` asks the connection doctor why a panel shows nothing of a topic, or ("") of any. ``panels`` are
+    those that can be seen now.
     """
 
     session: Session
@@ -66,6 +67,7 @@ class PanelContext:
     plot: Callable[[str, str], None] = lambda _topic, _path: None
     open_beside: Callable[[str], None] = lambda _topic: None
     why: Callable[[PanelWidget, str], None] = lambda _panel, _topic: None
+    panels: Callable[[], Sequence[PanelWidget]] = lambda: ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,6 +236,10 @@ class PanelWidget(QWidget):
     def hindrances(self) -> Sequence[Hindrance]:
         """What of the panel itself hides what comes: that it is paused, its filter."""
         return ()
+
+    def waits_for(self) -> str:
+        """The topic of which it is to show a message and has seen none; empty when it waits for none."""
+        return ""
 
     def why(self, topic: str = "") -> EmptyAction:
         """The way to the connection doctor for when nothing is seen of a topic, or ("") of any."""

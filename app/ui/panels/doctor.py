@@ -20,11 +20,14 @@ from app.ui.widgets import Button, Chip, ElidedLabel, EmptyState, IconButton, Se
 from app.ui.widgets.cards import AlertRow
 from app.ui.widgets.inputs.combo_box import ComboBox
 from app.ui.widgets.lists.scroll_areas import PanelRows
+from nep.errors import nearest
 from nep.i18n import _, lazy, ngettext, number
 from nep.programs.doctor import Finding, in_order, report
 
 STATUS = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
 BAD = frozenset({"error", "warning"})
+WAITS_S = 2.0
+"""A panel that waits for so long for a topic is told of."""
 MOST_OFFERED = 500
 """Topics in the list of what may be missed; a longer one helps nobody."""
 
@@ -49,6 +52,8 @@ class DoctorPanel(PanelWidget):
         self._master = ""
         self._asker: PanelWidget | None = None
         self._own: list[Hindrance] = []
+        self._waits: dict[tuple[PanelWidget, str], float] = {}  # since when which panel waits for what
+        self._near: dict[str, str | None] = {}
         self._told: tuple[object, ...] = ()
         self.rows: list[AlertRow] = []
         self.shown: list[Finding] = []  # each in the row of its place
@@ -151,6 +156,35 @@ class DoctorPanel(PanelWidget):
             yield from self._network_hides(topic, lost_words(network))
         if self._asker is not None:
             yield from self._asker.hindrances()
+        yield from self._waiting()
+
+    def _waiting(self) -> Iterator[Hindrance]:
+        """Panels that wait for a topic, but for the one that is missed: of that all is told below."""
+        missed, now = self.session.doctor.missed, time.monotonic()
+        shown = self.context.panels() if self.session.replay is None else ()
+        waiting = {(panel, topic) for panel in shown if (topic := panel.waits_for()) and topic != missed}
+        self._waits = {each: self._waits.get(each, now) for each in waiting}
+        for panel, topic in sorted(waiting, key=lambda each: (each[0].title(), each[1])):
+            if now - self._waits[panel, topic] >= WAITS_S:
+                yield self._panel_waits(panel, topic)
+
+    def _panel_waits(self, panel: PanelWidget, topic: str) -> Hindrance:
+        live, names = self.session.live, {"panel": panel.title(), "topic": topic_words(topic)}
+        ask = (_("Why do I see nothing?"), lambda: self.context.why(panel, topic))
+        known = live.topics.get(topic)
+        if split_key(topic)[0] or (known is not None and known.publisher_nodes):
+            return Hindrance(_("{panel} waits for {topic}: nothing has come.").format(**names), "", *ask)
+        sentence = _("{panel} waits for {topic}. Nobody sends it.").format(**names)
+        if topic not in self._near:  # thousands of names take long to be compared
+            sent = [each.key for each in live.topics if each.publisher_nodes]
+            self._near = {topic: nearest(topic, sent[:MOST_OFFERED])}
+        near = self._near[topic]
+        if near is None:
+            return Hindrance(sentence, "", *ask)
+        mend, use = _("Did you mean {topic}?"), _("Use {topic}")
+        return Hindrance(
+            sentence, mend.format(topic=near), use.format(topic=near), lambda: panel.show_topic(near)
+        )
 
     def _replay_hides(self, topic: str) -> Hindrance:
         recorded = not topic or self.session.topics.get(topic) is not None

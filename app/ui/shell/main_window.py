@@ -110,8 +110,8 @@ class MainWindow(QMainWindow):
         asked = self.asked.take_keyboard
         self.context = PanelContext(
             session, theme, self.open_topic, self.say, self._run, files, asked, self.plot,
-            partial(self.open_topic, beside=True),
-            self._why,
+            partial(self.open_topic, beside=True), self._why,
+            lambda: self.bench.shown_panels() if self.bench is not None else (),
         )  # fmt: skip
         self.ring = FocusRing(theme, self)
         self.timer = QTimer(self)

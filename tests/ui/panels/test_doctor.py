@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import importlib
+import time
 
 import pytest
 import shiboken6
@@ -11,6 +12,7 @@ from app.core.network.master import MasterState
 from app.ui.panels import console
 from app.ui.panels.base import Hindrance, PanelWidget, paused_hindrance
 from app.ui.panels.doctor import PANEL, DoctorPanel
+from app.ui.panels.inspector.panel import PANEL as INSPECTOR
 from app.ui.widgets import Button
 from nep.programs.doctor import Finding
 from tests.ui.fakes import Session
@@ -41,6 +43,36 @@ def test_it_looks_when_it_is_first_seen_and_shows_the_worst_first(panel, window)
     assert panel.chip.accessibleName() == "2"
     panel.refresh()
     assert window.session.doctor.looked == 1  # nothing changed, nothing done
+
+
+def test_panels_that_wait_are_listed_with_the_topic_that_was_meant(qtbot, panel, window, monkeypatch) -> None:
+    now = [time.monotonic()]
+    monkeypatch.setattr("app.ui.panels.doctor.time.monotonic", lambda: now[0])
+    near, far, silent = (window.make(INSPECTOR) for _ in range(3))
+    for each in (near, far, silent):
+        qtbot.addWidget(each)
+    published = next(each.name for each in window.session.topics if each.publisher_nodes)
+    window.session.topics[published].newest = None
+    near.show_topic(f"{published}s"), far.show_topic("/zzzz/qqqqqqqqqq"), silent.show_topic(published)
+    window.panels += [near, far, silent]
+    panel.refresh()
+    before = len(panel.rows)
+    now[0] += 2.5
+    panel.refresh()
+    told = {row.accessibleName(): row.button for row in panel.rows}
+    assert len(told) == before + 3
+    (why,) = [told[each] for each in told if "/zzzz/qqqqqqqqqq. Nobody sends it." in each]
+    assert why.accessibleName() == "Why do I see nothing?"
+    press(why)
+    assert window.asked_why == [(far, "/zzzz/qqqqqqqqqq")]
+    assert [each for each in told if f"waits for {published}: nothing has come." in each]
+    (use,) = [told[each] for each in told if f"waits for {published}s. Nobody sends it." in each]
+    assert use.accessibleName() == f"Use {published}"
+    press(use)
+    assert near.subtitle() == published
+    window.panels.clear()
+    panel.refresh()
+    assert len(panel.rows) == before
 
 
 def test_a_command_is_copied(qtbot, panel, window) -> None:

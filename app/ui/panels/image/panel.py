@@ -235,6 +235,9 @@ class ImagePanel(PanelWidget):
 
     # -- what a person does -------------------------------------------------------------------------------
 
+    def waits_for(self) -> str:
+        return self._topic if self.view.picture is None else ""
+
     def hindrances(self) -> list[Hindrance]:
         is_held = self.freeze.isChecked()
         return [paused_hindrance(self.title(), lambda: self.freeze.setChecked(False))] if is_held else []

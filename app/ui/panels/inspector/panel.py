@@ -314,6 +314,9 @@ class InspectorPanel(PanelWidget):
         """Whether the tree shows how the message differs from another one."""
         return (self.compare.isChecked() or self.pin.isChecked()) and not self.query.asking
 
+    def waits_for(self) -> str:
+        return self._topic if self._shown is None else ""
+
     def hindrances(self) -> list[Hindrance]:
         return [paused_hindrance(self.title(), self._go_on)] if self.holds else []
 

@@ -10,7 +10,7 @@ from PySide6.QtCore import QByteArray, QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
-from app.ui.panels.base import Panel, PanelContext, numbered
+from app.ui.panels.base import Panel, PanelContext, PanelWidget, numbered
 from app.ui.shell.docking.dock import Dock, key_of, kind_of, make_dock
 from app.ui.shell.docking.layouts import Fold, Layout
 from app.ui.shell.docking.sizes import fit
@@ -397,6 +397,10 @@ class Workbench(QMainWindow):
         """Panels that nobody can see rest, others wake; called with every tick, also while it is hidden."""
         for name, dock in list(self.docks.items()):
             self._tell_failure(name, dock.follow(now))
+
+    def shown_panels(self) -> list[PanelWidget]:
+        """The panels that can be seen now."""
+        return [dock.panel for dock in self.docks.values() if dock.shown()]
 
     def shows_pictures(self) -> bool:
         """Whether a person sees a panel of pictures, which want to be refreshed twice as often."""
