@@ -53,7 +53,7 @@ def test_topics_inspector_and_pictures_are_live(studio: Studio, address: str) ->
     until(lambda: studio.row("Topics", "/weather")["struck"], "a topic without a publisher is struck through")
 
     studio.screen.click(*middle(studio.row("Topics", "/Pepper/camera")["rect"]))
-    view = studio.find(kind="ZoomablePicture")
+    view = studio.find(kind="ClickablePicture")
     studio.says("shown")
     first = studio.picture(view)
     assert first[::3, ::3].std() > 20

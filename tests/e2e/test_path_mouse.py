@@ -91,12 +91,12 @@ def see_what_the_robot_says(studio: Studio, film: Film, mouse: MouseOnly) -> Non
         until(lambda: len(studio.rows("Newest message")) > closed, "its parts are there")
     with film.step("One click on a picture topic: the robot's camera"):
         mouse.click(*topic(studio, "/Pepper/camera"))
-        view = studio.find(kind="ZoomablePicture")
+        view = studio.find(kind="ClickablePicture")
         until(lambda: studio.picture(view)[::5, ::5].std() > 20, "the picture is there")
     with film.step("The wheel makes the picture larger"):
-        fitting = studio.find(kind="ZoomablePicture")["description"]
+        fitting = studio.find(kind="ClickablePicture")["description"]
         mouse.wheel(*middle(view["rect"]), 5)
-        until(lambda: studio.find(kind="ZoomablePicture")["description"] != fitting, "it says its size")
+        until(lambda: studio.find(kind="ClickablePicture")["description"] != fitting, "it says its size")
 
 
 def save(studio: Studio, film: Film, home: Path) -> None:

@@ -88,9 +88,8 @@ class RecordingDetails(QWidget):
         self.times.changed.connect(lambda value: self.strip.show_clock(value == "clock"))
         self.part_words = ElidedLabel("small", "textSecondary", least=60)
         self.about = label("", "small", role="textSecondary")
-        self.about.setToolTip(
-            plain.tip(_("What the messages have. The files can be smaller or larger than that."))
-        )
+        what = _("What the messages have. The files can be smaller or larger than that.")
+        self.about.setToolTip(plain.tip(what))
         self.format.changed.connect(lambda _kind: self._show_part())
         self.folder: Path | None = None
         self.into = ElidedLabel("small", "textSecondary", least=60)
