@@ -178,7 +178,8 @@ def main() -> int:
         same, late_ms = rows(opened, bare, names, arguments.seconds)
     if not same:
         print(
-            f"the plain window took more than {TRUSTED:.0%} of a core else than before: this run does NOT count"
+            f"the plain window differs from the one before by more than {TRUSTED:.0%} of a core: "
+            "this run does NOT count"
         )
         return 1
     return verdict(same, late_ms)
