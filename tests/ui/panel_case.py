@@ -87,6 +87,11 @@ def button(widget: QWidget, name: str) -> QWidget:
     return found[0]
 
 
+def has_keys(widget: QWidget) -> bool:
+    """If its window gives it the keys; `hasFocus` asks for more: that no other window became the active one."""
+    return widget.window().focusWidget() is widget
+
+
 def press(widget: QWidget) -> None:
     """Press a button in its middle."""
     from PySide6.QtCore import Qt

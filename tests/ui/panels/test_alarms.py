@@ -28,7 +28,7 @@ from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
 from nep.programs.alarms.history import AlarmDeed, AlarmRecord
 from nep.programs.alarms.rule import KINDS, problem_of
 from tests.ui.fakes import Session
-from tests.ui.panel_case import Window, press, ticks
+from tests.ui.panel_case import Window, has_keys, press, ticks
 from tests.ui.test_accessible import unsaid
 
 pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
@@ -145,7 +145,7 @@ def test_what_exists_is_taken_as_soon_as_it_is_chosen(panel, qtbot) -> None:
     QTest.keyClick(popup, Qt.Key.Key_Return)
     qtbot.waitUntil(lambda: panel.field is None)
     assert panel.alarms.rules[0].condition.name == "/odom"
-    assert slot(panel, "subject").hasFocus() or not panel.isActiveWindow()
+    assert has_keys(slot(panel, "subject"))
 
 
 def test_the_banner_tells_the_value_that_did_it(panel, window) -> None:

@@ -12,7 +12,7 @@ from app.ui.panels.base import Panel
 from app.ui.panels.first_steps.panel import HINT_AFTER_S, KEPT, FirstStepsPanel
 from app.ui.panels.first_steps.steps import SAY, STEPS, TURN, Built, Now, built_in, shown_by
 from tests.ui.fakes import Session
-from tests.ui.panel_case import Window, press
+from tests.ui.panel_case import Window, has_keys, press
 from tests.ui.sample_data import pepper
 
 
@@ -135,7 +135,7 @@ def test_the_keyboard_goes_on_at_the_next_step(qtbot, panel, window) -> None:
     panel.rows[0].button.setFocus()
     window.session.join(pepper())
     panel.refresh()
-    assert panel.rows[1].button.hasFocus()
+    assert has_keys(panel.rows[1].button)
 
 
 def test_show_me_knows_the_block_of_the_robot_that_is_there(panel, window) -> None:

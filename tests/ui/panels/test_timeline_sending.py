@@ -15,7 +15,7 @@ from app.ui.panels.timeline.panel import TimelinePanel
 from app.ui.shell.bars.status_bar import StatusFacts
 from tests.nep.recordings.messages import json_message, record
 from tests.ui.fakes import Session
-from tests.ui.panel_case import Window
+from tests.ui.panel_case import Window, has_keys
 from tests.ui.test_accessible import unsaid
 
 pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
@@ -70,7 +70,7 @@ def test_topics_are_chosen_named_armed_asked_for_sent_and_counted(qtbot, qapp, p
     chooser = panel.chooser
     until(qtbot, window, panel, lambda: sending.is_known)
     assert chooser.isVisible()
-    assert chooser.table.hasFocus()
+    assert has_keys(chooser.table)
     assert unsaid(panel) == []
     assert not chooser.arm.isEnabled()
     QTest.keyClick(chooser.table, Qt.Key.Key_Return)
@@ -91,7 +91,7 @@ def test_topics_are_chosen_named_armed_asked_for_sent_and_counted(qtbot, qapp, p
 
     session.tick(), panel.refresh()
     assert not chooser.isVisible()
-    assert panel.strip.switch.hasFocus()
+    assert has_keys(panel.strip.switch)
     assert panel.strip.isVisible()
     assert not panel.transport.armed.isVisible()
     assert panel.strip.question.text().startswith("/base/cmd_vel tells robots what to do.")
