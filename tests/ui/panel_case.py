@@ -88,7 +88,7 @@ def button(widget: QWidget, name: str) -> QWidget:
 
 
 def has_keys(widget: QWidget) -> bool:
-    """If its window gives it the keys; `hasFocus` asks for more: that no other window became the active one."""
+    """If its window gives it the keys; `hasFocus` asks also if no other window became the active one."""
     return widget.window().focusWidget() is widget
 
 
