@@ -8,6 +8,7 @@ million cost no more than some thousands. It is appended to; what comes late is 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 
@@ -23,6 +24,8 @@ LATE_S = 1.0
 SHIFTS = (4, 7, 10)
 RAW_PER_COLUMN = 4
 """As long as there are no more numbers for each pixel, all of them are drawn."""
+FEW_RANGES, FEW_NUMBERS = 8, 4096
+"""Of so many, one after the other is quicker than all at once."""
 _FIRST_ROOM = 1024
 _GRAIN = 1 << SHIFTS[-1]
 _REWRITES_KEPT = 256
@@ -80,33 +83,49 @@ class _Level:
 
 
 @dataclass(slots=True)
-class _Peaks:
-    """The least and greatest of pixels that were drawn, by their number and what lay in them then.
+class _Pixels:
+    """Pixels from ``first`` to before ``end`` (their numbers) as they are drawn: two points each.
 
-    A plot that moves on draws nearly the same pixels again; most need not be looked through once more.
+    ``keys`` are the numbers of those that have any, ``broken`` whether something is missing before them.
+    """
+
+    first: float = 0.0
+    end: float = 0.0
+    keys: Floats = field(default_factory=lambda: np.empty(0))
+    times: Floats = field(default_factory=lambda: np.empty(0))
+    values: Floats = field(default_factory=lambda: np.empty(0))
+    broken: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
+
+    def part(self, first: float, end: float) -> _Pixels:
+        """Those of them from ``first`` to before ``end``; views."""
+        first, end = max(first, self.first), min(end, self.end)
+        if end <= first:
+            return _Pixels(first, first)
+        low, high = np.searchsorted(self.keys, (first, end))
+        both = slice(2 * low, 2 * high)
+        return _Pixels(
+            first, end, self.keys[low:high], self.times[both], self.values[both], self.broken[low:high]
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[_Pixels]) -> _Pixels:
+        """Parts that follow each other."""
+        names = ("keys", "times", "values", "broken")
+        arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+        return cls(parts[0].first, parts[-1].end, *arrays)
+
+
+@dataclass(slots=True)
+class _Drawn:
+    """The pixels that were drawn last, as far as nothing that comes after what came then changes them.
+
+    A plot that moves on draws nearly the same pixels again; they need not be looked through once more.
     """
 
     width_s: float = 0.0
     rewritten: int = 0
-    keys: Floats = field(default_factory=lambda: np.empty(0))
-    starts: Indexes = field(default_factory=lambda: np.empty(0, dtype=np.intp))  # absolute, as the ends
-    ends: Indexes = field(default_factory=lambda: np.empty(0, dtype=np.intp))
-    low: Floats = field(default_factory=lambda: np.empty(0))
-    high: Floats = field(default_factory=lambda: np.empty(0))
-
-    def forget_from(self, time_s: float) -> None:
-        """Forget the pixels that reach beyond a time."""
-        kept = int(np.searchsorted((self.keys + 1) * self.width_s, time_s, side="right"))
-        for name in ("keys", "starts", "ends", "low", "high"):
-            setattr(self, name, getattr(self, name)[:kept])
-
-    def places(self, keys: Floats, starts: Indexes, ends: Indexes) -> tuple[Indexes, NDArray[np.bool_]]:
-        """Where each of these pixels stands, and whether it has just the same in it."""
-        if not len(self.keys):
-            return np.zeros(len(keys), dtype=np.intp), np.zeros(len(keys), dtype=bool)
-        at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
-        same = (self.keys[at] == keys) & (self.starts[at] == starts) & (self.ends[at] == ends)
-        return at, same
+    begun: int = 0
+    pixels: _Pixels = field(default_factory=_Pixels)
 
 
 class Samples:
@@ -124,7 +143,7 @@ class Samples:
         self._times, self._values = np.empty(_FIRST_ROOM), np.empty(_FIRST_ROOM)
         self._gaps = np.zeros(_FIRST_ROOM, dtype=bool)
         self._levels = tuple(_Level(shift) for shift in SHIFTS)
-        self._drawn = _Peaks()
+        self._drawn = _Drawn()
         self._rewrites: deque[tuple[int, float]] = deque(maxlen=_REWRITES_KEPT)
         self.rewritten = 0
         self._gap_wanted = False
@@ -357,45 +376,67 @@ class Samples:
         width = (end_s - begin_s) / columns
         if 1e-30 < width < 1e30:  # rounded, so that pixels have the same edges while the plot moves on
             width = float(np.float32(width))
-        keys = np.floor(begin_s / width) + np.arange(columns + 2)
-        edges = width * keys
-        places = part[0] + np.searchsorted(self._times[part[0] : part[1]], edges)
-        places[0] = part[0]
-        places[-1] = part[1]
-        starts, ends = places[:-1], places[1:]
-        there = ends > starts
-        starts, ends, middles = starts[there], ends[there], (edges[:-1] + width / 2)[there]
-        low, high = self._peaks_of(width, keys[:-1][there], starts, ends)
-        values = np.column_stack([low, high]).ravel()
+        begin = float(np.floor(begin_s / width))
+        first, end = begin - 1, begin + columns + 1  # one pixel more, so that the line reaches the edge
+        known = self._known(width).part(first, end - 1)
+        if len(known.keys) and known.keys[0] == first:
+            pixels = _Pixels.joined((known, self._pixels(width, (known.end, end), None, part[1])))
+        else:
+            place, inside = np.searchsorted(self.times, (width * first, width * begin))
+            alone = bool(place == inside)  # then the number before the range stands in for it
+            pixels = self._pixels(width, (first, end), max(0, int(place) - alone), part[1])
+            first += alone
+        sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later ones may get more numbers
+        kept = pixels.part(first, max(first, min(sure, end - 1)))
+        self._drawn = _Drawn(width, self.rewritten, self.begun, kept)
+        times, values = pixels.times, pixels.values
+        broken = 2 * np.flatnonzero(pixels.broken)
+        broken = broken[broken > 0]
+        if len(broken):
+            times, values = np.insert(times, broken, times[broken]), np.insert(values, broken, np.nan)
+        return Line(times, values, part[1] - part[0], is_whole=False)
+
+    def _known(self, width_s: float) -> _Pixels:
+        """What of the pixels that were drawn last is still as it was."""
+        drawn = self._drawn
+        if drawn.width_s != width_s:
+            return _Pixels()
+        pixels = drawn.pixels
+        changed_s = self.rewritten_from(drawn.rewritten)
+        if changed_s is not None:
+            pixels = pixels.part(-np.inf, float(np.floor(changed_s / width_s)) - 1)
+        if drawn.begun != self.begun:
+            pixels = pixels.part(float(np.floor(self._times[0] / width_s)) + 2, np.inf)
+        return pixels
+
+    def _pixels(self, width: float, keys: tuple[float, float], first: int | None, last: int) -> _Pixels:
+        """The pixels from a number to before another; the last has all to before ``last``, too.
+
+        ``first`` is the place of the first number of them; None: where their edge is.
+        """
+        edges = width * (keys[0] + np.arange(round(keys[1] - keys[0]) + 1))
+        places = np.searchsorted(self._times[:last], edges)
+        if first is not None:
+            places[0] = first
+        places[-1] = last
+        there = np.flatnonzero(places[1:] > places[:-1])
+        if not len(there):
+            return _Pixels(*keys)
+        starts, ends = places[there], places[there + 1]
+        low, high = self._least_and_most(starts, ends)
+        times, values = np.repeat(edges[there] + width / 2, 2), np.empty(2 * len(there))
         rising = self._values[ends - 1] < self._values[starts]  # nearer to how the line really runs
         values[0::2], values[1::2] = np.where(rising, high, low), np.where(rising, low, high)
-        times = np.repeat(middles, 2)
         times[1::2] += np.where(low == high, width / 2, 0.0)  # or one alone between two gaps would be nothing
-        broken = 2 * np.flatnonzero(self._gaps[starts])
-        broken = broken[broken > 0]
-        points = part[1] - part[0]
-        times = np.insert(times, broken, times[broken])
-        return Line(times, np.insert(values, broken, np.nan), points, is_whole=False)
+        return _Pixels(*keys, keys[0] + there.astype(np.float64), times, values, self._gaps[starts])
 
-    def _peaks_of(
-        self, width_s: float, keys: Floats, starts: Indexes, ends: Indexes
-    ) -> tuple[Floats, Floats]:
-        """The least and greatest of each pixel; what was drawn before, and has not changed, is known."""
-        drawn = self._drawn
-        changed_s = self.rewritten_from(drawn.rewritten)
-        if drawn.width_s != width_s:
-            drawn = self._drawn = _Peaks(width_s)
-        elif changed_s is not None:
-            drawn.forget_from(changed_s)
-        drawn.rewritten = self.rewritten
-        absolute = starts + self.begun, ends + self.begun
-        at, known = drawn.places(keys, *absolute)
-        low, high = np.empty(len(keys)), np.empty(len(keys))
-        low[known], high[known] = drawn.low[at[known]], drawn.high[at[known]]
-        if not known.all():
-            low[~known], high[~known], _total = self._reduced(starts[~known], ends[~known])
-        drawn.keys, (drawn.starts, drawn.ends), drawn.low, drawn.high = keys, absolute, low, high
-        return low, high
+    def _least_and_most(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats]:
+        """Of each range of indexes; none is empty."""
+        if len(starts) > FEW_RANGES or ends[-1] - starts[0] > FEW_NUMBERS:
+            low, high, _total = self._reduced(starts, ends)
+            return low, high
+        parts = [self._values[start:end] for start, end in zip(starts, ends, strict=True)]
+        return np.array([part.min() for part in parts]), np.array([part.max() for part in parts])
 
     def _reduced(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats, Floats]:
         """The least, greatest and sum of each range of indexes; none is empty. Exact: no bucket is cut."""

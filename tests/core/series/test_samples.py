@@ -235,7 +235,7 @@ def test_what_was_drawn_before_is_drawn_as_if_for_the_first_time(seed, limit, co
     samples, now_s = Samples(limit), 0.0
     for _turn in range(12):
         count = int(random.integers(1, 6000))
-        times = now_s + np.cumsum(random.exponential(0.001, count))
+        times = now_s + np.cumsum(random.exponential(0.001 if random.random() < 0.8 else 0.02, count))
         samples.extend(times, random.normal(size=count), random.random(count) < 0.001)
         now_s = float(times[-1])
         if random.random() < 0.3:
@@ -246,7 +246,8 @@ def test_what_was_drawn_before_is_drawn_as_if_for_the_first_time(seed, limit, co
         span_s = float(random.choice([10.0, 10.0, 3.0, 1e-40]))
         fresh = Samples()
         fresh.extend(samples.times.copy(), samples.values.copy(), samples.gaps.copy())
-        one, two = (each.line(now_s - span_s, now_s, columns) for each in (samples, fresh))
+        end_s = now_s - float(random.choice([0.0, 0.0, random.uniform(0, 5)]))  # a person looks back
+        one, two = (each.line(end_s - span_s, end_s, columns) for each in (samples, fresh))
         assert np.array_equal(one.times, two.times)
         assert np.array_equal(one.values, two.values, equal_nan=True)
 

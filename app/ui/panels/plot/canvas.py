@@ -8,6 +8,7 @@ zooms time, with Ctrl values, a drag moves, a double click shows all.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -153,6 +154,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.cursors: dict[str, float] = {}
         self.marks: list[tuple[ShownCurve, float, float]] = []  # curve, time, value
         self.mouse_s: float | None = None
+        self.painted_s = 0.0  # processor time of all its paintings
         self.signs: list[tuple[ShownCurve, float, float]] = []  # the same, where a line has no dashes
         self._lines: dict[str, pg.PlotCurveItem] = {}
         self._held: tuple[str, QPointF] | None = None
@@ -227,9 +229,9 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         """How many pixels the curves have from left to right."""
         return max(16, round(self.area.width()))
 
-    def x_of(self, time_s: float) -> float:
-        """Where a time is, in this widget."""
-        area = self.area
+    def x_of(self, time_s: float, area: QRectF | None = None) -> float:
+        """Where a time is, in this widget; ``area`` when it is known already."""
+        area = area or self.area
         return area.left() + (time_s - self.begin_s) / (self.end_s - self.begin_s) * area.width()
 
     def time_at(self, x: float) -> float:
@@ -238,9 +240,9 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         share = (x - area.left()) / max(1.0, area.width())
         return self.begin_s + share * (self.end_s - self.begin_s)
 
-    def y_of(self, value: float, *, right: bool) -> float:
+    def y_of(self, value: float, *, right: bool, area: QRectF | None = None) -> float:
         """Where a value is, in this widget."""
-        area, shown = self.area, self.ranges["right" if right else "left"]
+        area, shown = area or self.area, self.ranges["right" if right else "left"]
         return area.bottom() - (value - shown.low) / (shown.high - shown.low) * area.height()
 
     def show_lines(self, lines: Sequence[tuple[ShownCurve, Line]], clock_s: float) -> None:
@@ -343,15 +345,17 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
     # -- the cursors -----------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        began = time.thread_time()
         super().paintEvent(event)
         painter = QPainter(self.viewport())
         self.paint_cursors(painter)
         painter.end()
+        self.painted_s += time.thread_time() - began
 
     def paint_cursors(self, painter: QPainter) -> None:
         """Paint A and B over the curves."""
         area, theme = self.area, self.theme
-        places = {name: self.x_of(time_s) for name, time_s in self.cursors.items()}
+        places = {name: self.x_of(time_s, area) for name, time_s in self.cursors.items()}
         inside = {name: x for name, x in places.items() if area.left() - 1 <= x <= area.right() + 1}
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if len(places) == 2:
@@ -365,7 +369,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             painter.setPen(pen)
             painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
         for curve, time_s, value in (*self.signs, *self.marks):
-            x, y = self.x_of(time_s), self.y_of(value, right=curve.right)
+            x, y = self.x_of(time_s, area), self.y_of(value, right=curve.right, area=area)
             if area.left() <= x <= area.right() and area.top() - 1 <= y <= area.bottom() + 1:
                 curve.look.paint_mark(painter, theme, QPointF(x, y), 9)
         self._paint_distance(painter, places)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -26,6 +25,7 @@ from app.ui.panels.plot.canvas import PlotCanvas
 from app.ui.panels.plot.export import CSV, PNG, SVG, PlotExport
 from app.ui.panels.plot.lanes import StateLanes
 from app.ui.panels.plot.legend import LegendFigures, LegendTable, columns, foot_words, next_look
+from app.ui.panels.plot.pace import DrawingPace
 from app.ui.panels.plot.shown_curve import ShownCurve, look_of
 from app.ui.panels.plot.time_view import SPANS, TimeView
 from app.ui.panels.plot.tools import PlotTools
@@ -50,9 +50,7 @@ if TYPE_CHECKING:
     from PySide6.QtGui import QDragEnterEvent, QDropEvent
 
 
-DRAW_EVERY, FIGURES_EVERY = (2, 8), 6  # refreshes of 30 a second
-SLOW_S = 0.02
-"""A drawing that takes longer is done half as often."""
+FIGURES_EVERY = 10  # refreshes of 30 a second; nobody reads figures that change quicker
 MOST_ROWS, TABLE_SHARE = 6, 0.32
 
 
@@ -66,8 +64,8 @@ class PlotPanel(PanelWidget):
         self.view = TimeView()
         self.figures = LegendFigures()
         self._ticks = 0
-        self._due = True
-        self._drawing_s = 0.0
+        self._due = self._figures_due = True
+        self._pace = DrawingPace()
         self._points = (0, True)
         self._last_cursor = "A"
         self.exporter = PlotExport(
@@ -254,21 +252,14 @@ class PlotPanel(PanelWidget):
         self.exporter.follow()
         if not self.shown:
             return
-        every = self._draw_every()
-        if self._due or (self.view.follows and self._ticks % every == 0):
-            self._due = False
-            began = time.perf_counter()
-            self._draw()
-            self._drawing_s = time.perf_counter() - began
-        if self._ticks % FIGURES_EVERY == 0:
-            self._show_figures()
-
-    def _draw_every(self) -> int:
-        """After how many refreshes it is drawn again: not before it has moved on by a pixel or so."""
         pixel_s = (self.canvas.end_s - self.canvas.begin_s) / self.canvas.columns
-        least, most = DRAW_EVERY
-        every = round(min(most, max(least, pixel_s * 30)))
-        return min(most, 2 * every) if self._drawing_s > SLOW_S else every
+        if self._due or (self.view.follows and self._ticks % self._pace.every(pixel_s) == 0):
+            self._due = False
+            with self._pace.drawing(self.canvas):
+                self._draw()
+        if self._figures_due or self._ticks % FIGURES_EVERY == 0:
+            self._figures_due = False
+            self._show_figures()
 
     def _soon(self) -> None:
         """Draw at the next tick, also while it is paused."""
@@ -349,6 +340,7 @@ class PlotPanel(PanelWidget):
         topics = {topic for each in self.shown for topic in topics_of(each.curve.source)}
         self.set_title(_("Plot"), next(iter(topics)) if len(topics) == 1 else "")
         self.table.viewport().update()
+        self._figures_due = True
         self._soon()
 
     def _fit_table(self) -> None:

@@ -1,0 +1,48 @@
+"""How often a plot is drawn."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from app.ui.panels.plot.pace import DRAW_EVERY, DRAWING_SHARE, DrawingPace
+
+
+def test_a_quick_drawing_comes_as_often_as_the_plot_moves_on() -> None:
+    pace = DrawingPace()
+    assert [pace.every(pixel_s) for pixel_s in (0.0, 1 / 15, 0.1, 0.2, 1e9)] == [2, 2, 3, 6, 8]
+
+
+@pytest.mark.parametrize("took_s", [0.004, 0.012, 0.02])
+def test_drawings_take_no_more_than_their_share(took_s: float) -> None:
+    pace = DrawingPace()
+    for _turn in range(100):
+        pace.took(took_s)
+    each_s = pace.every(0.0) / 30
+    assert took_s / each_s <= DRAWING_SHARE * 1.15  # whole refreshes
+    assert pace.every(0.0) <= DRAW_EVERY[1]
+
+
+def test_the_slowest_is_still_drawn_some_times_a_second() -> None:
+    pace = DrawingPace()
+    for _turn in range(100):
+        pace.took(3.0)
+    assert pace.every(0.0) == DRAW_EVERY[1]
+
+
+class Canvas:
+    painted_s = 0.0
+
+
+def test_what_was_painted_counts_once() -> None:
+    pace, canvas = DrawingPace(), Canvas()
+    canvas.painted_s = 100.0
+    with pace.drawing(canvas):
+        began = time.thread_time()
+        while time.thread_time() - began < 0.02:
+            pass
+    assert pace.drawing_s == pytest.approx(10.0, abs=0.5)
+    with pace.drawing(canvas):
+        pass
+    assert pace.drawing_s == pytest.approx(9.0, abs=0.5)
