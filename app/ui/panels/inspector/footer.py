@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from app.core.networks.kinds import NetworkKind
     from nep.messages.message import Message
 
-FACTS_S = 0.1  # nobody reads faster, and each time is painted
 _SHOWN_S = 0.0001
 """Less than the last digit is not shown as nothing."""
 
@@ -114,7 +113,6 @@ class Footer(QWidget):
         self.copy_path = IconButton(theme, "link", _("Copy path"), "Ctrl+Shift+C", size=26)
         self.plot = IconButton(theme, "chart-line", _("Plot"), "Ctrl+Shift+L", size=26)
         self.facts = FixedWidthLabel("small", "textTertiary")
-        self._facts_next, self._facts_due = "", -FACTS_S
         self.legend = Legend(theme)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
@@ -139,15 +137,7 @@ class Footer(QWidget):
     def clear(self) -> None:
         """Another topic is shown from now on."""
         self.show_path("")
-        self._facts_next, self._facts_due = "", -FACTS_S
 
-    def show_facts(self, facts: str, now: float) -> None:
-        """The facts of the message that is shown from ``now`` (monotonic) on, ten times a second at most."""
-        self._facts_next = facts
-        self.show_next_facts(now)
-
-    def show_next_facts(self, now: float) -> None:
-        """Show the facts that came too soon after others, when it is time; call it with every refresh."""
-        if self._facts_next and now >= self._facts_due:
-            self.facts.setText(self._facts_next)
-            self._facts_next, self._facts_due = "", now + FACTS_S
+    def show_facts(self, facts: str) -> None:
+        """The facts of the message that is shown from now on."""
+        self.facts.setText(facts)

@@ -101,18 +101,23 @@ class HistoryStrip(QWidget):
             self.say(at_once=True)
             self.moved.emit()
 
-    def say(self, *, at_once: bool = False) -> None:
-        """Show where it is among what is kept; call it with every refresh."""
-        self._ticks += 1
-        kept = self.kept
-        if self.at is not None and self.at >= kept.end:  # the source is at another time now
+    def follow(self) -> None:
+        """Leave a message that is to come once more: the source is at another time now."""
+        if self.at is not None and self.at >= self.kept.end:
             self.at = None
+
+    def say(self, *, at_once: bool = False, beside: bool = False) -> None:
+        """Show where it is among what is kept; call it with every refresh, ``beside`` if more is painted."""
+        self._ticks += 1
+        self.follow()
+        kept = self.kept
         state = (kept.first, kept.end, self.at)
         is_there = len(kept) > 1 or self.at is not None
-        due = at_once or is_there is self.isHidden() or self._ticks % SAYS_EVERY == 0
+        waits = SAYS_EVERY if beside else 2 * SAYS_EVERY
+        due = at_once or is_there is self.isHidden() or self._ticks >= waits
         if state == self._said or not due:
             return
-        self._said = state
+        self._said, self._ticks = state, 0
         show_when(self, is_there)
         self.track.blockSignals(True)
         self.track.setRange(0, max(0, len(kept) - 1))

@@ -20,6 +20,7 @@ from app.ui.panels.inspector.actions import InspectorActions
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TABLE, TREE, InspectorBody
 from app.ui.panels.inspector.diff import OFF, count_changes
 from app.ui.panels.inspector.footer import message_facts
+from app.ui.panels.inspector.pace import ReadingPace
 from app.ui.panels.inspector.tree_model import TreeNode, field_of, steps_of
 from app.ui.panels.inspector.values import payload_or, read_at_once
 from app.ui.widgets import Chip, IconButton
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 FIRST_ROWS = 24
+FADES_HZ = 7.0  # slower than messages are shown, which paint the marks too
 BEFORE, PINNED = lazy("Message before"), lazy("Pinned message")
 
 
@@ -52,6 +54,7 @@ class InspectorPanel(PanelWidget):
         self._reading: Reading | None = None  # what the tree shows
         self._raw_wanted = self._table_wanted = False
         self._since_ns = 0  # when the panel began to look
+        self._pace, self._fades = ReadingPace(), ReadingPace(burst=1, hz=FADES_HZ)
         self._facts_of: tuple[Message | None, str] = (None, "")
         self._value: object = None
         self._before: object = OFF  # what stood here before, of the same topic
@@ -71,7 +74,7 @@ class InspectorPanel(PanelWidget):
         self.freeze = IconButton(theme, "snowflake", _("Freeze this panel"), checkable=True, size=26)
         pin = _("Pin this message and compare with it")
         self.pin = IconButton(theme, "pin", pin, checkable=True, size=26)
-        self.freeze.toggled.connect(lambda _on: self.refresh())
+        self.freeze.toggled.connect(lambda _on: self._refresh_now())
         self.pin.toggled.connect(self._pin)
         self.header = [self.live, self.freeze, self.pin]
 
@@ -118,6 +121,7 @@ class InspectorPanel(PanelWidget):
         self.query.forget()
         self.body.objects.begin_anew()
         self.foot.clear()
+        self._pace.begin_anew()
         for button in (self.freeze, self.pin):
             button.setChecked(False)
         self.set_title(_("Inspector"), topic_words(name))
@@ -137,12 +141,14 @@ class InspectorPanel(PanelWidget):
         if not self._topic:
             return
         topic, recorded = self.session.topic(self._topic), self.session.replay is not None
-        self.history.say()
+        self.history.follow()
         earlier = self.history.at is not None
         self.live.set(*chip_words(topic, self.frozen, recorded=recorded, earlier=earlier))
-        newest = topic.newest if topic is not None and topic.gone_s is None else None
+        newest, taken = topic.newest if topic is not None and topic.gone_s is None else None, False
         if topic is not None and newest is not None and newest is not self._shown and not self.holds:
-            self._take(newest)
+            taken = self._pace.may(self.clock())
+            if taken:
+                self._take(newest)
         elif recorded and newest is None and self._shown is not None and not self.holds:
             self._show_none_yet()
         if self.body.page == NOTHING:
@@ -153,9 +159,19 @@ class InspectorPanel(PanelWidget):
         answer = self.query.take(self.clock())
         if answer is not None and self._value is not None:
             self._show_found(answer)
-        self.foot.show_next_facts(self.clock())
-        if self.body.page == TREE and self.tree.fading():
+        self.history.say(beside=taken)
+        self._show_fading(taken=taken)
+
+    def _show_fading(self, *, taken: bool) -> None:
+        """Marks of what changed fade; a message that was just taken has them painted already."""
+        if taken:
+            self._fades.spend(self.clock())
+        elif self.body.page == TREE and self.tree.fading() and self._fades.may(self.clock()):
             self.tree.viewport().update()
+
+    def _refresh_now(self) -> None:
+        self._pace.begin_anew()
+        self.refresh()
 
     def _show_none_yet(self) -> None:
         """The playhead is before the topic's first message."""
@@ -215,7 +231,7 @@ class InspectorPanel(PanelWidget):
             self.finder.forget()
         self._value = done.value
         self._show_value()
-        self.foot.show_facts(self._facts(message), self.clock())
+        self.foot.show_facts(self._facts(message))
         self._page(TABLE if self._table_wanted else TREE)
 
     def _facts(self, message: Message) -> str:
@@ -262,7 +278,7 @@ class InspectorPanel(PanelWidget):
 
     def _show_raw(self, message: Message, sentence: str) -> None:
         self._shown = message
-        self.foot.show_facts(self._facts(message), self.clock())
+        self.foot.show_facts(self._facts(message))
         self.bytes.show_bytes(message.data)
         said = _("This can't be read as {codec}: {reason}.").format(codec=message.codec, reason=sentence)
         self.body.sentence.setText(said if sentence else "")
@@ -342,7 +358,7 @@ class InspectorPanel(PanelWidget):
             self._take(message)
         elif self.history.at is None:
             self.freeze.setChecked(False)
-            self.refresh()
+            self._refresh_now()
 
     def _queried(self, text: str) -> None:
         """A query was typed, or ("") there is none any more: the tree begins anew."""

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
 
 
 FIGURES_EVERY = 10  # refreshes of 30 a second; nobody reads figures that change quicker
+SOON = 2 * FIGURES_EVERY
 MOST_ROWS, TABLE_SHARE = 6, 0.32
 
 
@@ -64,7 +65,8 @@ class PlotPanel(PanelWidget):
         self.view = TimeView()
         self.figures = LegendFigures()
         self._ticks = 0
-        self._due = self._figures_due = True
+        self._due = True
+        self._since_figures = SOON
         self._pace = DrawingPace()
         self._points = (0, True)
         self._last_cursor = "A"
@@ -253,12 +255,13 @@ class PlotPanel(PanelWidget):
         if not self.shown:
             return
         pixel_s = (self.canvas.end_s - self.canvas.begin_s) / self.canvas.columns
-        if self._due or (self.view.follows and self._ticks % self._pace.every(pixel_s) == 0):
+        drawn = self._due or (self.view.follows and self._ticks % self._pace.every(pixel_s) == 0)
+        if drawn:
             self._due = False
             with self._pace.drawing(self.canvas):
                 self._draw()
-        if self._figures_due or self._ticks % FIGURES_EVERY == 0:
-            self._figures_due = False
+        self._since_figures += 1
+        if self._since_figures >= (FIGURES_EVERY if drawn else SOON):  # painted together
             self._show_figures()
 
     def _soon(self) -> None:
@@ -315,6 +318,7 @@ class PlotPanel(PanelWidget):
         self.canvas.marks = marks
 
     def _show_figures(self) -> None:
+        self._since_figures = 0
         cursors = self.canvas.cursors
         both = (cursors["A"], cursors["B"]) if len(cursors) == 2 else None
         begin_s, end_s = (min(both), max(both)) if both else (self.canvas.begin_s, self.canvas.end_s)
@@ -340,7 +344,7 @@ class PlotPanel(PanelWidget):
         topics = {topic for each in self.shown for topic in topics_of(each.curve.source)}
         self.set_title(_("Plot"), next(iter(topics)) if len(topics) == 1 else "")
         self.table.viewport().update()
-        self._figures_due = True
+        self._since_figures = SOON
         self._soon()
 
     def _fit_table(self) -> None:

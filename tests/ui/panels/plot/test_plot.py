@@ -19,7 +19,7 @@ from app.core.network.mailbox import Batch
 from app.ui.panels.plot import PANEL
 from app.ui.panels.plot.export import CSV, PNG, SVG
 from app.ui.panels.plot.look import DASHES, CurveLook
-from app.ui.panels.plot.panel import FIGURES_EVERY, PlotPanel
+from app.ui.panels.plot.panel import SOON, PlotPanel
 from app.ui.panels.plot.shown_curve import MINUS, value_words
 from app.ui.panels.plot.time_view import TimeView
 from app.ui.widgets.field_drag import dropped_field, field_in_hand
@@ -61,7 +61,7 @@ def show(panel: PlotPanel, *texts: str, right: bool = False) -> None:
         panel._show_new(panel.curves.add(text, TOPICS), right=right)
 
 
-def look(panel: PlotPanel, times: int = FIGURES_EVERY) -> None:
+def look(panel: PlotPanel, times: int = SOON) -> None:
     for _ in range(times):
         panel.refresh()
 
