@@ -180,13 +180,14 @@ def paced(folder: Path, seconds: float) -> bool:
             writer.post(arms[step * 200 : step * 200 + 200])
             most_queued = max(most_queued, writer.status.queued_bytes)
             never.wait(max(0.0, started + (step + 1) * step_s - time.perf_counter()))
+        posted_s = time.perf_counter() - started
     took = time.perf_counter() - started
     status = writer.status
-    share = (cpu_s() - used) / took
+    share, given = (cpu_s() - used) / took, sum(each.size_bytes for each in (*camera, *arms)) / 1e6
     print(
         f"\npaced, {took:.1f} s: {status.message_count} of {len(camera) + len(arms)} messages, "
-        f"{status.size_bytes / took / 1e6:.0f} MB/s, unkept {status.unkept}, "
-        f"most queued {most_queued / 1e6:.1f} MB, {share:.0%} of a core"
+        f"{given / posted_s:.0f} MB/s given, {status.size_bytes / 1e6:.0f} MB written, "
+        f"unkept {status.unkept}, most queued {most_queued / 1e6:.1f} MB, {share:.0%} of a core"
     )
     path.unlink()
     return status.unkept == 0 and status.message_count == len(camera) + len(arms)
