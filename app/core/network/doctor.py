@@ -24,13 +24,21 @@ class Doctor:
     """Looks when it is asked. One thread uses it (the window's); the looking happens in another."""
 
     def __init__(
-        self, look: Callable[[str], Sequence[doctor.Finding]], clock: Callable[[], float] = time.time
+        self,
+        look: Callable[[str, doctor.Tell], Sequence[doctor.Finding]],
+        clock: Callable[[], float] = time.time,
     ) -> None:
-        """``look`` gets the topic that is missed, and may take seconds; ``clock`` gives epoch seconds."""
+        """``look`` gets the topic that is missed, and may take seconds; ``clock`` gives epoch seconds.
+
+        Meanwhile it tells what is found so far, how many things it looked at, and of how many.
+        """
         self._look, self._clock = look, clock
         self._thread: threading.Thread | None = None
         self._missed = self._told_of = ""
         self._found: tuple[doctor.Finding, ...] = ()
+        self._so_far: tuple[doctor.Finding, ...] | None = None
+        self.looked_at = self.things = 0
+        """How many things were looked at, by the look that goes on or the last, and of how many."""
         self._looked_s: float | None = None
         self.revision = 0
 
@@ -43,6 +51,11 @@ class Doctor:
     def findings(self) -> Sequence[doctor.Finding]:
         """What was found last, the worst first."""
         return self._found
+
+    @property
+    def so_far(self) -> Sequence[doctor.Finding] | None:
+        """What was found by a look that goes on, the worst first; None when none does."""
+        return self._so_far
 
     @property
     def looked_s(self) -> float | None:
@@ -86,16 +99,21 @@ class Doctor:
 
     def _run(self) -> None:
         while True:  # whoever misses another topic meanwhile waits for that one
-            missed = self._missed
+            missed, self._so_far = self._missed, None
             found = self._find(missed)
             if missed == self._missed:
                 break
         self._found, self._looked_s, self._told_of = found, self._clock(), missed
+        self._so_far = None
+        self.revision += 1
+
+    def _tell(self, found: tuple[doctor.Finding, ...], looked_at: int, things: int) -> None:
+        self._so_far, self.looked_at, self.things = found, looked_at, things
         self.revision += 1
 
     def _find(self, missed: str) -> tuple[doctor.Finding, ...]:
         try:
-            return tuple(self._look(missed))
+            return tuple(self._look(missed, self._tell))
         except Exception as error:  # noqa: BLE001  a doctor that breaks off must say so, not vanish
             words = _("The doctor could not finish: {kind}: {error}.").format(
                 kind=type(error).__name__, error=error
@@ -109,4 +127,4 @@ def doctor_of(address: str, folder: Path) -> Doctor:
     What it knows of the topics of other networks it is not asked: it looks into Studio's own only.
     """
     folders = [(_("Settings and unsaved work"), folder)]
-    return Doctor(lambda key: doctor.look(address, "" if split_key(key)[0] else key, folders))
+    return Doctor(lambda key, tell: doctor.look(address, "" if split_key(key)[0] else key, folders, tell))

@@ -186,9 +186,13 @@ def file_stem(name: str) -> str:
     return f"_{plain}" if _DEVICES.fullmatch(plain) else plain
 
 
-def free_path(wanted: Path) -> Path:
-    """This path, or with a number behind its name when there is such a file already."""
+def free_path(wanted: Path, *, is_folder: bool = False) -> Path:
+    """This path, or with a number behind its name when there is such a file already.
+
+    A folder has no suffix: the points in its name are of times.
+    """
+    stem, suffix = (wanted.name, "") if is_folder else (wanted.stem, wanted.suffix)
     made, number = wanted, 2
     while made.exists():
-        made, number = wanted.with_name(f"{wanted.stem} {number}{wanted.suffix}"), number + 1
+        made, number = wanted.with_name(f"{stem} {number}{suffix}"), number + 1
     return made

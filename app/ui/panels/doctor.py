@@ -129,22 +129,27 @@ class DoctorPanel(PanelWidget):
             return
         self._seen = now
         self.again.setEnabled(not doctor.looking)
-        if doctor.looked_s is None:
+        so_far = doctor.so_far
+        is_new = doctor.looked_s is None or doctor.told_of != doctor.missed
+        if so_far is None and doctor.looked_s is None:
             return
-        self._own = own
-        found = self._all(own)
+        self._own = own  # an earlier look at the same stays until the next is done
+        found = self._all(own, so_far if so_far is not None and is_new else doctor.findings)
         if found != self.shown or told != self._told:
             self._told = told
             self._show(found)
-        self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.looked_s)))
-        self._say_looked()
+        if doctor.looked_s is not None:
+            self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.looked_s)))
+        self._show_chip(is_done=so_far is None)
+        self._say_looked(is_done=so_far is None)
         self.pages.show_rows(bool(self.rows))
 
-    def _all(self, own: Sequence[Hindrance]) -> list[Finding]:
+    @staticmethod
+    def _all(own: Sequence[Hindrance], found: Sequence[Finding]) -> list[Finding]:
         here = [
             Finding(f"studio:{place}", "error", each.sentence, each.mend) for place, each in enumerate(own)
         ]
-        return list(in_order([*here, *self.session.doctor.findings]))
+        return list(in_order([*here, *found]))
 
     def _hindrances(self) -> Iterator[Hindrance]:
         """What hides messages in Studio itself; the panel that asked tells the rest."""
@@ -218,10 +223,16 @@ class DoctorPanel(PanelWidget):
         command = f"nep doctor {missed}" if missed and not split_key(missed)[0] else "nep doctor"
         self.terminal.setText(_("In a terminal: {command}").format(command=command))
 
-    def _say_looked(self) -> None:
-        count = len(self.shown)
-        words = ngettext("{count} thing looked at", "{count} things looked at", count)
-        self.looked.setText(words.format(count=number(count, ".0f")))
+    def _say_looked(self, *, is_done: bool) -> None:
+        doctor = self.session.doctor
+        done, count = (number(each, ".0f") for each in (doctor.looked_at, doctor.things))
+        if not is_done:
+            self.looked.setText(_("Looking: {done} of {count}").format(done=done, count=count))
+            return
+        words = ngettext("{count} thing looked at", "{count} things looked at", doctor.things)
+        if all(each.severity not in BAD for each in self.shown):
+            words = ngettext("{count} thing is well", "All {count} things are well", doctor.things)
+        self.looked.setText(words.format(count=count))
 
     def _show(self, found: Sequence[Finding]) -> None:
         for row in self.rows:
@@ -233,11 +244,15 @@ class DoctorPanel(PanelWidget):
         for place, row in enumerate(self.rows):
             row.button.set_kind("primary" if place in mends[:1] else "plain")
             self.pages.put(place, row)
-        bad = [each.severity for each in found if each.severity in BAD]
+
+    def _show_chip(self, *, is_done: bool) -> None:
+        bad = [each.severity for each in self.shown if each.severity in BAD]
         if bad:
             self.chip.set(str(len(bad)), STATUS[bad[0]])
-        else:
+        elif is_done:
             self.chip.set(_("all is well"), "ok")
+        else:
+            self.chip.set("", "info")
 
     def _row(self, finding: Finding, step: NextStep | None) -> AlertRow:
         row = AlertRow(self.theme, framed=finding.severity in BAD)

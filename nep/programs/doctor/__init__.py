@@ -9,13 +9,14 @@ from nep.programs.doctor.diagnosis import findings, in_order, report, to_plain, 
 from nep.programs.doctor.facts import Facts, TopicFacts
 from nep.programs.doctor.finding import Finding, Severity
 from nep.programs.doctor.listen import collect_topic
-from nep.programs.doctor.look import look
+from nep.programs.doctor.look import Tell, look
 from nep.programs.doctor.topics import meant_topic, topic_findings
 
 __all__ = [
     "Facts",
     "Finding",
     "Severity",
+    "Tell",
     "TopicFacts",
     "collect_facts",
     "collect_topic",

@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 else:
     metadata, psutil = lazy_module("importlib.metadata"), lazy_module("psutil")
 
-__all__ = ["PORTS", "collect_facts", "loopback_problem", "start_obstacle"]
+__all__ = ["PORTS", "collect_facts", "collect_in_steps", "loopback_problem", "start_obstacle"]
 
 PORTS: Mapping[int, str] = {
     7000: lazy("where programs of nep up to 0.5.4.5, nep-js and C# ask"),
@@ -66,39 +67,69 @@ def collect_facts(
     `folders`: more folders that must take files, each with what is kept there. `here`: where programs are
     started (default: the current folder).
     """
-    chosen = master_address(address)
+    *_parts, (_known, facts) = collect_in_steps(address, folders=folders, here=here)
+    return facts
+
+
+def collect_in_steps(
+    address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
+) -> Iterator[tuple[tuple[str, ...], Facts]]:
+    """As `collect_facts`, but what is known so far after each step, the quick ones first.
+
+    With it come the names of the parts of the diagnosis (`nep.programs.doctor.diagnosis.PARTS`) for which all
+    is known since this step.
+    """
+    chosen, package = master_address(address), Path(nep.errors.__file__).parent
+    facts = Facts(time.time(), chosen, sys.platform, _versions(), str(package))
+    yield ("clock", "versions"), facts
+    facts = replace(facts, loopback=loopback_problem())
+    yield ("loopback",), facts
+    state = (_("The ports of original programs"), default_file(0).parent)
+    facts = replace(facts, folders=tuple(_folder(purpose, path) for purpose, path in (state, *folders)))
+    yield ("folders",), facts
+    facts = replace(
+        facts,
+        packages=tuple(_packages()),
+        strange_files=tuple(name for name in _ORIGINAL_FILES if (package / name).exists()),
+        shadow=_shadow(here or Path.cwd(), package),
+    )
+    yield ("packages",), facts
+    facts, master_pid, listening = _with_master(facts)
+    yield ("masters", "alerts", "clocks"), facts
+    joins = os.environ.get("NEP_GATEWAY", "1").lower() not in _GATEWAY_OFF
+    ports = tuple(_port(port, purpose, listening, master_pid) for port, purpose in PORTS.items())
+    facts = replace(facts, ports=ports, joins_originals=joins)
+    yield ("ports", "originals"), facts
+    holder = facts.master_port.holder if facts.master_port is not None else None
+    facts = replace(
+        facts, files=_files(holder.pid if holder is not None and holder.is_master else master_pid)
+    )
+    yield ("files",), facts
+    yield ("programs",), replace(facts, programs=tuple(_programs(facts.view)))
+
+
+def _with_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | None]]:
+    """What is known of the master, too; its process where it answers, and who listens at which port."""
+    chosen = facts.address
     number = int(chosen.rpartition(":")[2])
     view, answered_s, is_known = _ask(chosen)
     listening = processes.listening()
     master_port = _port(number, "the master's", listening) if _is_here(chosen) else None
     holder = master_port.holder if master_port is not None else None
     master_pid = holder.pid if view is not None and holder is not None else None
-    package = Path(nep.errors.__file__).parent
-    state = (_("The ports of original programs"), default_file(number).parent)
-    return Facts(
-        time.time(),
-        chosen,
-        sys.platform,
-        _versions(),
-        str(package),
-        view,
-        answered_s,
-        master_port,
-        tuple(_port(port, purpose, listening, master_pid) for port, purpose in PORTS.items()),
-        processes.masters(listening, number),
-        os.environ.get("NEP_GATEWAY", "1").lower() not in _GATEWAY_OFF,
-        tuple(_packages()),
-        tuple(name for name in _ORIGINAL_FILES if (package / name).exists()),
-        _shadow(here or Path.cwd(), package),
-        _files(holder.pid if holder is not None and holder.is_master else master_pid),
-        tuple(_folder(purpose, path) for purpose, path in (state, *folders)),
-        tuple(_clocks(view)),
-        loopback_problem(),
-        installs.install_of(master_pid) if master_pid is not None else None,
-        tuple(_programs(view)),
-        is_known,
-        _answers_at(chosen) if view is None and master_port is not None and master_port.is_taken else "",
+    elsewhere = view is None and master_port is not None and master_port.is_taken
+    found = replace(
+        facts,
+        view=view,
+        answered_s=answered_s,
+        master_port=master_port,
+        masters=processes.masters(listening, number),
+        clocks=tuple(_clocks(view)),
+        master_install=installs.install_of(master_pid) if master_pid is not None else None,
+        is_known=is_known,
+        answers_at=_answers_at(chosen) if elsewhere else "",
     )
+    return found, master_pid, listening
 
 
 def _answers_at(address: str) -> str:

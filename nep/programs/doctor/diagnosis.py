@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Literal
 
@@ -11,7 +11,7 @@ from nep.programs.doctor.facts import Facts, FolderFact
 from nep.programs.doctor.finding import Finding, Severity
 from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, originals, ports
 
-__all__ = ["findings", "in_order", "report", "to_plain", "worst"]
+__all__ = ["PARTS", "findings", "in_order", "report", "to_plain", "worst"]
 
 FEWEST_FILES = 1024
 NEARLY = 0.8
@@ -25,11 +25,7 @@ EARLIEST_S = 1_704_067_200.0
 
 def findings(facts: Facts) -> tuple[Finding, ...]:
     """Everything that the facts say, the worst first."""
-    parts: Sequence[Callable[[Facts], Iterator[Finding]]] = (
-        loopback, masters, ports, _packages, originals, master_alerts, _files, _programs, _folders, clocks,
-        _clock, _versions,
-    )  # fmt: skip
-    return in_order(finding for part in parts for finding in part(facts))
+    return in_order(finding for part in PARTS.values() for finding in part(facts))
 
 
 def in_order(found: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -175,3 +171,20 @@ def _clock(facts: Facts) -> Iterator[Finding]:
 def _versions(facts: Facts) -> Iterator[Finding]:
     words = ", ".join(f"{name} {version}" for name, version in facts.versions.items())
     yield Finding("versions", "info", f"{words}.")
+
+
+PARTS: Mapping[str, Callable[[Facts], Iterator[Finding]]] = {
+    "loopback": loopback,
+    "masters": masters,
+    "ports": ports,
+    "packages": _packages,
+    "originals": originals,
+    "alerts": master_alerts,
+    "files": _files,
+    "programs": _programs,
+    "folders": _folders,
+    "clocks": clocks,
+    "clock": _clock,
+    "versions": _versions,
+}
+"""What is looked at, by name; what is as bad is told in this order."""

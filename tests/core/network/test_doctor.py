@@ -6,7 +6,7 @@ import socket
 import threading
 
 from app.core.network.doctor import Doctor, doctor_of
-from nep.programs.doctor import Finding
+from nep.programs.doctor import Finding, Tell
 
 FINE = Finding("master", "ok", "A master runs.")
 
@@ -15,7 +15,7 @@ def test_it_looks_beside_the_window_and_keeps_what_it_found() -> None:
     go_on = threading.Event()
     looks = []
 
-    def look(_topic: str) -> list[Finding]:
+    def look(_topic: str, _tell: object) -> list[Finding]:
         looks.append(threading.current_thread().name)
         go_on.wait(5)
         return [FINE]
@@ -32,11 +32,31 @@ def test_it_looks_beside_the_window_and_keeps_what_it_found() -> None:
     assert doctor.revision == 2
 
 
+def test_what_is_found_so_far_is_told_while_it_looks() -> None:
+    went, go_on = threading.Event(), threading.Event()
+
+    def look(_topic: str, tell: Tell) -> list[Finding]:
+        tell((FINE,), 1, 3)
+        went.set()
+        go_on.wait(30)
+        return [FINE, FINE, FINE]
+
+    doctor = Doctor(look)
+    assert doctor.so_far is None
+    doctor.look()
+    assert went.wait(30)
+    assert (doctor.so_far, doctor.looked_at, doctor.things) == ((FINE,), 1, 3)
+    assert (doctor.looked_s, doctor.findings) == (None, ())
+    go_on.set()
+    doctor.close()
+    assert (doctor.so_far, len(doctor.findings)) == (None, 3)
+
+
 def test_whoever_misses_another_topic_while_it_looks_is_told_of_that_one() -> None:
     began, go_on = threading.Event(), threading.Event()
     asked = []
 
-    def look(topic: str) -> list[Finding]:
+    def look(topic: str, _tell: object) -> list[Finding]:
         asked.append(topic)
         began.set()
         go_on.wait(30)
@@ -64,7 +84,7 @@ def test_topics_of_other_networks_are_not_looked_for_in_this_one(tmp_path) -> No
 
 
 def test_a_doctor_that_breaks_off_says_so() -> None:
-    def look(_topic: str) -> list[Finding]:
+    def look(_topic: str, _tell: object) -> list[Finding]:
         raise ValueError("no such luck")
 
     doctor = Doctor(look)

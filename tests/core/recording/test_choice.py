@@ -118,3 +118,6 @@ def test_a_path_that_is_taken_gets_a_number(tmp_path: Path):
     first.touch()
     (tmp_path / "a 2.mcap").touch()
     assert free_path(first).name == "a 3.mcap"
+    folder = tmp_path / "a, 0.02.0 to 0.06.0, CSV"
+    folder.mkdir()
+    assert free_path(folder, is_folder=True).name == "a, 0.02.0 to 0.06.0, CSV 2"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import sys
+from itertools import pairwise
 
 import psutil
 import pytest
@@ -11,6 +12,7 @@ import pytest
 import nep
 from nep.masters.master import Master
 from nep.programs.doctor import collect_topic, look, topic_findings
+from nep.programs.doctor.diagnosis import PARTS
 from nep.programs.doctor.listen import reach_of
 from tests.nep.programs import running
 
@@ -93,3 +95,18 @@ def test_a_master_that_serves_this_computer_only_does_not_hang(master: Master, o
     assert found["master:closed"].severity == "error"
     assert f"127.0.0.1:{port_of(master.address)}" in found["master:closed"].sentence
     assert "master" in {each.id for each in look(master.address)}
+
+
+def test_it_tells_what_is_found_so_far_and_comes_to_the_same_end(master: Master) -> None:
+    told = []
+    found = look(master.address, "/arm/pose", tell=lambda *each: told.append(each))
+    done = [done for _found, done, _count in told]
+    assert done == sorted(done)
+    assert {count for _found, _done, count in told} == {done[-1]} == {len(PARTS) + 1}
+    ids = [{each.id for each in some} for some, _done, _count in told]
+    assert all(fewer <= more for fewer, more in pairwise(ids))
+    assert {each.id for each in found} == ids[-1] >= {"topic:nobody"}
+    assert "topic:nobody" not in ids[-2]
+    assert {each.id for each in told[0][0]} == {"versions"}
+    alone = [each.id for each in look(master.address)]
+    assert {each for each in alone if not each.startswith("files:")} <= ids[-1]

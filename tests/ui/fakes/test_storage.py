@@ -158,7 +158,7 @@ def look(is_real: bool) -> Callable[[list[Finding]], Doctor]:
 
     def found(findings: list[Finding] | None) -> Doctor:
         if is_real:
-            made = Doctor(lambda _topic: tuple(findings))  # type: ignore[arg-type]
+            made = Doctor(lambda _topic, _tell: tuple(findings))  # type: ignore[arg-type]
         else:
             made = session.Doctor()
             made.found = findings  # type: ignore[assignment]

@@ -19,6 +19,10 @@ from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press, ticks
 from tests.ui.sample_data import FOUND
 
+FINE = Finding("master", "ok", "A master runs.")
+ALSO_FINE = Finding("loopback", "ok", "Programs of this computer reach each other.")
+FULL = Finding("disk", "error", "The disk is full.", "Make room.")
+
 
 @pytest.fixture
 def window(qapp) -> Window:
@@ -43,6 +47,44 @@ def test_it_looks_when_it_is_first_seen_and_shows_the_worst_first(panel, window)
     assert panel.chip.accessibleName() == "2"
     panel.refresh()
     assert window.session.doctor.looked == 1  # nothing changed, nothing done
+
+
+def test_while_it_looks_rows_come_as_they_are_found(qtbot, window) -> None:
+    window.session.master = MasterState("none", "127.0.0.1:7780")
+    doctor = window.session.doctor
+    doctor.found = (FINE, ALSO_FINE, FULL)
+    told = []
+
+    def look() -> None:
+        """As the other thread: two steps, and a refresh of the panel after each."""
+        doctor.looked += 1
+        doctor.looking = True
+        for done, found in enumerate(((FINE,), (FULL, FINE))):
+            doctor._tell(found, done + 1, 4)
+            panel.refresh()
+            told.append(([each.id for each in panel.shown], panel.looked.text(), panel.chip.accessibleName()))
+        doctor._run()
+        doctor.looking = False
+
+    panel = PANEL.make(window.context())
+    qtbot.addWidget(panel)
+    for widget in panel.header_widgets():
+        qtbot.addWidget(widget)
+    panel.resize(640, 480), panel.show()
+    doctor.look = look
+    panel._master = "none"
+    look()
+    assert told == [(["master"], "Looking: 1 of 4", ""), (["disk", "master"], "Looking: 2 of 4", "1")]
+    panel.refresh()
+    assert [each.id for each in panel.shown] == ["disk", "master", "loopback"]
+    assert panel.looked.text() == "3 things looked at"
+    told.clear()
+    doctor.found = (FINE, ALSO_FINE)
+    look()  # again: what was found stays until all was looked at
+    panel.refresh()
+    assert [shown for shown, _looked, _chip in told] == [["disk", "master", "loopback"]] * 2
+    assert [looked for _shown, looked, _chip in told] == ["Looking: 1 of 4", "Looking: 2 of 4"]
+    assert (panel.looked.text(), panel.chip.accessibleName()) == ("All 2 things are well", "all is well")
 
 
 def test_panels_that_wait_are_listed_with_the_topic_that_was_meant(qtbot, panel, window, monkeypatch) -> None:

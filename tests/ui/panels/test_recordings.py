@@ -242,8 +242,12 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
     QTest.keyClicks(details.topics.edit, "/a ")
     assert details.part_words.text() == "0:02.0 to 0:06.0, 1 of 3 topics"
     assert details.about.text() == f"about 200 messages, {size_words(sizes[0] * 200 / 500)}"
+    assert details.into.text() == f"{folder.name}/long, 0.02.0 to 0.06.0, CSV"
+    assert details.files.text() == "1 file"
     window.answers.path = tmp_path
     details.choose.click()
+    assert details.into.text() == f"{tmp_path.name}/long, 0.02.0 to 0.06.0, CSV"
+    assert details.into.toolTip() == str(tmp_path / "long, 0.02.0 to 0.06.0, CSV")
     details.export.click()
 
     def is_over() -> bool:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.core.recording.choice import file_stem
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripLook, part_of
 from app.core.recording.folder import RecordingFacts
+from app.core.recording.replay.scale import span_words
 from app.ui.panels.recordings.film_strip import FilmStrip
 from app.ui.panels.recordings.topic_list import TopicList, shortest_choice
 from app.ui.text import plain
@@ -86,26 +88,26 @@ class RecordingDetails(QWidget):
         times = [("start", _("From start"), None), ("clock", _("Clock"), None)]
         self.times = Segments(theme, times, size="small", name=_("Times"))
         self.times.changed.connect(lambda value: self.strip.show_clock(value == "clock"))
-        self.part_words = ElidedLabel("small", "textSecondary", least=60)
-        self.about = label("", "small", role="textSecondary")
+        self.part_words = label("", "small", role="textSecondary", wrap=True)
+        self.about = label("", "small", role="textSecondary", wrap=True)
         what = _("What the messages have. The files can be smaller or larger than that.")
         self.about.setToolTip(plain.tip(what))
         self.format.changed.connect(lambda _kind: self._show_part())
+        self._recording: Path | None = None
         self.folder: Path | None = None
-        self.into = ElidedLabel("small", "textSecondary", least=60)
-        self.choose = Button(theme, _("Into another folder"), "folder-open", size="small")
+        """Where a person wants it to be; None: beside the recording."""
+        self.into = ElidedLabel("body", "text", least=60)
+        self.files = label("", "small", role="textSecondary")
+        self.choose = Button(theme, _("Choose"), "folder-open", size="small")
+        self.choose.setAccessibleName(_("Choose the folder of what is exported"))
 
     def _arrange(self) -> None:
-        acts, says, exports, places = (Flow(gap=8, row_gap=6) for _row in range(4))
+        acts = Flow(gap=8, row_gap=6)
+        acts.add_elastic(self.name)
+        acts.addWidget(self.counts)
+        acts.push()
         for button in (self.open, self.rename, self.show_file, self.delete):
             acts.addWidget(button)
-        for part in (label(_("Export as"), "small"), self.format, self.times, self.pick):
-            exports.addWidget(part)
-        for widget in (self.export, self.bar, self.progress, self.choose):
-            places.addWidget(widget)
-        places.add_elastic(self.into)
-        says.add_elastic(self.part_words, greedy=True)
-        says.addWidget(self.about)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -113,20 +115,42 @@ class RecordingDetails(QWidget):
         inside = QVBoxLayout()
         inside.setContentsMargins(12, 8, 12, 10)
         inside.setSpacing(8)
-        inside.addWidget(self.name)
-        inside.addWidget(self.counts)
         inside.addLayout(acts)
         inside.addWidget(self.strip)
-        inside.addLayout(says)
-        inside.addLayout(exports)
-        inside.addWidget(self.topics)
-        inside.addWidget(self.list)
-        inside.addLayout(places)
+        inside.addLayout(self._form())
         column.addLayout(inside)
+
+    def _form(self) -> QGridLayout:
+        """How it is exported, row by row; what does not fit into a row goes on below."""
+        kinds, topics, times, places = (Flow(gap=8, row_gap=6) for _row in range(4))
+        kinds.addWidget(self.format)
+        topics.add_elastic(self.topics, greedy=True)
+        topics.addWidget(self.pick)
+        times.addWidget(self.times)
+        for row, words in ((kinds, self.about), (times, self.part_words)):
+            row.push()
+            row.addWidget(words)
+        places.add_elastic(self.into, greedy=True)
+        for widget in (self.files, self.choose, self.export, self.bar, self.progress):
+            places.addWidget(widget)
+        form = QGridLayout()
+        form.setHorizontalSpacing(12)
+        form.setVerticalSpacing(8)
+        form.setColumnStretch(1, 1)
+        rows = ((_("Export as"), kinds), (_("Topics"), topics), (_("Times"), times), (_("Into"), places))
+        for place, (title, row) in enumerate(rows):
+            name = label(title, "small", role="textSecondary")
+            form.addWidget(name, 2 * place, 0, Qt.AlignmentFlag.AlignTop)
+            name.setMinimumHeight(self.format.sizeHint().height())
+            form.addLayout(row, 2 * place, 1)
+        form.addWidget(self.list, 3, 1)
+        return form
 
     def show_facts(self, facts: RecordingFacts, being_written: bool) -> None:
         """Say this of the recording, and let be done what can be."""
         self.name.setText(facts.path.stem)
+        self._recording = facts.path
+        self._say_place()
         topics, count = len(facts.topics), facts.message_count
         self.counts.setText(
             facts.problem
@@ -150,10 +174,26 @@ class RecordingDetails(QWidget):
         self._show_part()
 
     def set_folder(self, folder: Path | None) -> None:
-        """Where it is exported to; None: a new folder beside it."""
+        """In which folder the one of the files is made; None: beside the recording."""
         self.folder = folder
-        self.into.setText(str(folder) if folder is not None else "")
-        self.into.setVisible(folder is not None)
+        self._say_place()
+
+    def place(self) -> Path | None:
+        """The folder that is made for the files, or one with a number behind it; None without a recording."""
+        if self._recording is None:
+            return None
+        strip, name = self.strip, self._recording.stem
+        if not strip.is_whole and strip.look is not None:
+            times = [span_words(at - strip.look.start_ns, digits=1) for at in (strip.begin_ns, strip.end_ns)]
+            begin, end = (each.replace(":", ".") for each in times)
+            name = _("{name}, {begin} to {end}").format(name=name, begin=begin, end=end)
+        kind = _(FORMAT_WORDS[self.format.value])
+        return (self.folder or self._recording.parent) / file_stem(f"{name}, {kind}")
+
+    def _say_place(self) -> None:
+        place = self.place()
+        self.into.setText(f"{place.parent.name}/{place.name}" if place is not None else "")
+        self.into.setToolTip(plain.tip(str(place or "")))
 
     def _typed(self) -> None:
         self._is_none_chosen = False
@@ -195,6 +235,7 @@ class RecordingDetails(QWidget):
         self.topics.set_wrong(part is None)
         set_role(self.part_words, "error" if part is None else "textSecondary")
         self._say_size(look, part)
+        self._say_place()
         if look is None:
             self.part_words.setText("")
             return
@@ -212,7 +253,7 @@ class RecordingDetails(QWidget):
 
     def _say_size(self, look: FilmStripLook | None, part: Part | None) -> None:
         """About how much that is, of the topics that the format takes."""
-        words = ""
+        words, count = "", 0
         if look is not None and part is not None:
             names = {
                 each.name
@@ -220,8 +261,10 @@ class RecordingDetails(QWidget):
                 if (part.topics is None or each.name in part.topics) and takes(self.format.value, each.codec)
             }
             words = self._size_words(look, names) if names else _("nothing of it can become that")
+            count = min(len(names), 1) if self.format.value == "mcap" else len(names)
         self.about.setText(words)
-        self.about.setVisible(bool(words))
+        self.files.setText(ngettext("{count} file", "{count} files", count).format(count=grouped(count)))
+        self.files.setVisible(count > 0)
 
     def _size_words(self, look: FilmStripLook, names: Collection[str]) -> str:
         exact, size = look.about(self.strip.begin_ns, self.strip.end_ns, names)

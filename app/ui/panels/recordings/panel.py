@@ -20,11 +20,10 @@ from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripLook, film_strip
 from app.core.recording.folder import FolderLook, RecordingFacts, RecordingFolder, picture_in
 from app.core.recording.recordings import FOLDER_KEY
-from app.core.recording.replay.scale import span_words
 from app.ui.other_programs import open_outside
 from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.recordings.columns import PICTURE, columns, cropped
-from app.ui.panels.recordings.details import FORMAT_WORDS, RecordingDetails
+from app.ui.panels.recordings.details import RecordingDetails
 from app.ui.panels.recordings.table import RecordingTable
 from app.ui.panels.row_actions import RowAction
 from app.ui.panels.table_panel import TablePanel, TableWords
@@ -389,13 +388,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         if part is None:
             self.context.toast(_("No topic of it fits"))
             return
-        strip, name = self.details.strip, facts.path.stem
-        if not strip.is_whole and strip.look is not None:
-            times = [span_words(at - strip.look.start_ns, digits=1) for at in (strip.begin_ns, strip.end_ns)]
-            begin, end = (each.replace(":", ".") for each in times)
-            name = _("{name}, {begin} to {end}").format(name=name, begin=begin, end=end)
-        place = self.details.folder or facts.path.parent
-        folder = free(place / file_stem(f"{name}, {_(FORMAT_WORDS[kind])}"))
+        folder = free(self.details.place() or facts.path.with_suffix(""), is_folder=True)
         self._job = RecordingExport(facts.path, kind, folder, part)
         self.details.show_export(self._job)
 
