@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, Qt, QTimer, Signal
-from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
+from app.core.messages.picture import Picture
 from app.core.run.acting.picture_point import Button, PicturePoint
-from app.ui.pictures.zoom import ZoomablePicture
+from app.ui.pictures.zoom import WAYS, ZoomablePicture, key_name
 from app.ui.theme.theme import Theme
+from app.ui.widgets.paint import announce
+from nep.i18n import _, lazy
 
 MARK_MS = 1200
 RING_PX, REACH_PX = 7.0, 12.0
+FAR = 10  # pixels with Shift
+KEYS_WORDS = lazy("The arrow keys point at a pixel, Enter publishes it.")
+BESIDE = (16, 16, -16, -16)
 BUTTONS: dict[Qt.MouseButton, Button] = {
     Qt.MouseButton.LeftButton: "left",
     Qt.MouseButton.MiddleButton: "middle",
@@ -22,7 +28,8 @@ class ClickablePicture(ZoomablePicture):
     """`clicked` with a `PicturePoint` while it takes clicks, once it is sure that it is no double click.
 
     The point is what was there when the button was pressed, and is told after the time that a double click
-    may take; a click elsewhere tells the one before at once.
+    may take; a click elsewhere tells the one before at once. On the keyboard the arrow keys point at a pixel,
+    with Shift ten further, and Enter clicks it.
     """
 
     clicked = Signal(object)
@@ -35,6 +42,8 @@ class ClickablePicture(ZoomablePicture):
         self._sure = QTimer(self)
         self._sure.setSingleShot(True)
         self._sure.timeout.connect(self._tell)
+        self.pointed: tuple[int, int] | None = None
+        """The pixel that the keys point at."""
         self.marked: PicturePoint | None = None
         """Where a mark stands."""
         self._fading = QTimer(self)
@@ -52,6 +61,8 @@ class ClickablePicture(ZoomablePicture):
             self._takes_clicks = takes
             self.forget_click()
             self._show_cursor()
+            if takes:
+                announce(self, _(KEYS_WORDS))
 
     def mark(self, point: PicturePoint) -> None:
         """Show for a moment where this is."""
@@ -64,9 +75,10 @@ class ClickablePicture(ZoomablePicture):
         self.update()
 
     def forget_click(self) -> None:
-        """Tell nothing of what was pressed so far."""
+        """Tell nothing of what was pressed so far, and point at nothing."""
         self._pressed = self._waiting = None
         self._sure.stop()
+        self._point_nowhere()
 
     def clear(self) -> None:
         super().clear()
@@ -102,6 +114,7 @@ class ClickablePicture(ZoomablePicture):
         return PicturePoint(*pixel, picture.width, picture.height, picture.stamp_ns, button)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        self._point_nowhere()
         if self._pressed is not None:
             moved = event.position() - self._pressed[0]
             if moved.manhattanLength() >= QApplication.startDragDistance():
@@ -124,20 +137,91 @@ class ClickablePicture(ZoomablePicture):
         self.forget_click()
         super().mouseDoubleClickEvent(event)
 
+    # -- the keyboard -------------------------------------------------------------------------------------
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        name, picture = key_name(event), self.picture
+        way = WAYS.get(name.removeprefix("Shift+"))
+        if not self._takes_clicks or picture is None:
+            super().keyPressEvent(event)
+        elif way is not None:
+            self._point(-way[0], -way[1], FAR if name.startswith("Shift+") else 1)
+        elif name in {"Return", "Enter"} and self.pointed is not None and not event.isAutoRepeat():
+            self._tell()
+            x, y = _inside(self.pointed, picture)
+            self.clicked.emit(PicturePoint(x, y, picture.width, picture.height, picture.stamp_ns, "left"))
+        else:
+            super().keyPressEvent(event)
+
+    def _point(self, across: int, down: int, count: int) -> None:
+        """Point so many pixels further, as it is seen; at first in the middle of what is seen."""
+        if self.pointed is None:
+            wanted = QRectF(self.rect()).center()
+        else:
+            step = count * max(1.0, self.scale())
+            wanted = self._view_of(self.pointed) + QPointF(across * step, down * step)
+        shown = self.area()
+        inside = QPointF(
+            min(max(wanted.x(), shown.left()), shown.right() - 1e-3),
+            min(max(wanted.y(), shown.top()), shown.bottom() - 1e-3),
+        )
+        pixel = self.pixel_at(inside)
+        if pixel is None:
+            return
+        self.pointed = pixel
+        self._bring_into_sight()
+        self.mouse = self._view_of(pixel)
+        self.update()
+
+    def _bring_into_sight(self) -> None:
+        """Move a picture that is enlarged, so that the pixel is not beside what is seen."""
+        if self.pointed is None or self.place.zoom is None:
+            return
+        at, seen = self._view_of(self.pointed), QRectF(self.rect()).adjusted(*BESIDE)
+        dx = min(0.0, seen.right() - at.x()) + max(0.0, seen.left() - at.x())
+        dy = min(0.0, seen.bottom() - at.y()) + max(0.0, seen.top() - at.y())
+        if dx or dy:
+            self.move_by(dx, dy)
+
+    def _view_of(self, pixel: tuple[int, int]) -> QPointF:
+        """Where the middle of a pixel is in the view."""
+        picture = self.picture
+        if picture is None:
+            return QPointF()
+        x, y = _inside(pixel, picture)
+        share = QPointF((x + 0.5) / picture.width, (y + 0.5) / picture.height)
+        return self.place.to_view(self.area()).map(share)
+
+    def _point_nowhere(self) -> None:
+        if self.pointed is not None:
+            self.pointed = self.mouse = None
+            self.update()
+
     # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        if self.marked is None or self.picture is None:
+        if self.picture is None:
             return
-        at = self.place.to_view(self.area()).map(QPointF(*self.marked.share))
+        if self.marked is not None:
+            self._paint_cross(self.place.to_view(self.area()).map(QPointF(*self.marked.share)))
+        if self.pointed is not None and self._takes_clicks:
+            self._paint_cross(self._view_of(self.pointed), ring=False)
+
+    def _paint_cross(self, at: QPointF, *, ring: bool = True) -> None:
+        """Dark below and light above: it is seen on every picture."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        # dark below and light above: it is seen on every picture
         for ink, width in ((Qt.GlobalColor.black, 4.0), (Qt.GlobalColor.white, 1.6)):
             painter.setPen(QPen(ink, width))
-            painter.drawEllipse(QRectF(at.x() - RING_PX, at.y() - RING_PX, 2 * RING_PX, 2 * RING_PX))
+            if ring:
+                painter.drawEllipse(QRectF(at.x() - RING_PX, at.y() - RING_PX, 2 * RING_PX, 2 * RING_PX))
             for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
                 way = QPointF(dx, dy)
                 painter.drawLine(at + way * (RING_PX - 3), at + way * REACH_PX)
         painter.end()
+
+
+def _inside(pixel: tuple[int, int], picture: Picture) -> tuple[int, int]:
+    """The next pixel that the picture has: those that come can be smaller."""
+    return min(pixel[0], picture.width - 1), min(pixel[1], picture.height - 1)

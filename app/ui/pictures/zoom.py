@@ -76,9 +76,8 @@ class ZoomablePicture(PictureView):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         name = key_name(event)
-        steps = {"Left": (1, 0), "Right": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
-        if name in steps and self.place.zoom is not None:
-            across, down = steps[name]
+        if name in WAYS and self.place.zoom is not None:
+            across, down = WAYS[name]
             self.move_by(across * KEY_MOVE, down * KEY_MOVE)
         elif name in self.keys:
             self.key_pressed.emit(name)

@@ -51,6 +51,9 @@ def panel(qtbot, window) -> Iterator[ImagePanel]:
     made.shut()
 
 
+SHIFT = Qt.KeyboardModifier.ShiftModifier
+
+
 def arm(window: Window, panel: ImagePanel) -> Subscriber:
     """Let its clicks publish points, and listen to them."""
     heard = window.session.source.listen(POINTS, "json")
@@ -114,6 +117,65 @@ def test_it_says_what_to_arm_and_one_click_is_one_message(qtbot, window, panel) 
     ticks(window, panel)
     assert not panel.view.takes_clicks
     assert session.acting.repeat(entry.number).startswith("Not armed for")
+
+
+def test_the_keys_point_at_a_pixel_and_enter_publishes_it(qtbot, window, panel) -> None:
+    view = panel.view
+    for key in (Qt.Key.Key_Left, Qt.Key.Key_Return):
+        QTest.keyClick(view, key)  # not armed: nothing is pointed at
+    assert view.pointed is None
+    heard = arm(window, panel)
+    QTest.keyClick(view, Qt.Key.Key_Return)  # nothing is pointed at yet
+    QTest.keyClick(view, Qt.Key.Key_Left)
+    assert view.pointed == (160, 120)
+    plain = view.grab().toImage()
+    for key, shift in (
+        (Qt.Key.Key_Left, True),
+        (Qt.Key.Key_Up, True),
+        (Qt.Key.Key_Right, False),
+        (Qt.Key.Key_Down, False),
+    ):
+        before = view.pointed
+        QTest.keyClick(view, key, SHIFT if shift else Qt.KeyboardModifier.NoModifier)
+        moved = tuple(now - then for now, then in zip(view.pointed, before, strict=True))
+        wanted = {Qt.Key.Key_Left: (-1, 0), Qt.Key.Key_Up: (0, -1), Qt.Key.Key_Right: (1, 0)}.get(key, (0, 1))
+        near = 10 if shift else 1
+        assert all(
+            abs(is_so - near * way) <= (way != 0) * near * 0.5
+            for is_so, way in zip(moved, wanted, strict=True)
+        )
+    assert view.grab().toImage() != plain
+    x, y = view.pointed
+    QTest.keyClick(view, Qt.Key.Key_Return)
+    ticks(window, panel)
+    told = heard.listen(timeout_s=20.0)[1]
+    assert (told["x"], told["y"], told["button"]) == (x, y, "left")
+    panel.actions_of["right"].trigger()  # turned to the right, what is seen above is the picture's left edge
+    for _step in range(60):
+        QTest.keyClick(view, Qt.Key.Key_Up, SHIFT)
+    assert view.pointed[0] == 0
+    view.zoom_by(8)
+    for _step in range(12):
+        QTest.keyClick(view, Qt.Key.Key_Down, SHIFT)
+    assert view.rect().contains(view._view_of(view.pointed).toPoint()), "an enlarged picture goes along"
+    QTest.mouseMove(view, QPoint(30, 30))
+    qtbot.waitUntil(lambda: view.pointed is None)
+    QTest.keyClick(view, Qt.Key.Key_Left)
+    assert view.pointed is not None
+    small = np.zeros((4, 4, 3), np.uint8)
+    sent = Message(
+        CAMERA, small.tobytes(), "image", "image", stamp_ns=STAMP_NS + 1,
+        extension={"shape": list(small.shape), "encoding": "bgr8"},
+    )  # fmt: skip
+    window.session.images.offer([sent])
+    ticks(window, panel)
+    QTest.keyClick(view, Qt.Key.Key_Return)
+    ticks(window, panel)
+    told = heard.listen(timeout_s=20.0)[1]
+    assert (told["x"], told["y"], told["width"]) == (3, 3, 4)
+    window.session.runs.stop()
+    ticks(window, panel)
+    assert view.pointed is None
 
 
 def test_what_is_no_click_publishes_nothing(qtbot, window, panel) -> None:

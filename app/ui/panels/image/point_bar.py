@@ -15,7 +15,8 @@ from app.core.run.acting.picture_point import TYPES, PicturePoint, topic_of
 from app.core.run.acting.sending import SendOrder, SendResult
 from app.ui.panels.armed_strip import ArmedStrip
 from app.ui.panels.base import PanelContext
-from app.ui.pictures.clicks import ClickablePicture
+from app.ui.pictures.clicks import KEYS_WORDS, ClickablePicture
+from app.ui.text import plain
 from app.ui.widgets import Button, ComboBox, IconButton, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.menus import EditMenu
@@ -86,7 +87,9 @@ class PointBar(QWidget):
         row = QWidget()
         flow = Flow(row, gap=8, row_gap=4)
         flow.setContentsMargins(12, 6, 6, 6)
-        flow.addWidget(label(_("A click publishes its point to"), "small", role="textSecondary"))
+        about = label(_("A click publishes its point to"), "small", role="textSecondary")
+        about.setToolTip(plain.tip(_(KEYS_WORDS)))
+        flow.addWidget(about)
         flow.add_elastic(self.topic, greedy=True)
         for widget in (self.kind, self.let, self.close_button):
             flow.addWidget(widget)
