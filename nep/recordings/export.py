@@ -13,12 +13,14 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
 from nep.messages.message import Message
+from nep.recordings.film import Container, Film, container_there, frame_of
 from nep.recordings.reader import RecordedMessage, Recording
 from nep.recordings.writer import RecordingWriter, disk_sentence
 from nep.system.replace_file import replace_file
@@ -37,9 +39,7 @@ _SAID = ("notes", "runs", "alarms", "alerts")
 _CELLS_AT_ONCE = 200_000
 _FIRST_COLUMNS = ("time_s", "stamp_s", "seq", "publisher")
 _FPS = 30.0
-_LONGEST_FILM_S = 86_400.0
-"""A recording with one picture of another day would become a film of millions of them."""
-_SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "mp4": ".mp4", "pictures": ""}
+_SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "pictures": ""}
 Progress = Callable[[int, int], object]
 
 
@@ -77,7 +77,7 @@ def export(
     fps: float = _FPS,
     progress: Progress | None = None,
 ) -> list[Exported]:
-    """Export as one of `FORMATS` into a folder, which is made.
+    """Export as one of `FORMATS` into a folder, which is made; a film is an .avi where no MP4 can be written.
 
     `progress` is told how many messages of how many are done. Raises `RecordingError`, also when no topic
     fits, `RecordingsUnavailableError` when a package is missing.
@@ -87,12 +87,17 @@ def export(
     topics, counted = _wanted(recording, kind, part, progress)
     if kind == "mcap":
         return [_mcap(recording, folder, replace(part, topics=topics), counted)]
-    make = {"csv": _csv, "parquet": _parquet, "pictures": _pictures, "mp4": _mp4}[kind]
+    make: Callable[[_Source, Path, float], int]
     made, taken = [], set[str]()
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        if kind == "mp4":
+            container = container_there(_opencv(), folder)
+            make, suffix = partial(_film, container=container), container.suffix
+        else:
+            make, suffix = {"csv": _csv, "parquet": _parquet, "pictures": _pictures}[kind], _SUFFIXES[kind]
         for topic in topics:
-            path = folder / _file_name(topic, taken, _SUFFIXES[kind])
+            path = folder / _file_name(topic, taken, suffix)
             if path.exists():
                 raise RecordingError(str(path), _("there is such a file already; choose another name"))
             unfinished = path.with_name(f"{path.name}.part")
@@ -493,14 +498,14 @@ def _opencv() -> Any:  # noqa: ANN401 - a module
     return cv2
 
 
-def _mp4(source: _Source, path: Path, fps: float) -> int:
+def _film(source: _Source, path: Path, fps: float, container: Container) -> int:
     """A film in the recording's own time: each of its pictures is the newest up to then."""
     opencv = _opencv()
-    film = _Film(opencv, path, fps)
+    film = Film(opencv, path, fps, container)
     count = 0
     try:
         for each in source.messages():
-            frame = _frame(opencv, each.message)
+            frame = frame_of(opencv, each.message)
             if frame is None:
                 source.unreadable += 1
                 continue
@@ -512,80 +517,3 @@ def _mp4(source: _Source, path: Path, fps: float) -> int:
     if not count:
         raise RecordingError(str(path), _("no picture of it can be read"))
     return count
-
-
-def _frame(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
-    """The picture with three channels of 8 bits; None when it cannot be read."""
-    try:
-        frame: Any = message.payload
-    except DecodeError:
-        return None
-    if frame.dtype.name != "uint8":
-        frame = opencv.normalize(frame, None, 0, 255, opencv.NORM_MINMAX).astype("uint8")
-    channels = 1 if frame.ndim == 2 else frame.shape[2]
-    if channels in {1, 2}:
-        plane = frame if frame.ndim == 2 else frame[:, :, 0]
-        return opencv.cvtColor(plane.copy(), opencv.COLOR_GRAY2BGR)
-    return frame[:, :, :3].copy()
-
-
-class _Film:
-    """Pictures at a steady rate, all of the size of the first one."""
-
-    def __init__(self, opencv: Any, path: Path, fps: float) -> None:  # noqa: ANN401 - a module
-        self._opencv, self._path, self._fps = opencv, path, fps
-        self._film: Any = None
-        self._size = (0, 0)
-        self._start_ns = self._frames = 0
-        self._last: Any = None
-        # OpenCV knows the container by the name's end.
-        self._written = path.with_name(f"{path.name}.mp4")
-
-    def add(self, log_ns: int, frame: Any) -> None:  # noqa: ANN401 - an array
-        """The next picture."""
-        if self._film is None:
-            height, width = frame.shape[:2]
-            self._size = (width // 2 * 2 or 2, height // 2 * 2 or 2)
-            code = self._opencv.VideoWriter_fourcc(*"mp4v")
-            self._film = self._opencv.VideoWriter(str(self._written), code, self._fps, self._size)
-            if not self._film.isOpened():
-                raise RecordingError(str(self._path), _("OpenCV cannot write films here"))
-            self._start_ns = log_ns
-        if log_ns - self._start_ns > _LONGEST_FILM_S * 1e9:
-            raise RecordingError(
-                str(self._path), _("its pictures are of more than a day; choose a part of it for a film")
-            )
-        until = int((log_ns - self._start_ns) * self._fps / 1e9)
-        while self._last is not None and self._frames < until:
-            self._film.write(self._last)
-            self._frames += 1
-        if (frame.shape[1], frame.shape[0]) != self._size:
-            frame = self._opencv.resize(frame, self._size)
-        self._last = frame
-
-    def finish(self) -> None:
-        """Write the last picture, and end. Raises `RecordingError` when they are not all in the file.
-
-        OpenCV does not say so when a disk is full.
-        """
-        if self._film is None:
-            return
-        self._film.write(self._last)
-        self._frames += 1
-        self.close()
-        film = self._opencv.VideoCapture(str(self._written))
-        count = int(film.get(self._opencv.CAP_PROP_FRAME_COUNT))
-        film.release()
-        if count != self._frames:
-            raise RecordingError(str(self._path), _("the film could not be written; the disk may be full"))
-        replace_file(self._written, self._path)
-
-    def close(self) -> None:
-        """End it as it is; may be called twice."""
-        if self._film is not None:
-            self._film.release()
-
-    def remove(self) -> None:
-        """Leave no half film behind."""
-        self.close()
-        _remove(self._written)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import os
+import subprocess
 import sys
+import textwrap
 from contextlib import suppress
 
 import cv2
@@ -134,14 +136,48 @@ def test_a_film_has_the_recordings_time(tmp_path):
     )
 
 
+def test_without_ffmpeg_a_film_is_an_avi(tmp_path):
+    """As in a package, in a process of its own: OpenCV reads what it may use once."""
+    record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 31)]])
+    program = f"""
+        from pathlib import Path
+        from nep.recordings.export import export
+        from nep.recordings.reader import Recording
+        with Recording({str(tmp_path / "a.mcap")!r}) as recording:
+            (made,) = export(recording, "mp4", Path({str(tmp_path / "out")!r}), fps=20.0)
+        print(made.path.name, made.count)
+    """
+    environment = {**os.environ, "OPENCV_VIDEOIO_PRIORITY_FFMPEG": "0"}
+    command = [sys.executable, "-c", textwrap.dedent(program)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    made = next((tmp_path / "out").iterdir())
+    assert done.stdout.split() == [made.name, "30"]
+    if made.suffix == ".avi":  # a system can have another part of OpenCV that writes MP4
+        film = cv2.VideoCapture(str(made), cv2.CAP_OPENCV_MJPEG)
+        assert (film.get(cv2.CAP_PROP_FPS), film.read()[0]) == (20.0, True)
+        film.release()
+    assert [each.name for each in (tmp_path / "out").iterdir()] == [made.name]
+
+
+def test_where_no_film_can_be_written_that_is_said(tmp_path, monkeypatch):
+    record(tmp_path / "a.mcap", [[picture(1)]])
+    monkeypatch.setattr("nep.recordings.film.CONTAINERS", ())
+    with (
+        Recording(tmp_path / "a.mcap") as recording,
+        pytest.raises(RecordingError, match="OpenCV cannot write films here"),
+    ):
+        export(recording, "mp4", tmp_path / "out")
+    assert not list((tmp_path / "out").iterdir())
+
+
 def test_a_film_that_cannot_be_is_a_sentence_and_leaves_nothing(tmp_path, monkeypatch):
     record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 4)]])
     with Recording(tmp_path / "a.mcap") as recording:
         with monkeypatch.context() as patched:
-            patched.setattr("nep.recordings.export._LONGEST_FILM_S", 0.015)
+            patched.setattr("nep.recordings.film.LONGEST_S", 0.015)
             with pytest.raises(RecordingError, match="more than a day"):
                 export(recording, "mp4", tmp_path / "out")
-        monkeypatch.setattr("nep.recordings.export._Film.close", truncate)
+        monkeypatch.setattr("nep.recordings.film.Film.close", truncate)
         with pytest.raises(RecordingError, match="the disk may be full"):
             export(recording, "mp4", tmp_path / "out")
     assert not list((tmp_path / "out").iterdir())

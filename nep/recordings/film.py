@@ -1,0 +1,139 @@
+"""A film of a recording's pictures, in the container that OpenCV can write on this computer.
+
+MP4 needs FFmpeg, which the packages of Studio leave out; OpenCV alone writes Motion JPEG into an .avi file,
+which the players of Windows and Linux show, and VLC everywhere.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nep.errors import DecodeError, RecordingError
+from nep.i18n import _
+from nep.messages.message import Message
+from nep.system.replace_file import replace_file
+
+__all__ = ["Container", "Film", "container_there", "frame_of"]
+
+LONGEST_S = 86_400.0
+"""A recording with one picture of another day would become a film of millions of them."""
+_TRIED_PX = (64, 48)
+
+
+@dataclass(frozen=True)
+class Container:
+    """A kind of film: the end of its files' names, its codec, which part of OpenCV writes and reads it."""
+
+    suffix: str
+    fourcc: str
+    api: str
+
+    def writer(self, opencv: Any, path: Path, fps: float, size: tuple[int, int]) -> Any:  # noqa: ANN401
+        """OpenCV's writer of such a file; it may not be open."""
+        code = opencv.VideoWriter_fourcc(*self.fourcc)
+        return opencv.VideoWriter(str(path), getattr(opencv, self.api), code, fps, size)
+
+
+CONTAINERS = (Container(".mp4", "mp4v", "CAP_ANY"), Container(".avi", "MJPG", "CAP_OPENCV_MJPEG"))
+"""The one that is wanted first."""
+
+
+def container_there(opencv: Any, folder: Path) -> Container:  # noqa: ANN401 - a module
+    """The first that can be written into this folder. Raises `RecordingError` when none can."""
+    for container in CONTAINERS:
+        tried = folder / f"trial{container.suffix}"
+        writer = container.writer(opencv, tried, 30.0, _TRIED_PX)
+        is_open = writer.isOpened()
+        writer.release()
+        with suppress(OSError):
+            tried.unlink(missing_ok=True)
+        if is_open:
+            return container
+    raise RecordingError(str(folder), _("OpenCV cannot write films here"))
+
+
+def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
+    """The picture with three channels of 8 bits; None when it cannot be read."""
+    try:
+        frame: Any = message.payload
+    except DecodeError:
+        return None
+    if frame.dtype.name != "uint8":
+        frame = opencv.normalize(frame, None, 0, 255, opencv.NORM_MINMAX).astype("uint8")
+    channels = 1 if frame.ndim == 2 else frame.shape[2]
+    if channels in {1, 2}:
+        plane = frame if frame.ndim == 2 else frame[:, :, 0]
+        return opencv.cvtColor(plane.copy(), opencv.COLOR_GRAY2BGR)
+    return frame[:, :, :3].copy()
+
+
+class Film:
+    """Pictures at a steady rate, all of the size of the first one."""
+
+    def __init__(
+        self,
+        opencv: Any,  # noqa: ANN401 - a module
+        path: Path,
+        fps: float,
+        container: Container,
+    ) -> None:
+        self._opencv, self._path, self._fps = opencv, path, fps
+        self._container = container
+        self._film: Any = None
+        self._size = (0, 0)
+        self._start_ns = self._frames = 0
+        self._last: Any = None
+        # OpenCV knows the container by the name's end.
+        self._written = path.with_name(f"{path.name}{container.suffix}")
+
+    def add(self, log_ns: int, frame: Any) -> None:  # noqa: ANN401 - an array
+        """The next picture."""
+        if self._film is None:
+            height, width = frame.shape[:2]
+            self._size = (width // 2 * 2 or 2, height // 2 * 2 or 2)
+            self._film = self._container.writer(self._opencv, self._written, self._fps, self._size)
+            if not self._film.isOpened():
+                raise RecordingError(str(self._path), _("OpenCV cannot write films here"))
+            self._start_ns = log_ns
+        if log_ns - self._start_ns > LONGEST_S * 1e9:
+            raise RecordingError(
+                str(self._path), _("its pictures are of more than a day; choose a part of it for a film")
+            )
+        until = int((log_ns - self._start_ns) * self._fps / 1e9)
+        while self._last is not None and self._frames < until:
+            self._film.write(self._last)
+            self._frames += 1
+        if (frame.shape[1], frame.shape[0]) != self._size:
+            frame = self._opencv.resize(frame, self._size)
+        self._last = frame
+
+    def finish(self) -> None:
+        """Write the last picture, and end. Raises `RecordingError` when they are not all in the file.
+
+        OpenCV does not say so when a disk is full.
+        """
+        if self._film is None:
+            return
+        self._film.write(self._last)
+        self._frames += 1
+        self.close()
+        film = self._opencv.VideoCapture(str(self._written), getattr(self._opencv, self._container.api))
+        count = int(film.get(self._opencv.CAP_PROP_FRAME_COUNT))
+        film.release()
+        if count != self._frames:
+            raise RecordingError(str(self._path), _("the film could not be written; the disk may be full"))
+        replace_file(self._written, self._path)
+
+    def close(self) -> None:
+        """End it as it is; may be called twice."""
+        if self._film is not None:
+            self._film.release()
+
+    def remove(self) -> None:
+        """Leave no half film behind."""
+        self.close()
+        with suppress(OSError):
+            self._written.unlink(missing_ok=True)
