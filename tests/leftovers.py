@@ -24,7 +24,7 @@ KEPT = re.compile(
     + "|".join(re.escape(prefix) for prefix in {sys.prefix, sys.base_prefix})
 )
 """Files that libraries keep open: their own, the system's, and memory that processes share."""
-FIRST_USES = {"anon_inode:": 8, "unnamed socket": 3, "pipe:": 2}
+FIRST_USES = {"anon_inode:": 12, "unnamed socket": 3, "pipe:": 2}
 """What libraries keep from a first use without a name (libzmq's context, Qt's file dialog, its network): so
 many tests of a process may end with more of it than they began with, and not one more."""
 PAGE = "QtWebEngineProcess"

@@ -45,6 +45,8 @@ EARNED = {
     "nep.programs.blackboard.perception": "pure, and tested alone",
     "nep.cli.doctor": "one of a list: the commands of nep",
     "nep.programs.doctor.look": "joins collecting and judging, which know nothing of each other",
+    "app.ui.panels.inspector.pace": "pure, and tested alone",
+    "app.ui.panels.plot.pace": "pure, and tested alone",
     "app.ui.panels.plot.advice": "a line of its own: the plot panel is as long as may be",
     "app.core.run.edits_since_run": "pure, and tested alone",
     "app.core.run.run_warnings": "pure, and tested alone",
