@@ -34,7 +34,7 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.shell.window_state import WindowState, fitting
 from app.ui.speaker import QtSpeaker
-from app.ui.startup import interpreter, portal, qt_log, sandbox, single_instance
+from app.ui.startup import graphics, interpreter, portal, qt_log, sandbox, single_instance
 from app.ui.startup.deferred import DeferredSteps
 from app.ui.startup.file_open import Application, IncomingFiles
 from app.ui.startup.single_instance import StartRequest
@@ -82,6 +82,7 @@ def make_application() -> QApplication:
     if isinstance(existing, QApplication):
         return existing
     interpreter.shorten_switch_interval()
+    graphics.draw_by_software(os.environ, sys.platform)
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontShowIconsInMenus)
     application = Application(sys.argv[:1])

@@ -1,0 +1,46 @@
+"""Where there is no graphics processor, Qt draws by itself."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from app.ui.startup import graphics
+
+
+@pytest.mark.parametrize(
+    ("given", "has_one", "wanted", "is_so"),
+    [
+        ({}, False, {graphics.CHOICE: "software"}, True),
+        ({}, True, {}, False),
+        ({graphics.CHOICE: ""}, False, {graphics.CHOICE: "software"}, True),
+        ({graphics.CHOICE: "rhi"}, False, {graphics.CHOICE: "rhi"}, False),
+        ({graphics.CHOICE: "software"}, True, {graphics.CHOICE: "software"}, True),
+    ],
+)
+def test_it_is_chosen_unless_a_person_has_chosen(given, has_one, wanted, is_so) -> None:
+    environ = dict(given)
+    assert graphics.draw_by_software(environ, "linux", lambda _platform: has_one) is is_so
+    assert environ == wanted
+
+
+def test_linux_is_asked_for_its_devices(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(graphics, "DEVICES", (str(tmp_path / "renderD*"),))
+    assert not graphics.has_graphics_processor("linux")
+    (tmp_path / "card0").touch()  # what only shows a screen computes nothing
+    assert not graphics.has_graphics_processor("linux")
+    (tmp_path / "renderD128").touch()
+    assert graphics.has_graphics_processor("linux")
+
+
+def test_a_stand_in_of_windows_is_no_driver() -> None:
+    assert not graphics.has_driver(["Microsoft Basic Display Adapter"])
+    assert graphics.has_driver(["Microsoft Basic Display Adapter", "Intel(R) UHD Graphics 620"])
+    assert graphics.has_driver([])
+    assert graphics.has_graphics_processor("darwin")
+
+
+@pytest.mark.skipif(sys.platform != "win32", reason="Windows tells it")
+def test_windows_tells_of_its_adapters() -> None:
+    assert graphics.adapters()
