@@ -12,6 +12,14 @@ from app.core.storage.settings import Settings
 from nep.masters.master import Master
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What a test makes without saying where is not kept among the work of whoever runs the tests."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("NEP_STUDIO_HOME", str(tmp_path_factory.mktemp("home")))
+        yield
+
+
 @pytest.fixture
 def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
     """A session on the test's own master, with everything that it keeps in the test's folder.
