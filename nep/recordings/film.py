@@ -6,6 +6,7 @@ which the players of Windows and Linux show, and VLC everywhere.
 
 from __future__ import annotations
 
+import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,16 +43,17 @@ CONTAINERS = (Container(".mp4", "mp4v", "CAP_ANY"), Container(".avi", "MJPG", "C
 
 
 def container_there(opencv: Any, folder: Path) -> Container:  # noqa: ANN401 - a module
-    """The first that can be written into this folder. Raises `RecordingError` when none can."""
-    for container in CONTAINERS:
-        tried = folder / f"trial{container.suffix}"
-        writer = container.writer(opencv, tried, 30.0, _TRIED_PX)
-        is_open = writer.isOpened()
-        writer.release()
-        with suppress(OSError):
-            tried.unlink(missing_ok=True)
-        if is_open:
-            return container
+    """The first that can be written into this folder; whatever is in it stays.
+
+    Raises `RecordingError` when none can, `OSError` when nothing can be written there.
+    """
+    with tempfile.TemporaryDirectory(prefix=".film-", dir=folder) as trial:
+        for container in CONTAINERS:
+            writer = container.writer(opencv, Path(trial) / f"trial{container.suffix}", 30.0, _TRIED_PX)
+            is_open = writer.isOpened()
+            writer.release()
+            if is_open:
+                return container
     raise RecordingError(str(folder), _("OpenCV cannot write films here"))
 
 

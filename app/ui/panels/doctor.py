@@ -229,10 +229,10 @@ class DoctorPanel(PanelWidget):
         if not is_done:
             self.looked.setText(_("Looking: {done} of {count}").format(done=done, count=count))
             return
-        words = ngettext("{count} thing looked at", "{count} things looked at", doctor.things)
+        words = ngettext("{count} thing looked at", "{count} things looked at", doctor.looked_at)
         if all(each.severity not in BAD for each in self.shown):
-            words = ngettext("{count} thing is well", "All {count} things are well", doctor.things)
-        self.looked.setText(words.format(count=count))
+            words = ngettext("{count} thing is well", "All {count} things are well", doctor.looked_at)
+        self.looked.setText(words.format(count=done))
 
     def _show(self, found: Sequence[Finding]) -> None:
         for row in self.rows:

@@ -170,7 +170,6 @@ class ClickablePicture(ZoomablePicture):
             return
         self.pointed = pixel
         self._bring_into_sight()
-        self.mouse = self._view_of(pixel)
         self.update()
 
     def _bring_into_sight(self) -> None:
@@ -200,6 +199,8 @@ class ClickablePicture(ZoomablePicture):
     # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        if self.pointed is not None:  # its value is told wherever zoom, turn and size have put it
+            self.mouse = self._view_of(self.pointed)
         super().paintEvent(event)
         if self.picture is None:
             return

@@ -159,6 +159,18 @@ def test_without_ffmpeg_a_film_is_an_avi(tmp_path):
     assert [each.name for each in (tmp_path / "out").iterdir()] == [made.name]
 
 
+def test_what_is_in_the_folder_already_stays_when_films_are_tried(tmp_path):
+    record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 4)]])
+    out = tmp_path / "out"
+    out.mkdir()
+    for name in ("trial.mp4", "trial.avi"):
+        (out / name).write_bytes(b"mine")
+    with Recording(tmp_path / "a.mcap") as recording:
+        (made,) = export(recording, "mp4", out)
+    assert {each.name for each in out.iterdir()} == {"trial.mp4", "trial.avi", made.path.name}
+    assert {(out / name).read_bytes() for name in ("trial.mp4", "trial.avi")} == {b"mine"}
+
+
 def test_where_no_film_can_be_written_that_is_said(tmp_path, monkeypatch):
     record(tmp_path / "a.mcap", [[picture(1)]])
     monkeypatch.setattr("nep.recordings.film.CONTAINERS", ())

@@ -157,6 +157,9 @@ def test_the_keys_point_at_a_pixel_and_enter_publishes_it(qtbot, window, panel) 
     view.zoom_by(8)
     for _step in range(12):
         QTest.keyClick(view, Qt.Key.Key_Down, SHIFT)
+    view.zoom_by(0.5)
+    view.repaint()
+    assert view._under_mouse().startswith(f"({view.pointed[0]}, {view.pointed[1]})"), "its value is told"
     assert view.rect().contains(view._view_of(view.pointed).toPoint()), "an enlarged picture goes along"
     QTest.mouseMove(view, QPoint(30, 30))
     qtbot.waitUntil(lambda: view.pointed is None)
