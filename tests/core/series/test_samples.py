@@ -246,7 +246,8 @@ def test_what_was_drawn_before_is_drawn_as_if_for_the_first_time(seed, limit, co
         span_s = float(random.choice([10.0, 10.0, 3.0, 1e-40]))
         fresh = Samples()
         fresh.extend(samples.times.copy(), samples.values.copy(), samples.gaps.copy())
-        end_s = now_s - float(random.choice([0.0, 0.0, random.uniform(0, 5)]))  # a person looks back
+        # a person looks back, or another curve is further on
+        end_s = now_s - float(random.choice([0.0, random.uniform(0, 5), -random.uniform(0, 3)]))
         one, two = (each.line(end_s - span_s, end_s, columns) for each in (samples, fresh))
         assert np.array_equal(one.times, two.times)
         assert np.array_equal(one.values, two.values, equal_nan=True)
