@@ -9,7 +9,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import cast, get_args
 
 import pytest
 from msgpack import packb  # type: ignore[import-untyped]
@@ -48,6 +48,7 @@ from nep.programs.doctor.facts import (
     PortFact,
     ProcessFact,
     ProgramFact,
+    Reach,
 )
 from nep.protocol.encoding import decode_answer, decode_request
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
@@ -282,6 +283,7 @@ def test_findings_of_the_doctor() -> None:
         replace(well, view=None, is_known=False),
         replace(well, view=None, master_port=PortFact(7780, "", True, other)),
         replace(well, view=None, master_port=None),
+        *(replace(well, view=None, master_port=None, reach=reach) for reach in get_args(Reach)),
         replace(well, masters=((master, 7780), (other, None)), loopback="Xx", now_s=1.0),
         replace(well, packages=(PackageFact("nep", "0.1", "/zz"),), joins_originals=False),
         replace(well, strange_files=("zz.py",), shadow="zz.py", clocks=(ClockFact("zz", 3.0),)),

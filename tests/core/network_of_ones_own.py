@@ -14,16 +14,22 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 def alone(
-    *arguments: str, up: bool, timeout_s: float, **environment: str
+    *arguments: str, up: bool, timeout_s: float, silent: str = "", **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run this Python with the arguments there. Skips when this computer does not permit that."""
+    """Run this Python with the arguments there. Skips when this computer does not permit that.
+
+    `silent`: an address of that network (10.9.9.1/24) whose neighbours never answer, as behind a firewall.
+    """
     unshare = shutil.which("unshare")
     if unshare is None or shutil.which("ip") is None:
         pytest.skip("a network of one's own needs Linux with unshare and ip")
     if subprocess.run([unshare, "-rn", "true"], check=False, capture_output=True).returncode:
         pytest.skip("this computer does not permit networks of one's own (unshare -rn)")
     first = "ip link set lo up; " if up else ""
-    return subprocess.run(
+    if silent:  # what goes into such a device is dropped without a word
+        first += "ip link add fire type ifb && ip link set fire up && "
+        first += f"ip address add {silent} dev fire || exit 77; "
+    done = subprocess.run(
         [unshare, "-rn", "sh", "-c", f'{first}exec "$@"', "sh", sys.executable, *arguments],
         cwd=REPOSITORY,
         env={**os.environ, "PYTHONPATH": str(REPOSITORY), "NEP_MASTER": "127.0.0.1:7780", **environment},
@@ -32,3 +38,6 @@ def alone(
         timeout=timeout_s,
         check=False,
     )
+    if silent and done.returncode == 77:
+        pytest.skip("this computer has no network that swallows everything (ifb)")
+    return done

@@ -29,6 +29,7 @@ from nep.programs.doctor.facts import (
     ProgramFact,
 )
 from nep.programs.doctor.finding import Finding
+from nep.programs.doctor.listen import reach_of
 from nep.programs.doctor.network import loopback, masters
 from nep.programs.gateway.portmap import default_file
 from nep.protocol.graph_view import GraphView
@@ -118,6 +119,7 @@ def _with_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | No
     holder = master_port.holder if master_port is not None else None
     master_pid = holder.pid if view is not None and holder is not None else None
     elsewhere = view is None and master_port is not None and master_port.is_taken
+    is_far = view is None and is_known and master_port is None
     found = replace(
         facts,
         view=view,
@@ -128,6 +130,7 @@ def _with_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | No
         master_install=installs.install_of(master_pid) if master_pid is not None else None,
         is_known=is_known,
         answers_at=_answers_at(chosen) if elsewhere else "",
+        reach=reach_of(f"tcp://{chosen}") if is_far else None,
     )
     return found, master_pid, listening
 

@@ -24,8 +24,8 @@ __all__ = [
 ]
 
 Reach = Literal["", "elsewhere", "refused", "timeout", "unknown"]
-"""Why a publisher's address is not reached from here: only its own computer reaches it, nobody listens there,
-nothing answers, or another reason that the system gives; "" when it is reached, or was not tried."""
+"""Why an address is not reached from here: only its own computer reaches it, nobody listens there, nothing
+answers, or another reason that the system gives; "" when it is reached, or was not tried."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,9 @@ class Facts:
     when that is not known. `programs` are those of this computer that have nodes, as far as the system tells
     of their files. Not `is_known`: no computer has the name that the master's address begins with.
     `answers_at` is the loopback address at which a master answers when none does at `address`, which is of
-    this computer, too; "" when none answers there, either.
+    this computer, too; "" when none answers there, either. `reach` is why the address of a master that is
+    on another computer and does not answer is not reached, "" when somebody is there, None when it was not
+    tried.
     """
 
     now_s: float
@@ -134,6 +136,7 @@ class Facts:
     programs: tuple[ProgramFact, ...] = ()
     is_known: bool = True
     answers_at: str = ""
+    reach: Reach | None = None
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from nep.i18n import _, ngettext, number
 from nep.programs.doctor.facts import Facts, PortFact, ProcessFact
 from nep.programs.doctor.finding import Finding, ago
-from nep.system.addresses import host_of, is_loopback
+from nep.system.addresses import host_of
 
 __all__ = ["clocks", "loopback", "master_alerts", "masters", "originals", "ports"]
 
@@ -46,6 +46,8 @@ def masters(facts: Facts) -> Iterator[Finding]:
         yield _hung(facts, holder)
     elif port is not None and port.is_taken:
         yield _foreign(facts, holder)
+    elif facts.reach is not None:
+        yield _unreached(facts)
     else:
         yield _none(facts)
     yield from _several(facts)
@@ -112,11 +114,31 @@ def _none(facts: Facts) -> Finding:
         _("No master runs at {address}, so new programs cannot find each other.").format(
             address=facts.address
         ),
-        _("Start one.")
-        if is_loopback(facts.address)
-        else _("Start one on that computer, and check that it is in the same network."),
+        _("Start one."),
         command="nep master" if number == "7780" else f"nep master --port {number}",
     )
+
+
+def _unreached(facts: Facts) -> Finding:
+    """It is on another computer: how that was not reached tells what is to be looked at there."""
+    host, _colon, port = facts.address.rpartition(":")
+    if facts.reach == "timeout":
+        sentence = _("Nothing answers at {address}, so no master is found.")
+        mend = _(
+            "{host} is switched off, in another network, or its firewall keeps programs out. Let NEP Studio "
+            "(Python) through the firewall there."
+        )
+    elif facts.reach == "refused":
+        sentence = _("{host} is there, but nobody listens at its port {port} for other computers.")
+        mend = _("Start NEP Studio on that computer, and let other computers connect in its settings.")
+    elif facts.reach:
+        sentence = _("There is no way to {address}, so no master is found.")
+        mend = _("Look whether both computers are in the same network.")
+    else:
+        sentence = _("{host} answers at port {port}, but no master does.")
+        mend = _("It hangs, or another program holds that port. Start NEP Studio anew on that computer.")
+    holes = {"address": facts.address, "host": host, "port": port}
+    return Finding("master:unreached", "error", sentence.format(**holes), mend.format(**holes))
 
 
 def _running(facts: Facts, holder: ProcessFact | None) -> Finding:

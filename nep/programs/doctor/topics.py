@@ -81,7 +81,17 @@ def _nobody(facts: TopicFacts) -> Iterator[Finding]:
         more = len(known) - len(some)
         names = [*some, _("{count} more").format(count=more)] if more else some
         yield Finding("topic:nobody", "error", sentence, words.format(topics=listed(names) if names else ""))
-    if not facts.is_shared and is_loopback(facts.address):
+    if facts.is_shared:
+        yield Finding(
+            "topic:shared",
+            "info",
+            _("Other computers may connect to the master at {address}.").format(address=facts.address),
+            _(
+                "Is the program on another computer? Then it needs the master's address in the network as "
+                "its NEP_MASTER, and the master's computer a firewall that lets NEP Studio (Python) through."
+            ),
+        )
+    elif is_loopback(facts.address):
         yield Finding(
             "topic:closed",
             "info",

@@ -42,6 +42,15 @@ def test_with_the_loopback_down_studio_says_so_once_with_the_next_step(tmp_path:
     assert lines == "1 line"
 
 
+def test_a_firewall_that_swallows_everything_is_told_by_the_doctor() -> None:
+    done = alone(
+        "-m", "nep", "doctor", up=True, timeout_s=60, silent="10.9.9.1/24", NEP_MASTER="10.9.9.2:7780"
+    )  # fmt: skip
+    assert "Nothing answers at 10.9.9.2:7780, so no master is found." in done.stdout, done.stderr
+    assert "10.9.9.2 is switched off, in another network, or its firewall" in " ".join(done.stdout.split())
+    assert "Traceback" not in done.stderr
+
+
 @pytest.mark.e2e
 @pytest.mark.slow
 @pytest.mark.timeout(180)

@@ -102,8 +102,24 @@ def test_no_master_says_how_to_start_one():
     assert (one.severity, one.command) == ("error", "nep master")
     other = found(view=None, address="127.0.0.1:9", master_port=PortFact(9, "", False))["master:none"]
     assert other.command == "nep master --port 9"
-    far = found(view=None, address="10.0.0.5:7780", master_port=None)["master:none"]
-    assert "on that computer" in far.mend
+
+
+@pytest.mark.parametrize(
+    ("reach", "sentence", "mend"),
+    [
+        ("timeout", "Nothing answers at 10.0.0.5:7780, so no master is found.", "10.0.0.5 is switched off"),
+        ("refused", "10.0.0.5 is there, but nobody listens at its port 7780", "let other computers connect"),
+        ("unknown", "There is no way to 10.0.0.5:7780", "in the same network"),
+        ("", "10.0.0.5 answers at port 7780, but no master does.", "another program holds that port"),
+    ],
+)
+def test_a_master_on_another_computer_that_does_not_answer_is_told_by_how(reach, sentence, mend):
+    made = found(view=None, address="10.0.0.5:7780", master_port=None, reach=reach)
+    one = made["master:unreached"]
+    assert (one.severity, one.command) == ("error", "")  # it can't be started from here
+    assert one.sentence.startswith(sentence)
+    assert mend in one.mend
+    assert "master:none" not in made
 
 
 def test_a_master_whose_name_nobody_knows_is_not_told_to_be_started():

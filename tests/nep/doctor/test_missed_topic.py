@@ -91,6 +91,9 @@ def test_who_is_not_there_at_all():
     alone = found(topic="/speech", publishers=(), others={})
     assert alone["topic:nobody"].mend == "Start the program that does; nothing else is published, either."
     assert "topic:closed" not in alone  # it serves other computers
+    assert alone["topic:shared"].severity == "info"
+    assert "firewall" in alone["topic:shared"].mend
+    assert "topic:shared" not in nobody
     service = found(topic="/restart", publishers=(), services=("/restart",))["topic:service"]
     assert service.instead == "/restart"
 
