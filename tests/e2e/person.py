@@ -37,9 +37,13 @@ class Person:
 
     # -- looking ----------------------------------------------------------------------------------
 
-    def look(self) -> list[Seen]:
-        """Every widget that can be seen now; nothing while the window is not up."""
-        seen = self._ask("look")
+    def look(self, **wanted: str | bool) -> list[Seen]:
+        """Every widget that can be seen now; nothing while the window is not up.
+
+        ``wanted``: those that are ``named`` so (name or text), of a ``kind``, that say words (``says``: in
+        name, text or description) or that are menus (``is_menu``). Asking for few disturbs the window least.
+        """
+        seen = self._ask("look", wanted=wanted)
         assert not isinstance(seen, dict), seen
         return seen or []
 
@@ -47,10 +51,8 @@ class Person:
         """Those with this accessible name or text, and these other properties."""
         return [
             each
-            for each in self.look()
-            if (not name or name in (each["name"], each["text"]))
-            and each["rect"][2] > 0
-            and all(each[key] == value for key, value in wanted.items())
+            for each in self.look(named=name, kind=wanted.get("kind", ""))
+            if each["rect"][2] > 0 and all(each[key] == value for key, value in wanted.items())
         ]
 
     def find(self, name: str = "", within_s: float = STEP_S, **wanted: object) -> Seen:
@@ -61,7 +63,7 @@ class Person:
         """Wait until something in the window says these words; all that it says."""
 
         def found() -> str:
-            seen = self.look()
+            seen = self.look(says=words)
             texts = (str(each[key]) for each in seen for key in ("name", "text", "description"))
             return next((text for text in texts if words in text), "")
 
@@ -112,12 +114,12 @@ class Person:
 
         One that the window closes, as it does when the blocks come to show after the start, is opened again.
         """
-        until(lambda: not self._menus("popup"), "the menu before it closes")
+        until(lambda: not self.menus("popup"), "the menu before it closes")
         self._entry("bar", menu)
         try:
             self._entry("popup", entry, AGAIN_S)
         except AssertionError:
-            if not self._menus("popup"):
+            if not self.menus("popup"):
                 self._entry("bar", menu)
             self._entry("popup", entry)
 
@@ -125,12 +127,13 @@ class Person:
         """Choose an entry of the menu that is open."""
         self._entry("popup", entry)
 
-    def _menus(self, kind: str) -> list[Seen]:
-        return [each for each in self.look() if each.get("menu") == kind]
+    def menus(self, kind: str) -> list[Seen]:
+        """The menus that can be seen: of the "bar", or what has opened, "popup"."""
+        return [each for each in self.look(is_menu=True) if each["menu"] == kind]
 
     def _entry(self, kind: str, text: str, within_s: float = STEP_S) -> None:
         def found() -> Seen | None:
-            entries = [entry for each in self._menus(kind) for entry in each.get("entries", [])]
+            entries = [entry for each in self.menus(kind) for entry in each.get("entries", [])]
             return next((e for e in entries if e["text"].replace("&", "").split("\t")[0] == text), None)
 
         self.screen.click(*middle(until(found, f"no entry {text!r}", within_s)["rect"]))

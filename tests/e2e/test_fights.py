@@ -47,7 +47,7 @@ def test_who_lost_is_told_and_mended(start: Callable[..., Studio], tmp_path: Pat
         assert bubbles(studio)
     with film.step("Put one after the other: one script, no problem, no warning"):
         studio.click("Put one after the other")
-        until(lambda: not any(BOTH in str(each["name"]) for each in studio.look()), "the problem is gone")
+        until(lambda: not studio.look(says=BOTH), "the problem is gone")
         until(lambda: not bubbles(studio), "the blocks have changed: the warning goes")
         inside = "document.querySelector('[data-id=one] [data-id=walk]') !== null"
         until(lambda: studio.page(inside), "the second script hangs below the first")

@@ -156,9 +156,9 @@ def greeting(studio: Studio, film: Film, fingers: Fingers, ears: Ears) -> None:
     with film.step("The room's menu, Shift+F10: Pepper looks straight ahead again"):
         to_room(fingers)
         fingers.press("F10", held=["Shift"])
-        until(lambda: [each for each in studio.look() if each.get("menu") == "popup"], "the menu is open")
+        until(lambda: studio.menus("popup"), "the menu is open")
         fingers.press("Up", "Return")
-        until(lambda: not [each for each in studio.look() if each.get("menu") == "popup"], "it is done")
+        until(lambda: not studio.menus("popup"), "it is done")
     with film.step("F5: it sees Aiko and greets her"):
         fingers.press("F5")
         ears.hear("Nice to see you")

@@ -30,7 +30,7 @@ def mine(start: Callable[..., Studio], tmp_path: Path) -> Studio:
 
 def test_alt_and_a_letter_opens_a_menu_and_a_letter_does_it(mine: Studio) -> None:
     mine.screen.key("f", ["Alt"])
-    until(lambda: any(each.get("menu") == "popup" for each in mine.look()), "File is open")
+    until(lambda: mine.menus("popup"), "File is open")
     mine.screen.key("n")
     until(lambda: len(tabs(mine)) == 2, lambda: f"a new behaviour: {tabs(mine)}")
 

@@ -128,7 +128,7 @@ def test_stop_while_something_of_a_block_is_open_or_in_the_hand(turning: Studio)
 
 def menus(studio: Studio) -> list[Seen]:
     """The menus of ours that are open."""
-    return [each for each in studio.look() if each.get("menu") == "popup"]
+    return studio.menus("popup")
 
 
 def a_menu_in_a_menu(studio: Studio) -> None:

@@ -8,15 +8,17 @@ from collections.abc import Callable
 from typing import TypeVar
 
 T = TypeVar("T")
-LOOK_S = 0.05
+LOOK_S, MOST_LOOK_S = 0.05, 0.2
+"""How often somebody asks: what is soon is seen soon, and what takes long is not disturbed by the asking."""
 
 
 def until(true: Callable[[], T], what: str | Callable[[], str], within_s: float = 40.0) -> T:
     """Ask until the answer is true, and return it; fails with `what`, or what it says then."""
     pause = threading.Event()
-    end = time.monotonic() + within_s
+    end, look_s = time.monotonic() + within_s, LOOK_S
     while not (found := true()):
         if time.monotonic() >= end:
             raise AssertionError(f"not within {within_s:g} s: {what if isinstance(what, str) else what()}")
-        pause.wait(LOOK_S)
+        pause.wait(look_s)
+        look_s = min(look_s * 1.2, MOST_LOOK_S)
     return found

@@ -11,6 +11,7 @@ import os
 import sys
 import threading
 import time
+from functools import cached_property
 from typing import NamedTuple
 
 CELL_ROLE = 0x0100  # Qt.UserRole: what a cell of our tables shows
@@ -75,7 +76,7 @@ def _looker(reply):
                 elif request["do"] == "reactions":
                     reply(request["n"], reactions.told())
                 else:
-                    reply(request["n"], _widgets(application))
+                    reply(request["n"], _widgets(application, _Wanted(**request.get("wanted", {}))))
             except Exception as error:  # noqa: BLE001  the tests are told, Studio goes on
                 reply(request["n"], {"error": f"{type(error).__name__}: {error}"})
             _looked[0] += time.monotonic() - began_s
@@ -143,20 +144,26 @@ def _reactions(application):
 
 def _script(request, reply) -> None:
     """What a script that only reads finds in the page of the block editor."""
-    page = next((view.page() for view in _web_views()), None)
-    if page is None:
+    view = _web_view_that_shows()
+    if view is None:
         reply(request["n"], None)
         return
-    page.runJavaScript(f"JSON.stringify({request['script']})", lambda got: reply(request["n"], got))
+    view.page().runJavaScript(f"JSON.stringify({request['script']})", lambda got: reply(request["n"], got))
 
 
-def _web_views():
-    """The pages that can be seen."""
+_known: list = []  # the view that showed the last time: looking for it takes longer than most scripts
+
+
+def _web_view_that_shows():
+    """The page that can be seen; None when there is none."""
+    import shiboken6
     from PySide6.QtWidgets import QApplication
 
-    kind = _web_view()
-    views = [each for each in QApplication.allWidgets() if kind is not None and isinstance(each, kind)]
-    return [view for view in views if view.isVisible()]
+    if not (_known and shiboken6.isValid(_known[0]) and _known[0].isVisible()):
+        kind = _web_view()
+        views = [each for each in QApplication.allWidgets() if kind is not None and isinstance(each, kind)]
+        _known[:] = [view for view in views if view.isVisible()][:1]
+    return _known[0] if _known else None
 
 
 def _web_view():
@@ -164,51 +171,91 @@ def _web_view():
     return getattr(sys.modules.get("PySide6.QtWebEngineWidgets"), "QWebEngineView", None)
 
 
-class _Around(NamedTuple):
-    """What a widget has from those around it, so that nobody asks for it again for each widget in them."""
+class _Wanted(NamedTuple):
+    """Which widgets the tests ask for; with nothing said, all."""
 
-    shown: object = None  # the part of the screen that they leave, a QRect
-    panel: str = ""
-    is_fresh: bool = False  # in a banner that has just come and lets presses through: nobody aimed at it
+    kind: str = ""
+    named: str = ""  # its name or its text
+    says: str = ""  # words in its name, its text or its description
+    is_menu: bool = False
+
+    def has(self, widget) -> bool:
+        if self.kind and type(widget).__name__ != self.kind:
+            return False
+        if self.is_menu and not _is_menu(widget):
+            return False
+        if self.named:
+            return self.named in (widget.accessibleName(), _text(widget))
+        if self.says:
+            words = (widget.accessibleName(), _text(widget), widget.accessibleDescription())
+            return any(self.says in each for each in words)
+        return True
 
 
-def _widgets(application) -> list[dict]:
-    """Every widget that can be seen, windows first. Quick: the window can do nothing else meanwhile."""
+class _Around:
+    """What a widget and those around it leave of the screen, and the panel they are in; found when asked."""
+
+    def __init__(self, widget, outer: _Around | None) -> None:
+        self._widget, self._outer = widget, outer
+
+    @cached_property
+    def shown(self):
+        """The part of the screen, a QRect."""
+        from PySide6.QtCore import QPoint, QRect
+
+        place = QRect(self._widget.mapToGlobal(QPoint(0, 0)), self._widget.size())
+        return place if self._outer is None else place & self._outer.shown
+
+    @cached_property
+    def panel(self) -> str:
+        from PySide6.QtWidgets import QDockWidget
+
+        if isinstance(self._widget, QDockWidget):
+            return self._widget.objectName().removeprefix("panel.")
+        return "" if self._outer is None else self._outer.panel
+
+    @cached_property
+    def is_fresh(self) -> bool:
+        """In a banner that has just come and lets presses through: nobody aimed at it."""
+        from PySide6.QtCore import Qt
+
+        if type(self._widget).__name__ == "AlertBanner":
+            return self._widget.testAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        return self._outer is not None and self._outer.is_fresh
+
+
+def _widgets(application, wanted: _Wanted) -> list[dict]:
+    """Every widget that can be seen and is wanted, windows first.
+
+    Quick: the window can do nothing else meanwhile.
+    """
     from PySide6.QtWidgets import QWidget
 
     seen, focus, kind = [], application.focusWidget(), _web_view()
 
-    def walk(widget, around: _Around) -> None:
-        around = _inside(widget, around)
-        seen.append(_tell(widget, around, focus, kind))
+    def walk(widget, outer: _Around | None) -> None:
+        around = _Around(widget, outer)
+        if wanted.has(widget):
+            seen.append(_tell(widget, around, focus, kind))
         for child in widget.children():
             if isinstance(child, QWidget) and child.isVisible() and not child.isWindow():
                 walk(child, around)
 
     for window in application.topLevelWidgets():
         if window.isVisible():
-            walk(window, _Around())
+            walk(window, None)
     return seen
 
 
-def _inside(widget, around: _Around) -> _Around:
-    """What those have around them that are in this widget."""
-    from PySide6.QtCore import QPoint, QRect, Qt
-    from PySide6.QtWidgets import QDockWidget
+def _is_menu(widget) -> bool:
+    from PySide6.QtWidgets import QMenu, QMenuBar
 
-    place = QRect(widget.mapToGlobal(QPoint(0, 0)), widget.size())
-    shown = place if around.shown is None else place & around.shown
-    panel, is_fresh = around.panel, around.is_fresh
-    if isinstance(widget, QDockWidget):
-        panel = widget.objectName().removeprefix("panel.")
-    if type(widget).__name__ == "AlertBanner":
-        is_fresh = widget.testAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-    return _Around(shown, panel, is_fresh)
+    return isinstance(widget, (QMenu, QMenuBar))
 
 
 def _tell(widget, around: _Around, focus, web_view) -> dict:
     from PySide6.QtCore import QRect
-    from PySide6.QtWidgets import QAbstractItemView, QMenu, QMenuBar
+    from PySide6.QtWidgets import QAbstractItemView, QMenuBar
 
     shown = around.shown
     told = {
@@ -230,7 +277,7 @@ def _tell(widget, around: _Around, focus, web_view) -> dict:
         told["pid"] = widget.page().renderProcessPid()
     if isinstance(widget, QAbstractItemView):
         told["rows"] = _rows(widget)
-    if isinstance(widget, (QMenu, QMenuBar)):
+    if _is_menu(widget):
         told["menu"] = "bar" if isinstance(widget, QMenuBar) else "popup"
         told["entries"] = [
             {"text": action.text(), "rect": _at(widget, QRect(widget.actionGeometry(action)))}
