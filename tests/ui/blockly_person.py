@@ -23,9 +23,10 @@ UNKNOWN = json.loads((DATA / "unknown.json").read_text("utf-8"))
 TOKENS = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
 START = {"type": "events_started", "id": "start", "x": 56, "y": 56}
 WAIT_MS = 30_000
+PAINTED = "performance.getEntriesByName('first-contentful-paint').length > 0"
 LISTEN = """
 window.nepEvents = [];
-for (const kind of ['pointerdown', 'pointerup', 'keydown', 'focusin', 'focusout', 'resize']) {
+for (const kind of ['pointerdown', 'pointerup', 'keydown', 'focusin', 'focusout', 'resize', 'wheel']) {
     window.addEventListener(kind, event => {
         const {target, clientX, clientY, button, key} = event;
         const told = [Math.round(performance.now()), kind, clientX, clientY, button, key, target.tagName,
@@ -97,7 +98,10 @@ class Person:
         def seen() -> None:
             assert true(), what
 
-        self._qtbot.waitUntil(seen, timeout=WAIT_MS)
+        try:
+            self._qtbot.waitUntil(seen, timeout=WAIT_MS)
+        except self._qtbot.TimeoutError as error:
+            raise AssertionError(f"never {what}. {self.story()}") from error
 
     def newest(self) -> dict:
         got: list[WorkspaceJson] = []
@@ -140,7 +144,12 @@ class Person:
         QTest.keyClick(self.target, key, modifiers)
 
     def wheel(self, by: int) -> None:
-        """Turn the wheel over the middle of the blocks; a negative way shows what is below."""
+        """Turn the wheel over the middle of the blocks; a negative way shows what is below.
+
+        Once the page has been painted: before that it drops a turn, and with it all that follow within half
+        a second, which are one movement to it.
+        """
+        self.wait_for(PAINTED)
         middle = QPointF(self.target.rect().center())
         event = QWheelEvent(
             middle,

@@ -43,13 +43,9 @@ def test_the_script_with_the_keys_stays_drawn_and_keeps_them(person):
     them = person(script("here", 40, 40), script("below", 40, 1400))
     them.view.show_block("here_wait")
     them.wait_for(FOCUSED, "here_wait")
-    bottom = "document.querySelector('[data-id=here]').getBoundingClientRect().bottom"
-
-    def is_far() -> bool:
-        them.wheel(-600)  # again and again: the page itself may still be bringing the block into sight
-        return them.ask(bottom) < -250
-
-    them.until(is_far, "the script is far above")
+    for _ in range(12):
+        them.wheel(-600)
+    them.wait_for("document.querySelector('[data-id=here]').getBoundingClientRect().bottom < -250")
     them.wait_for(drawn("here", "below"), ["here", "below"])
     assert them.ask(FOCUSED) == "here_wait"
 
