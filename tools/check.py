@@ -63,12 +63,12 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Options of pytest-xdist: one process more than processors, six at most; tests/conftest.py groups tests.
+    """Options of pytest-xdist: two processes more than processors, six at most; tests/conftest.py groups them.
 
-    Most tests wait for processes and windows: with one each processor, a third of the time is idle. With two
-    more everything took a third longer.
+    Many tests wait for processes and windows: on two processors, with one more a fifth of the time was idle,
+    with two more a fiftieth (1381 and 1300 s).
     """
-    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 1)
+    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 2)
     return ("-n", str(workers), "--dist", "loadfile")
 
 
