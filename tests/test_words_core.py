@@ -283,6 +283,7 @@ def test_findings_of_the_doctor() -> None:
         replace(well, view=None, is_known=False),
         replace(well, view=None, master_port=PortFact(7780, "", True, other)),
         replace(well, view=None, master_port=None),
+        replace(well, view=None, master_port=None, address="10.0.0.5:7780"),
         *(replace(well, view=None, master_port=None, reach=reach) for reach in get_args(Reach)),
         replace(well, masters=((master, 7780), (other, None)), loopback="Xx", now_s=1.0),
         replace(well, packages=(PackageFact("nep", "0.1", "/zz"),), joins_originals=False),

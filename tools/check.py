@@ -63,7 +63,7 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Options of pytest-xdist: two processes more than processors, six at most; tests/conftest.py groups them.
+    """Options of pytest-xdist: two processes more than processors, six at most. tests/conftest.py groups.
 
     Many tests wait for processes and windows: on two processors, with one more a fifth of the time was idle,
     with two more a fiftieth (1381 and 1300 s).

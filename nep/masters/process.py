@@ -166,12 +166,12 @@ def start_process(
         start_new_session=True,
         creationflags=detached,
     )
-    deadline, asked_s = time.monotonic() + timeout_s, 0.5
-    while (left := deadline - time.monotonic()) > 0 and process.poll() is None:
+    began, asked_s = time.monotonic(), 0.5
+    while (left := began + timeout_s - time.monotonic()) > 0 and process.poll() is None:
         if is_running(chosen, min(asked_s, left)):
             return process
         asked_s = min(2 * asked_s, _ASKED_AT_MOST_S)  # a busy computer may need longer for every answer
     if process.poll() is None:
         process.kill()
     process.wait(5.0)
-    raise MasterUnreachable(chosen, timeout_s)
+    raise MasterUnreachable(chosen, round(time.monotonic() - began, 1))

@@ -21,6 +21,7 @@ from app.core.reports.crash import crash_extra, end_words, is_crash, split_trace
 from app.robots.identity import Identity
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
+from nep.system.addresses import is_loopback
 
 END_WAIT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
@@ -121,9 +122,11 @@ class Launcher:
         """The virtual robots that a person started here and did not end, each with its model."""
         self.ended: frozenset[str] = frozenset()
         """The virtual robots started here whose processes have ended by themselves."""
+        sentence = (
+            _("The master can't be started.") if is_loopback(address) else _("The master does not answer.")
+        )
         self._master = MasterStart(
-            address,
-            lambda why: post_event(LaunchFailed("master", _("The master can't be started."), why, False)),
+            address, lambda why: post_event(LaunchFailed("master", sentence, why, False))
         )
 
     @property

@@ -142,13 +142,19 @@ def _answers_at(address: str) -> str:
 
 
 def start_obstacle(address: str | None = None) -> Finding | None:
-    """Why no master can be started at the address; None when nothing is known to be in its way."""
+    """Why no master can be started at the address; None when nothing is known to be in its way.
+
+    In the way is also that it is an address of the network: a master starts at loopback alone.
+    """
     chosen = master_address(address)
-    here = _is_here(chosen)
-    port = _port(int(chosen.rpartition(":")[2]), "", processes.listening()) if here else None
-    facts = Facts(time.time(), chosen, sys.platform, {}, "", master_port=port, loopback=loopback_problem())
+    facts = Facts(time.time(), chosen, sys.platform, {}, "", loopback=loopback_problem())
+    if is_loopback(chosen):
+        port = _port(int(chosen.rpartition(":")[2]), "", processes.listening())
+        facts = replace(facts, master_port=port)
+    else:
+        facts, *_more = _with_master(facts)
     for finding in (*loopback(facts), *masters(facts)):
-        if finding.id in {"loopback", "master:foreign", "master:hung"} and finding.severity == "error":
+        if finding.severity == "error" and finding.id != "master:none":
             return finding
     return None
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from nep.i18n import _, ngettext, number
 from nep.programs.doctor.facts import Facts, PortFact, ProcessFact
 from nep.programs.doctor.finding import Finding, ago
-from nep.system.addresses import host_of
+from nep.system.addresses import host_of, is_loopback
 
 __all__ = ["clocks", "loopback", "master_alerts", "masters", "originals", "ports"]
 
@@ -48,6 +48,8 @@ def masters(facts: Facts) -> Iterator[Finding]:
         yield _foreign(facts, holder)
     elif facts.reach is not None:
         yield _unreached(facts)
+    elif not is_loopback(facts.address):
+        yield _never_there(facts)
     else:
         yield _none(facts)
     yield from _several(facts)
@@ -116,6 +118,22 @@ def _none(facts: Facts) -> Finding:
         ),
         _("Start one."),
         command="nep master" if number == "7780" else f"nep master --port {number}",
+    )
+
+
+def _never_there(facts: Facts) -> Finding:
+    """It is asked by an address of the network, and none runs here; one would begin at loopback alone."""
+    own = f"127.0.0.1:{facts.address.rpartition(':')[2]}"
+    return Finding(
+        "master:network",
+        "error",
+        _("No master runs at {address}: one begins at {own}, for this computer.").format(
+            address=facts.address, own=own
+        ),
+        _(
+            "Use {own} in programs of this computer (NEP_MASTER), and let other computers connect in the "
+            "settings of Studio."
+        ).format(own=own),
     )
 
 

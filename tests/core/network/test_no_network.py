@@ -8,6 +8,7 @@ import pytest
 
 from tests.core.network_of_ones_own import alone
 
+FIREWALL = "10.9.9.2 is switched off, in another network, or its firewall keeps programs out."
 LOOK = """
 import sys, threading, time
 from pathlib import Path
@@ -47,8 +48,20 @@ def test_a_firewall_that_swallows_everything_is_told_by_the_doctor() -> None:
         "-m", "nep", "doctor", up=True, timeout_s=60, silent="10.9.9.1/24", NEP_MASTER="10.9.9.2:7780"
     )  # fmt: skip
     assert "Nothing answers at 10.9.9.2:7780, so no master is found." in done.stdout, done.stderr
-    assert "10.9.9.2 is switched off, in another network, or its firewall" in " ".join(done.stdout.split())
+    assert FIREWALL in " ".join(done.stdout.split())
     assert "Traceback" not in done.stderr
+
+
+def test_behind_such_a_firewall_studio_says_what_keeps_it_from_its_master(tmp_path: Path) -> None:
+    done = alone(
+        "-c", LOOK, str(tmp_path), up=True, timeout_s=60, silent="10.9.9.1/24", NEP_MASTER="10.9.9.2:7780"
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+    alert, lines = done.stdout.splitlines()
+    said = "Nothing answers at 10.9.9.2:7780, so no master is found."
+    assert alert.startswith(f"companion:master The master does not answer. {said} {FIREWALL}")
+    assert alert.endswith("help.doctor")
+    assert lines == "1 line"
 
 
 @pytest.mark.e2e

@@ -104,6 +104,13 @@ def test_no_master_says_how_to_start_one():
     assert other.command == "nep master --port 9"
 
 
+def test_a_master_is_not_told_to_be_started_at_an_address_of_the_network():
+    made = found(view=None, address="10.0.0.5:7780", master_port=PortFact(7780, "", False))
+    assert made["master:network"].command == ""
+    assert "127.0.0.1:7780" in made["master:network"].mend
+    assert "master:none" not in made
+
+
 @pytest.mark.parametrize(
     ("reach", "sentence", "mend"),
     [

@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from nep.programs.doctor import collect_topic, look, topic_findings
+from nep.programs.doctor import collect_topic, look, start_obstacle, topic_findings
 from nep.programs.doctor.diagnosis import PARTS
 from nep.programs.doctor.listen import reach_of
 from tests.nep.programs import running
@@ -95,6 +95,20 @@ def test_a_master_that_serves_this_computer_only_does_not_hang(master: Master, o
     assert found["master:closed"].severity == "error"
     assert f"127.0.0.1:{port_of(master.address)}" in found["master:closed"].sentence
     assert "master" in {each.id for each in look(master.address)}
+
+
+def test_at_an_address_of_the_network_no_master_is_started(master: Master, own: str) -> None:
+    closed = start_obstacle(f"{own}:{port_of(master.address)}")
+    assert closed is not None
+    assert closed.id == "master:closed"
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        free = probe.getsockname()[1]
+    nobody = start_obstacle(f"{own}:{free}")
+    assert nobody is not None
+    assert (nobody.id, nobody.command) == ("master:network", "")
+    assert f"one begins at 127.0.0.1:{free}" in nobody.sentence
+    assert f"Use 127.0.0.1:{free}" in nobody.mend
 
 
 def test_it_tells_what_is_found_so_far_and_comes_to_the_same_end(master: Master) -> None:
