@@ -68,3 +68,19 @@ def test_of_one_that_lost_little_little_is_read_and_every_loss_found(tmp_path, r
         made.is_complete = False  # then all of it is read
         assert losses_of(made) == found
     assert sum(read_bytes) - few > 3 * few
+
+
+@pytest.mark.parametrize("is_complete", [True, False])
+def test_what_came_late_is_not_lost(tmp_path, is_complete) -> None:
+    path = tmp_path / "a.mcap"
+    order = [*range(200), 205, *range(206, 400), 200, 201, *range(400, 600), 603, *range(604, 800)]
+    with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.0)) as writer:
+        for number in order:  # 200 to 204 are missing until 200 and 201 come; then 600 to 602
+            writer.post([json_message(number, "/a")])
+            assert writer.flush()
+    with Recording(path) as made:
+        assert made.figures()["/a"].lost == 6
+        made.is_complete = is_complete
+        marks = losses_of(made)["/a"]
+    assert [mark.count for mark in marks] == [3, 3]
+    assert marks[0].at_ns < marks[1].at_ns

@@ -91,7 +91,11 @@ def density_of(recording: Recording, start_ns: int, end_ns: int, buckets: int) -
 
 
 def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
-    """Where the recorder's figures of each topic grew: there something was lost, or was not kept."""
+    """Where the recorder's figures of each topic grew: there something was lost, or was not kept.
+
+    What came late was missing until then: it is taken from the newest marks before, so that all marks of a
+    topic are as many as are missing at the end.
+    """
     found: dict[str, list[LossMark]] = {}
     before: dict[str, int] = {}
     for at_ns, figures in _figures_that_grow(recording):
@@ -99,22 +103,35 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
             missing = _missing(each)
             grown = missing - before.get(topic, 0)
             before[topic] = missing
-            if grown <= 0:
-                continue
             marks = found.setdefault(topic, [])
-            if len(marks) < MOST_MARKS:
+            if grown <= 0:
+                _take_back(marks, -grown)
+            elif len(marks) < MOST_MARKS:
                 marks.append(LossMark(at_ns, grown))
             else:
                 marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + grown)
-    return {topic: tuple(marks) for topic, marks in found.items()}
+    if recording.is_complete:  # not all figures were read
+        before = {topic: _missing(each) for topic, each in recording.figures().items()}
+    for topic, marks in found.items():
+        _take_back(marks, sum(mark.count for mark in marks) - before.get(topic, 0))
+    return {topic: tuple(marks) for topic, marks in found.items() if marks}
+
+
+def _take_back(marks: list[LossMark], count: int) -> None:
+    """So many came after all: take them from the newest marks."""
+    while marks and count > 0:
+        newest = marks.pop()
+        if newest.count > count:
+            marks.append(LossMark(newest.at_ns, newest.count - count))
+        count -= newest.count
 
 
 def _figures_that_grow(recording: Recording) -> Iterator[tuple[int, Mapping[str, TopicFigures]]]:
     """The figures at every time when more was missing than before, found by halving.
 
-    What is missing only grows, and how much it is at the end stands in the file: between two times at which
-    it is the same nothing is read. So of a long recording that lost little, little is read; of one that was
-    not ended all of them.
+    What is missing grows, but for what comes late, and how much it is at the end stands in the file: between
+    two times at which it is the same nothing is read. So of a long recording that lost little, little is
+    read; of one that was not ended all of them.
     """
     if not recording.is_complete:
         yield from recording.figures_over_time()
