@@ -404,7 +404,7 @@ def test_a_program_file_writes_into_every_pipe(master, tmp_path):
             "PYTHONIOENCODING": "ascii",
             "PYTHONUTF8": "0",
         },
-        timeout=30,
+        timeout=120,
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, b"")
