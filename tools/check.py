@@ -63,12 +63,12 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Options of pytest-xdist: two processes more than processors, six at most. tests/conftest.py groups.
+    """Options of pytest-xdist: one process more than processors, six at most; tests/conftest.py groups tests.
 
-    Many tests wait for processes and windows: on two processors, with one more a fifth of the time was idle,
-    with two more a fiftieth (1381 and 1300 s).
+    Many tests wait for processes and windows: on two processors, with one more a fifth of the time is idle.
+    With two more all is done a little sooner, and some tests wait too long for a robot or a page.
     """
-    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 2)
+    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 1)
     return ("-n", str(workers), "--dist", "loadfile")
 
 

@@ -113,7 +113,8 @@ def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) 
         tick_until(session, lambda: stream.picture is not None)
         stream.close()
         said = session.fleet.invoke("Pepper", "say", {"text": "hi"})
-        tick_until(session, lambda: said.state == "succeeded")
+        tick_until(session, lambda: not said.running)
+        assert said.state == "succeeded", said
         walk = session.fleet.invoke("Pepper", "walk", {"distance": 2.0})
         tick_until(session, lambda: link.drawing is not None and link.drawing["moving"])
         assert link.state == "busy"
