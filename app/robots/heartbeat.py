@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import uuid
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 from nep.errors import NepError
+from nep.system.log_rarely import is_logged
 
 ALIVE_S = 0.2
+_log = logging.getLogger(__name__)
 
 Publish = Callable[[Mapping[str, object]], object]
 
@@ -24,6 +28,7 @@ class Heartbeat:
         self._changed = threading.Event()
         self._closing = False
         self._thread: threading.Thread | None = None
+        self._failures = 0
 
     def beat(self, robot: str, publish: Publish) -> None:
         """Keep this robot going until `rest`; ``publish`` sends on its command topic."""
@@ -63,3 +68,8 @@ class Heartbeat:
             publish(alive)
         except NepError:
             return  # it has gone, or this node has; the robot's watchdog does the rest
+        except BaseException:  # noqa: BLE001 - the other robots must be told all the same
+            self._failures += 1
+            if is_logged(self._failures):
+                with suppress(Exception):
+                    _log.exception("a sign of life can't be sent (%d so far)", self._failures)

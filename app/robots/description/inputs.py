@@ -16,10 +16,13 @@ from app.errors import InputProblem
 from app.robots.description.json_access import as_part, names, number, number_of, part, spoken, text
 from nep.i18n import _, listed, ngettext, translate
 from nep.i18n import number as number_text
+from nep.text import quotable
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _LENGTH, _ITEMS = ("minLength", "maxLength"), ("minItems", "maxItems")
 _DEEPEST = 40
+_MAX_WORD_LENGTH = 100
+_MAX_UNKNOWN_NAMED = 5  # looking for a similar name takes 20 µs, and a stranger may send any number of names
 _UNITS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"}
 
 
@@ -76,6 +79,8 @@ def pretty_number(value: float) -> str:
 
 def near_miss(wrong: str, known: Iterable[str]) -> str:
     """The known word that is close to a wrong one; "" when none is."""
+    if len(wrong) > _MAX_WORD_LENGTH:
+        return ""
     return next(iter(difflib.get_close_matches(wrong, list(known), n=1)), "")
 
 
@@ -198,12 +203,16 @@ def problems_of(parameters: tuple[Parameter, ...], given: object) -> tuple[Input
     if not isinstance(given, Mapping):
         return (InputProblem("", _("the input must be an object with named values")),)
     known = {parameter.name: parameter for parameter in parameters}
+    unknown = [name for name in given if name not in known]
     problems = []
-    for name in given:
-        if name not in known:
-            close = near_miss(str(name), known)
-            words = _("there is no “{word}”; did you mean “{close}”?") if close else _("there is no “{word}”")
-            problems.append(InputProblem("", words.format(word=name, close=close)))
+    for name in unknown[:_MAX_UNKNOWN_NAMED]:
+        close = near_miss(str(name), known)
+        words = _("there is no “{word}”; did you mean “{close}”?") if close else _("there is no “{word}”")
+        problems.append(InputProblem("", words.format(word=quotable(name), close=close)))
+    if len(unknown) > _MAX_UNKNOWN_NAMED:
+        count = len(unknown) - _MAX_UNKNOWN_NAMED
+        words = ngettext("{count} more name is unknown", "{count} more names are unknown", count)
+        problems.append(InputProblem("", words.format(count=count)))
     for name, parameter in known.items():
         if name in given and given[name] is None and parameter.nullable:
             continue
@@ -294,7 +303,9 @@ def _wrong_other(parameter: Parameter, others: Mapping[str, object], place: str)
     known = [field.name for field in parameter.fields]
     for name, item in others.items():
         if parameter.each is not None:
-            wrong = wrong_value(parameter.each, item, _("{place} “{name}”").format(place=place, name=name))
+            wrong = wrong_value(
+                parameter.each, item, _("{place} “{name}”").format(place=place, name=quotable(name))
+            )
             if wrong is not None:
                 return wrong
         elif known:
@@ -304,7 +315,7 @@ def _wrong_other(parameter: Parameter, others: Mapping[str, object], place: str)
                 if close
                 else _("{place} has no “{word}”")
             )
-            return words.format(place=place, word=name, close=close)
+            return words.format(place=place, word=quotable(name), close=close)
     return None
 
 

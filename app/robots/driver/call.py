@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import threading
 import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Protocol
+
+_JOIN_S = 2.0
+_log = logging.getLogger(__name__)
 
 
 class Clock(Protocol):
@@ -37,6 +41,14 @@ class Canceled(Exception):  # noqa: N818 - not an error: the word of the answer'
 
 class Failed(Exception):  # noqa: N818 - the word of the answer's state
     """The action can't be done; its sentence is shown to people: ``Failed("no ball in sight")``."""
+
+
+def _call_each(callbacks: Sequence[Callable[[], object]]) -> None:
+    for callback in callbacks:
+        try:
+            callback()
+        except BaseException:  # noqa: BLE001 - also SystemExit of a driver's code
+            _log.warning("an on_cancel callback failed", exc_info=True)
 
 
 def _in_event_loop() -> bool:
@@ -71,7 +83,7 @@ class Link(Protocol):
         """How many subscribers the topic of a sensor has: nobody needs a picture that nobody sees."""
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
-        """Let people act on a virtual robot's world; `changed` is called with each message."""
+        """Let people act on a virtual robot's world: `changed` gets each message, in a thread of its own."""
 
     def share(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
@@ -92,6 +104,7 @@ class Call:
         self._ended = threading.Event()
         self._lock = threading.Lock()
         self._on_cancel: list[Callable[[], object]] = []
+        self._canceling: threading.Thread | None = None
 
     @property
     def canceled(self) -> bool:
@@ -99,12 +112,24 @@ class Call:
         return self._ended.is_set()
 
     def cancel(self) -> None:
-        """End the action: the function's next wait raises Canceled."""
+        """End the action: the function's next wait raises Canceled. Waits for nothing."""
         with self._lock:
             self._ended.set()
-            told, self._on_cancel = self._on_cancel, []
-        for tell in told:
-            tell()
+            callbacks, self._on_cancel = self._on_cancel, []
+        if callbacks:
+            self._canceling = threading.Thread(
+                target=_call_each, args=(callbacks,), name=f"cancel {self.action}", daemon=True
+            )
+            try:
+                self._canceling.start()
+            except (RuntimeError, MemoryError):  # no room for a thread
+                self._canceling = None
+                _call_each(callbacks)
+
+    def close(self) -> None:
+        """Wait until the callbacks of `on_cancel` have returned, 2 s at most."""
+        if self._canceling is not None:
+            self._canceling.join(_JOIN_S)
 
     def on_cancel(self, tell: Callable[[], object]) -> None:
         """Call `tell` once, in another thread, as soon as the action is to end; at once when it is already.

@@ -1,4 +1,4 @@
-"""Where commands come in: ``robot/command`` messages become tasks, answers ``robot/answer`` messages."""
+"""Commands of a robot: ``robot/command`` messages become tasks, answers ``robot/answer`` messages."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ from app.robots.driver.task import Answer, ProgramId, Task
 from app.robots.driver.tasks import NOTHING_RUNS, Tasks
 from app.robots.identity import program_of
 from nep.i18n import _
+from nep.text import bounded_str, quotable
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 Done: TypeAlias = Callable[[object, Call], object]
-_LONGEST_ID = 200
+_MAX_ID_LENGTH = 200
 _ENDED_KEPT = 100
 
 
 class CommandHandler:
-    """Takes the commands for one robot; all methods are for the deciding thread of its tasks."""
+    """Takes the commands for one robot, in the deciding thread of its tasks; `stop` and `is_stop` in any."""
 
     def __init__(
         self,
@@ -43,45 +44,98 @@ class CommandHandler:
         self._open: set[str] = set()
         self._ended: deque[str] = deque(maxlen=_ENDED_KEPT)
 
-    def receive(self, command: object, publisher: int | None = None) -> None:
-        """One message of the command topic; whatever it is, it is answered or has no id to answer to.
+    def is_stop(self, command: object) -> bool:
+        """Return True for a command that stops the robot. Thread-safe."""
+        message = as_part(command)
+        operation = message.get("op")
+        return operation == "stop" or (
+            operation == "invoke" and message.get("action") == self._robot.safe_stop.action
+        )
 
-        `publisher` is the id of the publisher that it came from: signs of life and cancels count only from
-        the one that asked. A stop counts from everybody.
+    def stop(self, command: object) -> None:
+        """Carry out a command for which `is_stop` is true. Thread-safe, and waits for nothing queued."""
+        message = as_part(command)
+        ended = text(message.get("ends"))
+        if ended is not None:
+            self._ended.append(program_of(ended))
+        wanted, operation = _id_of(message), message.get("op")
+        if wanted is None or (operation == "invoke" and wanted in self._open):
+            self._tasks.stop(None)
+        else:
+            self._tasks.stop(self._answering(wanted, str(operation), self._robot.safe_stop.action))
+
+    def receive(self, command: object, publisher: int | None = None, epoch: int | None = None) -> None:
+        """Handle one message of the command topic.
+
+        Args:
+            command: The payload, of any type. It is answered if it has an id.
+            publisher: Id of the publisher that sent it: signs of life and cancels count only from the one
+                that asked for the action.
+            epoch: `Tasks.epoch` when it was received.
         """
         message = as_part(command)
-        wanted = text(message.get("id"))
-        name = text(message.get("from"))
+        wanted = _id_of(message)
+        try:
+            if self.is_stop(message):
+                self.stop(message)
+            else:
+                self._handle(message, wanted, publisher, epoch)
+        except Exception as error:
+            if wanted is not None and wanted not in self._open:
+                words = _("{robot} can't handle this command: {error}").format(
+                    robot=self._robot.name, error=quotable(error)
+                )
+                self._answering(wanted, quotable(message.get("op")), "")(Answer("failed", error=words))
+            raise
+
+    def reject(self, wanted: str, operation: str, error: str) -> None:
+        """Answer a command that is not decoded; an id that is in use belongs to another command."""
+        if wanted not in self._open:
+            self._answering(wanted, operation, "")(Answer("failed", error=error))
+
+    def _handle(
+        self,
+        message: Mapping[str, object],
+        wanted: str | None,
+        publisher: int | None,
+        epoch: int | None,
+    ) -> None:
+        operation, name = message.get("op"), text(message.get("from"))
+        if name is not None and len(name) > _MAX_ID_LENGTH:
+            if wanted is not None:
+                self.reject(
+                    wanted,
+                    quotable(operation),
+                    _("“from” is longer than {count} characters").format(count=_MAX_ID_LENGTH),
+                )
+            return
         program = None if name is None else ProgramId(name, publisher)
-        operation = message.get("op")
         if program is not None:
             self._tasks.sign_of_life(program, watch=operation == "invoke")
-        if operation == "alive" or wanted is None or len(wanted) > _LONGEST_ID:
+        if operation == "alive" or wanted is None:
             return
-        if operation == "stop":
-            ended = text(message.get("ends"))
-            if ended is not None:
-                self._ended.append(program_of(ended))
-            self._tasks.stop(self._answering(wanted, "stop", self._robot.safe_stop.action))
-        elif operation == "cancel":
-            self._cancel(wanted, str(message.get("action") or ""), publisher)
+        if operation == "cancel":
+            self._cancel(wanted, quotable(message.get("action") or ""), publisher)
         elif operation == "invoke":
-            task = str(message.get("action") or ""), message.get("input")
-            self._invoke(wanted, *task, program, publisher)
+            self._invoke(wanted, message, program, publisher, epoch)
         else:
             error = _("there is no “{operation}”; a command is invoke, cancel, stop or alive").format(
-                operation=operation
+                operation=quotable(operation)
             )
-            self._answering(wanted, str(operation), "")(Answer("failed", error=error))
+            self._answering(wanted, quotable(operation), "")(Answer("failed", error=error))
 
-    def beat(self, not_ended: Sequence[str] = (), error: str | None = None) -> None:
+    def beat(self, not_ended: Sequence[str] = (), error: str | None = None, rejected: int = 0) -> None:
         """Tell that the robot lives while it does something: programs notice when it no longer does.
 
-        `not_ended` are the actions whose functions go on although they were told to end, `error` the sentence
-        for it.
+        Args:
+            not_ended: Actions whose functions go on although they were told to end.
+            error: The sentence for it.
+            rejected: Number of messages to the robot that were not handled.
         """
         told: dict[str, object] = {"op": "alive", "id": "", "action": "", "state": "running"}
-        self._publish(told | {"not_ended": list(not_ended), "error": _sendable(error)})
+        told |= {"not_ended": list(not_ended), "error": _sendable(error)}
+        counts = {"rejected": rejected, "errors": self._tasks.failures}
+        self._publish(told | {name: count for name, count in counts.items() if count})
 
     def task(
         self,
@@ -90,7 +144,9 @@ class CommandHandler:
         given: Mapping[str, object],
         answer: Callable[[Answer], None],
         program: ProgramId | None = None,
+        *,
         publisher: int | None = None,
+        epoch: int | None = None,
     ) -> Task:
         """The task that runs an action of the body with an input that has been checked."""
         spec = self._specs[action.name]
@@ -121,6 +177,7 @@ class CommandHandler:
             program=program,
             publisher=publisher,
             goes_on=action.repeat_s is not None,
+            epoch=epoch,
         )
 
     def unknown(self, name: str) -> str:
@@ -129,31 +186,42 @@ class CommandHandler:
         words = (
             _("{robot} can't “{action}”; did you mean “{close}”?") if close else _("{robot} can't “{action}”")
         )
-        return words.format(robot=self._robot.name, action=name, close=close)
+        return words.format(robot=self._robot.name, action=quotable(name), close=close)
 
     def _invoke(
-        self, wanted: str, name: str, given: object, program: ProgramId | None, publisher: int | None
+        self,
+        wanted: str,
+        message: Mapping[str, object],
+        program: ProgramId | None,
+        publisher: int | None,
+        epoch: int | None,
     ) -> None:
         if wanted in self._open:
             return  # the same command a second time
-        answer = self._answering(wanted, "invoke", name)
+        name, given = message.get("action"), message.get("input")
+        answer = self._answering(wanted, "invoke", quotable(name or ""))
         if program is not None and program.name in self._ended:
             # sent before its program was ended, come after the stop: it must not move the robot again
             answer(Answer("canceled", error=_("its program was stopped")))
             return
-        action = self._robot.action(name)
+        action = self._robot.action(name) if isinstance(name, str) else None
         if action is None:
-            answer(Answer("failed", error=self.unknown(name)))
+            answer(Answer("failed", error=self.unknown(bounded_str(name or ""))))
             return
-        if name == self._robot.safe_stop.action:
+        if action.name == self._robot.safe_stop.action:
             self._tasks.stop(answer)
             return
         sentences = action.check({} if given is None else given)
         if sentences:
             answer(Answer("failed", error="; ".join(sentences)))
             return
+        task = self.task(wanted, action, as_part(given), answer, program, publisher=publisher, epoch=epoch)
         self._open.add(wanted)
-        self._tasks.submit(self.task(wanted, action, as_part(given), answer, program, publisher))
+        try:
+            self._tasks.submit(task)
+        except BaseException:
+            self._open.discard(wanted)
+            raise
 
     def _cancel(self, wanted: str, name: str, publisher: int | None) -> None:
         error = self._tasks.cancel(lambda task: task.id == wanted and task.publisher == publisher)
@@ -182,6 +250,14 @@ class CommandHandler:
             self._publish(told)
 
         return answer
+
+
+def _id_of(message: Mapping[str, object]) -> str | None:
+    """The id that answers to a message have; None when it has none that can be sent back."""
+    wanted = text(message.get("id"))
+    if wanted is None or len(wanted) > _MAX_ID_LENGTH or bounded_str(wanted) != wanted:
+        return None
+    return wanted
 
 
 def _sendable(error: str | None) -> str | None:

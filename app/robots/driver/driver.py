@@ -22,6 +22,8 @@ from app.robots.description.json_access import as_part
 from app.robots.driver.call import Call, Canceled, Clock, MonotonicClock
 from app.robots.driver.commands import CommandHandler
 from app.robots.driver.declare import Kind
+from app.robots.driver.dispatcher import Dispatcher
+from app.robots.driver.receiver import CommandReceiver, MessageQueue, RejectedMessages
 from app.robots.driver.rize_dialect import RizeDialect
 from app.robots.driver.schema_values import told_fields
 from app.robots.driver.tasks import Tasks
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
 
 RIZE_COMMANDS, RIZE_ANSWERS, RIZE_EVENTS = "robot_action", "action_state", "rize_event"
 BLACKBOARD = "/blackboard"
-_BACKLOG = 2000
+MAX_WORLD_BYTES = 1_000_000
 _CLOSE_S, _JOIN_S = 2.0, 2.0
 _log = logging.getLogger(__name__)
 
@@ -64,7 +66,8 @@ class Driver:
         self._subscribers: list[nep.Subscriber] = []
         self._body: object = None
         self._tasks: Tasks | None = None
-        self._unread: set[str] = set()
+        self._rejected = RejectedMessages(name)
+        self._world: Dispatcher | None = None
         self._loop = EventLoop(name)
 
     @property
@@ -108,7 +111,7 @@ class Driver:
         answer = partial(self._publish, self.robot.topics.answer)
 
         def beat(not_ended: tuple[str, ...], error: str | None) -> None:
-            desk.beat(not_ended, error)  # which is made with the tasks, below
+            desk.beat(not_ended, error, rejected=self._rejected.count)  # desk is made with the tasks, below
 
         self._tasks = tasks = Tasks(
             self.name,
@@ -123,14 +126,20 @@ class Driver:
             self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS)
         )
         tasks.start()
-        self._listen(self.robot.topics.command, "robot/command", desk.receive)
-        self._listen(RIZE_COMMANDS, "json", lambda message, _publisher: dialect.receive(message))
+        topic, stop_words = self.robot.topics.command, ("stop", stop)
+        native = CommandReceiver(topic, tasks, desk, stop_words, self._rejected)
+        rize = CommandReceiver(RIZE_COMMANDS, tasks, dialect, stop_words, self._rejected, queues_stops=True)
+        self._subscribers.append(self._node.new_sub(topic, "robot/command", sink=native.take))
+        self._subscribers.append(self._node.new_sub(RIZE_COMMANDS, "json", sink=rize.take))
 
     def close(self) -> None:
         """Stop the robot, answer what is open, end its threads, leave the network. May be called twice."""
         for subscriber in self._subscribers:
             subscriber.close()
         self._subscribers.clear()
+        world, self._world = self._world, None
+        if world is not None:
+            world.close()
         tasks, self._tasks = self._tasks, None
         if tasks is not None:
             tasks.close()
@@ -216,20 +225,18 @@ class Driver:
         return self._loop.run(work)
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
-        """Call `changed` with every message of ``/<name>/world``, in the network's thread: be quick."""
-        self._subscribe(
-            topic_of(self.name, "world"), "json", lambda payload, _publisher: changed(as_part(payload))
-        )
+        """Call `changed` with every message of ``/<name>/world``, in the thread ``<name> world``."""
+        self._subscribe(topic_of(self.name, "world"), changed)
 
     def share(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
     ) -> Callable[[Mapping[str, object]], None]:
-        """Join a topic that several robots share: `changed` gets each message, in the network's thread.
+        """Join a topic that several robots share: `changed` gets each message, as in `on_world`.
 
         What is returned publishes one; after `close` it does nothing.
         """
         self._open(topic, latched=latched)
-        self._subscribe(topic, "json", lambda payload, _publisher: changed(as_part(payload)))
+        self._subscribe(topic, changed)
         return partial(self._publish, topic)
 
     def _done(self, result: object, call: Call | None = None, *, within_s: float | None = None) -> object:
@@ -252,32 +259,18 @@ class Driver:
         except nep.ClosedError:
             return
 
-    def _listen(self, topic: str, msg_type: str, receive: Callable[[object, int | None], None]) -> None:
-        def hand_over(payload: object, publisher: int | None) -> None:
-            tasks = self._tasks
-            if tasks is None:
-                return
-            # A flood of commands must not pile up without end. A stop gets through it; when as many again
-            # wait, they are stops, and the robot will stop without another one.
-            is_stop = as_part(payload).get("op") == "stop"
-            if tasks.backlog < _BACKLOG * (1 + is_stop):
-                tasks.call_soon(partial(receive, payload, publisher))
+    def _subscribe(self, topic: str, changed: Callable[[Mapping[str, object]], None]) -> None:
+        # In a thread of its own: what a driver does with a message must not hold up a stop.
+        if self._world is None:
+            self._world = Dispatcher(f"{self.name} world", self.clock)
+            self._world.start()
+        queue = MessageQueue(topic, self._world.post, self._rejected, MAX_WORLD_BYTES)
 
-        self._subscribe(topic, msg_type, hand_over)
-
-    def _subscribe(self, topic: str, msg_type: str, use: Callable[[object, int | None], None]) -> None:
         def take(messages: Sequence[nep.Message]) -> None:
             for message in messages:
-                try:
-                    payload = message.payload
-                except nep.DecodeError as error:
-                    if topic not in self._unread:
-                        self._unread.add(topic)
-                        _log.warning("%s: a message on '%s' can't be read: %s", self.name, topic, error)
-                else:
-                    use(payload, message.publisher)
+                queue.put(message, lambda payload: changed(as_part(payload)))
 
-        self._subscribers.append(self._node.new_sub(topic, msg_type, sink=take))
+        self._subscribers.append(self._node.new_sub(topic, "json", sink=take))
 
 
 class EventLoop:
@@ -337,7 +330,9 @@ class EventLoop:
             if self._loop is None:
                 self._loop = asyncio.new_event_loop()
                 name = f"{self._name} asyncio"
-                self._thread = threading.Thread(target=_serve, args=(self._loop,), name=name, daemon=True)
+                self._thread = threading.Thread(
+                    target=_serve, args=(self._loop, lambda: self._closed), name=name, daemon=True
+                )
                 self._thread.start()
             return self._loop
 
@@ -384,10 +379,14 @@ class _Waited:
         self.ended.set()
 
 
-def _serve(loop: asyncio.AbstractEventLoop) -> None:
+def _serve(loop: asyncio.AbstractEventLoop, is_closed: Callable[[], bool]) -> None:
     asyncio.set_event_loop(loop)
     try:
-        loop.run_forever()
+        while not is_closed():
+            try:
+                loop.run_forever()
+            except BaseException:  # noqa: BLE001 - SystemExit of a driver's own task: an async stop needs the loop
+                _log.error("a coroutine ended the event loop; it goes on", exc_info=True)
         left = asyncio.all_tasks(loop)
         for task in left:
             task.cancel()

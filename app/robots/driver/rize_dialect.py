@@ -12,16 +12,18 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from app.robots.description.inputs import Parameter
-from app.robots.description.json_access import as_part, names, number_of
+from app.robots.description.json_access import as_part, number_of, text
 from app.robots.description.model import Action, Robot
 from app.robots.driver.call import Call
 from app.robots.driver.commands import CommandHandler
 from app.robots.driver.declare import ActionSpec
 from app.robots.driver.task import Answer, Task
 from app.robots.driver.tasks import Tasks
+from nep.text import bounded_str
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 _LONGEST_WAIT_S = 3600.0
+_MAX_PRIMITIVES = 100
 
 
 @dataclass(eq=False)
@@ -34,7 +36,7 @@ class _Group:
 
 
 class RizeDialect:
-    """Speaks RIZE for one robot; all methods are for the deciding thread of its tasks."""
+    """Speaks RIZE for one robot, in the deciding thread of its tasks; `stop` and `is_stop` in any."""
 
     def __init__(
         self,
@@ -48,25 +50,55 @@ class RizeDialect:
         self._specs = {spec.primitive: (name, spec) for name, spec in specs.items() if spec.primitive}
         self._numbers = itertools.count(1)
 
-    def receive(self, message: object) -> None:
-        """One message of ``robot_action``; those for other robots are nobody's business here."""
+    def is_stop(self, message: object) -> bool:
+        """Return True for a message that has the robot's stop among its primitives. Thread-safe."""
         command = as_part(message)
-        robots = command.get("robots")
-        if self._robot.name not in ((robots,) if isinstance(robots, str) else names(robots)):
+        return (
+            self._is_for_me(command)
+            and command.get("node") == "action"
+            and any(
+                self._action_of(as_part(each)) == self._robot.safe_stop.action
+                for each in _primitives(command)
+            )
+        )
+
+    def stop(self, message: object) -> None:  # noqa: ARG002 - see `Dialect`
+        """Stop the robot at once; thread-safe. The message is answered when `receive` comes to it."""
+        self._tasks.stop(None)
+
+    def receive(self, message: object, publisher: int | None = None, epoch: int | None = None) -> None:  # noqa: ARG002
+        """Handle one message of ``robot_action``; those for other robots are ignored.
+
+        `epoch` is `Tasks.epoch` when it was received.
+        """
+        command = as_part(message)
+        if not self._is_for_me(command):
             return
         if command.get("node") == "cancel":
             self._tasks.cancel(lambda task: task.id.startswith(_PREFIX))
         elif command.get("node") == "action":
-            self._run(command)
+            self._run(command, epoch)
 
-    def _run(self, command: Mapping[str, object]) -> None:
-        given = command.get("primitives")
-        primitives: Sequence[object] = given if isinstance(given, list) else [given]
+    def reject(self, wanted: str, operation: str, error: str) -> None:
+        """Do nothing: RIZE's answer repeats the whole command."""
+
+    def _is_for_me(self, command: Mapping[str, object]) -> bool:
+        robots = command.get("robots")
+        return robots == self._robot.name or (isinstance(robots, list) and self._robot.name in robots)
+
+    def _action_of(self, primitive: Mapping[str, object]) -> str:
+        """The name of the action that a primitive means; "" when it can be none."""
+        name = text(primitive.get("primitive")) or ""
+        return self._specs.get(name, (name, None))[0]
+
+    def _run(self, command: Mapping[str, object], epoch: int | None) -> None:
+        primitives = _primitives(command)
         group = _Group(command, open=len(primitives))
-        if not primitives:
+        if not primitives or len(primitives) > _MAX_PRIMITIVES:
             self._publish({**command, "state": "failure"})
+            return
         for primitive in primitives:
-            self._start(as_part(primitive), lambda answer: self._answered(group, answer))
+            self._start(as_part(primitive), lambda answer: self._answered(group, answer), epoch)
 
     def _answered(self, group: _Group, answer: Answer) -> None:
         if not answer.is_final:
@@ -77,8 +109,10 @@ class RizeDialect:
             good = all(state == "succeeded" for state in group.states)
             self._publish({**group.command, "state": "success" if good else "failure"})
 
-    def _start(self, primitive: Mapping[str, object], answer: Callable[[Answer], None]) -> None:
-        name, given = str(primitive.get("primitive") or ""), str(primitive.get("input") or "")
+    def _start(
+        self, primitive: Mapping[str, object], answer: Callable[[Answer], None], epoch: int | None
+    ) -> None:
+        name, given = text(primitive.get("primitive")) or "", _as_text(primitive.get("input"))
         wanted = f"{_PREFIX}{next(self._numbers)}"
         known, spec = self._specs.get(name, (name, None))
         action = self._robot.action(known)
@@ -89,9 +123,9 @@ class RizeDialect:
         if action is not None:
             meant = _meant(action, spec, given, as_part(primitive.get("options")))  # options may be "none"
             if meant is not None and not action.check(meant):
-                task = self._desk.task(wanted, action, meant, answer)
+                task = self._desk.task(wanted, action, meant, answer, epoch=epoch)
         elif name == "wait":
-            task = _waiting(wanted, given, answer)
+            task = _waiting(wanted, given, answer, epoch)
         if task is None:
             answer(Answer("failed"))
         else:
@@ -101,11 +135,21 @@ class RizeDialect:
 _PREFIX = "rize:"
 
 
-def _waiting(wanted: str, given: str, answer: Callable[[Answer], None]) -> Task | None:
+def _primitives(command: Mapping[str, object]) -> Sequence[object]:
+    given = command.get("primitives")
+    return given if isinstance(given, list) else [given]
+
+
+def _as_text(value: object) -> str:
+    """RIZE's input is text; other programs send numbers, too."""
+    return str(value or "") if isinstance(value, (str, float, bool)) else bounded_str(value or "")
+
+
+def _waiting(wanted: str, given: str, answer: Callable[[Answer], None], epoch: int | None) -> Task | None:
     seconds = number_of(given)
     if seconds is None or not 0 <= seconds <= _LONGEST_WAIT_S:
         return None
-    return Task(wanted, "wait", lambda call: _wait(call, seconds), answer)
+    return Task(wanted, "wait", lambda call: _wait(call, seconds), answer, epoch=epoch)
 
 
 def _wait(call: Call, seconds: float) -> None:
@@ -120,7 +164,7 @@ def _meant(
         return _by_name(action, given, options)
     try:
         return spec.from_rize(given, options)
-    except (ValueError, KeyError):
+    except (ValueError, KeyError, TypeError, OverflowError):
         return None
 
 

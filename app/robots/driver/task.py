@@ -50,6 +50,7 @@ class Task:
     while its function goes on.
     `program` asked for it and must stay alive while it runs; one that `goes_on` (a speed) also afterwards.
     `publisher` is the id of the publisher that the command came from, also when it named no program.
+    `epoch` is `Tasks.epoch` when the command was received: after a later stop it is not run.
     """
 
     id: str
@@ -64,6 +65,7 @@ class Task:
     program: ProgramId | None = None
     publisher: int | None = None
     goes_on: bool = False
+    epoch: int | None = None
     call: Call | None = None
     thread: threading.Thread | None = None
     due_s: float | None = None

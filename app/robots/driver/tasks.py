@@ -1,21 +1,26 @@
-"""Running what a robot is asked to do: who goes first, who waits, who is ended, when the robot is still.
+"""Run what a robot is asked to do: order, busy policies, cancel, stop, watchdog.
 
-All decisions are taken in one thread, ``<name> commands``; each running task has a thread of its own. The
-deciding thread never waits for a driver's function, so a stop is acted on at once.
+All decisions are taken in one supervised thread, ``<name> commands`` (`Dispatcher`); each running task has a
+thread of its own. A stop waits for neither: `Tasks.stop` cancels the running calls in the caller's thread and
+wakes the thread of the stop function (`StopThread`). Commands that were received before a stop are not run
+after it.
 """
 
 from __future__ import annotations
 
 import logging
 import threading
-from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
+from typing import NamedTuple
 
 from app.robots.driver.call import Call, Canceled, Clock, Failed
+from app.robots.driver.dispatcher import Dispatcher
+from app.robots.driver.stop_thread import StopThread
 from app.robots.driver.task import Answer, ProgramId, Task
-from app.robots.identity import MAY_MOVE
+from app.robots.identity import ERROR_MOST, MAY_MOVE
 from nep.i18n import _, lazy, ngettext, number
+from nep.text import bounded_str
 
 BEAT_S = 0.5
 """While something runs or waits, the robot says at least so often that it lives."""
@@ -30,6 +35,7 @@ _MOST_RUNNING = 50
 """What uses nothing runs side by side, each in a thread of its own."""
 THE_STOP = lazy("the stop itself")
 NOTHING_RUNS = lazy("nothing with this id runs")
+_MAX_PENDING_STOPS = 2_000
 _JOIN_S = 2.0
 _log = logging.getLogger(__name__)
 
@@ -80,6 +86,15 @@ class Watchdog:
         return any(name in acting or name in self._going_on.values() for name in silent)
 
 
+class _PendingStop(NamedTuple):
+    """A stop that is not answered yet."""
+
+    run: int
+    """Number of the run of the stop function that it waits for."""
+    limit_s: float
+    answer: Callable[[Answer], None]
+
+
 class Tasks:
     """The tasks of one robot. Methods without another word are for the deciding thread only."""
 
@@ -99,39 +114,75 @@ class Tasks:
         called once more with none of them as soon as the last one has ended. A stop that nobody asked for (of
         the watchdog) and that failed is among them until a stop succeeds: there is no other answer to it.
         """
-        self._name, self._stop_body, self._clock, self._beat = name, stop, clock, beat
+        self._name, self._clock, self._beat = name, clock, beat
         self._next_beat_s = 0.0
         self._told_not_ended: tuple[tuple[str, ...], str | None] = ((), None)
         self._stop_is_late = False
-        self._not_stopped: str | None = (
-            None  # what the last stop said that failed and had nobody to answer to
-        )
+        self._not_stopped: str | None = None  # the failure of the last stop that had nobody to answer to
         self._patience_s = max(STOP_ANSWER_S, within_s)
         self._watchdog = Watchdog(watchdog_s)
-        self._inbox: deque[Callable[[], None]] = deque()
-        self._wake = threading.Event()
-        self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._decide, name=f"{name} commands", daemon=True)
+        self._dispatcher = Dispatcher(
+            f"{name} commands",
+            clock,
+            tick=self._look_at_clock,
+            next_due_s=self._next_due,
+            on_restart=self._restarted,
+        )
+        self._stop_thread = StopThread(name, stop, self._stop_run_ended)
+        self._ended_run = 0
+        self._ended_error: str | None = None
+        self._lock = threading.Lock()
+        self._epoch = 0
         self._running: list[Task] = []
         self._queue: list[Task] = []
-        self._stopper: threading.Thread | None = None
-        self._stop_answers: list[tuple[float, Callable[[Answer], None]]] = []
+        self._pending_stops: list[_PendingStop] = []
 
     # ---- for every thread -------------------------------------------------------------------------
 
     def start(self) -> None:
         """Begin to decide."""
-        self._thread.start()
+        self._stop_thread.start()
+        self._dispatcher.start()
 
-    def call_soon(self, what: Callable[[], None]) -> None:
+    def call_soon(self, what: Callable[[], object]) -> None:
         """Let the deciding thread do something next."""
-        self._inbox.append(what)
-        self._wake.set()
+        self._dispatcher.post(what)
 
     @property
     def backlog(self) -> int:
         """How many things the deciding thread has still to do."""
-        return len(self._inbox)
+        return self._dispatcher.backlog
+
+    @property
+    def failures(self) -> int:
+        """Number of exceptions that the deciding thread survived."""
+        return self._dispatcher.failures
+
+    @property
+    def epoch(self) -> int:
+        """Number of stops so far. A command that was received in an earlier epoch is not run."""
+        return self._epoch
+
+    def stop(self, answer: Callable[[Answer], None] | None, why: str = "stopped") -> None:
+        """Stop the robot at once and end everything. Thread-safe; waits for nothing.
+
+        `answer` is called in the deciding thread when the robot stands still and every function has ended.
+        What does not end within STOP_ANSWER_S is named in the answers, and nothing is accepted until it has.
+        Begins a new `epoch`.
+        """
+        with self._lock:
+            self._epoch += 1
+            calls = [task.call for task in self._running if task.call is not None]
+        for call in calls:
+            self._dispatcher.call(call.cancel)
+        run = self._stop_thread.reserve()
+        try:
+            if self._dispatcher.is_current:
+                self._begin_stop(run, answer, why)
+            elif self._dispatcher.urgent_backlog < _MAX_PENDING_STOPS:
+                self._dispatcher.post_urgent(partial(self._begin_stop, run, answer, why))
+        finally:
+            self._stop_thread.wake()
 
     def close(self) -> None:
         """Stop the robot, end everything and join the threads; a function that never ends is left behind."""
@@ -141,45 +192,47 @@ class Tasks:
             self._take_unasked(answer)
             stopped.set()
 
-        self.call_soon(lambda: self.stop(take, _("the driver ends")))
+        self.stop(take, _("the driver ends"))
         stopped.wait(self._patience_s + _GRACE_S)
-        self._closing.set()
-        self._wake.set()
-        self._thread.join(_JOIN_S)
+        self._stop_thread.close()
+        self._dispatcher.close()
 
     # ---- what is asked ----------------------------------------------------------------------------
 
     def submit(self, task: Task) -> None:
         """Run a task as soon as what it uses is free; refuse it, or end others, by its busy policy."""
+        if task.epoch is not None and task.epoch < self._epoch:
+            self._tell(task.finish, _stopped_before())
+            return
         refused = self._refusal()
         if refused is not None:
-            task.finish(Answer("failed", error=f"{task.action}: {refused}"))
+            self._tell(task.finish, Answer("failed", error=f"{task.action}: {refused}"))
             return
         clashing = [other for other in (*self._running, *self._queue) if set(other.uses) & set(task.uses)]
         if clashing and task.on_busy == "reject":
             busy = _("{action}: {robot} is busy with {other}").format(
                 action=task.action, robot=self._name, other=clashing[0].title or clashing[0].action
             )
-            task.finish(Answer("failed", error=busy))
+            self._tell(task.finish, Answer("failed", error=busy))
             return
         if len(self._running) >= _MOST_RUNNING:
             full = _("{action}: {count} other actions run already").format(
                 action=task.action, count=_MOST_RUNNING
             )
-            task.finish(Answer("failed", error=full))
+            self._tell(task.finish, Answer("failed", error=full))
             return
         if len(self._queue) >= _LONGEST_QUEUE:
             full = _("{action}: {count} other actions are waiting already").format(
                 action=task.action, count=_LONGEST_QUEUE
             )
-            task.finish(Answer("failed", error=full))
+            self._tell(task.finish, Answer("failed", error=full))
             return
         ended = []
         if task.on_busy == "replace":
             ended = [other for other in clashing if other.cancellable or other in self._queue]
         waits_for = tuple(dict.fromkeys(other.action for other in clashing if other not in ended))
         replaces = tuple(dict.fromkeys(other.action for other in ended))
-        task.answer(Answer("accepted", waits_for=waits_for, replaces=replaces))
+        self._tell(task.answer, Answer("accepted", waits_for=waits_for, replaces=replaces))
         replaced = Answer(
             "canceled", error=_("{action} took its place").format(action=task.title or task.action)
         )
@@ -206,14 +259,13 @@ class Tasks:
         """A program said something; `watch` begins to expect more (it asked the robot to act)."""
         self._watchdog.hear(program, self._clock.now(), watch=watch)
 
-    def stop(self, answer: Callable[[Answer], None] | None, why: str = "stopped") -> None:
-        """End everything; `answer` is called when the robot stands still and every function has ended.
+    # ---- the deciding thread ----------------------------------------------------------------------
 
-        What does not end within STOP_ANSWER_S is named in the answers, and nothing is accepted until it has.
-        """
+    def _begin_stop(self, run: int, answer: Callable[[Answer], None] | None, why: str) -> None:
+        """End all tasks; the stop function is called in `run`."""
         limit = self._clock.now() + self._patience_s
         if answer is not None:
-            self._stop_answers.append((limit, answer))
+            self._pending_stops.append(_PendingStop(run, limit, answer))
         self._watchdog.reset()
         ended = Answer("canceled", error=why)
         self._drop(list(self._queue), ended)
@@ -224,21 +276,20 @@ class Tasks:
             elif task.due_s is not None:
                 task.due_s = min(task.due_s, limit)
             task.stopped = True
-        self._start_stop()
+        if run <= self._ended_run:  # another stop came at the same time and its run has ended
+            self._stop_ended(self._ended_run, self._ended_error)
 
-    # ---- the deciding thread ----------------------------------------------------------------------
+    def _restarted(self) -> None:
+        """Stop the robot: the deciding loop ended by an exception, and nobody knows what it left undone."""
+        self.stop(self._take_unasked, _("its driver had an internal error"))
 
-    def _decide(self) -> None:
-        while not self._closing.is_set():
-            self._clock.wait(self._wake, self._next_due())
-            self._wake.clear()
-            while self._inbox:
-                self._inbox.popleft()()
-            self._look_at_clock(self._clock.now())
+    def _tell(self, answer: Callable[[Answer], None], told: Answer) -> None:
+        """Give an answer; one that can't be given keeps nothing else from being done."""
+        self._dispatcher.call(partial(answer, told))
 
     def _next_due(self) -> float | None:
         due = [task.due_s for task in self._running if task.due_s is not None]
-        due += [limit for limit, _ in self._stop_answers]
+        due += [pending.limit_s for pending in self._pending_stops]
         due += self._watchdog.due()
         if self._beat is not None and self._has_to_tell:
             due.append(self._next_beat_s)
@@ -246,7 +297,12 @@ class Tasks:
 
     @property
     def _is_busy(self) -> bool:
-        return bool(self._running or self._queue or self._stopper is not None)
+        return bool(self._running or self._queue or self._is_stopping)
+
+    @property
+    def _is_stopping(self) -> bool:
+        """Whether the stop function runs, or its end is not known yet."""
+        return self._stop_thread.requested > self._ended_run
 
     @property
     def _has_to_tell(self) -> bool:
@@ -257,11 +313,7 @@ class Tasks:
         stopped = [task for task in self._running if task.stopped]
         if self._stop_is_late or any(task.answered for task in stopped):
             return still_moving(self._name, self._not_ended())
-        return (
-            _("{robot} is stopping").format(robot=self._name)
-            if self._stopper is not None or stopped
-            else None
-        )
+        return _("{robot} is stopping").format(robot=self._name) if self._is_stopping or stopped else None
 
     def _not_ended(self) -> tuple[str, ...]:
         """What goes on although it should have ended, and was answered so."""
@@ -275,34 +327,44 @@ class Tasks:
             return not_ended, still_moving(self._name, not_ended)
         return ((THE_STOP,) if self._not_stopped is not None else ()), self._not_stopped
 
-    def _tell_beat(self, now: float) -> None:
+    def _tell_beat(self) -> None:
         """Say in time that the robot lives, and at once when a function that would not end has ended."""
         if self._beat is None:
             return
+        now = self._clock.now()
         told = self._still_moving()
         if (self._has_to_tell and now >= self._next_beat_s) or told != self._told_not_ended:
             self._next_beat_s, self._told_not_ended = now + BEAT_S, told
             self._beat(*told)
 
-    def _look_at_clock(self, now: float) -> None:
-        for task in self._running:
+    def _look_at_clock(self) -> None:
+        for step in (self._end_overdue, self._answer_late_stops, self._watch_programs, self._tell_beat):
+            self._dispatcher.call(step)
+
+    def _end_overdue(self) -> None:
+        now = self._clock.now()
+        for task in list(self._running):
             if task.due_s is not None and now >= task.due_s:
                 self._overdue(task)
-        late = [answer for limit, answer in self._stop_answers if now >= limit]
-        self._stop_answers = [pair for pair in self._stop_answers if now < pair[0]]
-        if late and self._stopper is not None:
+
+    def _answer_late_stops(self) -> None:
+        now = self._clock.now()
+        late = [pending for pending in self._pending_stops if now >= pending.limit_s]
+        self._pending_stops = [pending for pending in self._pending_stops if now < pending.limit_s]
+        if any(pending.run > self._ended_run for pending in late):
             self._stop_is_late = True
-        for answer in late:
-            answer(Answer("failed", error=still_moving(self._name, self._not_ended())))
+        for pending in late:
+            self._tell(pending.answer, Answer("failed", error=still_moving(self._name, self._not_ended())))
+
+    def _watch_programs(self) -> None:
         acting = [task.program for task in (*self._running, *self._queue)]
-        if self._watchdog.bites(now, acting):
+        if self._watchdog.bites(self._clock.now(), acting):
             self.stop(
                 self._take_unasked,
                 _("no sign of life from its program for {seconds} s").format(
                     seconds=number(self._watchdog.patience_s or 0.0)
                 ),
             )
-        self._tell_beat(now)
 
     def _take_unasked(self, answer: Answer) -> None:
         """The answer to a stop that nobody asked for: a failure is logged, and told by each sign of life."""
@@ -331,12 +393,12 @@ class Tasks:
         task.due_s = None
         why = "" if task.stopped or task.ending.error is None else f" ({task.ending.error})"
         goes_on = still_moving(self._name, [task.action])
-        task.finish(Answer("failed", error=f"{goes_on}{why}"))
+        self._tell(task.finish, Answer("failed", error=f"{goes_on}{why}"))
 
     def _drop(self, tasks: list[Task], how: Answer) -> None:
         self._queue = [task for task in self._queue if task not in tasks]
         for task in tasks:
-            task.finish(how)
+            self._tell(task.finish, how)
 
     def _start_ready(self) -> None:
         taken = {used for task in self._running for used in task.uses}
@@ -350,91 +412,108 @@ class Tasks:
         def report(values: Mapping[str, object]) -> None:
             self.call_soon(partial(self._progress, task, dict(values)))
 
-        task.call = Call(task.action, self._clock, report)
+        call = Call(task.action, self._clock, report)
+        with self._lock:  # either a stop in another thread finds the call, or the task finds the stop
+            is_stopped = task.epoch is not None and task.epoch < self._epoch
+            if not is_stopped:
+                task.call = call
+                self._running.append(task)
+        if is_stopped:
+            self._tell(task.finish, _stopped_before())
+            return
         task.due_s = None if task.timeout_s is None else self._clock.now() + task.timeout_s
-        self._running.append(task)
         self._watchdog.begins(task)
-        task.answer(Answer("running"))
+        self._tell(task.answer, Answer("running"))
         name = f"{self._name} {task.action}"
-        task.thread = threading.Thread(target=self._work, args=(task, task.call), name=name, daemon=True)
-        task.thread.start()
+        task.thread = threading.Thread(target=self._work, args=(task, call), name=name, daemon=True)
+        try:
+            task.thread.start()
+        except (RuntimeError, MemoryError) as error:  # no room for a thread
+            task.thread = None
+            self._ended(task, Answer("failed", error=self._broke_off(task, error)))
 
     def _progress(self, task: Task, values: dict[str, object]) -> None:
         if not task.answered:
-            task.answer(Answer("running", feedback=values))
+            self._tell(task.answer, Answer("running", feedback=values))
 
     def _work(self, task: Task, call: Call) -> None:
+        done = Answer("failed", error=task.action)
         try:
+            done = self._outcome(task, call)
+            call.close()
+        finally:
+            self.call_soon(partial(self._ended, task, done))
+
+    def _outcome(self, task: Task, call: Call) -> Answer:
+        try:
+            if call.canceled:  # by a stop that came before this thread began
+                raise Canceled
             output = task.run(call)
-            done = Answer("succeeded", output=output if isinstance(output, Mapping) else {})
         except Canceled:
-            done = Answer("canceled")
+            return Answer("canceled")
         except Failed as failed:
-            done = Answer("failed", error=_said(failed))
+            return Answer("failed", error=bounded_str(failed, ERROR_MOST))
         except BaseException as error:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
             _log.warning("%s: %s broke off", self._name, task.action, exc_info=True)
-            done = Answer(
-                "failed",
-                error=_("{action} broke off: {error}").format(action=task.action, error=_said(error)),
-            )
-        self.call_soon(partial(self._ended, task, done))
+            return Answer("failed", error=self._broke_off(task, error))
+        return Answer("succeeded", output=output if isinstance(output, Mapping) else {})
+
+    def _broke_off(self, task: Task, error: BaseException) -> str:
+        return _("{action} broke off: {error}").format(
+            action=task.action, error=bounded_str(error, ERROR_MOST)
+        )
 
     def _ended(self, task: Task, done: Answer) -> None:
         if task.thread is not None:
             task.thread.join(_JOIN_S)
-        self._running.remove(task)
+        with self._lock:
+            self._running.remove(task)
         if done.state == "succeeded" and task.ending is None:
             self._watchdog.ends_well(task)
-        if task.stopped and task.answered and self._stopper is None:
+        if task.stopped and not self._is_stopping:
             # It may have moved the robot after the stop: it is stopped once more, and only then stands still.
-            self._stop_is_late = True
-            self._start_stop()
+            self._stop_is_late = task.answered
+            run = self._stop_thread.reserve()
+            self._stop_thread.wake()
+            self._pending_stops = [pending._replace(run=run) for pending in self._pending_stops]
         # A function that was told to end may return as if it had finished: what was asked counts.
-        task.finish(done if task.ending is None or done.state == "failed" else task.ending)
+        self._tell(task.finish, done if task.ending is None or done.state == "failed" else task.ending)
         self._start_ready()
         self._settle()
 
-    def _start_stop(self) -> None:
-        if self._stopper is None:
-            self._stopper = threading.Thread(target=self._run_stop, name=f"{self._name} stop", daemon=True)
-            self._stopper.start()
+    def _stop_run_ended(self, run: int, error: str | None) -> None:
+        """In the thread of the stop function."""
+        self._dispatcher.post_urgent(partial(self._stop_ended, run, error))
 
-    def _run_stop(self) -> None:
-        error = None
-        try:
-            self._stop_body()
-        except Failed as failed:
-            error = _(MAY_MOVE).format(robot=self._name, why=_said(failed))
-        except BaseException as failed:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
-            _log.warning("%s: its stop broke off", self._name, exc_info=True)
-            error = _(MAY_MOVE).format(
-                robot=self._name, why=_("its stop broke off: {error}").format(error=_said(failed))
-            )
-        self.call_soon(partial(self._stop_ended, error))
-
-    def _stop_ended(self, error: str | None) -> None:
-        if self._stopper is not None:
-            self._stopper.join(_JOIN_S)
-        self._stopper, self._stop_is_late = None, False
-        if error is not None:
-            failed = Answer("failed", error=error)
-            if not self._stop_answers:
-                self._take_unasked(failed)  # who asked was answered already that it had not ended
-            elif self._not_stopped is not None:
-                self._not_stopped = error
-            answers, self._stop_answers = self._stop_answers, []
-            for _program, answer in answers:
-                answer(failed)
-        else:
+    def _stop_ended(self, run: int, error: str | None) -> None:
+        self._ended_run, self._ended_error = run, error
+        self._stop_is_late = False
+        if error is None:
             self._not_stopped = None
-        self._settle()
+            self._settle()
+            return
+        failed = Answer("failed", error=error)
+        waiting = [pending for pending in self._pending_stops if pending.run <= run]
+        self._pending_stops = [pending for pending in self._pending_stops if pending.run > run]
+        if not waiting:
+            self._take_unasked(failed)  # who asked was answered already that it had not ended
+        elif self._not_stopped is not None:
+            self._not_stopped = error
+        for pending in waiting:
+            self._tell(pending.answer, failed)
 
     def _settle(self) -> None:
-        """Answer the stops once its function is through and nothing runs any more."""
-        if self._stopper is None and not self._running:
-            answers, self._stop_answers = self._stop_answers, []
-            for _program, answer in answers:
-                answer(Answer("succeeded"))
+        """Answer the stops whose run of the stop function has ended, once no task runs."""
+        if self._running:
+            return
+        stopped = [pending for pending in self._pending_stops if pending.run <= self._ended_run]
+        self._pending_stops = [pending for pending in self._pending_stops if pending.run > self._ended_run]
+        for pending in stopped:
+            self._tell(pending.answer, Answer("succeeded"))
+
+
+def _stopped_before() -> Answer:
+    return Answer("canceled", error=_("the robot was stopped before this began"))
 
 
 def still_moving(name: str, actions: Sequence[str]) -> str:
@@ -442,11 +521,3 @@ def still_moving(name: str, actions: Sequence[str]) -> str:
     why = ngettext("{actions} has not ended", "{actions} have not ended", len(actions))
     told = ", ".join(_(THE_STOP) if each == THE_STOP else each for each in actions)
     return _(MAY_MOVE).format(robot=name, why=why.format(actions=told))
-
-
-def _said(error: BaseException) -> str:
-    """What an error says, or its type; one that can't even be told must not keep its action from ending."""
-    try:
-        return str(error) or type(error).__name__
-    except BaseException:  # noqa: BLE001 - a driver's own words are a driver's code
-        return type(error).__name__

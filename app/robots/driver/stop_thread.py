@@ -1,0 +1,105 @@
+"""The thread of a robot's stop function. It exists before it is needed and waits for nothing else."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+
+from app.robots.driver.call import Failed
+from app.robots.identity import ERROR_MOST, MAY_MOVE
+from nep.i18n import _
+from nep.text import bounded_str
+
+_JOIN_S = 0.5
+_log = logging.getLogger(__name__)
+
+
+class StopThread:
+    """Runs the stop function of one robot. Thread-safe.
+
+    Runs are numbered from 1. Stops that are asked for while the function runs share that run.
+    """
+
+    def __init__(
+        self, name: str, stop: Callable[[], object], ended: Callable[[int, str | None], object]
+    ) -> None:
+        """Create the thread; `start` starts it.
+
+        Args:
+            name: Name of the robot.
+            stop: The robot's stop function.
+            ended: Called in this thread with the number of a run and the sentence of its failure, or None.
+        """
+        self._name, self._stop, self._ended = name, stop, ended
+        self._lock = threading.Lock()
+        self._wake = threading.Event()
+        self._is_closing = False
+        self._requested = self._finished = 0
+        self._thread = self._new_thread()
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    @property
+    def requested(self) -> int:
+        """Number of the newest run that was reserved; 0 before the first one."""
+        return self._requested
+
+    def reserve(self) -> int:
+        """Return the number of the run that serves a stop that is asked for now; `wake` begins it."""
+        with self._lock:
+            if self._requested == self._finished:
+                self._requested += 1
+            return self._requested
+
+    def wake(self) -> None:
+        """Begin the reserved run at once, in this object's thread."""
+        self._wake.set()
+
+    def close(self) -> None:
+        """End the thread; a stop function that does not return is left behind."""
+        self._is_closing = True
+        self._wake.set()
+        if self._thread.ident is not None:
+            self._thread.join(_JOIN_S)
+
+    def _new_thread(self) -> threading.Thread:
+        return threading.Thread(target=self._supervise, name=f"{self._name} stop", daemon=True)
+
+    def _supervise(self) -> None:
+        try:
+            while not self._is_closing:
+                self._wake.wait()
+                self._wake.clear()
+                if self._requested > self._finished:
+                    self._run(self._requested)
+        finally:
+            if (
+                not self._is_closing
+            ):  # something raised an exception in this thread: a stop must still be possible
+                self._thread = self._new_thread()
+                self._wake.set()
+                self._thread.start()
+
+    def _run(self, run: int) -> None:
+        error: str | None = _(MAY_MOVE).format(robot=self._name, why=_("its stop broke off"))
+        try:
+            error = self._call_stop()
+        finally:
+            with self._lock:
+                self._finished = run
+            self._ended(run, error)
+
+    def _call_stop(self) -> str | None:
+        try:
+            self._stop()
+        except Failed as failed:
+            why = bounded_str(failed, ERROR_MOST)
+        except BaseException as failed:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
+            _log.warning("%s: its stop broke off", self._name, exc_info=True)
+            why = _("its stop broke off: {error}").format(error=bounded_str(failed, ERROR_MOST))
+        else:
+            return None
+        return _(MAY_MOVE).format(robot=self._name, why=why)

@@ -1,0 +1,97 @@
+"""Values that a stranger may send to every receiver: one shared set for the tests of robots, Studio and nep.
+
+All are bytes or fragments of JSON, because some can't be made by an encoder.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+
+LEVELS = 1_000
+LONG_NAME_BYTES = 5_000_000
+_PLACEHOLDER = "\x00hostile\x00"
+
+VALUES: Mapping[str, str] = {
+    "null": "null",
+    "true": "true",
+    "zero": "0",
+    "negative": "-1",
+    "2^64": str(2**64),
+    "-2^63-1": str(-(2**63) - 1),
+    "400 digits": "9" * 400,
+    "5000 digits": "9" * 5_000,
+    "1e308": "1e308",
+    "1e999": "1e999",
+    "-1e999": "-1e999",
+    "NaN": "NaN",
+    "empty text": '""',
+    "half letter": r'"\ud800"',
+    "control letters": json.dumps("\x1b]0;x\x07\u202e\u2028\x00\n"),
+    "path": '"../../etc/passwd"',
+    "braces": '"{0} {name} %s %n {0.__class__}"',
+    "long text": json.dumps("n" * 20_000),
+    "empty list": "[]",
+    "empty map": "{}",
+    "list of lists": "[[[[]]], [1, null], {}]",
+    "map of maps": '{"": {"a": {"b": null}}, "__proto__": []}',
+    "half letter as name": r'{"\udc80": 1}',
+    "60 levels": "[" * 50 + "{}" + "]" * 50,
+    "1000 lists": "[" * LEVELS + "]" * LEVELS,
+    "1000 maps": '{"a":' * LEVELS + "1" + "}" * LEVELS,
+    "many names": json.dumps({f"text{number}": 1 for number in range(2_000)}),
+    "long list": json.dumps(list(range(5_000))),
+}
+"""Fragments of JSON by what they are."""
+
+WHOLES: tuple[bytes, ...] = (
+    *(each.encode() for each in VALUES.values()),
+    b"",
+    b"{",
+    b"\xff\xfe\x00",
+    b"[" * 100_000,
+    json.dumps("n" * LONG_NAME_BYTES).encode(),
+    json.dumps({"n" * LONG_NAME_BYTES: 1}).encode(),
+)
+"""Whole payloads that are no message of any receiver."""
+
+
+def in_every_field(message: Mapping[str, object]) -> Iterator[bytes]:
+    """Yield a well-formed message as JSON with each hostile value in each of its fields, also nested ones."""
+    for place in _places(message):
+        prepared = json.dumps(_replaced(message, place, _PLACEHOLDER))
+        hole = json.dumps(_PLACEHOLDER)
+        for value in VALUES.values():
+            yield prepared.replace(hole, value).encode()
+    first = next(iter(message))
+    yield json.dumps({**message, first: "n" * LONG_NAME_BYTES}).encode()
+
+
+def payloads(*messages: Mapping[str, object]) -> Iterator[bytes]:
+    """Yield every hostile payload for a receiver of these messages."""
+    yield from WHOLES
+    for message in messages:
+        yield from in_every_field(message)
+
+
+def _places(value: object, above: tuple[object, ...] = ()) -> Iterator[tuple[object, ...]]:
+    items: Iterator[tuple[object, object]] = iter(())
+    if isinstance(value, Mapping):
+        items = iter(value.items())
+    elif isinstance(value, list):
+        items = iter(enumerate(value))
+    for name, item in items:
+        yield (*above, name)
+        yield from _places(item, (*above, name))
+
+
+def _replaced(value: object, place: tuple[object, ...], new: object) -> object:
+    if not place:
+        return new
+    name, *below = place
+    if isinstance(value, Mapping):
+        return {
+            key: _replaced(item, tuple(below), new) if key == name else item for key, item in value.items()
+        }
+    assert isinstance(value, list)
+    return [_replaced(item, tuple(below), new) if at == name else item for at, item in enumerate(value)]

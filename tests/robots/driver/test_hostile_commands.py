@@ -1,0 +1,287 @@
+"""Whatever a stranger sends, a robot still stops, and answers the next command."""
+
+from __future__ import annotations
+
+import asyncio
+import ctypes
+import json
+import threading
+
+import pytest
+
+import nep
+from app.robots.description.inputs import Parameter, problems_of
+from app.robots.driver.driver import Driver, EventLoop
+from app.robots.driver.receiver import MAX_COMMAND_BYTES
+from app.robots.heartbeat import Heartbeat
+from tests import hostile
+from tests.robots.conftest import TURTLE, Ears, eventually
+
+COMMAND = {"id": "h", "op": "invoke", "action": "say", "from": "p", "input": {"text": "hi"}, "ends": "key"}
+RIZE = {
+    "node": "action",
+    "robots": ["Turtle", "Ann"],
+    "state": "idle",
+    "primitives": [{"primitive": "say", "input": "hi", "options": {"contextual": True}}],
+}
+
+
+def stops(ears: Ears, wanted: str) -> bool:
+    ears.command(id=wanted, op="stop")
+    return ears.final(wanted, "stop")["state"] == "succeeded"
+
+
+def test_robot_stops_after_every_hostile_message(turtle, node):
+    """Issue 26: one message of 2 kB with 1000 levels ended the thread that carries out stops."""
+    body, ears, _clock = turtle
+    threads = set(threading.enumerate())
+    senders = {
+        node.new_pub("/Turtle/command", "robot/command"): hostile.payloads(COMMAND),
+        node.new_pub("robot_action", "json"): hostile.payloads(RIZE),
+    }
+    body.go_on.set()
+    for sender, payloads in senders.items():
+        for number, payload in enumerate(payloads):
+            sender.publish_bytes(payload)
+            if number % 20 == 0:
+                assert stops(ears, f"s{number} {sender.topic}")
+    assert stops(ears, "last")
+    ears.invoke("1", "dig")
+    assert ears.final("1")["state"] == "succeeded"
+    assert threads <= set(threading.enumerate())
+
+
+def test_moving_robot_is_stopped_after_a_deep_command(turtle, node):
+    body, ears, _clock = turtle
+    ears.invoke("1", "move")
+    eventually(lambda: body.moving)
+    deep = b'{"op":"invoke","id":"z","from":"e","action":' + b"[" * 1000 + b"]" * 1000 + b"}"
+    node.new_pub("/Turtle/command", "robot/command").publish_bytes(deep)
+    assert stops(ears, "s")
+    assert not body.moving
+
+
+def test_one_rize_message_does_not_disable_the_robots_it_names(node, clock):
+    deep = (
+        b'{"node":"action","robots":["Ann","Bob"],"state":"idle","primitives":{"primitive":'
+        + b"[" * 1000
+        + b"]" * 1000
+        + b"}}"
+    )
+    with (
+        nep.node("listener", "memory") as other,
+        Driver(TURTLE, "Ann", node, clock=clock),
+        Driver(TURTLE, "Bob", node, clock=clock),
+    ):
+        ann, bob = Ears(other, "Ann"), Ears(other, "Bob")
+        node.new_pub("robot_action", "json").publish_bytes(deep)
+        assert stops(ann, "1")
+        assert stops(bob, "2")
+
+
+def test_command_of_more_than_64_kb_is_rejected_with_a_sentence(turtle, caplog):
+    body, ears, _clock = turtle
+    ears.invoke("1", "say", text="a" * MAX_COMMAND_BYTES)
+    assert ears.final("1")["error"] == "the message has 64 kB; at most 64 kB are read"
+    ears.rize({"node": "action", "robots": "Turtle", "primitives": [], "pad": "x" * MAX_COMMAND_BYTES})
+    assert stops(ears, "s")
+    assert len([record for record in caplog.records if "rejected" in record.getMessage()]) == 1
+    assert body.done == []
+
+
+def test_unknown_names_are_checked_in_bounded_time():
+    """Issue 26: looking for a similar name for each of 200 000 names took 3.5 s."""
+    parameters = (Parameter("text", "text", "text"),)
+    given = {"text": "hi"} | {f"text{number}": 1 for number in range(20_000)}
+    problems = problems_of(parameters, given)
+    assert len(problems) < 10
+    assert problems[-1].sentence == "19995 more names are unknown"
+    assert problems_of(parameters, {"txt": "hi"})[0].sentence == "there is no “txt”; did you mean “text”?"
+
+
+@pytest.fixture
+def busy(node, clock):
+    """A turtle that moves while its deciding thread is blocked, its ears, and the event that unblocks it."""
+    go_on = threading.Event()
+    with nep.node("listener", "memory") as other, Driver(TURTLE, "Turtle", node, clock=clock) as driver:
+        ears = Ears(other, "Turtle")
+        ears.invoke("1", "move")
+        eventually(lambda: driver.body.moving)
+        driver._tasks.call_soon(go_on.wait)
+        yield driver, ears, go_on
+        go_on.set()
+        driver.body.go_on.set()
+
+
+def test_stop_is_carried_out_while_the_deciding_thread_is_busy(busy):
+    driver, ears, go_on = busy
+    ears.command(id="s", op="stop")
+    eventually(lambda: driver.body.stops >= 1 and not driver.body.moving)
+    go_on.set()
+    assert ears.final("s", "stop")["state"] == "succeeded"
+
+
+@pytest.mark.parametrize("how", ["native", "action", "rize"])
+def test_commands_received_before_a_stop_are_not_run_after_it(busy, how):
+    driver, ears, go_on = busy
+    for number in range(100):
+        ears.invoke(f"q{number}", "light")
+    ears.rize({"node": "action", "robots": "Turtle", "id": "r", "primitives": {"primitive": "leds"}})
+    if how == "native":
+        ears.command(id="s", op="stop")
+    elif how == "action":
+        ears.invoke("s", "stop")
+    else:
+        stop = {"primitive": "stop", "input": "", "options": "none"}
+        ears.rize({"node": "action", "robots": ["Turtle"], "id": "s", "primitives": stop})
+    eventually(lambda: driver.body.stops >= 1 and not driver.body.moving)
+    go_on.set()
+    answers = [ears.final(f"q{number}") for number in range(100)]
+    if how != "rize":  # on another topic nobody knows which of them was first
+        assert {answer["state"] for answer in answers} == {"canceled"}
+        assert driver.body.done == []
+        assert ears.final("s", "stop" if how == "native" else "invoke")["state"] == "succeeded"
+    eventually(lambda: ears.invoke("after", "light") or "succeeded" in ears.states("after"))
+
+
+def test_command_after_a_stop_in_the_same_batch_is_run(turtle):
+    body, ears, _clock = turtle
+    ears.command(id="s", op="stop")
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    ears.invoke("1", "light")
+    assert ears.final("1")["state"] == "succeeded"
+    assert len(body.done) == 1
+
+
+def test_large_stop_is_carried_out(busy):
+    driver, ears, go_on = busy
+    ears.command(id="s", op="stop", ends="z" * 1_000_000)
+    eventually(lambda: driver.body.stops >= 1 and not driver.body.moving)
+    go_on.set()
+    assert ears.final("s", "stop")["state"] == "succeeded"
+
+
+def test_stop_is_proven_by_a_run_that_ended_after_the_last_action(turtle):
+    """An action that outlives the stop function may have moved the robot again."""
+    body, ears, _clock = turtle
+    ears.invoke("1", "ignore")
+    eventually(lambda: "running" in ears.states("1"))
+    ears.command(id="s", op="stop")
+    eventually(lambda: body.stops == 1)
+    assert ears.states("s") == []
+    body.go_on.set()
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    assert body.stops == 2
+
+
+# ---- what ends a thread
+
+
+def kill(name: str) -> threading.Thread:
+    """Raise SystemExit in a thread; return the thread."""
+    thread = next(each for each in threading.enumerate() if each.name == name)
+    assert ctypes.pythonapi.PyThreadState_SetAsyncExc(
+        ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit)
+    )
+    return thread
+
+
+def test_deciding_thread_that_is_killed_stops_the_robot_and_runs_again(turtle, caplog):
+    body, ears, _clock = turtle
+    ears.invoke("1", "move")
+    eventually(lambda: body.moving)
+    for count in range(1, 4):
+        kill("Turtle commands")
+        eventually(lambda count=count: body.stops >= count)
+        assert ears.final("1")["error"] == "its driver had an internal error"
+        assert stops(ears, f"s{count}")
+    assert not body.moving
+    ears.invoke("2", "dig")
+    assert ears.final("2")["state"] == "succeeded"
+    assert "error 1" in caplog.text
+
+
+@pytest.mark.parametrize("error", [ValueError(), RecursionError(), MemoryError(), SystemExit(3)], ids=repr)
+def test_exception_of_one_item_is_counted_and_the_next_one_runs(node, error, caplog):
+    with Driver(TURTLE, "Other", node) as driver:
+
+        def fail() -> None:
+            raise error
+
+        other = Ears(node, "Other")
+        for _count in range(20):
+            driver._tasks.call_soon(fail)
+        assert stops(other, "s")
+        assert driver._tasks.failures == 20
+        assert len([record for record in caplog.records if record.exc_info]) == 2  # the first and the tenth
+        other.invoke("1", "move")
+        eventually(lambda: driver.body.moving)
+        driver.body.go_on.set()
+        assert other.final("1")["state"] == "succeeded"
+
+
+def test_answer_that_raises_keeps_no_other_stop_from_being_answered(node):
+    with Driver(TURTLE, "Other", node) as driver:
+        told: list[object] = []
+
+        def fail(_answer: object) -> None:
+            raise RuntimeError("no way back")
+
+        driver._tasks.stop(fail)
+        driver._tasks.stop(told.append)
+        driver._tasks.stop(fail)
+        eventually(lambda: told)
+
+
+def test_async_stop_works_after_a_coroutine_ended_the_event_loop():
+    loop = EventLoop("Bot")
+
+    async def exit_program() -> None:
+        raise SystemExit(3)
+
+    async def act() -> None:
+        spawned.append(asyncio.get_running_loop().create_task(exit_program()))
+
+    async def stop() -> str:
+        return "stopped"
+
+    spawned: list[asyncio.Task[None]] = []
+    loop.run(act())
+    eventually(spawned[0].done)
+    assert loop.run(stop(), within_s=30.0) == "stopped"
+    loop.close()
+    with pytest.raises(SystemExit):
+        spawned[0].result()
+
+
+def test_heartbeat_survives_a_publisher_that_raises():
+    told = threading.Event()
+    failures: list[BaseException] = [SystemExit(3), MemoryError(), ValueError()]
+
+    def publish(_message: object) -> None:
+        if failures:
+            raise failures.pop()
+        told.set()
+
+    heart = Heartbeat("p", "heartbeat of the test")
+    heart.beat("Turtle", publish)
+    assert told.wait(30.0)
+    heart.close()
+
+
+def test_world_message_that_makes_a_driver_raise_does_not_end_its_thread(node, clock):
+    with Driver(TURTLE, "Turtle", node, clock=clock) as driver:
+        heard: list[object] = []
+
+        def changed(message: object) -> None:
+            heard.append(message)
+            raise SystemExit(3)
+
+        driver.on_world(changed)
+        world = node.new_pub("/Turtle/world", "json")
+        for number in range(3):
+            world.publish({"number": number})
+        world.publish_bytes(json.dumps("n" * hostile.LONG_NAME_BYTES).encode())
+        world.publish({"number": 3})
+        eventually(lambda: len(heard) == 4)
+        assert stops(Ears(node, "Turtle"), "s")
