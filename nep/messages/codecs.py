@@ -13,7 +13,8 @@ JSON has no NaN and no infinity: they are sent as `null`, and a publisher tells 
 able to read on. The original NEP up to 0.5.4.5 raised `ValueError`, 0.5.4.8 sends the bare word `NaN`,
 which no strict reader takes. Keys that are numbers become strings. msgpack takes numpy arrays and dataclasses
 as JSON does. Readers in other languages may want keys that are text or numbers; ours reads all that Python
-can have. Any other message type ("robot/description", "sensor_msgs/Image") is carried as json.
+can have. Lists and maps have 64 levels at most, in both (`nep.messages.nesting`).
+Any other message type ("robot/description", "sensor_msgs/Image") is carried as json.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from nep.errors import DecodeError, EncodeError, did_you_mean
 from nep.i18n import _
 from nep.messages import image_codec
 from nep.messages.encoded import Encoded, encoded
+from nep.messages.nesting import MAX_LEVELS, json_is_too_deep, packed_is_too_deep, too_deep
 from nep.messages.packing import pack, unpack
 
 __all__ = [
@@ -92,27 +94,37 @@ def _plain(value: object) -> object:
 
 def _encode_json(payload: object) -> Encoded:
     try:
-        return encoded((orjson.dumps(payload, _plain, _NUMPY), None))
+        return encoded((_ordinary_json(payload), None))
     except TypeError:
         pass  # number keys need the slower way; everything else fails again with its reason
     try:
-        return Encoded(orjson.dumps(payload, _plain, _NUMPY | orjson.OPT_NON_STR_KEYS))
+        data = orjson.dumps(payload, _plain, _NUMPY | orjson.OPT_NON_STR_KEYS)
     except (TypeError, RecursionError) as error:
-        reason = str(error.__cause__ or error) or _("it does not fit")
+        # orjson itself takes 254 levels, and says so in words of its own
+        is_deep = isinstance(error, RecursionError) or "Recursion limit" in str(error)
+        reason = too_deep() if is_deep else str(error.__cause__ or error) or _("it does not fit")
         raise EncodeError("json", type(payload).__name__, reason) from error
+    if json_is_too_deep(data):
+        raise EncodeError("json", type(payload).__name__, too_deep())
+    return Encoded(data)
 
 
 def _ordinary_json(payload: object) -> bytes:
-    return orjson.dumps(payload, _plain, _NUMPY)
+    data = orjson.dumps(payload, _plain, _NUMPY)
+    if len(data) > 2 * MAX_LEVELS and json_is_too_deep(data):
+        raise EncodeError("json", type(payload).__name__, too_deep())
+    return data
 
 
 def _decode_json(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
+    if len(data) > 2 * MAX_LEVELS and json_is_too_deep(data):
+        raise DecodeError("json", len(data), too_deep())
     try:
         return orjson.loads(data)
     except orjson.JSONDecodeError as first:
         # The original NEP's 0.5.4.8 sends bare NaN, which only Python's own reader takes.
         try:
-            return json.loads(bytes(data))
+            return json.loads(str(data, "utf-8-sig"))
         except (ValueError, RecursionError):
             raise DecodeError("json", len(data), str(first)) from first
 
@@ -185,16 +197,24 @@ def _packable(value: object) -> object:
 
 def _encode_msgpack(payload: object) -> Encoded:
     try:
-        return Encoded(pack(payload, _packable))
+        data = pack(payload, _packable)
     except ValueError as error:
-        raise EncodeError("msgpack", type(payload).__name__, str(error)) from error
+        is_deep = "recursion limit" in str(error)
+        raise EncodeError("msgpack", type(payload).__name__, too_deep() if is_deep else str(error)) from error
+    if packed_is_too_deep(data, payload):
+        raise EncodeError("msgpack", type(payload).__name__, too_deep())
+    return Encoded(data)
 
 
 def _decode_msgpack(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
     try:
-        return unpack(data)
+        value = unpack(data)
     except ValueError as error:
-        raise DecodeError("msgpack", len(data), str(error)) from error
+        is_deep = isinstance(error.__cause__, msgpack.StackError)
+        raise DecodeError("msgpack", len(data), too_deep() if is_deep else str(error)) from error
+    if packed_is_too_deep(data, value):
+        raise DecodeError("msgpack", len(data), too_deep())
+    return value
 
 
 def _decode_image(data: bytes | memoryview, extension: Mapping[str, object]) -> object:

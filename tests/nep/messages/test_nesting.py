@@ -1,0 +1,114 @@
+"""The limit of 64 levels, in every codec and both ways."""
+
+from __future__ import annotations
+
+import json
+import logging
+
+import msgpack
+import orjson
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import nep
+from nep.errors import DecodeError, EncodeError
+from nep.messages.codecs import codec
+from nep.messages.nesting import MAX_LEVELS, json_is_too_deep
+
+SENTENCE = "it has more than 64 levels of lists and maps"
+
+
+def nested(levels: int, kind: str) -> object:
+    value: object = 1
+    for level in range(levels):
+        value = [value] if kind == "lists" or (kind == "both" and level % 2) else {"a": value}
+    return value
+
+
+@pytest.mark.parametrize("kind", ["lists", "maps", "both"])
+@pytest.mark.parametrize("name", ["json", "msgpack"])
+def test_64_levels_are_carried_and_65_are_refused_in_the_same_words(name: str, kind: str) -> None:
+    assert codec(name).decode(codec(name).encode(nested(64, kind)).data, {}) == nested(64, kind)
+    for levels in (65, 300, 1_000, 2_000):
+        value = nested(levels, kind)
+        with pytest.raises(EncodeError, match=SENTENCE):
+            codec(name).encode(value)
+        if name == "json":
+            opening = {"lists": "[", "maps": '{"a":', "both": '[{"a":'}[kind]
+            data = (
+                opening * levels
+                + "1"
+                + ("]" if kind == "lists" else "}" if kind == "maps" else "}]") * levels
+            )
+            packed = data.encode()
+        else:
+            packed = {"lists": b"\x91", "maps": b"\x81\xa1a", "both": b"\x91\x81\xa1a"}[
+                kind
+            ] * levels + b"\x01"
+        with pytest.raises(DecodeError, match=SENTENCE):
+            codec(name).decode(packed, {})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        json.dumps(["]", "[" * 200, '"', "\\", '\\"[', "{" * 100]),
+        json.dumps([{"x": 1, "y": [number]} for number in range(200)]),
+        json.dumps({"a\\": '\\\\"[[[['} | {f"[{number}": "{" for number in range(200)}, indent=2),
+    ],
+)
+def test_brackets_in_texts_are_no_levels(text: str) -> None:
+    assert codec("json").decode(text.encode(), {}) == json.loads(text)
+
+
+@pytest.mark.parametrize(("before", "after"), [('["]",', '"["]'), ('["\\\\]",', ',"["]'), ('{"}":', "}")])
+def test_brackets_in_texts_hide_no_levels(before: str, after: str) -> None:
+    text = before * 70 + "1" + after * 70
+    with pytest.raises(DecodeError, match=SENTENCE):
+        codec("json").decode(text.encode(), {})
+
+
+JSON_VALUES = st.recursive(
+    st.none() | st.integers(-5, 5) | st.text('[]{}"\\a', max_size=6),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text('[]{}"\\a', max_size=3), inner, max_size=3)
+    ),
+    max_leaves=60,
+)
+
+
+def levels_of(value: object) -> int:
+    if isinstance(value, list):
+        return 1 + max(map(levels_of, value), default=0)
+    return 1 + max(map(levels_of, value.values()), default=0) if isinstance(value, dict) else 0
+
+
+@settings(max_examples=150)
+@given(JSON_VALUES, st.integers(0, 80))
+def test_check_of_the_bytes_agrees_with_the_value(value: object, around: int) -> None:
+    for _level in range(around):
+        value = [value, "]"]
+    assert json_is_too_deep(orjson.dumps(value)) == (levels_of(value) > MAX_LEVELS)
+
+
+def test_text_of_another_encoding_hides_no_levels() -> None:
+    text = '["\u5d5d\u2222",' * 100 + "1" + "]" * 100
+    with pytest.raises(DecodeError):
+        codec("json").decode(text.encode("utf-16"), {})
+
+
+def test_publisher_refuses_and_counts_what_is_too_deep(caplog: pytest.LogCaptureFixture) -> None:
+    with nep.node("deep", "memory") as node, caplog.at_level(logging.WARNING):
+        publisher, subscriber = node.new_pub("/deep"), node.new_sub("/deep")
+        publisher.publish(nested(65, "both"))
+        assert publisher.refused == 1
+        assert SENTENCE in publisher.problem
+        publisher.publish_bytes(b"[" * 65 + b"]" * 65)
+        publisher.publish(nested(64, "both"))
+        assert subscriber.listen(timeout_s=30.0) == (True, nested(64, "both"))
+
+
+def test_deep_msgpack_is_refused_however_it_is_deep() -> None:
+    with pytest.raises(DecodeError, match=SENTENCE):
+        codec("msgpack").decode(msgpack.packb([[1.5] * 1000, nested(70, "maps")]), {})
