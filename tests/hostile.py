@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 
 LEVELS = 1_000
 LONG_NAME_BYTES = 5_000_000
+Message = Mapping[str, object] | list[object]
 _PLACEHOLDER = "\x00hostile\x00"
 
 VALUES: Mapping[str, str] = {
@@ -56,22 +57,29 @@ WHOLES: tuple[bytes, ...] = (
 """Whole payloads that are no message of any receiver."""
 
 
-def in_every_field(message: Mapping[str, object]) -> Iterator[bytes]:
-    """Yield a well-formed message as JSON with each hostile value in each of its fields, also nested ones."""
-    for place in _places(message):
+def in_every_field(message: Message, share: int = 1) -> Iterator[bytes]:
+    """Yield a well-formed message as JSON with hostile values in each of its fields, also nested ones.
+
+    Each field gets all values, or every `share`-th of them, other ones than the field before.
+    """
+    hole = json.dumps(_PLACEHOLDER)
+    for number, place in enumerate(_places(message)):
         prepared = json.dumps(_replaced(message, place, _PLACEHOLDER))
-        hole = json.dumps(_PLACEHOLDER)
-        for value in VALUES.values():
+        for value in list(VALUES.values())[number % share :: share]:
             yield prepared.replace(hole, value).encode()
-    first = next(iter(message))
-    yield json.dumps({**message, first: "n" * LONG_NAME_BYTES}).encode()
 
 
-def payloads(*messages: Mapping[str, object]) -> Iterator[bytes]:
-    """Yield every hostile payload for a receiver of these messages."""
+def with_long_name(message: Mapping[str, object]) -> Iterator[bytes]:
+    """Yield a well-formed message with a text of 5 MB in each of its fields."""
+    for name in message:
+        yield json.dumps({**message, name: "n" * LONG_NAME_BYTES}).encode()
+
+
+def payloads(*messages: Message, share: int = 1) -> Iterator[bytes]:
+    """Yield every hostile payload for a receiver of these messages; `share` as for `in_every_field`."""
     yield from WHOLES
     for message in messages:
-        yield from in_every_field(message)
+        yield from in_every_field(message, share)
 
 
 def _places(value: object, above: tuple[object, ...] = ()) -> Iterator[tuple[object, ...]]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import cv2
 
+from app.robots.description.json_access import finite
 from app.robots.diffdrive import DIFFDRIVE, DiffDrive
 from app.robots.driver.call import Clock, Link, MonotonicClock
 from app.robots.driver.process import main as drive
@@ -159,15 +160,15 @@ class VirtualWheels:
 
     def act(self, change: Mapping[str, object]) -> None:
         """A person moves things of its room, or puts all back."""
-        moved, x, y = change.get("move"), change.get("x"), change.get("y")
+        moved, x, y = change.get("move"), finite(change.get("x")), finite(change.get("y"))
         with self._lock:
             if isinstance(change.get("hold"), bool):
                 self.body.hold(held=change["hold"] is True)
-            if isinstance(moved, str) and isinstance(x, (int, float)) and isinstance(y, (int, float)):
+            if isinstance(moved, str) and x is not None and y is not None:
                 if moved == ITSELF:
-                    self.body.carry(float(x), float(y))
+                    self.body.carry(x, y)
                 else:
-                    self._shared.move(moved, float(x), float(y))
+                    self._shared.move(moved, x, y)
             if change.get("reset") is True:
                 self.body.reset(self._shared.put_back())
         if isinstance(change.get("happen"), str):

@@ -21,6 +21,7 @@ from app.blocks.runtime.link import ProgramLink, RobotCall
 from app.blocks.runtime.scheduler import EndScript, Scheduler
 from app.robots.description.description import Action, Parameter, Robot
 from app.robots.description.inputs import from_words
+from app.robots.description.json_access import finite
 from nep.i18n import _, listed
 
 FIRST_ANSWER_S = 3.0
@@ -437,4 +438,4 @@ def _is_number(value: object) -> bool:
 
 
 def _number(value: object) -> float:
-    return float(value) if isinstance(value, (int, float)) else 0.0
+    return finite(value) or 0.0

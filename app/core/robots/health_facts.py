@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeGuard
 
 from app.core.network.topics import Topic, Topics
 from app.core.robots.robot_link import RobotLink
 from app.robots.description.description import Sensor
+from app.robots.description.json_access import finite
 from nep.i18n import _, lazy, ngettext, number
 
 SILENT_S = 3.0
@@ -101,8 +101,8 @@ def _battery(link: RobotLink) -> Iterable[HealthFact]:
     for sensor in link.robot.sensors:
         if "battery" not in f"{sensor.name} {sensor.title}".casefold() or sensor.unit != "%":
             continue
-        value = link.values.get(sensor.name)
-        if not _is_number(value):
+        value = finite(link.values.get(sensor.name))
+        if value is None:
             yield HealthFact(BATTERY, "off", _("not told yet"))
         elif value < LOW_PERCENT:
             yield HealthFact(BATTERY, "warn", _("{percent} %; charge it soon").format(percent=f"{value:.0f}"))
@@ -127,12 +127,14 @@ def _temperature(link: RobotLink) -> Iterable[HealthFact]:
 
 def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[float, str]]:
     value = values.get(sensor.name)
-    if sensor.unit == "°C" and _is_number(value):
-        yield float(value), sensor.title
+    degrees = finite(value)
+    if sensor.unit == "°C" and degrees is not None:
+        yield degrees, sensor.title
     for field in sensor.fields:
         inner = value.get(field.name) if isinstance(value, Mapping) else None
-        if field.unit == "°C" and _is_number(inner):
-            yield float(inner), field.title
+        degrees = finite(inner)
+        if field.unit == "°C" and degrees is not None:
+            yield degrees, field.title
 
 
 def _stop(link: RobotLink) -> HealthFact:
@@ -217,7 +219,3 @@ def _life(link: RobotLink) -> Iterable[HealthFact]:
         )
     elif link.robot.dialect == "native":
         yield HealthFact(SIGN_OF_LIFE, "off", _("none while it works"))
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from nep.i18n import language, translate
@@ -46,9 +47,18 @@ def number_of(value: object) -> float | None:
     """The number that RIZE may have sent as text; None when it is none."""
     if isinstance(value, bool):
         return None
-    if isinstance(value, (int, float)):
-        return float(value)
     try:
-        return float(text(value) or "")
-    except ValueError:
+        return float(value if isinstance(value, (int, float)) else text(value) or "")
+    except (ValueError, OverflowError):
         return None
+
+
+def finite(value: object) -> float | None:
+    """Return a number as a float; None for anything else, NaN, infinity and integers beyond all floats."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    try:
+        found = float(value)
+    except OverflowError:
+        return None
+    return found if math.isfinite(found) else None

@@ -28,6 +28,7 @@ from app.robots.driver.rize_dialect import RizeDialect
 from app.robots.driver.schema_values import told_fields
 from app.robots.driver.tasks import Tasks
 from nep.i18n import _, lazy, number
+from nep.text import quotable
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -201,7 +202,7 @@ class Driver:
         """
         described = self.robot.event(event)
         if described is None:
-            return (_("{robot} has no event “{event}”").format(robot=self.name, event=event),)
+            return (_("{robot} has no event “{event}”").format(robot=self.name, event=quotable(event)),)
         missing = [field for field in described.fields if field.name not in data]
         return (
             *(problem.sentence for problem in problems_of(described.fields, data)),

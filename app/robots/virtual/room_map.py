@@ -7,11 +7,11 @@ and nobody owns it (ADR 0022).
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
+from app.robots.description.json_access import finite
 from app.robots.virtual.room import Ball, Box, Marker, Person, Room, Thing
 
 TOPIC = "/room"
@@ -224,5 +224,5 @@ def _parsed(told: Sequence[object]) -> Iterator[ThingPlace]:
 
 
 def _is_place(value: object) -> bool:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return good and math.isfinite(value) and abs(value) < _FARTHEST  # type: ignore[arg-type]
+    place = finite(value)
+    return place is not None and abs(place) < _FARTHEST

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import cv2
 
+from app.robots.description.json_access import finite
 from app.robots.driver.call import Clock, Link
 from app.robots.virtual.body import HEIGHT, RADIUS, Body, BodyEvent
 from app.robots.virtual.camera import Camera, lens_of
@@ -18,6 +19,7 @@ from app.robots.virtual.room import Ball, Other, Person, Room, Thing
 from app.robots.virtual.room_map import kind_of
 from app.robots.virtual.shared_room import SharedRoom
 from app.robots.virtual.vision import Detection, ObjectDetector, message
+from nep.text import bounded_str, quotable
 
 BODY_HZ = 30.0
 CAMERA_HZ = 15.0
@@ -187,17 +189,17 @@ class Simulation:
     def act(self, change: Mapping[str, object]) -> None:
         """A person does something to the world: touch, move, say, reset."""
         place, moved, word = change.get("touch"), change.get("move"), change.get("say")
-        x, y = change.get("x"), change.get("y")
+        x, y = finite(change.get("x")), finite(change.get("y"))
         with self.changed:
             if place in PLACES:
                 self.body.touch(str(place), down=change.get("down") is not False)
             if isinstance(change.get("hold"), bool):
                 self.body.hold(held=change["hold"] is True)
-            if isinstance(moved, str) and isinstance(x, (int, float)) and isinstance(y, (int, float)):
+            if isinstance(moved, str) and x is not None and y is not None:
                 if moved == ITSELF:
-                    self.body.carry(float(x), float(y))
+                    self.body.carry(x, y)
                 else:
-                    self._shared.move(moved, float(x), float(y))
+                    self._shared.move(moved, x, y)
             if isinstance(word, str) and word.strip():
                 self.body.hear(word.strip())
             if change.get("reset") is True:
@@ -247,14 +249,14 @@ class Beat:
 
 def told_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
     """The event that a person lets happen, ``{"happen": "bumped", "side": "front"}``, and its data."""
-    return str(change["happen"]), {name: value for name, value in change.items() if name != "happen"}
+    return bounded_str(change["happen"]), {name: value for name, value in change.items() if name != "happen"}
 
 
 def may_happen(link: Link, event: str, data: Mapping[str, object]) -> bool:
     """Whether an event that a person lets happen is as the description says; one that is not is logged."""
     wrong = link.wrong_in(event, data)
     if wrong:
-        _log.warning("%s: it can't notice '%s': %s", link.name, event, "; ".join(wrong))
+        _log.warning("%s: it can't notice '%s': %s", link.name, quotable(event), "; ".join(wrong))
     return not wrong
 
 
