@@ -25,7 +25,7 @@ from typing import Protocol
 from nep.errors import ClosedError, NepError
 from nep.i18n import _, ngettext, number
 from nep.system.forks import watch
-from nep.text import shortened
+from nep.text import bounded_str, shortened
 
 __all__ = [
     "BURST",
@@ -104,7 +104,7 @@ class LogRecord:
         text, stamp = given.get("text"), _number(given.get("stamp_ns"))
         return cls(
             level_of(given.get("level")),
-            text if isinstance(text, str) else "" if text is None else str(text),
+            "" if text is None else bounded_str(text, TEXT_LIMIT),
             _word(given.get("name")),
             _word(given.get("node")),
             stamp if stamp is not None and 0 < stamp < 1 << 63 else stamp_ns or 0,
@@ -116,7 +116,7 @@ class LogRecord:
 
 def level_of(given: object) -> str:
     """The level of that name, also as others write it ("WARN"); "info" for what is none."""
-    word = str(given).strip().lower()
+    word = given.strip().lower() if isinstance(given, str) else ""
     word = _ALIASES.get(word, word)
     return word if word in LEVELS else "info"
 
