@@ -70,6 +70,7 @@ __all__ = [
     "nearest",
 ]
 
+_MAX_WORD_LENGTH = 200
 _LONGEST = 500
 """Letters of a reason that somebody else gave."""
 
@@ -84,6 +85,8 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
 
 def nearest(word: str, known: Sequence[str]) -> str | None:
     """The known word that is nearly this one."""
+    if len(word) > _MAX_WORD_LENGTH:  # comparing takes time with the square of the length
+        return None
     return next(iter(get_close_matches(word, known, n=1)), None)
 
 

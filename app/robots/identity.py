@@ -17,7 +17,7 @@ from app.robots.description.model import Robot
 from nep.i18n import _, lazy
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
-from nep.text import harmless, shortened
+from nep.text import bounded_str, harmless
 
 DESCRIPTION_TYPE = "robot/description"
 GATEWAY = "gateway"
@@ -117,12 +117,14 @@ def is_home(robot_name: str, topic: str) -> bool:
 
 def said(error: object) -> str:
     """The words of a robot's error, as a person may read them between our own: no more than they need be."""
-    return shortened(harmless(str(error or ""), lines=True), ERROR_MOST)
+    return harmless(bounded_str(error or "", ERROR_MOST), lines=True)
 
 
 def said_of_stop(name: str, error: object) -> str:
     """What a robot said that has not stopped, in its own words: "Arm may still move: the brake is stuck"."""
-    words = "".join(sign if sign.isprintable() else " " for sign in str(error or _("its stop failed")))
+    words = "".join(
+        sign if sign.isprintable() else " " for sign in bounded_str(error or _("its stop failed"), ERROR_MOST)
+    )
     words = " ".join(words[:WORDS_MOST].split()).rstrip(".")
     return words if may_move(name, words) else _(MAY_MOVE).format(robot=name, why=words)
 

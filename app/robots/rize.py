@@ -18,6 +18,7 @@ from app.robots.description.inputs import pretty_number
 from app.robots.description.json_access import as_part, names, part, text
 from app.robots.description.model import Robot
 from nep.i18n import _, lazy
+from nep.text import bounded_str
 
 COMMANDS, ANSWERS, EVENTS = "robot_action", "action_state", "rize_event"
 _STATES = {"success": "succeeded", "failure": "failed"}
@@ -93,14 +94,16 @@ def _as_text(value: object) -> str:
 def from_answer(message: object) -> dict[str, object] | None:
     """A message of ``action_state`` in the shape of ``robot/answer``; None while it tells no end."""
     said = as_part(message)
-    state = _STATES.get(str(said.get("state")))
+    state = _STATES.get(bounded_str(said.get("state")))
     wanted = text(said.get("id"))
     if state is None or wanted is None:
         return None
     primitives = said.get("primitives")
     first = as_part(primitives[0] if isinstance(primitives, list) and primitives else primitives)
-    action = str(first.get("primitive") or "")
-    error = _(_FAILED).format(robot=said.get("robots") or _("the robot"), action=action or _("do it"))
+    action = bounded_str(first.get("primitive") or "")
+    error = _(_FAILED).format(
+        robot=bounded_str(said.get("robots") or _("the robot")), action=action or _("do it")
+    )
     return {
         "id": wanted,
         "op": "invoke",

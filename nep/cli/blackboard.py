@@ -18,7 +18,7 @@ from nep.errors import NepError, NoServerError, RequestRefusedError, ServiceErro
 from nep.i18n import _, lazy
 from nep.nodes.node import Node
 from nep.system.lazy_import import lazy_module
-from nep.text import escaped
+from nep.text import escaped, quotable
 
 if TYPE_CHECKING:
     from nep.programs.blackboard import board as boards
@@ -196,12 +196,12 @@ def _entries(answer: object) -> Sequence[Mapping[str, object]]:
 def _row(entry: Mapping[str, object]) -> tuple[str, ...]:
     age_s = entry.get("age_s")
     return (
-        escaped(str(entry.get("key"))),
+        quotable(entry.get("key")),
         presented(entry.get("value"), whole=False),
         _age(age_s) if isinstance(age_s, int | float) else UNKNOWN,
-        {"stamp": _("stamp"), "arrival": _("arrival")}.get(str(entry.get("age_by")), UNKNOWN),
-        escaped(str(entry.get("source") or UNKNOWN)),
-        escaped(str(entry.get("robot") or UNKNOWN)),
+        {"stamp": _("stamp"), "arrival": _("arrival")}.get(quotable(entry.get("age_by")), UNKNOWN),
+        quotable(entry.get("source") or UNKNOWN),
+        quotable(entry.get("robot") or UNKNOWN),
     )
 
 

@@ -27,7 +27,7 @@ from nep.nodes.subscriber import Subscriber
 from nep.patterns.parameters.owned import MSG_TYPE, place_of
 from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
 from nep.system.replace_file import replace_file
-from nep.text import escaped, shortened
+from nep.text import bounded_str, escaped, shortened
 
 app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
@@ -144,7 +144,7 @@ def dump(
 ) -> None:
     """Write all parameters as JSON, for `nep param load`."""
     with _parameters(node, master) as theirs:
-        values = {str(each.get("name")): each.get("value") for each in theirs.list()}
+        values = {bounded_str(each.get("name")): each.get("value") for each in theirs.list()}
     data = json_of(values, indent=True) + b"\n"
     if file is None:
         write(data.decode())
@@ -217,7 +217,7 @@ def _values(message: Message) -> Mapping[str, object] | None:
     if not isinstance(listed, list):
         return None
     maps = [each for each in listed if isinstance(each, Mapping)]
-    return {str(each.get("name")): each.get("value") for each in maps}
+    return {bounded_str(each.get("name")): each.get("value") for each in maps}
 
 
 def _changes(states: Iterator[Mapping[str, object]], name: str | None) -> Iterator[tuple[str, object]]:

@@ -20,7 +20,7 @@ import orjson
 from nep.errors import BadTopicError, WireError
 from nep.i18n import _
 from nep.protocol.wire import check_topic
-from nep.text import escaped, shortened
+from nep.text import bounded_str, escaped, shortened
 
 __all__ = [
     "HEADER_BYTES",
@@ -210,7 +210,7 @@ def read_failure(data: bytes | memoryview) -> tuple[str, str]:
     if not isinstance(said, dict):
         return "", _("the reason cannot be read")
     name, reason = said.get("nep_error", ""), said.get("reason", "")
-    return escaped(shortened(str(name), _CLASS_LETTERS)), escaped(shortened(str(reason), _REASON_LETTERS))
+    return escaped(bounded_str(name, _CLASS_LETTERS)), escaped(bounded_str(reason, _REASON_LETTERS))
 
 
 def check_service(name: str) -> str:

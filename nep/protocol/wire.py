@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from nep.errors import BadNameError, BadTopicError, WireError
 from nep.i18n import _
+from nep.messages.nesting import packed_is_too_deep, too_deep
 from nep.messages.packing import pack, unpack
 from nep.text import control_in
 
@@ -295,6 +296,8 @@ def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
         value = unpack(part)
     except ValueError as error:
         raise WireError(_("the extension is no msgpack: {error}").format(error=error), len(part)) from error
+    if packed_is_too_deep(part, value):
+        raise WireError(too_deep(), len(part))
     if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
         raise WireError(_("the extension is no map with names"), len(part))
     return value

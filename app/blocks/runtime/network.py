@@ -21,6 +21,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
+from nep.text import bounded_str
 
 LOOK_S = 0.2
 """The master is asked so often at most who sent what came from an unknown publisher."""
@@ -404,11 +405,11 @@ class Network:
         self._hear(topic)
         if answer.get("op") == "stop":
             return
-        call = self._calls.get(str(answer.get("id")))
+        call = self._calls.get(bounded_str(answer.get("id")))
         # A cancel is answered with the id of the command it was for; only the command's own answer ends it.
         if call is None or call.done or answer.get("op") not in (None, "invoke"):
             return
-        state = str(answer.get("state"))
+        state = bounded_str(answer.get("state"))
         if self._robots[call.robot].topics.answer != topic or state not in STATES:
             return  # another robot's answer, or no word of a robot
         output = answer.get("output")
@@ -418,7 +419,7 @@ class Network:
         call.feedback = feedback if isinstance(feedback, Mapping) and feedback else call.feedback
         call.began = call.began or state == "running"
         waits_for = answer.get("waits_for")
-        call.waits_for = tuple(map(str, waits_for)) if isinstance(waits_for, list) else call.waits_for
+        call.waits_for = tuple(map(bounded_str, waits_for)) if isinstance(waits_for, list) else call.waits_for
         call.state = state
         if call.state in LAST_STATES:
             self._calls.pop(call.id, None)
@@ -440,7 +441,7 @@ class Network:
     def _stop_answered(self, topic: str, answer: Mapping[str, object], node: str) -> None:
         if answer.get("state") not in ("succeeded", "failed"):
             return
-        id = str(answer.get("id"))
+        id = bounded_str(answer.get("id"))
         robots = [robot.name for robot in self._robots.values() if robot.topics.answer == topic]
         own = [robot.name for robot in self._robots.values() if self._is_own(robot, topic, node)]
         with self._arrived:

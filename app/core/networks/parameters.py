@@ -24,6 +24,7 @@ from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.patterns.parameters.owned import place_of
 from nep.patterns.parameters.remote import RemoteParameters
+from nep.text import bounded_str
 
 ANSWER_S = 3.0
 """How long a node may take to answer that it has set one."""
@@ -31,6 +32,7 @@ READ_BYTES = 4 * 2**20
 """More is not read in the window."""
 EDITED_LETTERS = 20_000
 MOST = 1000
+_MAX_DESCRIPTION_LENGTH = 2_000
 """As many as a node may declare; of a stranger's the others are not shown."""
 
 
@@ -231,10 +233,10 @@ def parameters_in(state: object) -> tuple[ShownParameter, ...]:
 def _parameter(told: Mapping[str, object]) -> ShownParameter:
     choices = told.get("choices")
     return ShownParameter(
-        str(told.get("name")),
+        bounded_str(told.get("name")),
         told.get("value"),
-        str(told.get("type")),
-        str(told.get("description") or ""),
+        bounded_str(told.get("type")),
+        bounded_str(told.get("description") or "", _MAX_DESCRIPTION_LENGTH),
         _number(told.get("min")),
         _number(told.get("max")),
         tuple(choices[:MOST]) if isinstance(choices, list) else (),
@@ -259,7 +261,7 @@ def text_of(value: object) -> str:
     try:
         return orjson.dumps(value).decode()
     except TypeError:  # what no JSON has, and a stranger sent
-        return str(value)
+        return bounded_str(value)
 
 
 def value_of(text: str, kind: str) -> object:

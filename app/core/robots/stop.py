@@ -32,6 +32,7 @@ from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
+from nep.text import bounded_str
 
 _log = logging.getLogger("studio")
 RIZE = "rize"
@@ -389,7 +390,7 @@ class RobotStopper:
                 continue
             late = None
             with self._changed:
-                asked = self._asked.get(str(told.get("id")))
+                asked = self._asked.get(bounded_str(told.get("id")))
                 if asked is not None:
                     late = self._judge(asked, message)
                     self._changed.notify_all()

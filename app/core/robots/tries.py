@@ -11,6 +11,7 @@ from app.robots import rize
 from app.robots.description.description import Action, Robot
 from app.robots.identity import said
 from nep.i18n import _, number
+from nep.text import bounded_str
 
 FIRST_ANSWER_S = 3.0
 """How long a robot may take to say anything to a command."""
@@ -72,7 +73,7 @@ class Tries:
             self._take(link, made, answer)
 
     def _take(self, link: RobotLink, made: Invocation, answer: Payload) -> None:
-        state = str(answer.get("state"))
+        state = bounded_str(answer.get("state"))
         if state not in FINAL_STATES and state not in ("accepted", "running"):
             return  # no word of a robot
         made.feedback = _object(answer.get("feedback")) or made.feedback
@@ -149,7 +150,7 @@ def command_of(robot: Robot, made: Invocation, input: Payload) -> Payload:
 
 
 def _names(value: object) -> tuple[str, ...]:
-    return tuple(str(name) for name in value) if isinstance(value, (list, tuple)) else ()
+    return tuple(map(bounded_str, value)) if isinstance(value, (list, tuple)) else ()
 
 
 def _object(value: object) -> Payload | None:

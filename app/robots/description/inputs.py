@@ -16,7 +16,7 @@ from app.errors import InputProblem
 from app.robots.description.json_access import as_part, names, number, number_of, part, spoken, text
 from nep.i18n import _, listed, ngettext, translate
 from nep.i18n import number as number_text
-from nep.text import quotable
+from nep.text import bounded_str, quotable
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _LENGTH, _ITEMS = ("minLength", "maxLength"), ("minItems", "maxItems")
@@ -147,7 +147,7 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
     if isinstance(named, (list, tuple)):
         pairs = [(as_part(item).get("const"), spoken(as_part(item))) for item in named]
     return tuple(
-        Choice(value, title or translate("robot", str(value).replace("_", " ")))
+        Choice(value, title or translate("robot", bounded_str(value).replace("_", " ")))
         for value, title in pairs
         if isinstance(value, (str, int, float))
     )

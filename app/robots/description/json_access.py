@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from nep.i18n import language, translate
+from nep.text import bounded_str
 
 
 def part(mapping: Mapping[str, object], name: str) -> Mapping[str, object]:
@@ -20,7 +21,11 @@ def as_part(value: object) -> Mapping[str, object]:
 
 def names(value: object) -> tuple[str, ...]:
     """The words of a list; none when it is something else."""
-    return tuple(str(item) for item in value) if isinstance(value, (list, tuple)) else ()
+    return (
+        tuple(item if isinstance(item, str) else bounded_str(item) for item in value)
+        if isinstance(value, (list, tuple))
+        else ()
+    )
 
 
 def text(value: object) -> str | None:

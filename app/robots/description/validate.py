@@ -17,7 +17,7 @@ from app import resources
 from app.robots.description.inputs import parameter_of, wrong_value
 from app.robots.description.json_access import as_part, names, part
 from nep.i18n import _, lazy, listed
-from nep.text import control_in, harmless
+from nep.text import bounded_str, control_in, harmless
 
 if TYPE_CHECKING:
     from jsonschema import Draft7Validator
@@ -184,7 +184,7 @@ def _sentence(error: ValidationError) -> str:
 
 
 def _shortened(value: object) -> str:
-    text = str(value)
+    text = bounded_str(value, 41)
     return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
 
 
@@ -194,7 +194,7 @@ def _shortened(value: object) -> str:
 def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
     actions = part(model, "actions")
     properties = part(model, "properties")
-    stop = str(part(model, "rb:safeStop").get("action"))
+    stop = bounded_str(part(model, "rb:safeStop").get("action"))
     if stop not in actions:
         yield _("rb:safeStop.action names '{stop}', but there is no such action").format(stop=stop)
     elif part(part(actions, stop), "input").get("required"):

@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor, QPainter, QPen
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import number
+from nep.text import bounded_str
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
@@ -47,7 +48,9 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
         if isinstance(item, Mapping) and isinstance(place, Sequence) and len(place) == 4:
             x, y, w, h = (_number(part) or 0.0 for part in place)
             area = QRectF(x / width, y / height, w / width, h / height)
-            found.append(DetectionBox(str(item.get("name", "")), _number(item.get("confidence")), area, kind))
+            found.append(
+                DetectionBox(bounded_str(item.get("name", "")), _number(item.get("confidence")), area, kind)
+            )
     return tuple(found)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from nep.i18n import _
+from nep.text import bounded_str
 
 EYES = "#35B0FA"
 SHOULDERS = "#3AB5FF"
@@ -89,15 +90,15 @@ class RobotState:
             speech=speech if isinstance(speech, str) and speech.strip() else None,
             spoken=min(1.0, max(0.0, _number(data.get("spoken")))),
             sound=_sound(data.get("sound")),
-            heard=str(data.get("heard") or "")[:MOST_HEARD],
+            heard=bounded_str(data.get("heard") or "")[:MOST_HEARD],
             eyes=_colour(data.get("eyes"), EYES),
             shoulders=_colour(data.get("shoulders"), SHOULDERS),
-            emotion=str(data.get("emotion") or "neutral"),
+            emotion=bounded_str(data.get("emotion") or "neutral"),
             arm_left_deg=_number(data.get("arm_left_deg")),
             arm_right_deg=_number(data.get("arm_right_deg")),
             moving=data.get("moving") is True,
-            figure=str(data.get("figure") or "pepper"),
-            bumped=str(data.get("bumped") or ""),
+            figure=bounded_str(data.get("figure") or "pepper"),
+            bumped=bounded_str(data.get("bumped") or ""),
             touched=_touched(data.get("touched", data.get("touch"))),
             held=data.get("held") is True,
             shared=_is_shared(data.get("room")),
@@ -107,7 +108,7 @@ class RobotState:
 
 
 def _sound(value: object) -> str:
-    return str(value.get("title") or "")[:40] if isinstance(value, Mapping) else ""
+    return bounded_str(value.get("title") or "")[:40] if isinstance(value, Mapping) else ""
 
 
 def _number(value: object, default: float = 0.0) -> float:
@@ -125,9 +126,9 @@ def _touched(value: object) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value,)
     if isinstance(value, Mapping):
-        return tuple(str(place) for place, down in value.items() if down is True)
+        return tuple(bounded_str(place) for place, down in value.items() if down is True)
     if isinstance(value, Sequence):
-        return tuple(str(place) for place in value)
+        return tuple(bounded_str(place) for place in value)
     return ()
 
 
@@ -141,10 +142,10 @@ def _thing(one: Mapping[str, object]) -> Thing:
     colour = one.get("colour", one.get("color"))
     size = one.get("radius", one.get("size"))
     return Thing(
-        kind=str(one.get("kind") or "box"),
+        kind=bounded_str(one.get("kind") or "box"),
         x=_number(one.get("x")),
         y=_number(one.get("y")),
-        name=str(one.get("name") or ""),
+        name=bounded_str(one.get("name") or ""),
         colour=_colour(colour, "") or None,
         size_m=_number(size) if size is not None else None,
         height_m=_number(one.get("height")) if one.get("height") is not None else None,

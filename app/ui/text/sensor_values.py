@@ -8,8 +8,10 @@ from typing import TypeGuard
 
 from app.robots.description.description import DataField, Sensor
 from nep.i18n import _, number
+from nep.text import bounded_str
 
 MINUS = "\u2212"
+_MAX_NAMES = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +74,11 @@ def _detections(value: Mapping[str, object]) -> ReadingWords:
     found = [item for item in items if isinstance(item, Mapping)] if isinstance(items, list) else []
     count = value.get("count")
     name = value.get("name")
-    names = str(name) if name else ", ".join(str(item.get("name", "")) for item in found)
+    names = (
+        bounded_str(name)
+        if name
+        else ", ".join(bounded_str(item.get("name", "")) for item in found[:_MAX_NAMES])
+    )
     return ReadingWords(str(count if isinstance(count, int) else len(found)), names)
 
 
@@ -97,4 +103,4 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 
 def _name(item: object) -> str:
-    return str(item.get("name", item)) if isinstance(item, Mapping) else str(item)
+    return bounded_str(item.get("name", item) if isinstance(item, Mapping) else item)

@@ -10,7 +10,7 @@ from typing import Protocol
 from nep.errors import ClosedError, ParameterError, did_you_mean
 from nep.i18n import _
 from nep.patterns.parameters.parameter import NodeParameter, declared, shown
-from nep.text import escaped, shortened
+from nep.text import bounded_str, escaped
 
 __all__ = ["MSG_TYPE", "OnChange", "ParameterHost", "Parameters", "place_of"]
 
@@ -169,10 +169,9 @@ class Parameters:
 
     def _unknown(self, name: str) -> ParameterError:
         known = tuple(self._known)
-        said = did_you_mean(str(name), known) if known else _("there are none")
-        return ParameterError(
-            escaped(shortened(str(name), 60)), "", _("there is none; {said}").format(said=said)
-        )
+        shown = escaped(bounded_str(name, 60))
+        said = did_you_mean(shown, known) if known else _("there are none")
+        return ParameterError(shown, "", _("there is none; {said}").format(said=said))
 
     # ---- for others
 

@@ -10,7 +10,7 @@ from nep.i18n import _
 from nep.patterns.parameters.owned import place_of
 from nep.patterns.services.client import Client
 from nep.protocol.graph_view import GraphView
-from nep.text import escaped
+from nep.text import bounded_str, escaped
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -33,7 +33,7 @@ class RemoteParameters:
 
     def get(self, name: str) -> object:
         """The value of one. Raises `NepError` when there is none of this name, and as `list` does."""
-        found = {str(each.get("name")): each for each in self.list()}
+        found = {bounded_str(each.get("name")): each for each in self.list()}
         if name not in found:
             said = did_you_mean(name, tuple(found)) if found else _("there are none")
             raise NepError(_("no parameter '{name}'; {said}").format(name=escaped(name), said=said))

@@ -11,7 +11,9 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import orjson
+from nep.errors import DecodeError
+from nep.messages.codecs import JSON
+from nep.messages.message import NOTHING
 
 __all__ = ["Perception", "perception_in"]
 
@@ -30,8 +32,8 @@ def perception_in(payload: object) -> Perception | None:
     """The perception that a message is; None for any other message."""
     if isinstance(payload, Mapping) and len(payload) == 1 and isinstance(payload.get("data"), str):
         try:
-            payload = orjson.loads(payload["data"])
-        except orjson.JSONDecodeError:
+            payload = JSON.decode(payload["data"].encode("utf-8", "surrogatepass"), NOTHING)
+        except DecodeError:
             return None
     if not isinstance(payload, Mapping):
         return None

@@ -21,6 +21,7 @@ from nep.i18n import _
 from nep.nodes.node import Node
 from nep.programs.blackboard.board import Blackboard, BlackboardChange, BlackboardEntry
 from nep.system.arguments import seconds
+from nep.text import bounded_str
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -97,7 +98,7 @@ class BlackboardServer:
                 raise NepError(_("nothing is to be set; give 'key' and 'value', or a map 'values'"))
             values = given
         for key, value in values.items():
-            self._board.put(str(key), value, lives_s=lives_s)
+            self._board.put(key if isinstance(key, str) else bounded_str(key), value, lives_s=lives_s)
         return {"set": len(values)}
 
     def _keys(self, request: object) -> object:
@@ -129,7 +130,7 @@ def _request(request: object) -> Mapping[object, object]:
 def _text(asked: Mapping[object, object], field: str, default: str | None = None) -> str:
     value = asked.get(field, default)
     if not isinstance(value, str):
-        raise BadKeyError(str(value), _("give a text such as 'human.1.position'"))
+        raise BadKeyError(bounded_str(value), _("give a text such as 'human.1.position'"))
     return value
 
 
