@@ -19,6 +19,18 @@ MasterOption = Annotated[
         show_default=False,
     ),
 ]
+AllowMovingOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--allow-moving",
+        metavar=_("ROBOT"),
+        help=_(
+            "Let this robot be moved, virtual or not; may be given again. A topic stands for the robot that "
+            "it moves. Nobody asks: see that nobody is in its way."
+        ),
+        show_default=False,
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help=_("Write JSON, for programs."))]
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nep.cli.options import MasterOption
+from nep.cli.options import AllowMovingOption, MasterOption
 from nep.cli.recording_files import (
     FileArgument,
     FromOption,
@@ -27,6 +27,8 @@ from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 from nep.protocol.wire import check_topic
+from nep.robots.guard import MotionGuard, refusal_words
+from nep.robots.moving import MovingTopics
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -38,6 +40,8 @@ else:  # the other commands need not wait for it, nor have what it needs
     reader = lazy_module("nep.recordings.reader")
 
 _LOOK_S = 0.2
+_SETTLE_S = 1.0
+"""How long descriptions of robots may take to arrive; until then their programs' topics are not sent."""
 
 
 def play(
@@ -46,8 +50,10 @@ def play(
     publish_all: Annotated[
         bool, typer.Option("--all", help=_("All topics, but those that move robots."))
     ] = False,
+    allow_moving: AllowMovingOption = None,
     arm: Annotated[
-        bool, typer.Option("--arm", help=_("Also send what moves robots, of the topics that are named."))
+        bool,
+        typer.Option("--arm", help=_("As --allow-moving for every robot, of the topics that are named.")),
     ] = False,
     speed: Annotated[
         float, typer.Option("--speed", metavar=_("FACTOR"), help=_("0.1 to 10 times as fast."))
@@ -65,49 +71,111 @@ def play(
 ) -> None:
     """Publish what was recorded, in the time in which it came. Ctrl+C ends it.
 
-    Nothing is sent that is not named: topics, patterns in quotes, or --all. Commands of robots are sent only
-    with --arm, and when they are named.
+    Nothing is sent that is not named: topics, patterns in quotes, or --all. What moves a robot, by the
+    recording or by the robots that are there now, is sent only with --allow-moving, or with --arm when it is
+    named. A robot that comes later is not moved either.
     """
     with reader.Recording(file) as recording:
-        moving = player.moving_topics(recording)
-        chosen = _chosen(recording, topics or (), moving, publish_all=publish_all)
+        named = _named(recording, topics or (), publish_all=publish_all)
+        chosen = list(recording.topics) if publish_all else named
         names = _names(chosen, remap or ())
-        # A robot's commands move it also under another name, where somebody may hear them.
-        sent = (*chosen, *names.values())
-        moved = [each for each in sent if each in moving or player.is_command_topic(each)]
-        if moved and not arm:
-            raise NepError(
-                _("'{topic}' moves a robot; add --arm when nobody is in its way").format(topic=moved[0])
-            )
+        armed = frozenset(named) if arm else frozenset[str]()
+        limits = _Limits(recording, names, frozenset(allow_moving or ()), armed)
+        chosen = limits.checked(chosen, named)
         try:
             playback = player.Playback(recording, topics=chosen, remap=names)
             playback.speed = speed
             _set_part(recording, playback, span_ns(recording, from_s, to_s), loop=loop)
         except ValueError as error:
             raise typer.BadParameter(str(error)) from error
-        with node_for("play", master) as node, _Sender(node, recording, chosen, names) as sender:
-            _play(recording, playback, sender)
-            said = ngettext("published {count} message", "published {count} messages", sender.count)
-            say(said.format(count=sender.count))
+        with node_for("play", master) as node:
+            limits.guard = MotionGuard(node)
+            limits.guard.settle(_SETTLE_S)
+            chosen = limits.checked(chosen, named)
+            if not chosen:
+                raise NepError(_("nothing is left to publish"))
+            playback.choose(chosen)
+            with _Sender(node, recording, chosen, limits) as sender:
+                _play(recording, playback, sender)
+                said = ngettext("published {count} message", "published {count} messages", sender.count)
+                say(said.format(count=sender.count))
+        if limits.was_named_refused:
+            raise typer.Exit(1)
 
 
-def _chosen(
-    recording: reader.Recording, words: Sequence[str], moving: Collection[str], *, publish_all: bool
-) -> list[str]:
-    """The topics to publish; of those that move robots only the named ones. Raises `typer.BadParameter`."""
+def _named(recording: reader.Recording, words: Sequence[str], *, publish_all: bool) -> list[str]:
+    """The topics that words name. Raises `typer.BadParameter`, also when nothing is to be published."""
     if not words and not publish_all:
         known = listed([f"'{each}'" for each in list(recording.topics)[:20]], "and")
         raise typer.BadParameter(
             _("name the topics to publish, or --all; the recording has {topics}").format(topics=known)
         )
-    named = chosen_topics(recording, words)
-    if not publish_all:
-        return named
-    for name in recording.topics:
-        if name in moving and name not in named:
-            said = _("'{topic}' moves a robot and is not sent; name it and add --arm to send it")
-            say(said.format(topic=name))
-    return [name for name in recording.topics if name not in moving or name in named]
+    return chosen_topics(recording, words)
+
+
+class _Limits:
+    """Which topics may not be published, because they move robots that nobody has allowed to move."""
+
+    def __init__(
+        self,
+        recording: reader.Recording,
+        names: Mapping[str, str],
+        allowed: Collection[str],
+        armed: Collection[str],
+    ) -> None:
+        self.names = names
+        self.guard: MotionGuard | None = None
+        self.was_named_refused = False
+        self._topics = recording.topics
+        self._recorded = player.moving_topics(recording)
+        self._allowed, self._armed = allowed, armed
+        self._named: frozenset[str] = frozenset()
+        self._seen: MovingTopics | None = None
+        self._refused: dict[str, str] = {}
+
+    def checked(self, chosen: Sequence[str], named: Sequence[str]) -> list[str]:
+        """Those that may be published. Raises `typer.BadParameter` for a named one that may not."""
+        self._named = frozenset(named)
+        kept = []
+        for topic in chosen:
+            refusal = self._refusal(topic)
+            if not refusal:
+                kept.append(topic)
+            elif topic in self._named:
+                raise typer.BadParameter(refusal)
+            else:
+                say(_("not sent: {reason}").format(reason=refusal))
+        return kept
+
+    def allows(self, topic: str) -> bool:
+        """Whether a message may go out under this name now; says once why not."""
+        if self.guard is not None and self.guard.moving is not self._seen:
+            self._seen = self.guard.moving
+            self._refused = self._refusals(self._refused)
+        return topic not in self._refused
+
+    def _refusals(self, before: Mapping[str, str]) -> dict[str, str]:
+        refused = {}
+        for recorded in self._topics:
+            name = self.names.get(recorded, recorded)
+            refusal = self._refusal(recorded)
+            if refusal:
+                refused[name] = refusal
+                if name not in before:
+                    say(_("not sent: {reason}").format(reason=refusal))
+                    self.was_named_refused |= recorded in self._named
+        return refused
+
+    def _refusal(self, recorded: str) -> str:
+        name = self.names.get(recorded, recorded)
+        if recorded in self._armed or recorded in self._allowed:
+            return ""
+        live = () if self.guard is None else self.guard.moving.moved_by(name)
+        known = self._recorded.moved_by(recorded, self._topics[recorded].msg_type)
+        known = known or self._recorded.moved_by(name)
+        # live names are what moves now; a topic in their place says less than the recording
+        robots = known or live if live in ((), (name,)) else live
+        return refusal_words(name, robots, self._allowed)
 
 
 def _names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
@@ -145,9 +213,11 @@ class _Sender:
     """Publishes messages, with a publisher for each topic that has any."""
 
     def __init__(
-        self, node: Node, recording: reader.Recording, chosen: Sequence[str], names: dict[str, str]
+        self, node: Node, recording: reader.Recording, chosen: Sequence[str], limits: _Limits
     ) -> None:
+        self.limits, names = limits, limits.names
         self._opened = ExitStack()
+        self._heard: dict[Publisher, int] = {}
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._node = node
         self.count = 0
@@ -167,8 +237,19 @@ class _Sender:
         """Publish their bytes as they were."""
         for each in messages:
             publisher = self._publisher(each.topic, player.published_type(each))
+            heard = publisher.subscribers
+            if heard != self._heard.get(publisher):  # a robot may have come
+                self._heard[publisher] = heard
+                self.look()
+            if not self.limits.allows(each.topic):
+                continue
             publisher.publish_bytes(bytes(each.data), dict(each.extension) or None)
             self.count += 1
+
+    def look(self) -> None:
+        """Find out which robots are there now."""
+        if self.limits.guard is not None:
+            self.limits.guard.look()
 
     def __enter__(self) -> Self:
         return self
@@ -180,14 +261,19 @@ class _Sender:
 def _play(recording: reader.Recording, playback: player.Playback, sender: _Sender) -> None:
     ended = threading.Event()
     out = console(stderr=True)
+
+    def wait() -> bool:
+        sender.look()
+        return ended.wait(_LOOK_S)
+
     with player.Player(playback, sender.send, on_jump=_nothing, on_end=ended.set) as playing:
         playing.order(lambda each: each.play())
         if out.is_terminal:
             with out.status("") as shown:
-                while not ended.wait(_LOOK_S):
+                while not wait():
                     shown.update(_line(recording, playing.status))
         else:
-            while not ended.wait(_LOOK_S):
+            while not wait():
                 pass
     if playing.problem is not None:
         raise playing.problem

@@ -20,7 +20,14 @@ from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.message import UNDECODED, Message, MessageKind, new_message
 from nep.recordings.reader import RecordedMessage, Recording
-from nep.recordings.recorder import DESCRIPTION_TYPE
+from nep.robots.moving import (
+    COMMAND_TYPE,
+    DESCRIPTION_TYPE,
+    MovingTopics,
+    RobotControls,
+    controls_in,
+    described_name,
+)
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -32,7 +39,6 @@ __all__ = [
     "Playback",
     "Player",
     "PlayerStatus",
-    "is_command_topic",
     "latched_topics",
     "moving_topics",
     "published_type",
@@ -45,11 +51,9 @@ _MOST_AT_ONCE = 2_000
 _MOST_WAIT_S = 0.05
 _MEASURED_S = 1.0
 _MOST_KINDS = 10_000
-_COMMAND_TYPES = frozenset({"robot/command", "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
-_COMMAND_TOPICS = frozenset({"command", "robot_action", "cmd_vel"})
-"""By which robots are told what to do (docs/robots.md), or a base of ROS its speed: last parts of names."""
-_MOVING = ("command", "world")
-"""What a robot's description calls its topics by which it is moved, where it gives them names of its own."""
+_COMMAND_TYPES = frozenset({COMMAND_TYPE, "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
+"""Types of messages that move a robot, or a base of ROS (docs/robots.md)."""
+_MAX_DESCRIPTIONS = 10_000
 
 
 @dataclass(frozen=True)
@@ -347,23 +351,20 @@ def _log_ns(each: RecordedMessage) -> int:
     return each.log_ns
 
 
-def moving_topics(recording: Recording) -> frozenset[str]:
-    """The topics by which robots are moved, as far as a recording tells; they may not be in it themselves."""
-    by_type = {each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES}
+def moving_topics(recording: Recording) -> MovingTopics:
+    """Return the topics that move robots, as far as a recording tells; they may not be in it themselves.
+
+    It tells by descriptions, by types, and by names: the robot that heard a topic need not be in it.
+    """
     described = {each.name for each in recording.topics.values() if each.msg_type == DESCRIPTION_TYPE}
-    named = set[str]()
+    robots = dict[RobotControls, None]()
     for _at, message in recording.read(topics=described) if described else ():
         with suppress(NepError):
-            description = message.payload
-            topics = description.get("rb:topics") if isinstance(description, Mapping) else None
-            if isinstance(topics, Mapping):
-                named.update(each for key in _MOVING if isinstance(each := topics.get(key), str))
-    return frozenset(by_type | named | {name for name in recording.topics if is_command_topic(name)})
-
-
-def is_command_topic(topic: str) -> bool:
-    """Whether robots are usually told what to do by a topic of this name."""
-    return topic.rsplit("/", 1)[-1] in _COMMAND_TOPICS
+            found = controls_in(message.payload, described_name(message.topic))
+            if found is not None and len(robots) < _MAX_DESCRIPTIONS:
+                robots[found] = None
+    typed = (each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES)
+    return MovingTopics(robots, unidentified=typed, uses_names=True)
 
 
 def latched_topics(recording: Recording, topics: Iterable[str]) -> frozenset[str]:

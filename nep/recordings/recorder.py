@@ -17,14 +17,13 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_glob import glob_matches, is_glob, widened
 from nep.protocol.wire import check_topic
 from nep.recordings.channels import Role
+from nep.robots.moving import DESCRIPTION_TYPE
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["DESCRIPTION_TYPE", "Recorder", "TopicSelection"]
+__all__ = ["Recorder", "TopicSelection"]
 
-DESCRIPTION_TYPE = "robot/description"
-"""Topics of this type are recorded whatever is chosen, unless they are left out by name."""
 _LOOK_S = 1.0
 _PATIENCE_S = 0.5
 """A master that is away must not keep anybody waiting who does not need it."""
@@ -164,6 +163,7 @@ class Recorder:
             self._writer.say("alerts", {"alerts": alerts})
         self._told_alerts = alerts
         for name, topic in graph.topics.items():
+            # descriptions are recorded whatever is chosen, unless they are left out by name
             is_description = topic.msg_type == DESCRIPTION_TYPE and not self._selection.leaves_out(name)
             is_chosen = self._selection.has(name)
             is_heard = is_chosen and (self._has_patterns or name in self._subscriptions)

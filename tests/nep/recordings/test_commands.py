@@ -188,7 +188,7 @@ def test_play_publishes_what_is_named_and_nothing_else(path, master, capfd):
         assert "published 20 messages" in capfd.readouterr().err
         heard.clear()
         run(*words, "--all")
-        assert "'/pepper/command' moves a robot and is not sent" in capfd.readouterr().err
+        assert "not sent: '/pepper/command' moves a robot" in capfd.readouterr().err
         eventually(lambda: len(heard) >= 22)
         assert {each.topic for each in heard} == {"/arm/joints", "/camera", "/own/description"}
         assert next(each for each in heard if each.topic == "/camera").payload.shape == (12, 16, 3)
@@ -207,22 +207,80 @@ def test_play_publishes_what_is_named_and_nothing_else(path, master, capfd):
     [
         ((), typer.BadParameter, "name the topics"),
         (("/arm/joint",), typer.BadParameter, "did you mean '/arm/joints'"),
-        (("/pepper/command",), NepError, "moves a robot; add --arm"),
-        (("/*/command",), NepError, "moves a robot; add --arm"),
-        (("robot_action",), NepError, "moves a robot; add --arm"),
+        (("/pepper/command",), typer.BadParameter, "moves a robot; add --allow-moving"),
+        (("/*/command",), typer.BadParameter, "moves a robot; add --allow-moving"),
+        (("robot_action",), typer.BadParameter, "moves own; add --allow-moving own"),
         (("--all", "--speed", "0"), typer.BadParameter, "is no speed"),
         (("/arm/joints", "--remap", "/x=/y"), typer.BadParameter, "--remap OLD=NEW"),
         (("/arm/joints", "--from", "5"), typer.BadParameter, "has no length"),
-        (("/arm/joints", "--remap", "/arm/joints=robot_action"), NepError, "moves a robot; add --arm"),
-        (("/arm/joints", "--remap", "/arm/joints=/Fido/command"), NepError, "moves a robot; add --arm"),
-        (("/arm/joints", "--remap", "/arm/joints=/own/orders"), NepError, "'/own/orders' moves a robot"),
-        (("/arm/joints", "--remap", "/arm/joints=/cmd_vel"), NepError, "moves a robot; add --arm"),
+        (("/arm/joints", "--remap", "/arm/joints=robot_action"), typer.BadParameter, "moves own"),
+        (
+            ("/arm/joints", "--remap", "/arm/joints=/Fido/command"),
+            typer.BadParameter,
+            "moves a robot; add --allow-moving",
+        ),
+        (
+            ("/arm/joints", "--remap", "/arm/joints=/own/orders"),
+            typer.BadParameter,
+            "'/own/orders' moves own",
+        ),
+        (
+            ("/arm/joints", "--remap", "/arm/joints=/cmd_vel"),
+            typer.BadParameter,
+            "moves a robot; add --allow-moving",
+        ),
         (("/arm/joints", "--remap", "/arm/joints=two words"), NepError, "two words"),
     ],
 )
 def test_play_asks_before_it_sends(path, words, error, said):
     with pytest.raises(error, match=said):
         run("play", path, *words)
+
+
+def describe(robot: nep.Node, name: str, command: str) -> list[nep.Message]:
+    """A robot that names its command topic itself; what it is told."""
+    description = {"title": name, "rb:topics": {"command": command}}
+    robot.new_pub(f"/{name}/description", "robot/description", latched=True).publish(description)
+    told: list[nep.Message] = []
+    robot.new_sub(command, sink=told.extend)
+    return told
+
+
+def test_play_moves_no_robot_that_is_there_under_whatever_topic_it_names(master, tmp_path, capfd):
+    path = tmp_path / "Drive.mcap"
+    record(path, [[json_message(1, topic="/Rover/drive"), json_message(2, topic="/weather")]])
+    words = ("play", path, "--master", master.address, "--speed", 10)
+    with nep.node("rover", master=master.address) as robot:
+        told = describe(robot, "Rover", "/Rover/drive")
+        run(*words, "--all")
+        assert "--allow-moving Rover" in capfd.readouterr().err
+        for named in (("/Rover/drive",), ("/weather", "--remap", "/weather=/Rover/drive"), ("/**",)):
+            with pytest.raises(typer.BadParameter, match="'/Rover/drive' moves Rover; add --allow-moving"):
+                run(*words, *named)
+        with pytest.raises(typer.BadParameter):
+            run(*words, "/Rover/drive", "--allow-moving", "Fido")
+        assert not told
+        run(*words, "--all", "--allow-moving", "Rover")
+        eventually(lambda: told)
+        run(*words, "/Rover/drive", "--arm")
+        eventually(lambda: len(told) == 2)
+
+
+def test_play_stops_sending_when_a_robot_comes_that_the_topic_moves(master, tmp_path, capfd):
+    path = tmp_path / "Drive.mcap"
+    record(path, [[json_message(seq, topic="/drive") for seq in range(1, 601)]])
+    told = []
+    with nep.node("rover", master=master.address) as robot, nep.node("hears", master=master.address) as node:
+
+        def come(_messages: object) -> None:
+            if not told:
+                told.append(describe(robot, "Rover", "/drive"))
+
+        node.new_sub("/drive", sink=come)
+        words = ["play", str(path), "/drive", "--master", master.address, "--speed", "10"]
+        assert app(words, standalone_mode=False) == 1
+    assert "not sent: '/drive' moves Rover" in capfd.readouterr().err
+    assert len(told[0]) < 300
 
 
 def test_the_shell_is_offered_topics_of_the_file(path):

@@ -1,0 +1,212 @@
+"""Guard of programs without a window: they move no robot that nobody has allowed them to move.
+
+It subscribes to the descriptions of all robots on the network. The claim "virtual" of a description is not
+believed here, because only the program that started a virtual robot can verify it (docs/trust.md).
+"""
+
+from __future__ import annotations
+
+import shlex
+import threading
+import time
+from collections.abc import Collection, Mapping, Sequence
+
+from nep.errors import NepError
+from nep.i18n import _, listed
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.nodes.subscriber import Subscriber
+from nep.protocol.graph_view import GraphView
+from nep.robots.moving import (
+    DESCRIPTION_TYPE,
+    MovingTopics,
+    RobotControls,
+    controls_in,
+    described_name,
+    description_topics,
+    moving_topics,
+)
+from nep.text import harmless, shortened
+
+__all__ = ["MotionGuard", "refusal_words"]
+
+MAX_DESCRIPTIONS = 200
+MAX_DESCRIPTION_BYTES = 1_000_000
+_MAX_CLAIMANTS = 8
+_MAX_CACHED = 10_000
+_MAX_NAME_SHOWN = 100
+_POLL_S = 0.05
+_GRAPH_TIMEOUT_S = 0.5
+
+
+class MotionGuard:
+    """Decide whether a program may publish on a topic. Thread-safe.
+
+    Call `see` with each new graph; `refusal` is a dictionary look-up until something has changed. Before the
+    first graph nothing is known about robots, and only the message type and RIZE's topic decide.
+    """
+
+    def __init__(
+        self, node: Node, allowed: Collection[str] = (), *, own_nodes: Collection[str] | None = None
+    ) -> None:
+        """Guard what `node` publishes.
+
+        Args:
+            node: Subscribes to the robots' descriptions.
+            allowed: Names of robots that may be moved. A topic stands for whatever robot it moves.
+            own_nodes: Ids of the program's own nodes; without it only that of `node`.
+        """
+        self._node = node
+        self._allowed = frozenset(allowed)
+        self._own_nodes = frozenset((node.id,) if own_nodes is None else own_nodes)
+        self._lock = threading.RLock()
+        self._received_lock = threading.Lock()  # never held while subscribing, which may wait for the sink
+        self._subscribers: dict[str, Subscriber] = {}
+        self._received: dict[str, dict[int | None, Message]] = {}
+        self._controls: dict[str, dict[int | None, tuple[Message, RobotControls | None]]] = {}
+        self._moving = MovingTopics()
+        self._view: GraphView | None = None
+        self._is_dirty = False
+        self._cache: dict[tuple[str, str], str] = {}
+
+    @property
+    def moving(self) -> MovingTopics:
+        """The topics that move robots now."""
+        return self._moving
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether a graph was seen and every description in it was read."""
+        with self._lock:
+            return self._view is not None and not self._is_dirty and not self._unread(self._view)
+
+    def see(self, view: GraphView) -> None:
+        """Take over a new graph; costs little when nobody came or went and no description arrived."""
+        with self._lock:
+            before = self._view
+            if before is not None and (before.epoch, before.revision) == (view.epoch, view.revision):
+                if not self._is_dirty:
+                    return
+            else:
+                self._view = view
+                self._subscribe(view)
+            self._rebuild(view)
+
+    def look(self) -> None:
+        """Ask the master who is there and take that over; what was known stays while it does not answer."""
+        try:
+            view = self._node.graph(_GRAPH_TIMEOUT_S)
+        except NepError:
+            return
+        self.see(view)
+
+    def settle(self, timeout_s: float) -> bool:
+        """Wait until all descriptions that are there were read, `timeout_s` at most; whether they were."""
+        until = time.monotonic() + timeout_s
+        while True:
+            self.look()
+            if self.is_settled or time.monotonic() >= until:
+                return self.is_settled
+            threading.Event().wait(_POLL_S)
+
+    def refusal(self, topic: str, msg_type: str = "") -> str:
+        """Return why nothing may be published on a topic, with the option that allows it; "" when it may."""
+        key = topic, msg_type
+        said = self._cache.get(key)
+        if said is None:
+            with self._lock:
+                said = refusal_words(topic, self._moving.moved_by(topic, msg_type), self._allowed)
+                if len(self._cache) >= _MAX_CACHED:
+                    self._cache.clear()
+                self._cache[key] = said
+        return said
+
+    def close(self) -> None:
+        """Unsubscribe from the descriptions; what was known stays."""
+        with self._lock:
+            subscribers, self._subscribers = list(self._subscribers.values()), {}
+        for each in subscribers:
+            each.close()
+
+    # ---- descriptions
+
+    def _subscribe(self, view: GraphView) -> None:
+        """Subscribe to descriptions. One that has gone stays known: its program may only have slept."""
+        for topic in sorted(description_topics(view) - self._subscribers.keys()):
+            if len(self._subscribers) >= MAX_DESCRIPTIONS:
+                gone = next((each for each in self._subscribers if each not in view.topics), None)
+                if gone is None:
+                    return  # it counts as not read
+                self._subscribers.pop(gone).close()
+                self._controls.pop(gone, None)
+                with self._received_lock:
+                    self._received.pop(gone, None)
+            try:
+                made = self._node.new_sub(topic, DESCRIPTION_TYPE, sink=self._receive, wildcards=False)
+            except NepError:
+                continue  # with the next graph it is tried again
+            self._subscribers[topic] = made
+
+    def _receive(self, messages: Sequence[Message]) -> None:
+        with self._received_lock:
+            for message in messages:
+                newest = self._received.setdefault(message.topic, {})
+                newest.pop(message.publisher, None)
+                newest[message.publisher] = message
+                while len(newest) > _MAX_CLAIMANTS:
+                    del newest[next(iter(newest))]
+            self._is_dirty = True
+
+    def _rebuild(self, view: GraphView) -> None:
+        with self._received_lock:
+            self._is_dirty = False
+            received = {topic: dict(newest) for topic, newest in self._received.items()}
+        for topic, newest in received.items():
+            before = self._controls.get(topic, {})
+            self._controls[topic] = {
+                publisher: known
+                if (known := before.get(publisher)) is not None and known[0] is message
+                else (message, _read(message, topic))
+                for publisher, message in newest.items()
+            }
+        robots = [
+            controls
+            for claims in self._controls.values()
+            for _message, controls in claims.values()
+            if controls is not None
+        ]
+        self._moving = moving_topics(view, robots, self._unread(view), self._own_nodes)
+        self._cache = {}
+
+    def _unread(self, view: GraphView) -> frozenset[str]:
+        """The description topics of which nothing could be read so far."""
+        return frozenset(
+            topic
+            for topic in description_topics(view)
+            if all(controls is None for _message, controls in self._controls.get(topic, {}).values())
+        )
+
+
+def _read(message: Message, topic: str) -> RobotControls | None:
+    """The robot that a message describes; everybody's word counts here, because it only protects."""
+    if len(message.data) > MAX_DESCRIPTION_BYTES:
+        return None
+    try:
+        return controls_in(message.payload, described_name(topic))
+    except NepError:
+        return None
+
+
+def refusal_words(topic: str, robots: Sequence[str], allowed: Collection[str]) -> str:
+    """Return the sentence that names the robots and the option that allows it; "" when all are allowed."""
+    missing = [name for name in robots if name not in allowed]
+    if not missing or topic in allowed:
+        return ""
+    names: Mapping[str, str] = {name: shortened(harmless(name), _MAX_NAME_SHOWN) for name in missing}
+    options = " ".join(f"--allow-moving {shlex.quote(each)}" for each in names.values())
+    if missing == [topic]:
+        said = _("'{topic}' moves a robot; add {options} when nobody is in its way")
+        return said.format(topic=names[topic], options=options)
+    said = _("'{topic}' moves {robots}; add {options} when nobody is in the way")
+    shown = shortened(harmless(topic), _MAX_NAME_SHOWN)
+    return said.format(topic=shown, robots=listed(list(names.values())), options=options)

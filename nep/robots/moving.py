@@ -1,0 +1,202 @@
+"""Which topics move a robot, and which robot: decided from descriptions, types and subscribers. No sockets.
+
+Everything that publishes for a person or a program asks `MovingTopics.moved_by`: alarms, `nep play`,
+`nep bridge`, behaviours, and what a person sends by hand in Studio.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from nep.protocol.graph_view import GraphView
+from nep.protocol.topic_pattern import is_pattern, matches
+
+__all__ = [
+    "COMMAND_TYPE",
+    "DESCRIPTION_TYPE",
+    "RIZE_COMMANDS",
+    "MovingTopics",
+    "RobotControls",
+    "controls_in",
+    "described_name",
+    "description_topics",
+    "moving_topics",
+]
+
+DESCRIPTION_TYPE = "robot/description"
+COMMAND_TYPE = "robot/command"
+RIZE_COMMANDS = "robot_action"
+"""One topic for the commands of all robots of RIZE. Robots of the kit subscribe to it, too."""
+_CONTROL_KEYS = ("command", "world")
+_DESCRIPTION = "/description"
+_HREF_SCHEME = "nep:"
+_ORIGINAL_GENERATIONS = frozenset({"A", "B"})
+_COMMAND_NAMES = frozenset({"command", "cmd_vel"})
+_MAX_TOPICS = 1_000
+_MAX_NAME_LENGTH = 256
+
+
+@dataclass(frozen=True, slots=True)
+class RobotControls:
+    """Topics on which messages move one robot or change its world; they may contain wildcards."""
+
+    name: str
+    topics: frozenset[str]
+
+
+class MovingTopics:
+    """Topics that move robots at one moment. Immutable, so any thread may read it."""
+
+    __slots__ = ("_by_topic", "_everybody", "_patterns", "_unidentified", "_uses_names")
+
+    def __init__(
+        self,
+        robots: Iterable[RobotControls] = (),
+        *,
+        unidentified: Iterable[str] = (),
+        uses_names: bool = False,
+    ) -> None:
+        """Index the topics of `robots`.
+
+        Args:
+            robots: Robots and the topics by which they are moved.
+            unidentified: Topics (or patterns) by which robots are moved whose names are unknown.
+            uses_names: Also treat topics named like commands (``.../command``, ``.../cmd_vel``) as moving.
+                For recordings, where the robot that heard a topic may not be described.
+        """
+        known = tuple(robots)
+        by_topic: dict[str, dict[str, None]] = {}
+        for robot in known:
+            for topic in robot.topics:
+                by_topic.setdefault(topic, {})[robot.name] = None
+        self._by_topic = {topic: tuple(names) for topic, names in by_topic.items()}
+        self._unidentified = frozenset(unidentified)
+        self._patterns = tuple(topic for topic in {*self._by_topic, *self._unidentified} if is_pattern(topic))
+        self._everybody = tuple(dict.fromkeys(robot.name for robot in known))
+        self._uses_names = uses_names
+
+    @property
+    def topics(self) -> Mapping[str, tuple[str, ...]]:
+        """Each topic or pattern that moves an identified robot, with the names of these robots."""
+        return self._by_topic
+
+    def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
+        """Return the names of the robots that a message moves; empty when it moves none.
+
+        The name is the topic itself when a robot is moved whose name is unknown: by the type
+        ``robot/command``, by RIZE's topic, or by what the graph tells about the topic.
+
+        Args:
+            topic: The topic to publish on.
+            msg_type: The type to publish with, if known.
+        """
+        if topic == RIZE_COMMANDS:
+            return self._everybody or (topic,)
+        names = dict.fromkeys(self._by_topic.get(topic, ()))
+        is_unidentified = topic in self._unidentified
+        for pattern in self._patterns:
+            if matches(pattern, topic):
+                names |= dict.fromkeys(self._by_topic.get(pattern, ()))
+                is_unidentified = is_unidentified or pattern in self._unidentified
+        if names:
+            return tuple(names)
+        is_named_so = self._uses_names and topic.rpartition("/")[2] in _COMMAND_NAMES
+        return (topic,) if is_unidentified or is_named_so or msg_type == COMMAND_TYPE else ()
+
+
+def controls_in(description: object, fallback_name: str = "") -> RobotControls | None:
+    """Read the name and the controlling topics from a robot's description; None when it names none.
+
+    Only these parts are looked at, so a description that is wrong elsewhere still protects its robot.
+
+    Args:
+        description: The decoded message of the type ``robot/description``.
+        fallback_name: The name for a description without a title.
+    """
+    if not isinstance(description, Mapping):
+        return None
+    title = description.get("title")
+    name = title if isinstance(title, str) and title and len(title) <= _MAX_NAME_LENGTH else fallback_name
+    topics = set[str]()
+    for topic in _topics_in(description):
+        topics.add(topic)
+        if len(topics) >= _MAX_TOPICS:
+            break
+    return RobotControls(name, frozenset(topics)) if name and topics else None
+
+
+def _topics_in(description: Mapping[object, object]) -> Iterator[str]:
+    named = description.get("rb:topics")
+    if isinstance(named, Mapping):
+        yield from (topic for key in _CONTROL_KEYS if isinstance(topic := named.get(key), str) and topic)
+    actions = description.get("actions")
+    for action in actions.values() if isinstance(actions, Mapping) else ():
+        forms = action.get("forms") if isinstance(action, Mapping) else None
+        for form in forms if isinstance(forms, list | tuple) else ():
+            href = form.get("href") if isinstance(form, Mapping) else None
+            if isinstance(href, str) and href.startswith(_HREF_SCHEME) and href != _HREF_SCHEME:
+                yield href.removeprefix(_HREF_SCHEME)
+
+
+def description_topics(view: GraphView) -> frozenset[str]:
+    """Return the topics on which robots are announced now."""
+    return frozenset(
+        topic for topic, info in view.topics.items() if info.msg_type == DESCRIPTION_TYPE and info.publishers
+    )
+
+
+def described_name(topic: str) -> str:
+    """Return the robot's name in its description topic: ``Rover`` of ``/Rover/description``."""
+    return topic.strip("/").removesuffix(_DESCRIPTION) or topic
+
+
+def moving_topics(
+    view: GraphView,
+    robots: Iterable[RobotControls],
+    unread: Collection[str] = (),
+    own_nodes: Collection[str] = (),
+) -> MovingTopics:
+    """Combine the robots that are known by their descriptions with what the graph tells about others.
+
+    Args:
+        view: Who publishes and subscribes now.
+        robots: Robots whose descriptions were read.
+        unread: Description topics that could not be read yet. All that their programs subscribe to counts as
+            moving, and so do the topics that robots have by default.
+        own_nodes: Ids of nodes of the asking program; what they subscribe to does not count.
+    """
+    known = [*robots, *_unread_robots(view, unread, own_nodes), *_original_robots(view)]
+    typed = (name for name, info in view.topics.items() if info.msg_type == COMMAND_TYPE)
+    typed_patterns = (name for name, info in view.patterns.items() if info.msg_type == COMMAND_TYPE)
+    return MovingTopics(known, unidentified=(*typed, *typed_patterns))
+
+
+def _unread_robots(
+    view: GraphView, unread: Collection[str], own_nodes: Collection[str]
+) -> Iterator[RobotControls]:
+    if not unread:
+        return
+    heard: dict[str, set[str]] = {}
+    subscriptions = [(info.name, info.subscribers) for info in view.topics.values()]
+    subscriptions += [(info.name, info.subscribers) for info in view.patterns.values()]
+    for name, subscribers in subscriptions:
+        for subscriber in subscribers:
+            heard.setdefault(subscriber.node_id, set()).add(name)
+    for topic in unread:
+        home = topic.removesuffix(_DESCRIPTION)
+        topics = {f"{home}/{key}" for key in _CONTROL_KEYS}
+        announced = view.topics.get(topic)
+        for publisher in announced.publishers if announced is not None else ():
+            if publisher.node_id not in own_nodes:
+                topics |= heard.get(publisher.node_id, set())
+        yield RobotControls(described_name(topic), frozenset(topics))
+
+
+def _original_robots(view: GraphView) -> Iterator[RobotControls]:
+    """Programs of the original NEP that hear RIZE's commands: robots without a description."""
+    info = view.topics.get(RIZE_COMMANDS)
+    for subscriber in info.subscribers if info is not None else ():
+        node = view.nodes.get(subscriber.node_id)
+        if node is not None and node.generation in _ORIGINAL_GENERATIONS:
+            yield RobotControls(node.name, frozenset({RIZE_COMMANDS}))

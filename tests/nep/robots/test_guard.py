@@ -1,0 +1,76 @@
+"""Programs without a window move no robot that nobody has allowed them to move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import count
+
+import pytest
+
+import nep
+from nep.robots import MotionGuard
+from tests.nep.programs import eventually
+
+_names = count()
+
+
+@pytest.fixture
+def network() -> str:
+    return f"guard-{next(_names)}"
+
+
+@pytest.fixture
+def node(network: str) -> Iterator[nep.Node]:
+    with nep.node("asker", "memory", master=network) as node:
+        yield node
+
+
+def describe(robot: nep.Node, name: str, command: str) -> None:
+    publisher = robot.new_pub(f"/{name}/description", "robot/description", latched=True)
+    publisher.publish({"title": name, "rb:robot": {"virtual": True}, "rb:topics": {"command": command}})
+
+
+def test_robot_that_appears_later_is_protected_under_whatever_topic_it_names(
+    network: str, node: nep.Node
+) -> None:
+    guard = MotionGuard(node)
+    assert guard.settle(1.0)
+    assert guard.refusal("/orders") == ""
+    with nep.node("robot", "memory", master=network) as robot:
+        describe(robot, "Rover", "/orders")
+        guard.settle(5.0)
+        said = guard.refusal("/orders")
+        assert "Rover" in said
+        assert "--allow-moving Rover" in said  # its claim to be virtual is not believed
+        assert "--allow-moving Rover" in guard.refusal("robot_action")
+        assert guard.refusal("/weather") == ""
+        describe(robot, "Rover", "/others")
+        eventually(lambda: (guard.look(), guard.refusal("/others"))[1])
+    guard.look()
+    assert guard.refusal("/orders")  # it may only have lost its connection
+    guard.close()
+
+
+def test_allowed_robots_and_topics_are_not_refused(network: str, node: nep.Node) -> None:
+    with nep.node("robot", "memory", master=network) as robot:
+        describe(robot, "Rover", "/orders")
+        describe(robot, "Fido", "/orders")
+        guard = MotionGuard(node, ["Rover"])
+        assert guard.settle(5.0)
+        assert guard.refusal("/orders").count("--allow-moving") == 1
+        assert "--allow-moving Fido" in guard.refusal("/orders")
+        assert MotionGuard(node, ["/new"]).refusal("/new", "robot/command") == ""
+        guard.close()
+
+
+def test_description_that_cannot_be_read_protects_what_its_program_hears(
+    network: str, node: nep.Node
+) -> None:
+    with nep.node("robot", "memory", master=network) as robot:
+        robot.new_pub("/Rover/description", "robot/description", latched=True).publish("broken")
+        robot.new_sub("/orders")
+        guard = MotionGuard(node)
+        assert not guard.settle(0.2)
+        assert "--allow-moving Rover" in guard.refusal("/orders")
+        assert guard.refusal("/weather") == ""
+        guard.close()

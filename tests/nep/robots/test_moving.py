@@ -1,0 +1,98 @@
+"""Which topics move a robot, decided from descriptions, types and subscribers."""
+
+from __future__ import annotations
+
+import pytest
+
+from nep.protocol.graph_view import (
+    GraphView,
+    NodeInfo,
+    PatternInfo,
+    PublisherInfo,
+    SubscriberInfo,
+    TopicInfo,
+)
+from nep.robots import MovingTopics, RobotControls, controls_in, moving_topics
+
+ROVER = RobotControls("Rover", frozenset({"/Rover/drive", "/Rover/world"}))
+
+
+def topic(name: str, msg_type: str = "json", *, publisher: str = "", subscriber: str = "") -> TopicInfo:
+    publishers = (PublisherInfo(1, publisher, (), False, 0, 0, 0, None, None, None),) if publisher else ()
+    subscribers = (SubscriberInfo(2, subscriber, 0, 0),) if subscriber else ()
+    return TopicInfo(name, msg_type, "json", publishers, subscribers)
+
+
+def graph(*topics: TopicInfo, nodes: tuple[NodeInfo, ...] = (), patterns: tuple[PatternInfo, ...] = ()):
+    return GraphView(
+        1, 1, {each.id: each for each in nodes}, {each.name: each for each in topics},
+        patterns={each.name: each for each in patterns},
+    )  # fmt: skip
+
+
+def test_robot_is_moved_by_the_topics_of_its_description() -> None:
+    moving = MovingTopics([ROVER])
+    assert moving.moved_by("/Rover/drive") == moving.moved_by("/Rover/world") == ("Rover",)
+    assert moving.moved_by("/Rover/command") == ()  # the name alone says nothing
+    assert moving.moved_by("/elsewhere", "robot/command") == ("/elsewhere",)
+
+
+def test_topic_of_all_rize_robots_moves_each_robot() -> None:
+    fido = RobotControls("Fido", frozenset({"/Fido/command"}))
+    assert MovingTopics([ROVER, fido]).moved_by("robot_action") == ("Rover", "Fido")
+    assert MovingTopics().moved_by("robot_action") == ("robot_action",)
+
+
+def test_wildcards_in_a_description_protect_every_topic_that_matches() -> None:
+    moving = MovingTopics([RobotControls("Rover", frozenset({"/Rover/*/go"}))])
+    assert moving.moved_by("/Rover/left/go") == ("Rover",)
+    assert moving.moved_by("/Rover/go") == ()
+
+
+@pytest.mark.parametrize(
+    ("description", "topics"),
+    [
+        ({"title": "R", "rb:topics": {"command": "/c", "world": "/w", "answer": "/a"}}, {"/c", "/w"}),
+        ({"title": "R", "actions": {"go": {"forms": [{"href": "nep:/go"}, {"href": "http://x"}]}}}, {"/go"}),
+        ({"title": 7, "rb:topics": {"command": "/c", "world": 7}, "actions": [1]}, {"/c"}),
+    ],
+)
+def test_description_is_read_as_far_as_it_can_be(description: object, topics: set[str]) -> None:
+    found = controls_in(description, "R")
+    assert found == RobotControls("R", frozenset(topics))
+
+
+@pytest.mark.parametrize("description", [None, 3, [], {}, {"title": "R"}, {"rb:topics": {"command": ""}}])
+def test_description_without_a_topic_describes_no_robot(description: object) -> None:
+    assert controls_in(description, "R") is None
+
+
+def test_program_whose_description_is_unread_is_protected_on_all_that_it_hears() -> None:
+    view = graph(
+        topic("/Rover/description", "robot/description", publisher="n"), topic("/go", subscriber="n"),
+        topic("/other", subscriber="m"),
+        patterns=(PatternInfo("/Rover/parts/*", "json", (SubscriberInfo(3, "n", 0, 0),)),),
+    )  # fmt: skip
+    moving = moving_topics(view, (), ["/Rover/description"])
+    assert moving.moved_by("/go") == moving.moved_by("/Rover/command") == ("Rover",)
+    assert moving.moved_by("/Rover/parts/arm") == ("Rover",)
+    assert moving.moved_by("/other") == ()
+
+
+def test_topic_of_the_command_type_moves_a_robot_of_unknown_name() -> None:
+    view = graph(
+        topic("/Fido/go", "robot/command", subscriber="n"), patterns=(PatternInfo("/x/*", "robot/command"),)
+    )
+    moving = moving_topics(view, [ROVER])
+    assert moving.moved_by("/Fido/go", "json") == ("/Fido/go",)
+    assert moving.moved_by("/x/y") == ("/x/y",)
+
+
+def test_robots_of_the_original_nep_have_the_names_of_their_nodes() -> None:
+    nodes = (
+        NodeInfo("n", "pepper_driver", "", None, "python", "B", 0),
+        NodeInfo("m", "me", "", None, "", "native", 0),
+    )
+    heard = TopicInfo("robot_action", "json", "json", (), tuple(SubscriberInfo(1, id, 0, 0) for id in "nm"))
+    moving = moving_topics(graph(heard, nodes=nodes), ())
+    assert moving.moved_by("robot_action") == ("pepper_driver",)
