@@ -15,7 +15,7 @@ from typing import Annotated
 import typer
 
 from nep.cli import interrupts
-from nep.cli.options import JsonOption, MasterOption
+from nep.cli.options import AllowMovingOption, JsonOption, MasterOption
 from nep.cli.ring import KEEP_S, KEEP_SERVICE, has_ring
 from nep.cli.screen import console, say, show_json, write
 from nep.cli.values import cleaned
@@ -32,11 +32,13 @@ from nep.programs.alarms.rule import AlarmAction, AlarmRule
 from nep.programs.alarms.rule_file import EXAMPLE, read_alarms
 from nep.programs.alarms.sentences import action_words, rule_words, what_words
 from nep.protocol.graph_view import GraphView
+from nep.robots.guard import MotionGuard
 from nep.text import escaped
 
 _AGAIN_S = 1.0
 _PATIENCE_S = 0.5
 _SLICE_S = 0.05
+_SETTLE_S = 1.0
 _OF_STUDIO = frozenset({"run", "stop"})
 """What only Studio can do."""
 _STYLES = {"on": "bold red", "off": "green", "still": "bold red"}
@@ -59,6 +61,7 @@ def watch(
     check: CheckOption = False,
     example: ExampleOption = False,
     count: CountOption = 0,
+    allow_moving: AllowMovingOption = None,
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -66,8 +69,8 @@ def watch(
 
     Each alarm is a line when it comes on and when it goes off, with what it saw. It may call a service, send
     a message, ring the terminal's bell, and keep the last seconds where 'nep recording ring' is on; what only
-    Studio can do is said at the start. A master that is away is waited for: messages that still come are
-    watched meanwhile.
+    Studio can do is said at the start. A message that moves a robot is sent only with --allow-moving. A
+    master that is away is waited for: messages that still come are watched meanwhile.
     """
     if example:
         write(EXAMPLE)
@@ -85,8 +88,10 @@ def watch(
     interrupts.leave_when_told()
     with ExitStack() as opened:
         node = opened.enter_context(Node(f"nep-watch-{os.getpid()}", master=master))
-        watching = _Watching(node, rules, _JsonLines() if as_json else _Lines())
+        guard = MotionGuard(node, allow_moving or ())
+        watching = _Watching(node, rules, _JsonLines() if as_json else _Lines(), guard)
         opened.callback(watching.close)
+        watching.check_sends()
         if not as_json:
             watching.say_begin()
         watching.run(count)
@@ -156,9 +161,11 @@ class _JsonLines:
 class _Watching:
     """Alarms over one node: its subscriptions, the graph each second, and what is carried out."""
 
-    def __init__(self, node: Node, rules: tuple[AlarmRule, ...], out: _Lines | _JsonLines) -> None:
-        self._node, self._out = node, out
-        self._commands = AlarmCommands()
+    def __init__(
+        self, node: Node, rules: tuple[AlarmRule, ...], out: _Lines | _JsonLines, guard: MotionGuard
+    ) -> None:
+        self._node, self._out, self._guard = node, out, guard
+        self._commands = AlarmCommands(self._refusal)
         self._keeper: Client | None = None
         carriers: Mapping[str, Callable[[AlarmEvent, AlarmAction, Done], None]] = {
             "banner": _nothing,  # each alarm is a line anyway
@@ -175,6 +182,22 @@ class _Watching:
         self._look_at = 0.0
         self._was_away = False
         self._told = 0
+
+    def check_sends(self) -> None:
+        """Raises `typer.BadParameter` for an alarm that would move a robot nobody has allowed to move."""
+        sends = [
+            action
+            for rule in self.alarms.rules
+            if rule.is_on
+            for action in rule.actions
+            if action.kind == "send"
+        ]
+        if sends:
+            self._guard.settle(_SETTLE_S)
+        for action in sends:
+            refusal = self._guard.refusal(action.name, action.msg_type)
+            if refusal:
+                raise typer.BadParameter(refusal)
 
     def say_begin(self) -> None:
         """Say what is watched, and what can't be done here."""
@@ -206,6 +229,7 @@ class _Watching:
     def close(self) -> None:
         """End the subscriptions; the node ends the rest."""
         self._commands.close()
+        self._guard.close()
         for _type, subscriber in self._subscribers.values():
             subscriber.close()
         self._subscribers.clear()
@@ -220,6 +244,7 @@ class _Watching:
         try:
             self._view = self._node.graph(_PATIENCE_S)
             self._subscribe(self._view)
+            self._guard.see(self._view)
         except NepError as error:
             if not self._was_away:
                 say(_("{problem}; waiting").format(problem=error))
@@ -265,6 +290,10 @@ class _Watching:
             say(_("'{name}' is not there yet; waiting.{meant}").format(name=condition.name, meant=meant))
 
     # ---- what is done
+
+    def _refusal(self, topic: str, msg_type: str) -> str:
+        self._guard.look()  # an alarm is rare, and a robot may have come just now
+        return self._guard.refusal(topic, msg_type)
 
     def _command(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
         self._commands.carry(self._node, action, done)

@@ -21,10 +21,16 @@ CALL_S = 5.0
 _MOST_KEPT = 50
 
 
+def _never(_topic: str, _msg_type: str) -> str:
+    return ""
+
+
 class AlarmCommands:
     """Carries out "call" and "send" with a node. `carry` may be called in any one thread at a time."""
 
-    def __init__(self) -> None:
+    def __init__(self, refusal: Callable[[str, str], str] = _never) -> None:
+        """`refusal` says of a topic and a type why nothing may be sent there now; "" when it may."""
+        self._refusal = refusal
         self._lock = threading.Lock()
         self._clients: dict[str, Client] = {}
         self._publishers: dict[tuple[str, str], Publisher] = {}
@@ -38,7 +44,13 @@ class AlarmCommands:
                 if action.kind == "call":
                     self._call(node, action, done)
                     return
-                heard = self._send(node, action)
+                publisher = self._publisher(node, action)
+                refusal = self._refusal(action.name, action.msg_type)  # asked last: making it takes time
+                if refusal:
+                    done(False, _("not sent: {reason}").format(reason=refusal))
+                    return
+                publisher.publish(action.payload)
+                heard = publisher.subscribers > 0
         except NepError as error:
             done(False, str(error))
             return
@@ -65,16 +77,14 @@ class AlarmCommands:
             client = self._clients[action.name] = node.new_client(action.name, timeout_s=CALL_S)
         client.call_async(action.payload).add_done_callback(_teller(action.name, done))
 
-    def _send(self, node: Node, action: AlarmAction) -> bool:
-        """Whether anybody hears it."""
+    def _publisher(self, node: Node, action: AlarmAction) -> Publisher:
         key = (action.name, action.msg_type)
         publisher = self._publishers.get(key)
         if publisher is None:
             if len(self._publishers) >= _MOST_KEPT:
                 self._publishers.pop(next(iter(self._publishers))).close(0.0)
             publisher = self._publishers[key] = node.new_pub(action.name, action.msg_type)
-        publisher.publish(action.payload)
-        return publisher.subscribers > 0
+        return publisher
 
 
 def _teller(service: str, done: Done) -> Callable[[Future[object]], None]:

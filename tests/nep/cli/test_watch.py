@@ -114,6 +114,47 @@ def test_a_message_is_sent_and_a_typo_is_told(master, type_in, file) -> None:
     assert "sent to /say" in done.stdout
 
 
+def describe(robot: nep.Node, command: str) -> list[object]:
+    """A robot that names its command topic itself; what it is told."""
+    description = {"title": "Rover", "rb:topics": {"command": command}}
+    robot.new_pub("/Rover/description", "robot/description", latched=True).publish(description)
+    told: list[object] = []
+    robot.new_sub(command, sink=lambda messages: told.extend(each.payload for each in messages))
+    return told
+
+
+def test_alarm_moves_no_robot_that_was_not_allowed(master, type_in, file) -> None:
+    name = file({"when": BELOW, "do": [{"send": "/orders", "message": {"op": "invoke"}}]})
+    words = ("watch", name, "-n", "1", "--master", master.address)
+    with nep.node("rover", master=master.address) as robot, Talker(master.address, "/distance", {"range": 0}):
+        told = describe(robot, "/orders")
+        refused = type_in(*words)
+        assert refused.returncode == 2
+        assert "'/orders' moves Rover; add --allow-moving Rover" in " ".join(refused.stderr.split())
+        assert told == []
+        assert type_in(*words, "--allow-moving", "Rover").returncode == 0
+        eventually(lambda: told == [{"op": "invoke"}])
+
+
+def test_alarm_does_not_move_a_robot_that_came_later(master, type_in, file) -> None:
+    name = file({"when": BELOW, "do": [{"send": "/orders", "message": {"op": "invoke"}}]})
+    told: list[list[object]] = []
+
+    def come(robot: nep.Node) -> None:
+        near = robot.new_pub("/distance")
+        eventually(lambda: near.subscribers > 0)
+        told.append(describe(robot, "/orders"))
+        near.publish({"range": 0})
+
+    with nep.node("rover", master=master.address) as robot:
+        thread = threading.Thread(target=come, args=(robot,))
+        thread.start()
+        done = type_in("watch", name, "-n", "1", "--master", master.address)
+        thread.join()
+    assert "not sent: '/orders' moves Rover; add --allow-moving Rover" in done.stdout
+    assert told == [[]]
+
+
 def test_a_master_that_is_away_is_waited_for(type_in, file, monkeypatch) -> None:
     with Master("127.0.0.1:0") as first:
         address = first.address
