@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from nep.cli import interrupts
-from nep.cli.options import JsonOption
+from nep.cli.options import AllowMovingOption, JsonOption
 from nep.cli.screen import UNKNOWN, cells, console, padded, rate, say, show_json, write
 from nep.errors import NepError
 from nep.i18n import _, lazy
@@ -27,6 +27,8 @@ from nep.programs.bridges.bridge import Bridge, check_installed
 from nep.programs.bridges.configuration import BridgeConfiguration, direction_named, join_line
 from nep.programs.bridges.route import Route, RouteCounts
 from nep.programs.bridges.toml_file import EXAMPLE, read_configuration
+from nep.robots.guard import refusal_words
+from nep.robots.moving import MovingTopics
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 
 _EVERY_S = 1.0
 _SLICE_S = 0.1
+_SETTLE_S = 1.5
 _CELL = 10
 _NAME_MOST = 60
 _NOTES_MOST = 100
@@ -88,13 +91,15 @@ def bridge(
     check: CheckOption = False,
     example: ExampleOption = False,
     count: CountOption = 0,
+    allow_moving: AllowMovingOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Join topics of two back ends, as a file says, or one topic at once. Ctrl+C ends it.
 
     Messages pass as they are where both sides have the same form, else by what is in them. What a bridge has
     brought over is not brought back. Each second it shows what it has carried, what was lost before it, and
-    what it left out because more came than the file allows. A network that is not there is waited for.
+    what it left out because more came than the file allows. What moves a robot on either side is carried only
+    with --allow-moving. A network that is not there is waited for.
     """
     if example:
         write(EXAMPLE)
@@ -106,7 +111,11 @@ def bridge(
         _say_right(configuration)
         return
     interrupts.leave_when_told()
-    with _warnings() as notes, Bridge(configuration) as running, _published(running):
+    allowed = allow_moving or ()
+    _check_types(configuration, allowed)
+    with _warnings() as notes, Bridge(configuration, allow_moving=allowed) as running, _published(running):
+        for refusal in running.refusals(_SETTLE_S):
+            raise typer.BadParameter(refusal)
         report = _report_for(running, notes, as_json=as_json)
         if not as_json:
             said = _("{name} joins a, {a}, and b, {b}; Ctrl+C ends it")
@@ -150,6 +159,16 @@ def _check_reach(configuration: BridgeConfiguration) -> None:
                     "nep.programs.bridges.Bridge"
                 ).format(name=side.backend.name)
             )
+
+
+def _check_types(configuration: BridgeConfiguration, allowed: Sequence[str]) -> None:
+    """Raises `typer.BadParameter` for a topic that moves a robot whoever is there, by its type or name."""
+    for topic in configuration.topics:
+        for origin in topic.origins:
+            end = topic.b if origin == "a" else topic.a
+            refusal = refusal_words(end.name, MovingTopics().moved_by(end.name, end.msg_type), allowed)
+            if refusal and not topic.is_pattern:
+                raise typer.BadParameter(refusal)
 
 
 def _say_right(configuration: BridgeConfiguration) -> None:

@@ -6,7 +6,7 @@ import logging
 import secrets
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING
@@ -51,7 +51,16 @@ class Bridge:
     installed, or does not know a type.
     """
 
-    def __init__(self, configuration: BridgeConfiguration) -> None:
+    def __init__(
+        self, configuration: BridgeConfiguration, *, allow_moving: Collection[str] | None = None
+    ) -> None:
+        """Begin to join.
+
+        Args:
+            configuration: The two networks and their topics.
+            allow_moving: Names of the robots that may be moved; what would move another one is not carried
+                and counts as failed. None carries everything: for programs that decide by themselves.
+        """
         self.configuration = configuration
         self.id = secrets.token_hex(8)
         self._own: set[int] = set()
@@ -70,7 +79,7 @@ class Bridge:
         try:
             for name in SIDES:
                 side = configuration.side(name)
-                self.sides[name] = BridgeSide(name, side, configuration.node_name(name))
+                self.sides[name] = BridgeSide(name, side, configuration.node_name(name), allow_moving)
             _check_types(configuration)
             self.own_nodes = frozenset(side.node.id for side in self.sides.values())
             self._begin()
@@ -106,6 +115,17 @@ class Bridge:
                 return False
             self._closed.wait(_SLICE_S)
         return True
+
+    def refusals(self, timeout_s: float) -> tuple[str, ...]:
+        """Return why named topics are not carried: they move robots that nobody has allowed to move.
+
+        Waits `timeout_s` at most until both networks and the descriptions of their robots are known.
+        """
+        deadline = time.monotonic() + timeout_s
+        while not all(side.knows_robots for side in self.sides.values()) and time.monotonic() < deadline:
+            self._closed.wait(_SLICE_S)
+        refusals = (each.refusal for each in self._routes if not each.is_found)
+        return tuple(dict.fromkeys(filter(None, refusals)))
 
     def status(self) -> dict[str, object]:
         """What it joins and what became of the messages, as it is published on `/nep/bridges`."""
@@ -160,7 +180,8 @@ class Bridge:
     def _end(self, topic: BridgeTopic, side: SideName, name: str) -> RouteEnd:
         told, end = self.configuration.side(side), topic.end(side)
         echoes = self._echoes.setdefault((side, name), Echoes())
-        return RouteEnd(side, told.network, told.backend, name, end.msg_type, end.qos, echoes)
+        guard = self.sides[side].guard
+        return RouteEnd(side, told.network, told.backend, name, end.msg_type, end.qos, echoes, guard)
 
     def find(self, side: BridgeSide, view: GraphView) -> None:
         """Make routes for topics that others publish there and a pattern matches. In the side's thread."""

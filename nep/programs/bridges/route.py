@@ -20,6 +20,7 @@ from nep.programs.bridges.pacer import Limit, Pacer
 from nep.programs.bridges.topic_types import Form, default_type, type_for, type_in
 from nep.programs.bridges.trail import TRAIL_KEY, Echoes, Trail, read_trail
 from nep.protocol.graph_view import GraphView
+from nep.robots.guard import MotionGuard
 from nep.text import escaped, shortened
 
 __all__ = ["Route", "RouteCounts", "RouteEnd"]
@@ -45,6 +46,8 @@ class RouteEnd:
     msg_type: str = ""
     qos: str = ""
     echoes: Echoes = field(default_factory=Echoes)
+    guard: MotionGuard | None = field(default=None, compare=False)
+    """Knows what moves a robot on this side; without it everything is published there."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,7 @@ class Route:
         self._wake = wake
         self._clock = clock
         self._pacer = pacer
+        self._heard: dict[Publisher, int] = {}
         self._limit = Limit(max_rate_hz) if max_rate_hz else None
         self._newest: Message | None = None
         self._lock = threading.RLock()
@@ -198,6 +202,14 @@ class Route:
     def needs_type(self) -> bool:
         """Whether messages wait, and as what they are published is not decided."""
         return self._form is None and not self.end.msg_type and self.needs_publisher
+
+    @property
+    def refusal(self) -> str:
+        """Why nothing is published on the other side now: it would move a robot that nobody has allowed."""
+        if self.end.guard is None:
+            return ""
+        msg_type = self.end.msg_type if self._form is None else self._form.msg_type
+        return self.end.guard.refusal(self.end.topic, msg_type)
 
     # ---- in the thread of the origin's side
 
@@ -378,6 +390,7 @@ class Route:
                 elif now - self._gone_since.setdefault(key, now) >= _GONE_S:
                     del self._gone_since[key]
                     ended.append(self._publishers.pop(key))
+                    self._heard.pop(ended[-1], None)
         for publisher in ended:
             publisher.close()
 
@@ -387,6 +400,15 @@ class Route:
         form = self._form
         if form is None:  # `open_publishers` makes it before the first publisher
             return
+        if self.end.guard is not None:
+            heard = publisher.subscribers
+            if heard != self._heard.get(publisher):  # a robot may have come
+                self._heard[publisher] = heard
+                self.end.guard.look()
+            refusal = self.refusal
+            if refusal:
+                self._fail(refusal)
+                return
         try:
             if form.has(message):
                 try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Protocol
@@ -19,6 +19,7 @@ from nep.programs.bridges.configuration import SideConfiguration, SideName
 from nep.programs.bridges.other_bridges import HEARTBEAT_S
 from nep.programs.bridges.route import Route
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
+from nep.robots.guard import MotionGuard
 
 __all__ = ["BridgeSide"]
 
@@ -57,7 +58,14 @@ class BridgeSide:
     Raises `NepError` for a back end that is not installed.
     """
 
-    def __init__(self, name: SideName, configuration: SideConfiguration, node_name: str) -> None:
+    def __init__(
+        self,
+        name: SideName,
+        configuration: SideConfiguration,
+        node_name: str,
+        allow_moving: Collection[str] | None = None,
+    ) -> None:
+        """Make its node. `allow_moving` names the robots that may be moved, None allows all."""
         self.name = name
         self.configuration = configuration
         self.view: GraphView | None = None
@@ -66,6 +74,7 @@ class BridgeSide:
         self.looks = 0
         """How often somebody has answered who is there."""
         self.node = Node(node_name, configuration.backend.name, master=configuration.master, wait_s=_ANSWER_S)
+        self.guard = None if allow_moving is None else MotionGuard(self.node, allow_moving)
         self._wanted = threading.Event()
         self._is_closing = False
         self._thread: threading.Thread | None = None
@@ -74,6 +83,15 @@ class BridgeSide:
         self._told_at = float("-inf")
         self._status: Publisher | None = None
         self._others: Subscriber | None = None
+
+    @property
+    def knows_robots(self) -> bool:
+        """Whether the descriptions of all robots that are there were read, or nobody wants to know."""
+        if self.guard is None or self.guard.is_settled:
+            return True
+        if self.view is not None:
+            self.guard.see(self.view)  # descriptions may have come since the last look
+        return self.guard.is_settled
 
     def start(self, owner: BridgeOfSide) -> None:
         """Begin to look after it."""
@@ -141,6 +159,8 @@ class BridgeSide:
         if self.problem:
             self.problem = ""
             _logger.warning("side %s of the bridge, %s, is there", self.name, self.configuration.network)
+        if self.guard is not None:
+            self.guard.see(view)
         self.view = view
         self.looks += 1
         owner.find(self, view)
