@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -13,12 +13,14 @@ from app.core.console import Console
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.network.source import Source
 from app.core.network.watches import Watch
+from app.core.robots.fleet import Fleet
+from app.core.robots.motion_permission import Question
 from app.core.robots.voices import Notes, RobotVoices
 from app.core.run.control import Runs
 from app.core.storage.atomic_file import write_atomically
 from app.core.storage.kept_file import read_kept
 from app.core.storage.settings import Settings
-from nep.i18n import _, lazy
+from nep.i18n import _, lazy, listed
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmEvent, AlarmFile, AlarmRule, Alarms
@@ -55,11 +57,20 @@ class AlarmSession(Protocol):
     alerts: Alerts
     console: Console
     source: Source
+    fleet: Fleet
     voices: RobotVoices
     runs: Runs
 
     def watch(self, topic: str) -> Watch:
         """Look at a topic until the watch is closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class _AskedSend:
+    """A message that waits for the answer to a question."""
+
+    question: Question
+    done: Done
 
 
 class SessionAlarms:
@@ -81,7 +92,10 @@ class SessionAlarms:
         self._session = session
         self.path: Path | None = session.settings.path.with_name(FILE)
         self._clock, self._clock_s = clock, clock_s
-        self._commands = AlarmCommands()
+        self._commands = AlarmCommands(session.fleet.gate.refusal_now)
+        self._asked: _AskedSend | None = None
+        self.on_moved: Callable[[Sequence[str], str], object] = _nobody_moved
+        """Told the robots that a message moves, and "alarm", before it is sent."""
         self.keep: Carrier | None = None
         self.run_behaviour: Callable[[str], str] | None = None
         self.on_event: Callable[[AlarmEvent], object] = _nobody
@@ -97,7 +111,7 @@ class SessionAlarms:
             "keep": self._keep,
             "run": self._run,
             "call": self._command,
-            "send": self._command,
+            "send": self._send,
             "stop": self._stop,
         }
         self.alarms = Alarms(found.rules, found.history, carriers, clock=clock, clock_s=clock_s)
@@ -195,6 +209,12 @@ class SessionAlarms:
         for event in self.alarms.tick():
             self._show(event)
         self.alarms.take_deeds()
+        asked = self._asked
+        if asked is not None and self._session.fleet.permission.question is not asked.question:
+            self._asked = None
+            asked.done(
+                False, _("not sent: {robots} may not move").format(robots=listed(asked.question.names))
+            )
 
     def check(self) -> None:
         """Once a second: what alerts say is renewed, and what changed is kept."""
@@ -302,6 +322,25 @@ class SessionAlarms:
         self._session.runs.stop()
         done(True, _("all robots were told to stop"))
 
+    def _send(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+        """Send a message; what moves a real robot once a person has said that it may."""
+        fleet, (topic, msg_type) = self._session.fleet, (action.name, action.msg_type)
+        if not fleet.gate.is_permitted(topic, msg_type) and fleet.permission.question is not None:
+            done(False, _("not sent: a person is still asked whether a robot may move"))
+            return
+        if not fleet.gate.permits(topic, lambda: self._send_asked(event, action, done), msg_type):
+            question = fleet.permission.question
+            self._asked = None if question is None else _AskedSend(question, done)
+            return
+        moved = fleet.gate.moved_by(topic, msg_type)
+        if moved:
+            self.on_moved(moved, "alarm")
+        self._command(event, action, done)
+
+    def _send_asked(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+        self._asked = None
+        self._send(event, action, done)
+
     def _command(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
         asked = self._clock()
 
@@ -351,6 +390,10 @@ class SessionAlarms:
 
 
 def _nobody(_event: AlarmEvent) -> None:
+    """Nobody wants to know."""
+
+
+def _nobody_moved(_robots: Sequence[str], _by: str) -> None:
     """Nobody wants to know."""
 
 

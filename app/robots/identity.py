@@ -13,15 +13,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from app.robots.description.description import topic_of
-from app.robots.description.model import Robot
+from app.robots.description.model import Robot, RobotTopics
 from nep.i18n import _, lazy
 from nep.messages.message import Message
+from nep.programs.robots.moving import DESCRIPTION_TYPE as DESCRIPTION_TYPE
+from nep.programs.robots.moving import RIZE_COMMANDS, RobotControls
 from nep.protocol.graph_view import GraphView
 from nep.text import bounded_str, harmless
 
-DESCRIPTION_TYPE = "robot/description"
 GATEWAY = "gateway"
-SHARED = frozenset({"robot_action", "action_state"})
+SHARED = frozenset({RIZE_COMMANDS, "action_state"})
 """Topics of all robots of RIZE together (`app.robots.rize`)."""
 MOST_SENDERS = 20_000
 WORDS_MOST = 200
@@ -99,6 +100,13 @@ def reserved(robot: Robot) -> tuple[str, ...]:
     """The topics with which a robot is moved, or answers: no other robot may have them, too."""
     topics = robot.topics
     return tuple(topic for topic in (topics.command, topics.answer, topics.world) if topic is not None)
+
+
+def controls_of(robot: Robot, earlier: Iterable[RobotTopics] = ()) -> RobotControls:
+    """Return the topics that move a robot or change its world; ``earlier`` ones may still do so."""
+    topics = {topic for each in (robot.topics, *earlier) for topic in (each.command, each.world)}
+    topics.update(action.topic for action in robot.actions)
+    return RobotControls(robot.name, frozenset(filter(None, topics)))
 
 
 def program_of(key: str) -> str:

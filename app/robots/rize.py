@@ -18,9 +18,10 @@ from app.robots.description.inputs import pretty_number
 from app.robots.description.json_access import as_part, names, part, text
 from app.robots.description.model import Robot
 from nep.i18n import _, lazy
+from nep.programs.robots.moving import RIZE_COMMANDS
 from nep.text import bounded_str
 
-COMMANDS, ANSWERS, EVENTS = "robot_action", "action_state", "rize_event"
+COMMANDS, ANSWERS, EVENTS = RIZE_COMMANDS, "action_state", "rize_event"
 _STATES = {"success": "succeeded", "failure": "failed"}
 _FAILED = lazy("{robot} could not {action}")
 

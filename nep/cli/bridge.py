@@ -27,8 +27,8 @@ from nep.programs.bridges.bridge import Bridge, check_installed
 from nep.programs.bridges.configuration import BridgeConfiguration, direction_named, join_line
 from nep.programs.bridges.route import Route, RouteCounts
 from nep.programs.bridges.toml_file import EXAMPLE, read_configuration
-from nep.robots.guard import refusal_words
-from nep.robots.moving import MovingTopics
+from nep.programs.robots.guard import refusal_words
+from nep.programs.robots.moving import MovingTopics
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:

@@ -26,9 +26,9 @@ from nep.i18n import _, listed, ngettext, number
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
+from nep.programs.robots.guard import MotionGuard, refusal_words
+from nep.programs.robots.moving import MovingTopics
 from nep.protocol.wire import check_topic
-from nep.robots.guard import MotionGuard, refusal_words
-from nep.robots.moving import MovingTopics
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:

@@ -31,8 +31,8 @@ from nep.programs.alarms.evaluator import AlarmEvent
 from nep.programs.alarms.rule import AlarmAction, AlarmRule
 from nep.programs.alarms.rule_file import EXAMPLE, read_alarms
 from nep.programs.alarms.sentences import action_words, rule_words, what_words
+from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import GraphView
-from nep.robots.guard import MotionGuard
 from nep.text import escaped
 
 _AGAIN_S = 1.0
@@ -291,7 +291,7 @@ class _Watching:
 
     # ---- what is done
 
-    def _refusal(self, topic: str, msg_type: str) -> str:
+    def _refusal(self, _node: Node, topic: str, msg_type: str) -> str:
         self._guard.look()  # an alarm is rare, and a robot may have come just now
         return self._guard.refusal(topic, msg_type)
 

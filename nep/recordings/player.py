@@ -19,8 +19,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.message import UNDECODED, Message, MessageKind, new_message
-from nep.recordings.reader import RecordedMessage, Recording
-from nep.robots.moving import (
+from nep.programs.robots.moving import (
     COMMAND_TYPE,
     DESCRIPTION_TYPE,
     MovingTopics,
@@ -28,6 +27,7 @@ from nep.robots.moving import (
     controls_in,
     described_name,
 )
+from nep.recordings.reader import RecordedMessage, Recording
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -13,11 +13,11 @@ from nep.errors import BadTopicError, NepError
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
+from nep.programs.robots.moving import DESCRIPTION_TYPE
 from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_glob import glob_matches, is_glob, widened
 from nep.protocol.wire import check_topic
 from nep.recordings.channels import Role
-from nep.robots.moving import DESCRIPTION_TYPE
 
 if TYPE_CHECKING:
     from typing_extensions import Self

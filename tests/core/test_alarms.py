@@ -13,6 +13,7 @@ from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
 from nep.programs.alarms.rule_file import alarms_text, read_alarms
+from tests.core.robots.test_motion_gate import TOPIC, real_robot
 from tests.core.waiting import tick_until
 from tests.nep.alarms.scene import message
 
@@ -64,6 +65,37 @@ def test_a_value_brings_an_alarm_on_which_calls_and_sends(session: Session) -> N
         publisher.publish({"range": 2})
         tick_until(session, lambda: alert(session, rule) is None)
         assert record.lasted_s is not None
+
+
+def test_an_alarm_moves_a_real_robot_only_after_a_yes(session: Session, master) -> None:
+    moved: list[tuple[object, str]] = []
+    session.alarms.on_moved = lambda robots, by: moved.append((robots, by))
+    rule = AlarmRule("d", BELOW, (AlarmAction("send", TOPIC, {"op": "invoke"}),))
+    session.alarms.put(rule)
+    with real_robot(session, master.address) as told, nep.node("sensor") as node:
+        publisher = node.new_pub("/distance", "json")
+        tick_until(session, lambda: publisher.subscribers == 1)
+        permission = session.fleet.permission
+
+        def come_on() -> list[str]:
+            """The alarm comes on anew; what became of its message so far."""
+            publisher.publish({"range": 0.1})
+            tick_until(session, lambda: session.alarms.on)
+            return [deed.words for deed in session.alarms.history.records[0].deeds]
+
+        assert come_on() == []
+        tick_until(session, lambda: permission.question is not None)
+        assert permission.question.title == "Let Rover move?"
+        permission.answer(let=False)
+        tick_until(session, lambda: session.alarms.history.records[0].deeds)
+        assert session.alarms.history.records[0].deeds[0].words == "not sent: Rover may not move"
+        session.alarms.put(AlarmRule("e", BELOW, rule.actions))
+        publisher.publish({"range": 0.1})
+        tick_until(session, lambda: permission.question is not None)
+        assert (told, moved) == ([], [])
+        permission.answer(let=True)
+        tick_until(session, lambda: told == [{"op": "invoke"}])
+        assert moved == [(("Rover",), "alarm")]
 
 
 def test_an_alarm_without_a_banner_is_among_the_alerts_only(session: Session) -> None:

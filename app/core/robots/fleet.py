@@ -15,6 +15,7 @@ from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.known import KnownRobots
+from app.core.robots.motion_gate import MotionGate
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
 from app.core.robots.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.robots.stop_lines import MOST_TOPICS
@@ -29,6 +30,7 @@ from app.robots.identity import (
     GATEWAY,
     Identity,
     Senders,
+    controls_of,
     foreign_topic,
     hearing,
     publishing,
@@ -38,9 +40,10 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.node import Node
+from nep.programs.robots.moving import COMMAND_TYPE as COMMAND_TYPE
+from nep.programs.robots.moving import MovingTopics, description_topics, moving_topics
 from nep.protocol.graph_view import GraphView
 
-COMMAND_TYPE = "robot/command"
 MOST_HELD = 256
 """Answers of publishers that no master has told of yet, kept until the next graph."""
 MOST_EARLIER = 4
@@ -103,6 +106,8 @@ class Fleet:
             MotionPermission(settings, self._identity_of),
             KnownRobots(settings),
         )
+        self._moving: tuple[object, MovingTopics] = (None, MovingTopics())
+        self.gate = MotionGate(self.permission, self)
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
         self._told = False
@@ -120,6 +125,31 @@ class Fleet:
     def connected(self) -> tuple[RobotLink, ...]:
         """Those that are there now."""
         return tuple(link for link in self._links.values() if link.connected)
+
+    @property
+    def movable(self) -> tuple[Robot, ...]:
+        """Those that can be moved: also a real one that is away, which may only have lost its connection."""
+        return tuple(link.robot for link in self._links.values() if link.connected or not link.virtual)
+
+    @property
+    def described(self) -> frozenset[str]:
+        """The description topics of the robots that are there, which were read."""
+        return frozenset(topic for topic, name in self._names.items() if self._links[name].connected)
+
+    @property
+    def moving(self) -> MovingTopics:
+        """The topics that move robots now, also robots whose descriptions could not be read."""
+        unread = description_topics(self._view) - self.described
+        key = (self.revision, self._view.epoch, self._view.revision, unread)
+        if key != self._moving[0]:
+            names = {robot.name for robot in self.movable}
+            known = (
+                controls_of(link.robot, link.topics_before)
+                for link in self._links.values()
+                if link.name in names
+            )
+            self._moving = key, moving_topics(self._view, known, unread)
+        return self._moving[1]
 
     def is_there(self, name: str) -> bool | None:
         """Whether a robot of this name is there now, also one that has not yet told what it can do.
@@ -284,6 +314,7 @@ class Fleet:
             began_s = link.stop_began_s
             link.stopping = began_s is not None and self._clock() - began_s >= STOPPING_SHOWN_AFTER_S
         self._tries.look(self._links.values())
+        self.gate.follow()
 
     @property
     def claims(self) -> Mapping[str, Claim]:

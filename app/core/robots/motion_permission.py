@@ -17,6 +17,7 @@ from app.errors import AppError
 from app.robots.description.description import Robot
 from app.robots.identity import Identity
 from nep.i18n import _, listed, ngettext, pgettext
+from nep.programs.robots.moving import RIZE_COMMANDS
 
 ALWAYS = "robots.may_move"
 MOST_NAMED = 4
@@ -35,15 +36,24 @@ class MayNotMoveError(AppError):
 
 @dataclass(frozen=True)
 class Question:
-    """May these robots move? ``moves`` names for each what it would do, in the words of its description."""
+    """May these robots move? ``moves`` names for each what it would do, in the words of its description.
+
+    ``strangers`` would be moved, too: names of robots that could not be read, or topics of unknown robots.
+    """
 
     moves: Mapping[str, tuple[str, ...]]
-    go_on: Callable[[], None]
+    go_on: Callable[[], object]
+    strangers: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All of them, for people."""
+        return (*self.moves, *map(_stranger, self.strangers))
 
     @property
     def title(self) -> str:
         """In bold: "Let Rover move?"."""
-        return _("Let {robots} move?").format(robots=listed(list(self.moves)))
+        return _("Let {robots} move?").format(robots=listed(list(self.names)))
 
     @property
     def sentence(self) -> str:
@@ -54,6 +64,10 @@ class Question:
             )
             for name, actions in self.moves.items()
         ]
+        if self.strangers:
+            names = listed([_stranger(each) for each in self.strangers])
+            said = _("What is sent may move {robot}, of which Studio knows no more.")
+            told.append(said.format(robot=names))
         return _("{moves} See that nobody stands in the way. Stop is F12, at any time.").format(
             moves=" ".join(told)
         )
@@ -70,6 +84,8 @@ class MotionPermission:
         """`settings` keep the robots that may always; `identity_of` tells the program that a robot is."""
         self._settings, self._identity_of = settings, identity_of
         self._allowed: set[str] = set()
+        self.strangers: frozenset[str] = frozenset()
+        """Robots without a readable description, and topics of unknown robots, that may move."""
         self._asked: tuple[tuple[str, str], ...] = ()
         self.question: Question | None = None
         """What a person is to answer now."""
@@ -79,17 +95,23 @@ class MotionPermission:
         """Whether this robot may move without being asked for."""
         return robot.virtual or self._now(robot) in self._allowed or self._key(robot) in self._always()
 
-    def permits(self, wanted: Iterable[tuple[Robot, Sequence[str]]], go_on: Callable[[], None]) -> bool:
-        """Whether these robots may do these actions now.
+    def permits(
+        self,
+        wanted: Iterable[tuple[Robot, Sequence[str]]],
+        go_on: Callable[[], object],
+        strangers: Iterable[str] = (),
+    ) -> bool:
+        """Whether these robots may do these actions now, and ``strangers`` anything (see `Question`).
 
         If not, the question stands, and `go_on` is called when the answer is yes.
         """
         asked = [(robot, risky(robot, actions)) for robot, actions in wanted if not self.allowed(robot)]
         open_ = [(robot, moves) for robot, moves in asked if moves]
-        if not open_:
+        unknown = tuple(name for name in strangers if name not in self.strangers)
+        if not open_ and not unknown:
             return True
         self._asked = tuple((self._now(robot), self._key(robot)) for robot, _key in open_)
-        self.question = Question({robot.name: moves for robot, moves in open_}, go_on)
+        self.question = Question({robot.name: moves for robot, moves in open_}, go_on, unknown)
         self.revision += 1
         return False
 
@@ -100,6 +122,7 @@ class MotionPermission:
         if question is None or not let:
             return
         self._allowed.update(now for now, _key in self._asked)
+        self.strangers |= set(question.strangers)
         try:
             if always and self._settings is not None:
                 self._settings.set(ALWAYS, sorted({*self._always(), *(key for _now, key in self._asked)}))
@@ -115,6 +138,8 @@ class MotionPermission:
     def forget(self) -> None:
         """Ask again before any robot moves."""
         self._allowed.clear()
+        self.strangers = frozenset()
+        self.revision += 1
         if self._settings is not None:
             self._settings.set(ALWAYS, [])
 
@@ -130,6 +155,11 @@ class MotionPermission:
 
     def _always(self) -> list[str]:
         return self._settings.get(ALWAYS, []) if self._settings is not None else []
+
+
+def _stranger(name: str) -> str:
+    """A robot of which only its name, or only a topic, is known."""
+    return _("the robot on {topic}").format(topic=name) if "/" in name or name == RIZE_COMMANDS else name
 
 
 def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:

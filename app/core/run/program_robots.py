@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from app.blocks.runtime.publishing import guarded
 from app.core.robots.fleet import Fleet
 from app.core.run.runner import Runner
 from app.robots.description.description import Robot
+from nep.programs.robots.moving import MovingTopics
 
 
 def owners_of(fleet: Fleet) -> dict[str, str]:
@@ -25,12 +25,18 @@ class ProgramRobots:
         self._asked: Mapping[str, Sequence[str]] = {}
         self._told: Mapping[str, str] = {}
         self._revision = -1
+        self._moving = MovingTopics()
+        self._topics: Mapping[str, Sequence[str]] = {}
 
     def begin(
         self, runner: Runner, asked: Sequence[tuple[Robot, Sequence[str]]], owners: Mapping[str, str]
     ) -> None:
         """A program runs that knows these ``owners``; ``asked`` is what it asks of its robots."""
         self._runner, self._told, self._revision = runner, owners, self._fleet.revision
+        moving, connected = self._fleet.moving, {link.name for link in self._fleet.connected}
+        # it was started with the connected robots; of others, which can't be read, the next tick tells
+        self._moving = moving if connected.issuperset(moving.robots) else MovingTopics()
+        self._topics = self._moving.topics
         self._asked = {robot.name: actions for robot, actions in asked}
 
     def end(self) -> None:
@@ -39,7 +45,7 @@ class ProgramRobots:
 
     def follow(self) -> None:
         """Tell the program which robots there are now, if that has changed."""
-        if self._runner is None or self._fleet.revision == self._revision:
+        if self._runner is None or not self._has_changed():
             return
         self._revision, owners = self._fleet.revision, owners_of(self._fleet)
         links = [self._fleet.link(name) for name in self._asked]
@@ -54,9 +60,17 @@ class ProgramRobots:
         else:
             self._tell(without=[link.name for link in anew])
 
+    def _has_changed(self) -> bool:
+        is_same = self._fleet.revision == self._revision
+        if is_same and self._fleet.moving is self._moving:
+            return False
+        self._moving = self._fleet.moving
+        return not is_same or self._moving.topics != self._topics
+
     def _tell(self, without: Collection[str] = ()) -> None:
         if self._runner is None:
             return
         owners = {name: id for name, id in owners_of(self._fleet).items() if name not in without}
         self._told = {**self._told, **owners}
-        self._runner.set_robots(owners, guarded(link.robot for link in self._fleet.connected))
+        self._topics = self._fleet.moving.topics
+        self._runner.set_robots(owners, self._topics)

@@ -21,15 +21,15 @@ CALL_S = 5.0
 _MOST_KEPT = 50
 
 
-def _never(_topic: str, _msg_type: str) -> str:
+def _never(_node: Node, _topic: str, _msg_type: str) -> str:
     return ""
 
 
 class AlarmCommands:
     """Carries out "call" and "send" with a node. `carry` may be called in any one thread at a time."""
 
-    def __init__(self, refusal: Callable[[str, str], str] = _never) -> None:
-        """`refusal` says of a topic and a type why nothing may be sent there now; "" when it may."""
+    def __init__(self, refusal: Callable[[Node, str, str], str] = _never) -> None:
+        """`refusal` says of a topic and a type why a node may not send there now; "" when it may."""
         self._refusal = refusal
         self._lock = threading.Lock()
         self._clients: dict[str, Client] = {}
@@ -45,7 +45,9 @@ class AlarmCommands:
                     self._call(node, action, done)
                     return
                 publisher = self._publisher(node, action)
-                refusal = self._refusal(action.name, action.msg_type)  # asked last: making it takes time
+                refusal = self._refusal(
+                    node, action.name, action.msg_type
+                )  # asked last: making it takes time
                 if refusal:
                     done(False, _("not sent: {reason}").format(reason=refusal))
                     return

@@ -19,8 +19,8 @@ from nep.programs.bridges.configuration import SideName
 from nep.programs.bridges.pacer import Limit, Pacer
 from nep.programs.bridges.topic_types import Form, default_type, type_for, type_in
 from nep.programs.bridges.trail import TRAIL_KEY, Echoes, Trail, read_trail
+from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import GraphView
-from nep.robots.guard import MotionGuard
 from nep.text import escaped, shortened
 
 __all__ = ["Route", "RouteCounts", "RouteEnd"]

@@ -18,8 +18,8 @@ from nep.nodes.subscriber import Subscriber
 from nep.programs.bridges.configuration import SideConfiguration, SideName
 from nep.programs.bridges.other_bridges import HEARTBEAT_S
 from nep.programs.bridges.route import Route
+from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
-from nep.robots.guard import MotionGuard
 
 __all__ = ["BridgeSide"]
 

@@ -8,7 +8,7 @@ from itertools import count
 import pytest
 
 import nep
-from nep.robots import MotionGuard
+from nep.programs.robots import MotionGuard
 from tests.nep.programs import eventually
 
 _names = count()

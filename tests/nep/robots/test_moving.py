@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from nep.programs.robots import MovingTopics, RobotControls, controls_in, moving_topics
+from nep.programs.robots.moving import original_robots
 from nep.protocol.graph_view import (
     GraphView,
     NodeInfo,
@@ -12,7 +14,6 @@ from nep.protocol.graph_view import (
     SubscriberInfo,
     TopicInfo,
 )
-from nep.robots import MovingTopics, RobotControls, controls_in, moving_topics
 
 ROVER = RobotControls("Rover", frozenset({"/Rover/drive", "/Rover/world"}))
 
@@ -79,6 +80,18 @@ def test_program_whose_description_is_unread_is_protected_on_all_that_it_hears()
     assert moving.moved_by("/other") == ()
 
 
+def test_driver_that_is_about_to_announce_itself_is_protected() -> None:
+    answers = topic("/Rover/answer", "robot/answer", publisher="n")
+    view = graph(answers, topic("/go", subscriber="n"))
+    assert moving_topics(view, ()).moved_by("/go") == ("Rover",)
+    announced = graph(
+        answers,
+        topic("/go", subscriber="n"),
+        topic("/Rover/description", "robot/description", publisher="n"),
+    )
+    assert moving_topics(announced, [ROVER]).moved_by("/go") == ()  # its description says what moves it
+
+
 def test_topic_of_the_command_type_moves_a_robot_of_unknown_name() -> None:
     view = graph(
         topic("/Fido/go", "robot/command", subscriber="n"), patterns=(PatternInfo("/x/*", "robot/command"),)
@@ -94,5 +107,6 @@ def test_robots_of_the_original_nep_have_the_names_of_their_nodes() -> None:
         NodeInfo("m", "me", "", None, "", "native", 0),
     )
     heard = TopicInfo("robot_action", "json", "json", (), tuple(SubscriberInfo(1, id, 0, 0) for id in "nm"))
-    moving = moving_topics(graph(heard, nodes=nodes), ())
+    view = graph(heard, nodes=nodes)
+    moving = moving_topics(view, original_robots(view))
     assert moving.moved_by("robot_action") == ("pepper_driver",)

@@ -15,6 +15,7 @@ from app.core.documents.background_worker import BackgroundWorker
 from app.core.faults import error_words
 from app.core.network.source import Job
 from app.core.recording.replay.opening import OpenedRecording
+from app.core.robots.motion_gate import MotionGate
 from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import MOST_NAMES, Arming, Target
 from nep.errors import BadTopicError, NepError
@@ -22,8 +23,9 @@ from nep.i18n import _, ngettext
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
+from nep.programs.robots.moving import MovingTopics
 from nep.protocol.wire import check_topic
-from nep.recordings.player import is_command_topic, latched_topics, moving_topics, published_type
+from nep.recordings.player import latched_topics, moving_topics, published_type
 from nep.recordings.reader import Recording
 
 LATE_S = 0.1
@@ -57,6 +59,8 @@ class SentTopic:
     is_latched: bool
     publishers: dict[str, Publisher] = field(default_factory=dict)
     asked: set[str] = field(default_factory=set)
+    node: Node | None = None
+    checked: dict[Publisher, int] = field(default_factory=dict)
     is_ready: bool = False
     count: int = 0
     skipped: int = 0
@@ -71,9 +75,12 @@ class SentTopic:
 class ReplayOutbox:
     """Publishes what is offered, while the switch is on. `offer` is the replay's thread, the rest any."""
 
-    def __init__(self, arming: Arming, submit: Submit) -> None:
-        """``submit`` gives Studio's node on the live network to a job."""
-        self._arming, self._submit = arming, submit
+    def __init__(self, arming: Arming, submit: Submit, gate: MotionGate | None = None) -> None:
+        """``submit`` gives Studio's node on the live network to a job.
+
+        ``gate`` knows which messages would move a robot that may not; without it all are sent.
+        """
+        self._arming, self._submit, self._gate = arming, submit, gate
         self._lock = threading.Lock()
         self._going: dict[str, SentTopic] = {}
 
@@ -115,7 +122,7 @@ class ReplayOutbox:
         publisher = sent.publishers.get(kind)
         if publisher is None:
             self._ask(sent, kind)
-        if publisher is None or late_s > LATE_S:
+        if publisher is None or late_s > LATE_S or self._is_refused(sent, publisher):
             sent.skipped += 1
             return
         data, extension = bytes(message.data), dict(message.extension) or None
@@ -126,6 +133,18 @@ class ReplayOutbox:
                 sent.count += 1
         except Exception as error:  # noqa: BLE001 - the others, and the panels, go on
             sent.problem = str(error) if isinstance(error, NepError) else error_words(error)
+
+    def _is_refused(self, sent: SentTopic, publisher: Publisher) -> bool:
+        """Whether it would move a robot that may not: one may have come just now."""
+        if self._gate is None or sent.node is None:
+            return False
+        heard, name = publisher.subscribers, sent.route.name
+        if heard == sent.checked.get(publisher):
+            return bool(self._gate.refusal(name))
+        is_refused = bool(self._gate.refusal_now(sent.node, name))
+        if not is_refused:
+            sent.checked[publisher] = heard
+        return is_refused
 
     # ---- in the thread of the network
 
@@ -143,6 +162,7 @@ class ReplayOutbox:
             except Exception as error:  # noqa: BLE001 - whatever it is, it belongs to this topic
                 sent.problem = str(error) if isinstance(error, NepError) else error_words(error)
                 return
+            sent.node = node
             sent.publishers = {**sent.publishers, msg_type: made}  # anew: another thread reads it
             sent.is_ready = True
             if not self._is_going(sent):
@@ -168,17 +188,17 @@ class ReplaySending:
 
     def __init__(self, acting: SessionActing) -> None:
         self._acting = acting
-        self.outbox = ReplayOutbox(acting.arming, acting.submit)
+        self.outbox = ReplayOutbox(acting.arming, acting.submit, acting.gate)
         self.routes: dict[str, str] = {}
         """By topic of the recording the name under which it is to be sent; of those that are chosen."""
         self.revision = 0
         self._opened: OpenedRecording | None = None
-        self._moving: frozenset[str] | None = None
+        self._moving: MovingTopics | None = None
         self._latched: frozenset[str] = frozenset()
         self._asks: list[ReplayRoute] = []
         self._waits = False
         """Whether a person is asked about the first of them."""
-        self._worker: BackgroundWorker[tuple[frozenset[str], frozenset[str]]] | None = None
+        self._worker: BackgroundWorker[tuple[MovingTopics, frozenset[str]]] | None = None
         self.on_change: Callable[[], object] = _nothing
         """Called when other topics are sent."""
 
@@ -201,8 +221,10 @@ class ReplaySending:
 
     def moves(self, recorded: str, name: str) -> bool:
         """Whether a robot is told what to do by it; also under another name, where one may hear it."""
-        known = self._moving or frozenset()
-        return recorded in known or name in known or is_command_topic(name)
+        known = self._moving
+        if known is not None and (known.moved_by(recorded) or known.moved_by(name)):
+            return True
+        return bool(self._acting.gate.moved_by(name))
 
     def choose(self, recorded: str, name: str | None) -> str:
         """Send this topic under a name ("" for its own) once it is armed, or not (None); why it can't be."""
@@ -271,6 +293,7 @@ class ReplaySending:
         if opened is None:
             return
         topic = opened.recording.topics[route.recorded]
+        self._acting.tell_moved(route.target, "replay")
         self.outbox.begin(route, turn, topic.msg_type, is_latched=route.recorded in self._latched)
         self._say(route, _("is sent as it is played"))
         self._changed()
@@ -313,7 +336,7 @@ class ReplaySending:
             target = sent.route.target
             if sent.problem or sent.turn != arming.turn or not arming.allows(target):
                 self._end(sent)
-            elif self._acting.asks(target):
+            elif not self._acting.may_go_on(target):
                 self._end(sent)
                 self._asks.append(sent.route)
         if self._asks and not self._acting.is_asking:
@@ -327,13 +350,13 @@ class ReplaySending:
         try:
             taken = self._worker.take("topics")
         except NepError:  # it can't be read: then every topic may be one that moves a robot
-            taken = (frozenset(self._opened.recording.topics), frozenset())
+            taken = (MovingTopics(unidentified=self._opened.recording.topics), frozenset())
         if taken is not None:
             self._moving, self._latched = taken
             self.revision += 1
 
 
-def _facts_of(recording: Recording) -> tuple[frozenset[str], frozenset[str]]:
+def _facts_of(recording: Recording) -> tuple[MovingTopics, frozenset[str]]:
     """Which topics move robots, and which are kept for who comes later."""
     return moving_topics(recording), latched_topics(recording, recording.topics)
 

@@ -7,13 +7,12 @@ plays can be sent then (`app.core.recording.replay.sending`).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
-from app.blocks.runtime.publishing import moved_by
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.background_worker import BackgroundWorker
@@ -40,10 +39,8 @@ from app.core.storage.settings import Settings
 from nep.errors import NepError
 from nep.i18n import _, listed, ngettext
 
-if TYPE_CHECKING:
-    from app.robots.description.description import Robot
-
 FILE = "messages.json"
+_MOVED_BY: Mapping[str, str] = {"publish": "shelf", "image": "click"}
 
 
 class ActingSession(Protocol):
@@ -94,7 +91,10 @@ class SessionActing:
         self.arming = Arming(clock)
         self.submit = session.source.submit
         """Gives Studio's node on the live network to a job."""
-        self.outbox = Outbox(self.arming, self.submit, clock)
+        self.gate = session.fleet.gate
+        self.on_moved: Callable[[Sequence[str], str], object] = _nobody_moved
+        """Told the robots that something moves, and by what: "shelf", "click" or "replay"."""
+        self.outbox = Outbox(self.arming, self.submit, clock, self.gate)
         self.calls = ServiceCalls(self.arming, self.submit, clock, clock_s)
         self.recorded_commands: frozenset[str] = frozenset()
         """Topics by which robots are told what to do, as a recording says; until it is switched off."""
@@ -151,7 +151,7 @@ class SessionActing:
         A topic that moves robots is asked for again: then `question` stands, unless the person ``is_sure``.
         """
         if not is_sure and self.asks(target):
-            names = tuple(robot.name for robot in self._moved(target))
+            names = tuple(name for name in self._moved(target) if name != target.name)
             self.question = ArmQuestion(
                 target.name, names, partial(self._allow_surely, target, self.arming.turn, then)
             )
@@ -194,12 +194,19 @@ class SessionActing:
         """Whether a person is asked, here or before a real robot moves for the first time."""
         return self.question is not None or self._session.fleet.permission.question is not None
 
-    def _moved(self, target: Target) -> list[Robot]:
-        if target.kind != "topic":
-            return []
-        robots = [link.robot for link in self._session.fleet.connected]
-        names = set(moved_by(target.name, robots))
-        return [robot for robot in robots if robot.name in names]
+    def _moved(self, target: Target) -> tuple[str, ...]:
+        return self.gate.moved_by(target.name) if target.kind == "topic" else ()
+
+    def may_go_on(self, target: Target) -> bool:
+        """Whether what is sent again and again may still be: a robot may have come that it moves."""
+        is_permitted = target.kind != "topic" or self.gate.is_permitted(target.name)
+        return is_permitted and not self.asks(target)
+
+    def tell_moved(self, target: Target, asker: Asker) -> None:
+        """Something is about to be sent there: tell `on_moved` the robots that it moves."""
+        moved = self._moved(target)
+        if moved:
+            self.on_moved(moved, _MOVED_BY.get(asker, asker))
 
     # ---- messages
 
@@ -246,6 +253,7 @@ class SessionActing:
         not_armed = self.ready(order.target, partial(self.send_order, order, rate_hz=rate_hz))
         if not_armed is not None:
             return not_armed
+        self.tell_moved(order.target, order.asker)
         if not rate_hz:
             self.outbox.send(order)
         elif not self.outbox.begin(order, rate_hz):
@@ -266,7 +274,6 @@ class SessionActing:
             why_not = self.arm()
             if why_not:
                 return why_not
-        moved = self._moved(target)
         if not self.arming.allows(target) or self.asks(target):
             return self.allow(target, go_on)
         turn = self.arming.turn
@@ -275,8 +282,9 @@ class SessionActing:
             if turn == self.arming.turn:
                 go_on()
 
-        wanted = [(robot, [action.name for action in robot.actions]) for robot in moved]
-        return None if self._session.fleet.permission.permits(wanted, still) else ""
+        if target.kind != "topic":
+            return None
+        return None if self.gate.permits(target.name, still) else ""
 
     def repeat(self, number: int) -> str:
         """Do what an entry of `sent` tells of once more, while that is armed; why it can't be."""
@@ -325,9 +333,9 @@ class SessionActing:
             self.disarm()
         for each in self.outbox.all_repeated:  # a robot may have come that this topic moves
             target = each.order.target
-            if self.asks(target):
+            if not self.may_go_on(target):
                 self.outbox.end(each.order.id)
-                self.allow(target)
+                self.ready(target, _nothing)
         for result in self.outbox.take():
             self._take(result)
         for record in self.calls.tick():
@@ -431,6 +439,14 @@ class SessionActing:
             title = _("Kept messages could not be read.")
             self._session.alerts.put("messages:file", "warn", title, kept.problem)
         return kept.value if kept.value is not None else Shelf()
+
+
+def _nobody_moved(_robots: Sequence[str], _by: str) -> None:
+    """Nobody wants to know."""
+
+
+def _nothing() -> None:
+    """The person starts it again."""
 
 
 def result_words(result: SendResult) -> str:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from app.core.faults import error_words
 from app.core.network.source import Job
+from app.core.robots.motion_gate import MotionGate
 from app.core.run.acting.arming import Arming, Target
 from app.core.run.acting.json_text import pretty
 from app.core.run.acting.sent_log import KEPT_BYTES, Asker
@@ -78,6 +79,7 @@ class Repeated:
     order: SendOrder
     rate_hz: float
     turn: int
+    node: Node
     publisher: Publisher
     due_s: float
     count: int = 0
@@ -101,8 +103,14 @@ class Outbox:
         arming: Arming,
         submit: Callable[[str, Job], None],
         clock: Callable[[], float] = time.monotonic,
+        gate: MotionGate | None = None,
     ) -> None:
-        """``submit`` gives Studio's node to a job (`app.core.network.source.Source.submit`)."""
+        """``submit`` gives Studio's node to a job (`app.core.network.source.Source.submit`).
+
+        ``gate`` knows which messages would move a robot that may not; without it all are sent.
+        """
+        self._gate = gate
+        self._heard: dict[Publisher, int] = {}
         self._arming, self._submit, self._clock = arming, submit, clock
         self._changed = threading.Condition()
         self._publishers: dict[tuple[str, str], Publisher] = {}
@@ -145,6 +153,7 @@ class Outbox:
             publisher = self._publisher(node, order)
             value = order.make()
             made = codec_for(order.msg_type).encode(value)
+            self._check(node, order, publisher)
             if self._arming.if_armed(turn, order.target, lambda: publisher.publish(made)):
                 text = _text_of(value) if len(made.data) <= KEPT_BYTES else ""
                 self._tell(SendResult(order, "sent", heard=publisher.subscribers, text=text))
@@ -166,7 +175,7 @@ class Outbox:
             codec_for(order.msg_type).encode(order.make())  # what can't be sent is said before anything is
             publisher = self._publisher(node, order)
             now = time.monotonic()
-            made = Repeated(order, rate_hz, turn, publisher, now, since_s=now)
+            made = Repeated(order, rate_hz, turn, node, publisher, now, since_s=now)
             with self._changed:
                 if self._begun.get(order.id) is not token:
                     return  # a person ended it meanwhile
@@ -233,6 +242,19 @@ class Outbox:
 
         return run
 
+    def _check(self, node: Node, order: SendOrder, publisher: Publisher) -> None:
+        """Raise `NepError` when it would move a robot that may not: one may have come meanwhile."""
+        if self._gate is None:
+            return
+        heard = publisher.subscribers
+        if heard == self._heard.get(publisher):
+            refusal = self._gate.refusal(order.topic)
+        else:
+            refusal = self._gate.refusal_now(node, order.topic)
+        if refusal:
+            raise NepError(_("not sent: {reason}").format(reason=refusal))
+        self._heard[publisher] = heard
+
     def _publisher(self, node: Node, order: SendOrder) -> Publisher:
         key = (order.topic, order.msg_type)
         with self._changed:
@@ -241,7 +263,7 @@ class Outbox:
         if known is None or known.is_closed:
             unused = [each for each in self._publishers if each not in used]
             if len(self._publishers) >= MOST_KEPT and unused:
-                self._publishers.pop(unused[0]).close()
+                self._close(unused[0])
             known = self._publishers[key] = node.new_pub(order.topic, order.msg_type)
         return known
 
@@ -251,7 +273,12 @@ class Outbox:
         if self._arming.is_on:
             return  # it was armed again meanwhile
         for key in [each for each in self._publishers if each not in used]:
-            self._publishers.pop(key).close()
+            self._close(key)
+
+    def _close(self, key: tuple[str, str]) -> None:
+        publisher = self._publishers.pop(key)
+        self._heard.pop(publisher, None)
+        publisher.close()
 
     def _tell(self, result: SendResult) -> None:
         self._results.append(result)
@@ -282,6 +309,7 @@ class Outbox:
         problem = ""
         try:
             made = codec_for(each.order.msg_type).encode(each.order.make())
+            self._check(each.node, each.order, each.publisher)
             is_done = self._arming.if_armed(each.turn, each.order.target, lambda: self._publish(each, made))
         except Exception as error:  # noqa: BLE001 - the others go on
             is_done, problem = False, str(error) if isinstance(error, NepError) else error_words(error)

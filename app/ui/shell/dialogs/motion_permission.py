@@ -102,7 +102,7 @@ class MotionQuestion(QWidget):
         if question is None:
             self._put_away()
             return
-        names = list(question.moves)
+        names = list(question.names)
         self.title.setText(plain.breakable(question.title))
         self.sentence.setText(plain.breakable(question.sentence))
         self._always_for = _("Always for these")

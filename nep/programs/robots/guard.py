@@ -16,8 +16,7 @@ from nep.i18n import _, listed
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
-from nep.protocol.graph_view import GraphView
-from nep.robots.moving import (
+from nep.programs.robots.moving import (
     DESCRIPTION_TYPE,
     MovingTopics,
     RobotControls,
@@ -25,7 +24,9 @@ from nep.robots.moving import (
     described_name,
     description_topics,
     moving_topics,
+    original_robots,
 )
+from nep.protocol.graph_view import GraphView
 from nep.text import harmless, shortened
 
 __all__ = ["MotionGuard", "refusal_words"]
@@ -175,6 +176,7 @@ class MotionGuard:
             for _message, controls in claims.values()
             if controls is not None
         ]
+        robots += original_robots(view)
         self._moving = moving_topics(view, robots, self._unread(view), self._own_nodes)
         self._cache = {}
 

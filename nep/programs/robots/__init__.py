@@ -5,8 +5,8 @@ subscribers. `guard` reads the live descriptions for programs without a window, 
 allowed. Commands, drivers and Studio's question to a person are in `app`.
 """
 
-from nep.robots.guard import MotionGuard
-from nep.robots.moving import (
+from nep.programs.robots.guard import MotionGuard
+from nep.programs.robots.moving import (
     COMMAND_TYPE,
     DESCRIPTION_TYPE,
     RIZE_COMMANDS,

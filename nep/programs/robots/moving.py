@@ -22,14 +22,16 @@ __all__ = [
     "described_name",
     "description_topics",
     "moving_topics",
+    "original_robots",
 ]
 
 DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"
+ANSWER_TYPE = "robot/answer"
 RIZE_COMMANDS = "robot_action"
 """One topic for the commands of all robots of RIZE. Robots of the kit subscribe to it, too."""
 _CONTROL_KEYS = ("command", "world")
-_DESCRIPTION = "/description"
+_DESCRIPTION, _ANSWER = "/description", "/answer"
 _HREF_SCHEME = "nep:"
 _ORIGINAL_GENERATIONS = frozenset({"A", "B"})
 _COMMAND_NAMES = frozenset({"command", "cmd_vel"})
@@ -77,9 +79,27 @@ class MovingTopics:
         self._uses_names = uses_names
 
     @property
-    def topics(self) -> Mapping[str, tuple[str, ...]]:
+    def robots(self) -> tuple[str, ...]:
+        """Names of all identified robots."""
+        return self._everybody
+
+    @property
+    def topics(self) -> dict[str, tuple[str, ...]]:
         """Each topic or pattern that moves an identified robot, with the names of these robots."""
-        return self._by_topic
+        found = dict(self._by_topic)
+        if self._everybody:
+            found[RIZE_COMMANDS] = self._everybody
+        return found
+
+    def robots_on(self, topic: str) -> tuple[str, ...]:
+        """Return the names of the identified robots that a message moves."""
+        if topic == RIZE_COMMANDS:
+            return self._everybody
+        names = dict.fromkeys(self._by_topic.get(topic, ()))
+        for pattern in self._patterns:
+            if matches(pattern, topic):
+                names |= dict.fromkeys(self._by_topic.get(pattern, ()))
+        return tuple(names)
 
     def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
         """Return the names of the robots that a message moves; empty when it moves none.
@@ -91,18 +111,16 @@ class MovingTopics:
             topic: The topic to publish on.
             msg_type: The type to publish with, if known.
         """
-        if topic == RIZE_COMMANDS:
-            return self._everybody or (topic,)
-        names = dict.fromkeys(self._by_topic.get(topic, ()))
-        is_unidentified = topic in self._unidentified
-        for pattern in self._patterns:
-            if matches(pattern, topic):
-                names |= dict.fromkeys(self._by_topic.get(pattern, ()))
-                is_unidentified = is_unidentified or pattern in self._unidentified
-        if names:
-            return tuple(names)
-        is_named_so = self._uses_names and topic.rpartition("/")[2] in _COMMAND_NAMES
-        return (topic,) if is_unidentified or is_named_so or msg_type == COMMAND_TYPE else ()
+        return self.robots_on(topic) or ((topic,) if self._is_unidentified(topic, msg_type) else ())
+
+    def _is_unidentified(self, topic: str, msg_type: str) -> bool:
+        return (
+            topic == RIZE_COMMANDS
+            or msg_type == COMMAND_TYPE
+            or topic in self._unidentified
+            or (self._uses_names and topic.rpartition("/")[2] in _COMMAND_NAMES)
+            or any(each in self._unidentified and matches(each, topic) for each in self._patterns)
+        )
 
 
 def controls_in(description: object, fallback_name: str = "") -> RobotControls | None:
@@ -166,8 +184,8 @@ def moving_topics(
             moving, and so do the topics that robots have by default.
         own_nodes: Ids of nodes of the asking program; what they subscribe to does not count.
     """
-    known = [*robots, *_unread_robots(view, unread, own_nodes), *_original_robots(view)]
-    typed = (name for name, info in view.topics.items() if info.msg_type == COMMAND_TYPE)
+    known = [*robots, *_unread_robots(view, unread, own_nodes)]
+    typed = (name for name, info in view.topics.items() if info.msg_type == COMMAND_TYPE and info.subscribers)
     typed_patterns = (name for name, info in view.patterns.items() if info.msg_type == COMMAND_TYPE)
     return MovingTopics(known, unidentified=(*typed, *typed_patterns))
 
@@ -175,26 +193,47 @@ def moving_topics(
 def _unread_robots(
     view: GraphView, unread: Collection[str], own_nodes: Collection[str]
 ) -> Iterator[RobotControls]:
-    if not unread:
-        return
-    heard: dict[str, set[str]] = {}
+    """Robots without a description so far: all that their programs subscribe to counts.
+
+    A driver of the kit publishes its answer topic first, then subscribes to commands, and announces itself
+    last: who publishes answers and no description is about to do so.
+    """
+    announcing = {id for topic in description_topics(view) for id in _publishers(view, topic)}
+    programs: list[tuple[str, set[str]]] = [
+        (topic.removesuffix(_DESCRIPTION), _publishers(view, topic)) for topic in unread
+    ]
+    programs += [
+        (topic.removesuffix(_ANSWER), nodes)
+        for topic, info in view.topics.items()
+        if info.msg_type == ANSWER_TYPE and (nodes := _publishers(view, topic) - announcing)
+    ]
+    heard = _subscriptions(view) if programs else {}
+    for home, nodes in programs:
+        topics = {f"{home}/{key}" for key in _CONTROL_KEYS}
+        for node in nodes.difference(own_nodes):
+            topics |= heard.get(node, set())
+        yield RobotControls(home.strip("/") or home, frozenset(topics))
+
+
+def _publishers(view: GraphView, topic: str) -> set[str]:
+    """The ids of the nodes that publish a topic."""
+    info = view.topics.get(topic)
+    return {each.node_id for each in info.publishers} if info is not None else set()
+
+
+def _subscriptions(view: GraphView) -> dict[str, set[str]]:
+    """The topics and patterns that each node subscribes to."""
+    found: dict[str, set[str]] = {}
     subscriptions = [(info.name, info.subscribers) for info in view.topics.values()]
     subscriptions += [(info.name, info.subscribers) for info in view.patterns.values()]
     for name, subscribers in subscriptions:
         for subscriber in subscribers:
-            heard.setdefault(subscriber.node_id, set()).add(name)
-    for topic in unread:
-        home = topic.removesuffix(_DESCRIPTION)
-        topics = {f"{home}/{key}" for key in _CONTROL_KEYS}
-        announced = view.topics.get(topic)
-        for publisher in announced.publishers if announced is not None else ():
-            if publisher.node_id not in own_nodes:
-                topics |= heard.get(publisher.node_id, set())
-        yield RobotControls(described_name(topic), frozenset(topics))
+            found.setdefault(subscriber.node_id, set()).add(name)
+    return found
 
 
-def _original_robots(view: GraphView) -> Iterator[RobotControls]:
-    """Programs of the original NEP that hear RIZE's commands: robots without a description."""
+def original_robots(view: GraphView) -> Iterator[RobotControls]:
+    """Yield the programs of the original NEP that hear RIZE's commands: robots without a description."""
     info = view.topics.get(RIZE_COMMANDS)
     for subscriber in info.subscribers if info is not None else ():
         node = view.nodes.get(subscriber.node_id)

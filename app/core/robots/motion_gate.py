@@ -1,0 +1,128 @@
+"""Gate before everything that is published on a topic that moves a robot: alarms, shelf, replays, clicks.
+
+The window's thread asks the person (`permits`); any thread checks right before each message (`refusal`), so a
+robot that comes meanwhile is not moved. Which topics move robots decides `nep.programs.robots`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple, Protocol
+
+from app.core.robots.motion_permission import MotionPermission, risky
+from app.robots.description.description import Robot
+from nep.errors import NepError
+from nep.i18n import _, listed
+from nep.nodes.node import Node
+from nep.programs.robots.moving import MovingTopics, description_topics, moving_topics
+
+_GRAPH_TIMEOUT_S = 0.5
+
+
+class GatedRobots(Protocol):
+    """What the gate knows of the robots."""
+
+    @property
+    def moving(self) -> MovingTopics:
+        """The topics that move robots now; another object whenever that changes."""
+
+    @property
+    def movable(self) -> Iterable[Robot]:
+        """The robots that can be moved now."""
+
+    @property
+    def described(self) -> frozenset[str]:
+        """The description topics of `movable` that were read."""
+
+
+class _Snapshot(NamedTuple):
+    moving: MovingTopics = MovingTopics()
+    allowed: frozenset[str] = frozenset()
+    strangers: frozenset[str] = frozenset()
+    described: frozenset[str] = frozenset()
+
+
+class MotionGate:
+    """Decide who may publish on topics that move robots. Methods are for the window's thread.
+
+    `refusal` and `refusal_now` may be called in any thread; they answer from what `follow` saw.
+    """
+
+    def __init__(self, permission: MotionPermission, robots: GatedRobots) -> None:
+        """Ask with `permission` about `robots`."""
+        self._permission, self._robots = permission, robots
+        self._seen: tuple[MovingTopics, int] | None = None
+        self._snapshot = _Snapshot()
+
+    def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
+        """Return the names of the robots that a message moves; the topic when the robot is unknown."""
+        return self._robots.moving.moved_by(topic, msg_type)
+
+    def is_permitted(self, topic: str, msg_type: str = "") -> bool:
+        """Return whether a message may be published without asking."""
+        self.follow()
+        return not self.refusal(topic, msg_type)
+
+    def permits(self, topic: str, go_on: Callable[[], object], msg_type: str = "") -> bool:
+        """Return whether a message may be published now.
+
+        If not, a person is asked, and `go_on` is called when the answer is yes.
+        """
+        known = {robot.name: robot for robot in self._robots.movable}
+        names = self.moved_by(topic, msg_type)
+        wanted = [(known[name], _actions(known[name])) for name in names if name in known]
+        strangers = [name for name in names if name not in known]
+        is_permitted = self._permission.permits(wanted, go_on, strangers=strangers)
+        self.follow()
+        return is_permitted
+
+    def follow(self) -> None:
+        """Take over which robots there are and which may move, for `refusal`."""
+        now = self._robots.moving, self._permission.revision
+        if now == self._seen:
+            return
+        allowed = {
+            robot.name
+            for robot in self._robots.movable
+            if self._permission.allowed(robot) or not risky(robot, _actions(robot))
+        }
+        strangers = self._permission.strangers
+        self._snapshot = _Snapshot(now[0], strangers | allowed, strangers, self._robots.described)
+        self._seen = now
+
+    def refusal(self, topic: str, msg_type: str = "") -> str:
+        """Return why a message may not be published now; "" when it may. For any thread."""
+        known = self._snapshot
+        return _words(
+            topic, [name for name in known.moving.moved_by(topic, msg_type) if name not in known.allowed]
+        )
+
+    def refusal_now(self, node: Node, topic: str, msg_type: str = "") -> str:
+        """As `refusal`, after asking the master who has come since: for the first message to new subscribers.
+
+        May be called in any thread; waits for the master, 0.5 s at most.
+        """
+        refusal = self.refusal(topic, msg_type)
+        if refusal:
+            return refusal
+        try:
+            view = node.graph(_GRAPH_TIMEOUT_S)
+        except NepError:
+            return ""  # nobody can have come without it
+        known = self._snapshot
+        newcomers = moving_topics(view, (), description_topics(view) - known.described)
+        return _words(topic, [name for name in newcomers.robots_on(topic) if name not in known.strangers])
+
+
+def _words(topic: str, names: Sequence[str]) -> str:
+    if not names:
+        return ""
+    if names == [topic]:
+        return _("a robot would be moved on {topic}, and nobody has said that it may").format(topic=topic)
+    said = _("it would move {robots}, and nobody has said that this may be")
+    return said.format(robots=listed(list(names)))
+
+
+def _actions(robot: Robot) -> Sequence[str]:
+    """Everything, because nobody can tell from a message what it asks for."""
+    return [action.name for action in robot.actions]

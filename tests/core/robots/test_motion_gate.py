@@ -1,0 +1,131 @@
+"""A person is asked before anything is published that moves a real robot: shelf, keys, clicks and replays."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+
+import nep
+from app.core.robots.motion_gate import MotionGate
+from app.core.robots.motion_permission import MotionPermission
+from app.core.run.acting.sending import SendOrder
+from app.core.run.acting.shelf import KeptMessage
+from app.core.session import Session
+from app.robots.description.description import Robot, parse, td_for
+from app.robots.identity import controls_of
+from app.robots.turtle import ROBOT
+from nep.programs.robots import MovingTopics, RobotControls
+from tests.core.waiting import tick_until
+
+TOPIC = "/Rover/drive"
+ORDER = KeptMessage("a", "Go", TOPIC, "json", '{"op": "invoke"}')
+
+
+def description(*, virtual: bool) -> dict[str, object]:
+    """A robot that does not call its command topic so."""
+    text = json.dumps(td_for(ROBOT.thing_model, "Rover")).replace("/Rover/command", TOPIC)
+    made = json.loads(text)
+    made["rb:robot"]["virtual"] = virtual
+    return made
+
+
+class Robots:
+    """Robots that a test lets come."""
+
+    def __init__(self) -> None:
+        self.movable: tuple[Robot, ...] = ()
+        self.moving = MovingTopics()
+        self.described: frozenset[str] = frozenset()
+
+    def come(self, *robots: Robot, others: tuple[RobotControls, ...] = ()) -> None:
+        self.movable = robots
+        self.moving = MovingTopics((*map(controls_of, robots), *others))
+
+
+@pytest.fixture
+def rover() -> Robot:
+    return parse(description(virtual=False))
+
+
+@contextmanager
+def real_robot(session: Session, master: str) -> Iterator[list[object]]:
+    """A real robot that Studio knows; what it is told."""
+    told: list[object] = []
+    with nep.node("rover", master=master) as node:
+        announced = node.new_pub("/Rover/description", "robot/description", latched=True)
+        announced.publish(description(virtual=False))
+        node.new_sub(TOPIC, sink=lambda messages: told.extend(each.payload for each in messages))
+        tick_until(session, lambda: session.fleet.link("Rover") is not None)
+        yield told
+
+
+def test_a_message_that_moves_a_real_robot_waits_for_a_yes(rover) -> None:
+    robots, done = Robots(), []
+    permission = MotionPermission()
+    gate = MotionGate(permission, robots)
+    assert gate.permits(TOPIC, pytest.fail)
+    robots.come(rover)
+    assert not gate.permits(TOPIC, lambda: done.append(1))
+    assert "Rover" in gate.refusal(TOPIC)
+    assert "Rover" in gate.refusal("robot_action")
+    assert gate.refusal("/Rover/answer") == ""
+    permission.answer(let=True)
+    assert done == [1]
+    assert gate.permits(TOPIC, pytest.fail)
+    assert gate.refusal(TOPIC) == ""
+    robots.come(replace(rover, name="Fido"))
+    gate.follow()
+    assert "Fido" in gate.refusal(TOPIC)
+    robots.come(replace(rover, virtual=True))
+    assert gate.is_permitted(TOPIC)
+    permission.forget()
+    robots.come(rover)
+    assert not gate.is_permitted(TOPIC)
+
+
+def test_robots_without_a_readable_description_are_asked_about_too() -> None:
+    robots, permission = Robots(), MotionPermission()
+    robots.come(others=(RobotControls("Rover", frozenset({TOPIC})),))
+    gate = MotionGate(permission, robots)
+    assert not gate.permits(TOPIC, lambda: None)
+    assert permission.question is not None
+    assert permission.question.title == "Let Rover move?"
+    permission.answer(let=True)
+    assert gate.is_permitted(TOPIC)
+    assert not gate.permits("/Fido/go", lambda: None, "robot/command")
+    assert permission.question is not None
+    assert permission.question.names == ("the robot on /Fido/go",)
+
+
+def test_shelf_asks_and_ends_what_is_repeated_when_a_real_robot_comes(session: Session, master) -> None:
+    acting, permission = session.acting, session.fleet.permission
+    moved: list[tuple[object, str]] = []
+    acting.on_moved = lambda robots, by: moved.append((robots, by))
+    acting.shelf.put(ORDER)
+    assert acting.send(ORDER, rate_hz=20.0) == ""
+    tick_until(session, lambda: acting.outbox.all_repeated)
+    with real_robot(session, master.address) as told:
+        tick_until(session, lambda: not acting.outbox.all_repeated)
+        if acting.question is None:  # its thread saw the robot before the window did
+            assert acting.send(ORDER) == ""
+        acting.answer(let=True)
+        assert acting.send(ORDER) == ""
+        assert permission.question is not None
+        session.tick()
+        assert moved == []
+        before = len(told)
+        assert before <= 1  # what was on its way when the robot subscribed
+        permission.answer(let=True)
+        tick_until(session, lambda: len(told) == before + 1)
+        assert moved == [(("Rover",), "shelf")]
+        permission.forget()
+        acting.outbox.send(
+            SendOrder("a", "Go", TOPIC, "json", lambda: {"op": "invoke"})
+        )  # as if it had waited for the network
+        tick_until(session, lambda: acting.last["a"].kind == "failed")
+        assert "nobody has said" in acting.last["a"].sentence
+        assert len(told) == before + 1
