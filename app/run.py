@@ -21,7 +21,6 @@ from app.blocks import Program, compile_behaviour
 from app.blocks.model.workspace import Workspace, parse_workspace
 from app.blocks.runtime.find_robots import FoundRobots, find_robots
 from app.blocks.runtime.interrupts import without_interrupts
-from app.blocks.runtime.publishing import guarded
 from app.core.documents.document import read
 from app.core.robots.launcher import VIRTUAL_ROBOTS, VirtualProcesses
 from app.core.robots.motion_permission import risky, wanted_by
@@ -31,9 +30,10 @@ from app.core.robots.stop_report import StopReport
 from app.core.run.runner import Runner, RunnerEvent
 from app.errors import AppError, DescriptionError
 from app.robots.description.description import Robot, parse
-from app.robots.identity import DESCRIPTION_TYPE
+from app.robots.identity import controls_of
 from nep.errors import NepError
 from nep.i18n import _, listed, number
+from nep.programs.robots.moving import description_topics, moving_topics
 from nep.system.streams import tell
 from nep.text import escaped
 
@@ -260,11 +260,13 @@ class _LateRobots:
             return
         with suppress(NepError):
             view = self._node.graph()
-            there = tuple(sorted(t for t, info in view.topics.items() if info.msg_type == DESCRIPTION_TYPE))
+            there = tuple(sorted(description_topics(view)))
             if there != self._known:
                 found = find_robots(self._node, LATE_S)
-                self._runner.set_robots({}, guarded(found.robots))
-                self._known = there
+                unread = set(there) - {robot.topics.description for robot in found.robots}
+                moving = moving_topics(view, map(controls_of, found.robots), unread)
+                self._runner.set_robots({}, moving.topics)
+                self._known = there if not unread else ()
         self._next_s = time.monotonic() + LATE_S
 
 

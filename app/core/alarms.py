@@ -326,7 +326,7 @@ class SessionAlarms:
         """Send a message; what moves a real robot once a person has said that it may."""
         fleet, (topic, msg_type) = self._session.fleet, (action.name, action.msg_type)
         if not fleet.gate.is_permitted(topic, msg_type) and fleet.permission.question is not None:
-            done(False, _("not sent: a person is still asked whether a robot may move"))
+            done(False, _("not sent: the question whether a robot may move is not answered yet"))
             return
         if not fleet.gate.permits(topic, lambda: self._send_asked(event, action, done), msg_type):
             question = fleet.permission.question

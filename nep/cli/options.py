@@ -25,8 +25,8 @@ AllowMovingOption = Annotated[
         "--allow-moving",
         metavar=_("ROBOT"),
         help=_(
-            "Let this robot be moved, virtual or not; may be given again. A topic stands for the robot that "
-            "it moves. Nobody asks: see that nobody is in its way."
+            "Allow this robot to be moved, virtual or not; can be repeated. A topic stands for the robots "
+            "that it moves. Make sure that nobody is in the way."
         ),
         show_default=False,
     ),

@@ -53,7 +53,7 @@ def play(
     allow_moving: AllowMovingOption = None,
     arm: Annotated[
         bool,
-        typer.Option("--arm", help=_("As --allow-moving for every robot, of the topics that are named.")),
+        typer.Option("--arm", help=_("Allow every robot to be moved by the topics that are named.")),
     ] = False,
     speed: Annotated[
         float, typer.Option("--speed", metavar=_("FACTOR"), help=_("0.1 to 10 times as fast."))

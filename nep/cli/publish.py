@@ -93,7 +93,10 @@ def publish(
     ] = False,
     master: MasterOption = None,
 ) -> None:
-    """Publish once, or with --rate again and again. Ctrl+C ends it."""
+    """Publish once, or with --rate again and again. Ctrl+C ends it.
+
+    What is typed here is published without asking, also on a topic that moves a robot.
+    """
     if rate_hz is not None and not 0 < rate_hz <= 10_000:
         raise typer.BadParameter(_("a rate is more than 0 and at most 10000 a second"), param_hint="--rate")
     with node_for("pub", master) as node:

@@ -118,8 +118,8 @@ def _words(topic: str, names: Sequence[str]) -> str:
     if not names:
         return ""
     if names == [topic]:
-        return _("a robot would be moved on {topic}, and nobody has said that it may").format(topic=topic)
-    said = _("it would move {robots}, and nobody has said that this may be")
+        return _("a message on {topic} moves a robot that nobody has allowed to move").format(topic=topic)
+    said = _("it moves {robots}, which nobody has allowed")
     return said.format(robots=listed(list(names)))
 
 

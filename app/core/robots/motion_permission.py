@@ -66,7 +66,7 @@ class Question:
         ]
         if self.strangers:
             names = listed([_stranger(each) for each in self.strangers])
-            said = _("What is sent may move {robot}, of which Studio knows no more.")
+            said = _("The message may move {robot}, which Studio does not know.")
             told.append(said.format(robot=names))
         return _("{moves} See that nobody stands in the way. Stop is F12, at any time.").format(
             moves=" ".join(told)

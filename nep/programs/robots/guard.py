@@ -9,7 +9,7 @@ from __future__ import annotations
 import shlex
 import threading
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 from nep.errors import NepError
 from nep.i18n import _, listed
@@ -35,7 +35,7 @@ MAX_DESCRIPTIONS = 200
 MAX_DESCRIPTION_BYTES = 1_000_000
 _MAX_CLAIMANTS = 8
 _MAX_CACHED = 10_000
-_MAX_NAME_SHOWN = 100
+_MAX_NAME_SHOWN, _MAX_NAMES_SHOWN = 100, 5
 _POLL_S = 0.05
 _GRAPH_TIMEOUT_S = 0.5
 
@@ -204,11 +204,13 @@ def refusal_words(topic: str, robots: Sequence[str], allowed: Collection[str]) -
     missing = [name for name in robots if name not in allowed]
     if not missing or topic in allowed:
         return ""
-    names: Mapping[str, str] = {name: shortened(harmless(name), _MAX_NAME_SHOWN) for name in missing}
-    options = " ".join(f"--allow-moving {shlex.quote(each)}" for each in names.values())
+    shown = shortened(harmless(topic), _MAX_NAME_SHOWN)
+    names = [shortened(harmless(name), _MAX_NAME_SHOWN) for name in missing]
+    is_named = missing != [topic] and len(names) <= _MAX_NAMES_SHOWN
+    options = " ".join(f"--allow-moving {shlex.quote(each)}" for each in (names if is_named else [shown]))
     if missing == [topic]:
         said = _("'{topic}' moves a robot; add {options} when nobody is in its way")
-        return said.format(topic=names[topic], options=options)
+        return said.format(topic=shown, options=options)
+    robots = names[:_MAX_NAMES_SHOWN] + ["…"] * (len(names) > _MAX_NAMES_SHOWN)
     said = _("'{topic}' moves {robots}; add {options} when nobody is in the way")
-    shown = shortened(harmless(topic), _MAX_NAME_SHOWN)
-    return said.format(topic=shown, robots=listed(list(names.values())), options=options)
+    return said.format(topic=shown, robots=listed(robots), options=options)

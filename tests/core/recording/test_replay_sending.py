@@ -9,13 +9,18 @@ import pytest
 import nep
 from app.core.recording.replay.sending import LATE_S, ReplayOutbox, ReplayRoute, sent_words
 from app.core.recording.replay.source import ReplaySource
+from app.core.robots.motion_gate import MotionGate
+from app.core.robots.motion_permission import MotionPermission
 from app.core.run.acting.arming import MOST_NAMES, Arming, Target
 from app.core.session import Session
+from app.robots.description.description import parse
 from nep.errors import ClosedError
 from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
 from nep.recordings.player import Playback
 from nep.recordings.reader import Recording
 from tests.core.recording.test_replay_source import Clock, Pictures
+from tests.core.robots.test_motion_gate import TOPIC, Robots, description
 from tests.core.waiting import tick_until
 from tests.nep.recordings.messages import json_message, kept, picture, record
 
@@ -188,11 +193,31 @@ class TestNode:
     def __init__(self) -> None:
         self.made: list[TestPublisher] = []
 
+    def graph(self, _timeout_s: float) -> GraphView:
+        return GraphView(0, 0)
+
     def new_pub(self, topic: str, msg_type: str, *, latched: bool) -> TestPublisher:
         if topic == "/bad":
             raise ClosedError("node")
         self.made.append(TestPublisher(topic, msg_type, latched))
         return self.made[-1]
+
+
+def test_replay_leaves_out_what_would_move_a_robot_that_has_just_come():
+    node, jobs, arming, robots = TestNode(), [], Arming(), Robots()
+    gate = MotionGate(MotionPermission(), robots)
+    outbox = ReplayOutbox(arming, lambda _what, job: jobs.append(job), gate)
+    arming.arm()
+    arming.allow(Target("topic", TOPIC))
+    outbox.begin(ReplayRoute("/a", TOPIC), arming.turn, "json", is_latched=False)
+    jobs.pop()(node)
+    (sent,) = outbox.going
+    outbox.offer([json_message(1, "/a")], [0.0])
+    assert (sent.count, sent.skipped) == (1, 0)
+    robots.come(parse(description(virtual=False)))
+    gate.follow()
+    outbox.offer([json_message(2, "/a")], [0.0])
+    assert (sent.count, sent.skipped) == (1, 1)
 
 
 def test_the_outbox_sends_what_is_allowed_in_its_turn_and_counts_what_it_leaves_out():
