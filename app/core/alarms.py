@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -328,7 +329,11 @@ class SessionAlarms:
         if not fleet.gate.is_permitted(topic, msg_type) and fleet.permission.question is not None:
             done(False, _("not sent: the question whether a robot may move is not answered yet"))
             return
-        if not fleet.gate.permits(topic, lambda: self._send_asked(event, action, done), msg_type):
+        reason = _("An alarm sends a message on {topic}: {what}.").format(
+            topic=topic, what=what_words(event.rule.condition, event.seen)
+        )
+        go_on = partial(self._send_asked, event, action, done)
+        if not fleet.gate.permits(topic, go_on, msg_type, reason=reason):
             question = fleet.permission.question
             self._asked = None if question is None else _AskedSend(question, done)
             return

@@ -17,6 +17,7 @@ from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion_gate import MotionGate
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
+from app.core.robots.movable import MovableRobots
 from app.core.robots.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.robots.stop_lines import MOST_TOPICS
 from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S
@@ -30,7 +31,6 @@ from app.robots.identity import (
     GATEWAY,
     Identity,
     Senders,
-    controls_of,
     foreign_topic,
     hearing,
     publishing,
@@ -41,7 +41,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.programs.robots.moving import COMMAND_TYPE as COMMAND_TYPE
-from nep.programs.robots.moving import MovingTopics, description_topics, moving_topics
+from nep.programs.robots.moving import MovingTopics
 from nep.protocol.graph_view import GraphView
 
 MOST_HELD = 256
@@ -106,8 +106,8 @@ class Fleet:
             MotionPermission(settings, self._identity_of),
             KnownRobots(settings),
         )
-        self._moving: tuple[object, MovingTopics] = (None, MovingTopics())
-        self.gate = MotionGate(self.permission, self)
+        self._movable = MovableRobots(self._links, self._names)
+        self.gate = MotionGate(self.permission, self._movable)
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
         self._told = False
@@ -127,29 +127,9 @@ class Fleet:
         return tuple(link for link in self._links.values() if link.connected)
 
     @property
-    def movable(self) -> tuple[Robot, ...]:
-        """Those that can be moved: also a real one that is away, which may only have lost its connection."""
-        return tuple(link.robot for link in self._links.values() if link.connected or not link.virtual)
-
-    @property
-    def described(self) -> frozenset[str]:
-        """The description topics of the robots that are there, which were read."""
-        return frozenset(topic for topic, name in self._names.items() if self._links[name].connected)
-
-    @property
     def moving(self) -> MovingTopics:
         """The topics that move robots now, also robots whose descriptions could not be read."""
-        unread = description_topics(self._view) - self.described
-        key = (self.revision, self._view.epoch, self._view.revision, unread)
-        if key != self._moving[0]:
-            names = {robot.name for robot in self.movable}
-            known = (
-                controls_of(link.robot, link.topics_before)
-                for link in self._links.values()
-                if link.name in names
-            )
-            self._moving = key, moving_topics(self._view, known, unread)
-        return self._moving[1]
+        return self._movable.moving
 
     def is_there(self, name: str) -> bool | None:
         """Whether a robot of this name is there now, also one that has not yet told what it can do.
@@ -285,7 +265,7 @@ class Fleet:
     def update(self, view: GraphView) -> None:
         """Take over a new graph: robots come and go."""
         self._told = True
-        self._view = view
+        self._view = self._movable.view = view
         self._announcements.update(view)
         topics = (self._topics_that_count(link.robot) for link in self._links.values())
         self._senders.learn(view, {rize.ANSWERS}.union(*topics))

@@ -63,16 +63,19 @@ class MotionGate:
         self.follow()
         return not self.refusal(topic, msg_type)
 
-    def permits(self, topic: str, go_on: Callable[[], object], msg_type: str = "") -> bool:
+    def permits(
+        self, topic: str, go_on: Callable[[], object], msg_type: str = "", *, reason: str = ""
+    ) -> bool:
         """Return whether a message may be published now.
 
-        If not, a person is asked, and `go_on` is called when the answer is yes.
+        If not, a person is asked, and `go_on` is called when the answer is yes. `reason` is a sentence that
+        tells the person what wants to publish.
         """
         known = {robot.name: robot for robot in self._robots.movable}
         names = self.moved_by(topic, msg_type)
         wanted = [(known[name], _actions(known[name])) for name in names if name in known]
         strangers = [name for name in names if name not in known]
-        is_permitted = self._permission.permits(wanted, go_on, strangers=strangers)
+        is_permitted = self._permission.permits(wanted, go_on, strangers, reason)
         self.follow()
         return is_permitted
 

@@ -39,11 +39,13 @@ class Question:
     """May these robots move? ``moves`` names for each what it would do, in the words of its description.
 
     ``strangers`` would be moved, too: names of robots that could not be read, or topics of unknown robots.
+    ``reason`` is a sentence that says what asks, "" when the person has just asked for it themselves.
     """
 
     moves: Mapping[str, tuple[str, ...]]
     go_on: Callable[[], object]
     strangers: tuple[str, ...] = ()
+    reason: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -58,7 +60,8 @@ class Question:
     @property
     def sentence(self) -> str:
         """What would move, and how it is stopped."""
-        told = [
+        told = [self.reason] if self.reason else []
+        told += [
             ngettext("{actions} moves {robot}.", "{actions} move {robot}.", len(actions)).format(
                 actions=listed(actions), robot=name
             )
@@ -100,6 +103,7 @@ class MotionPermission:
         wanted: Iterable[tuple[Robot, Sequence[str]]],
         go_on: Callable[[], object],
         strangers: Iterable[str] = (),
+        reason: str = "",
     ) -> bool:
         """Whether these robots may do these actions now, and ``strangers`` anything (see `Question`).
 
@@ -111,7 +115,7 @@ class MotionPermission:
         if not open_ and not unknown:
             return True
         self._asked = tuple((self._now(robot), self._key(robot)) for robot, _key in open_)
-        self.question = Question({robot.name: moves for robot, moves in open_}, go_on, unknown)
+        self.question = Question({robot.name: moves for robot, moves in open_}, go_on, unknown, reason)
         self.revision += 1
         return False
 

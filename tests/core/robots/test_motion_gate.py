@@ -129,3 +129,18 @@ def test_shelf_asks_and_ends_what_is_repeated_when_a_real_robot_comes(session: S
         tick_until(session, lambda: acting.last["a"].kind == "failed")
         assert "which nobody has allowed" in acting.last["a"].sentence
         assert len(told) == before + 1
+
+
+def test_another_program_under_the_same_name_is_asked_about_again(session: Session, master) -> None:
+    permission, gate = session.fleet.permission, session.fleet.gate
+    with real_robot(session, master.address):
+        assert not gate.permits(TOPIC, lambda: None)
+        permission.answer(let=True)
+        assert gate.is_permitted(TOPIC)
+    tick_until(session, lambda: not session.fleet.connected)
+    link = session.fleet.link("Rover")
+    assert link is not None
+    before = link.identity
+    with real_robot(session, master.address):
+        tick_until(session, lambda: link.identity != before)
+        assert "Rover" in gate.refusal(TOPIC)
