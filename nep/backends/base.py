@@ -104,14 +104,15 @@ class QuickPublish(NamedTuple):
 
     Payloads of the type `kind` are bytes that are sent as they are, and `ordinary` makes the bytes of others;
     what it raises for, and all that is published while `owner` is closed or nobody listens, is given to
-    `slowly`. `look` is called first with a payload whose bytes have `null` in them, unless it is None.
+    `slowly`; so is what is published with ``strict=True``. `look` is called first with a payload whose bytes
+    have `null` in them, unless it is None.
     """
 
     owner: Closes
     kind: type | None
     ordinary: Callable[[Any], bytes]
     look: Callable[[Any], object] | None
-    slowly: Callable[[Any], object]
+    slowly: Callable[..., object]
 
 
 class Closes(Protocol):
@@ -124,7 +125,7 @@ class Closes(Protocol):
 class PublishesQuickly(Protocol):
     """What a `PublisherTransport` may have besides."""
 
-    def quick_publish(self, asked: QuickPublish) -> Callable[[Any], None]:
+    def quick_publish(self, asked: QuickPublish) -> Callable[..., None]:
         """A function that publishes, with as few calls on the way as can be. It never blocks."""
 
 

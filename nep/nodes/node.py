@@ -78,7 +78,8 @@ class Node(ServiceNode):
     end, "zeromq" (also "ZMQ"), "memory" (nodes of this process only), "zenoh", "nanomsg", "ros" or "ros2"
     (docs/backends.md). `master`: the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`:
     how long `new_pub` and `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for
-    ever. `generation`: what it is in the graph, another word for gateways to other systems. Raises
+    ever. `generation`: what it is in the graph, another word for gateways to other systems. `strict`: its
+    publishers raise `EncodeError` for whatever cannot be sent, see `Publisher.publish`. Raises
     `UnknownBackendError`, `BackendUnavailableError`, `BadNameError`, `TooManyFilesError`. In a child that is
     forked it is closed, with all that was made on it; a new node works there.
     """
@@ -91,6 +92,7 @@ class Node(ServiceNode):
         master: str | None = None,
         wait_s: float | None = 2.0,
         generation: str = "native",
+        strict: bool = False,
     ) -> None:
         self.name = check_node_name(name)
         key = secrets.token_hex(16)
@@ -101,6 +103,7 @@ class Node(ServiceNode):
         self._backend = backend_named(text("transport", transport))
         self._master = self._backend.master(master)
         self._wait_s = seconds("wait_s", wait_s)
+        self._is_strict = flag("strict", strict)
         self._lock = threading.RLock()
         self._publishers: set[Publisher] = set()
         self._subscribers: set[Subscriber] = set()
@@ -206,7 +209,8 @@ class Node(ServiceNode):
             quality_for(self._backend, qos),
             kept,
         )
-        publisher = Publisher(self._open_transport().publisher(spec), spec, self._publishers.discard)
+        transport = self._open_transport().publisher(spec)
+        publisher = Publisher(transport, spec, self._publishers.discard, is_strict=self._is_strict)
         with self._lock:
             self._publishers.add(publisher)
             if self._is_closed:

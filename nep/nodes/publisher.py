@@ -1,9 +1,9 @@
 """Publisher: payloads in, messages out. Made by `Node.new_pub`.
 
-Payloads that cannot become bytes are refused, counted, logged rarely and told in the graph, never raised
-(`Unsendable`). Whether a payload can be sent shows only when it is encoded, and it is encoded only when
-somebody listens. If that raised, a program would run until somebody looks at its topic: see
-docs/adr/0013-watching.md.
+A payload that can't be encoded is dropped, not raised: it is counted in `Publisher.refused`, logged at
+increasing intervals and shown as an alert in the graph (`Unsendable`). Encoding happens only while the topic
+has subscribers, so raising would make a program fail only when someone starts to watch it
+(docs/adr/0013-watching.md). With ``strict=True`` every payload is encoded, and what can't be is raised.
 """
 
 from __future__ import annotations
@@ -49,8 +49,11 @@ class Publisher:
         transport: PublisherTransport,
         spec: PublisherSpec,
         on_close: Callable[[Publisher], object] | None = None,
+        *,
+        is_strict: bool = False,
     ) -> None:
         self._on_close = on_close
+        self._is_strict = is_strict
         self._is_forked = False
         self._transport = transport
         self._spec = spec
@@ -108,14 +111,20 @@ class Publisher:
         """Why the newest payload was refused; empty when it could be sent."""
         return self._unsendable.problem
 
-    def publish(self, payload: object) -> None:
+    def publish(self, payload: object, *, strict: bool = False) -> None:
         """Encode and send `payload`; an `Encoded` is sent as it is. Never blocks.
 
         Raises `EncodeError` for a payload of a type that the message type does not take, and `ClosedError`.
         What cannot be sent because of something inside is refused: counted in `refused`, logged, and an alert
         in the graph until one can. So nothing depends on whether somebody listens: with no subscriber a
         payload is encoded only now and then, to see whether it could be sent, unless it is latched.
+
+        With `strict` (or a node that was made with it) the payload is always encoded, also while nobody
+        listens, and `EncodeError` is raised for whatever cannot be sent, with its place in the payload.
         """
+        if strict or self._is_strict:
+            self._publish_strictly(payload)
+            return
         if self.is_closed or not (self._transport.is_heard or self._is_latched):
             self._skip(payload)
             return
@@ -129,6 +138,25 @@ class Publisher:
             self._send(made)
         else:
             self._transport.send(made)
+
+    def _publish_strictly(self, payload: object) -> None:
+        if self.is_closed:
+            raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
+        try:
+            if isinstance(payload, Encoded):
+                self._check(payload)
+                check_sendable(payload)
+                made = payload
+            else:
+                made = self._encode(payload)
+        except Exception as error:
+            self._check(payload)  # raises in better words
+            raise self._unsendable.error(payload, error, self._spec.codec.name) from error
+        self._unsendable.resolve()
+        if self._transport.is_heard or self._is_latched:
+            self._transport.send(made)
+        else:
+            self._transport.skip()
 
     def _quickly(self, transport: PublishesQuickly, encode: Callable[[Any], bytes]) -> None:
         """Let `publish` be a function of the transport: what is not ordinary comes back to the method."""
@@ -285,6 +313,15 @@ class Unsendable:
         if sentence != self.problem:
             self.problem = sentence
             self._report(sentence)
+
+    def error(self, payload: object, error: Exception, codec: str) -> EncodeError:
+        """What to raise for `payload`, which cannot be sent because of `error`: with the place, if known."""
+        if not isinstance(error, EncodeError):
+            error = EncodeError(codec, type(payload).__name__, _said(error))
+        place = error.place or _place_of(payload, self._encode)
+        if not place or error.place:
+            return error
+        return EncodeError(error.codec, error.kind, f"{error.reason}; it is at '{place}'", place)
 
     def resolve(self) -> None:
         """A payload could be sent."""

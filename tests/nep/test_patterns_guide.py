@@ -39,4 +39,4 @@ def test_the_program_prints_what_is_said(master: Master, head: str) -> None:
 
 
 def test_each_pattern_has_its_program() -> None:
-    assert len(_programs()) == 5
+    assert len(_programs()) == 6

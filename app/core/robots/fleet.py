@@ -15,9 +15,8 @@ from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.known import KnownRobots
-from app.core.robots.motion_gate import MotionGate
+from app.core.robots.motion_gate import MotionGate, MovableRobots
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
-from app.core.robots.movable import MovableRobots
 from app.core.robots.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.robots.stop_lines import MOST_TOPICS
 from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S

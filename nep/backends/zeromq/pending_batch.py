@@ -81,7 +81,7 @@ class PendingBatch:
         if self.is_allowed:
             self.until_ns = stamp_ns + SOON_NS
 
-    def publishing(self, asked: QuickPublish, way: Way, lock: threading.Lock) -> Callable[[Any], None]:
+    def publishing(self, asked: QuickPublish, way: Way, lock: threading.Lock) -> Callable[..., None]:
         """What `Publisher.publish` is: most of a small message's way is in here, so all of it is one closure.
 
         `way` sends; `lock` is its lock.
@@ -89,7 +89,10 @@ class PendingBatch:
         owner, kind, ordinary, look, slowly = asked
         batch, waiting, put, send_now = self, self.waiting, self.waiting.append, way.send_now
 
-        def publish(payload: Any) -> None:  # noqa: ANN401 - as `Publisher.publish`
+        def publish(payload: Any, *, strict: bool = False) -> None:  # noqa: ANN401 - as `Publisher.publish`
+            if strict:
+                slowly(payload, strict=True)
+                return
             stamp_ns = _time_ns()
             if owner.is_closed or way.problem or not way.is_heard:
                 slowly(payload)

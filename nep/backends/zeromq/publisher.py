@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any, NoReturn, cast
+from typing import NoReturn, cast
 
 import zmq
 
@@ -223,7 +223,7 @@ class NativePublisher(GreetedPublisher):
         else:
             self._send_now(data, beside)
 
-    def quick_publish(self, asked: QuickPublish) -> Callable[[Any], None]:
+    def quick_publish(self, asked: QuickPublish) -> Callable[..., None]:
         """See `nep.backends.base.PublishesQuickly`."""
         return self._batch.publishing(asked, self, self._lock)
 

@@ -239,6 +239,32 @@ def test_whatever_is_inside_ends_no_program(
     assert (pub.count, pub.refused) == (0, 1)
 
 
+@pytest.mark.parametrize("is_heard", [False, True])
+def test_strict_raises_whatever_cannot_be_sent_heard_or_unheard(make: Make, is_heard: bool) -> None:
+    pub = make("a").new_pub("topic")
+    sub = make("b").new_sub("topic") if is_heard else None
+    for payload, sentence in (
+        ({"joints": [0, {"angle": {1, 2}}]}, "it is at 'joints[1].angle'"),
+        ({"a": "\ud800"}, "cannot encode a 'dict' as 'json'"),
+        (2**70, "cannot encode a 'int' as 'json'"),
+        ({Treacherous(): Treacherous()}, "cannot encode a 'dict' as 'json'"),
+        (nep.Encoded(b"1", {"a": object()}), "cannot encode a 'Encoded' as 'json'"),
+    ):
+        for _ in range(2):  # each of them, not only now and then
+            with pytest.raises(nep.EncodeError, match=re.escape(sentence)):
+                pub.publish(payload, strict=True)
+    assert (pub.count, pub.refused, pub.problem) == (0, 0, "")
+    pub.publish({1})
+    assert pub.refused == 1
+    pub.publish(1, strict=True)
+    assert (pub.count, pub.problem) == (1, "")
+    if sub is not None:
+        assert sub.listen(timeout_s=30.0) == (True, 1)
+    pub.close()
+    with pytest.raises(nep.ClosedError):
+        pub.publish(1, strict=True)
+
+
 def test_keep_latest(make: Make) -> None:
     sub = make("b").new_sub("topic", keep="latest")
     other = make("c").new_sub("topic")

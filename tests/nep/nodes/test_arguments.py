@@ -74,6 +74,11 @@ def test_a_publisher_of_wrong_arguments_is_not_made(
     assert not node.graph().topics
 
 
+def test_strict_is_a_truth_value() -> None:
+    with pytest.raises(ValueError, match="strict"):
+        nep.node("x", "memory", strict="yes")  # type: ignore[arg-type]
+
+
 def test_a_callback_is_a_function(node: nep.Node) -> None:
     with pytest.raises(ValueError, match="callback is a 'str'; give a function"):
         node.new_callback("t", "json", "print")  # type: ignore[arg-type]
