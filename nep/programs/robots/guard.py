@@ -27,7 +27,7 @@ from nep.programs.robots.moving import (
     original_robots,
 )
 from nep.protocol.graph_view import GraphView
-from nep.text import harmless, shortened
+from nep.text import escaped, shortened
 
 __all__ = ["MotionGuard", "refusal_words"]
 
@@ -167,7 +167,7 @@ class MotionGuard:
             self._controls[topic] = {
                 publisher: known
                 if (known := before.get(publisher)) is not None and known[0] is message
-                else (message, _read(message, topic))
+                else (message, _read(message, topic) or (None if known is None else known[1]))
                 for publisher, message in newest.items()
             }
         robots = [
@@ -181,12 +181,18 @@ class MotionGuard:
         self._cache = {}
 
     def _unread(self, view: GraphView) -> frozenset[str]:
-        """The description topics of which nothing could be read so far."""
-        return frozenset(
-            topic
-            for topic in description_topics(view)
-            if all(controls is None for _message, controls in self._controls.get(topic, {}).values())
-        )
+        """The description topics with a publisher whose description could not be read so far."""
+
+        def is_unread(topic: str) -> bool:
+            read = {
+                publisher
+                for publisher, (_message, controls) in self._controls.get(topic, {}).items()
+                if controls is not None
+            }
+            publishers = view.topics[topic].publishers
+            return None not in read and any(each.id not in read for each in publishers)
+
+        return frozenset(filter(is_unread, description_topics(view)))
 
 
 def _read(message: Message, topic: str) -> RobotControls | None:
@@ -195,7 +201,7 @@ def _read(message: Message, topic: str) -> RobotControls | None:
         return None
     try:
         return controls_in(message.payload, described_name(topic))
-    except NepError:
+    except Exception:  # noqa: BLE001 - a stranger wrote it; what its program hears is protected
         return None
 
 
@@ -204,8 +210,8 @@ def refusal_words(topic: str, robots: Sequence[str], allowed: Collection[str]) -
     missing = [name for name in robots if name not in allowed]
     if not missing or topic in allowed:
         return ""
-    shown = shortened(harmless(topic), _MAX_NAME_SHOWN)
-    names = [shortened(harmless(name), _MAX_NAME_SHOWN) for name in missing]
+    shown = shortened(escaped(topic), _MAX_NAME_SHOWN)
+    names = [shortened(escaped(name), _MAX_NAME_SHOWN) for name in missing]
     is_named = missing != [topic] and len(names) <= _MAX_NAMES_SHOWN
     options = " ".join(f"--allow-moving {shlex.quote(each)}" for each in (names if is_named else [shown]))
     if missing == [topic]:

@@ -7,10 +7,13 @@ Everything that publishes for a person or a program asks `MovingTopics.moved_by`
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
+from nep.errors import BadTopicError
 from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_pattern import is_pattern, matches
+from nep.protocol.wire import check_topic
 
 __all__ = [
     "COMMAND_TYPE",
@@ -35,7 +38,7 @@ _DESCRIPTION, _ANSWER = "/description", "/answer"
 _HREF_SCHEME = "nep:"
 _ORIGINAL_GENERATIONS = frozenset({"A", "B"})
 _COMMAND_NAMES = frozenset({"command", "cmd_vel"})
-_MAX_TOPICS = 1_000
+_MAX_TOPICS = 100
 _MAX_NAME_LENGTH = 256
 
 
@@ -138,7 +141,8 @@ def controls_in(description: object, fallback_name: str = "") -> RobotControls |
     name = title if isinstance(title, str) and title and len(title) <= _MAX_NAME_LENGTH else fallback_name
     topics = set[str]()
     for topic in _topics_in(description):
-        topics.add(topic)
+        with suppress(BadTopicError):  # nobody can publish there
+            topics.add(check_topic(topic))
         if len(topics) >= _MAX_TOPICS:
             break
     return RobotControls(name, frozenset(topics)) if name and topics else None

@@ -74,3 +74,30 @@ def test_description_that_cannot_be_read_protects_what_its_program_hears(
         assert "--allow-moving Rover" in guard.refusal("/orders")
         assert guard.refusal("/weather") == ""
         guard.close()
+
+
+HOSTILE = [
+    None, 2**63, float("nan"), "text", [[]], {"title": "\x1b[2J"}, {"title": {"a": [1]}}, {"rb:topics": [1]},
+    {"rb:topics": {"command": "a b", "world": "x" * 500}}, {"rb:topics": {"command": "/**"}},
+    {"title": "R" * 5000, "rb:topics": {"command": "/long"}},
+    {"actions": {"a": {"forms": [None, {"href": 1}]}, "b": 1}},
+    {"actions": {str(n): {"forms": [{"href": f"nep:/{n}/*"}]} for n in range(5000)}},
+]  # fmt: skip
+
+
+def test_hostile_descriptions_end_nothing_and_protect_no_less(network: str, node: nep.Node) -> None:
+    with nep.node("robot", "memory", master=network) as robot, nep.node("x", "memory", master=network) as x:
+        describe(robot, "Rover", "/orders")
+        guard = MotionGuard(node)
+        assert guard.settle(5.0)
+        strange = x.new_pub("/Rover/description", "robot/description", latched=True)
+        for payload in HOSTILE:
+            strange.publish(payload)
+            guard.look()
+            assert "Rover" in guard.refusal("/orders")
+            guard.refusal("/a/b").encode()
+        for data in (b"[" * 100_000, b" " * 1_000_001, b'{"title":"\\ud800"}', b"\xff"):
+            strange.publish_bytes(data)
+            guard.look()
+            assert "Rover" in guard.refusal("/orders")
+        guard.close()
