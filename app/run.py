@@ -242,8 +242,8 @@ def _run(
         for line in stop_lines(report):
             say(line)
     if was_interrupted:
-        return INTERRUPTED if report.proven and not say.is_lost else FAILED
-    return OK if told.ok and report.proven else FAILED
+        return INTERRUPTED if not report.unproven and not say.is_lost else FAILED
+    return OK if told.ok and not report.unproven else FAILED
 
 
 class _LateRobots:

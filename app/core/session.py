@@ -359,10 +359,8 @@ class Session:
             self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
         with self.guarded(lazy("tell what is wrong with Stop")):
             self._look_for_problems_of_stop()
-            if self.runs.kept and self.launcher.ended >= self.runs.kept:
-                self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
         with self.guarded(lazy("check what is wrong")):
-            self._health.check(self.runs.kept if self.runs.active else (), self.launcher.virtual_robots)
+            self._health.check(self.runs.used, self.launcher.virtual_robots)
             self.documents.unkept()
             self._health.journal(self.documents.journal_error)
             self._health.settings(self.settings.not_kept)
@@ -579,15 +577,7 @@ class Session:
 
     def _keep_within_reach(self) -> None:
         """Whom a stop reaches: who is there, and who went away while a program used it or without a stop."""
-        kept = self.runs.kept
-        for link in self.fleet.links:
-            if link.earlier and not (link.name in kept or link.left_busy or link.not_stopped):
-                link.earlier = ()  # nothing moved it when it was started anew
-        targets = tuple(
-            StopTarget(link.robot, link.identity, link.earlier, link.topics_before)
-            for link in self.fleet.links
-            if link.connected or link.not_stopped or link.name in kept
-        )
+        targets = self.fleet.stop_targets
         stopper = self.stopper
         if stopper is not None and (targets != self._reachable or self._tries_to_reach):
             self._reachable, self._tries_to_reach = targets, False

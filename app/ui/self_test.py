@@ -222,7 +222,7 @@ class WindowSteps:
     def _has_stopped(self) -> bool:
         view, state = self._session.runs.view(), self._state()
         still = state.get("moving") is False and not state.get("speech")
-        proven = view.state == "proven" and bool(view.result) and view.result_ok is True
+        proven = view.state == "proven" and bool(view.result) and view.result_status == "ok"
         return proven and still and self._newest() is not self._stopped_after
 
     def _newest(self) -> object:

@@ -190,7 +190,7 @@ def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
     session.runs.go_on()
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "proven")
-    assert session.runs.view().result_ok
+    assert session.runs.view().result_status == "ok"
     assert session.runs.view().title.startswith("Stopped after")
     # the end of the program, which is told later, is no second stop
     stops = [record for record in session.console.records if "stopped (" in record.text]

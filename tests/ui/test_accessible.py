@@ -183,7 +183,7 @@ def test_the_end_of_a_stop_is_said_and_no_figure(qtbot, theme: Theme, said: list
     bar.show_view(RunView("running", "Running, 1 s", "", "", can_pause=True))
     bar.show_view(RunView("running", "Running, 2 s", "", "", can_pause=True))
     bar.show_view(RunView("stopping", "Stopping", "", "", result="1 of 2 robots stopped"))
-    proven = RunView("proven", "Stopped", "", "", result="all 2 robots stopped (41 ms)", result_ok=True)
+    proven = RunView("proven", "Stopped", "", "", result="all 2 robots stopped (41 ms)", result_status="ok")
     bar.show_view(proven)
     bar.show_view(proven)
     assert said == ["all 2 robots stopped (41 ms)"]

@@ -17,9 +17,10 @@ from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion_gate import MotionGate, MovableRobots
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
-from app.core.robots.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
-from app.core.robots.stop_lines import MOST_TOPICS
-from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S
+from app.core.robots.moved_robots import MovedRobots
+from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink, topics_of
+from app.core.robots.stop_lines import MOST_TOPICS, StopTarget
+from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S, StopReport
 from app.core.robots.tries import Tries
 from app.core.storage.settings import Settings
 from app.errors import AppError, RobotInputError, RobotUnknownError
@@ -32,7 +33,9 @@ from app.robots.identity import (
     Senders,
     foreign_topic,
     hearing,
+    may_move,
     publishing,
+    said,
     said_of_stop,
 )
 from nep.errors import NepError
@@ -45,7 +48,6 @@ from nep.protocol.graph_view import GraphView
 
 MOST_HELD = 256
 """Answers of publishers that no master has told of yet, kept until the next graph."""
-MOST_EARLIER = 4
 
 
 class RobotProcesses(Protocol):
@@ -107,6 +109,8 @@ class Fleet:
         )
         self._movable = MovableRobots(self._links, self._names)
         self.gate = MotionGate(self.permission, self._movable)
+        self.moved = MovedRobots(self._identity_of, self._processes.has_ended, clock)
+        """Which robots a Stop must name."""
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
         self._told = False
@@ -188,6 +192,8 @@ class Fleet:
         ):
             raise MayNotMoveError([name])
         invocation = self._tries.begin(link, described, input)
+        if invocation.running:  # a speed goes on after its final answer: only a Stop ends it
+            self.moved.note([name], "form", id="" if described.repeat_s is not None else invocation.id)
         if invocation.running and link.publisher is not None and link.robot.dialect == "native":
             self._alive.beat(name, link.publisher.publish)
         return invocation
@@ -231,28 +237,67 @@ class Fleet:
         """Those that were told to stop and have not answered yet."""
         return tuple(link.name for link in self._links.values() if link.stop_began_s is not None)
 
-    def stopped(self, words: Mapping[str, tuple[str, str]], wrong: Mapping[str, str]) -> None:
-        """These robots were told to stop; the words say what each did, by its name, each with its status.
+    @property
+    def unheard(self) -> tuple[str, ...]:
+        """Robots that may move and can't be heard: every Stop names them."""
+        return tuple(name for name in self.moved.names if not self._is_heard(self._links.get(name)))
 
-        ``wrong`` says of those that are not proven to stand still why not; what they were asked ends when
-        they say so themselves.
+    @property
+    def stoppable(self) -> tuple[str, ...]:
+        """The robots that a Stop of all robots tells and waits for."""
+        return tuple(dict.fromkeys((*(link.name for link in self.connected), *self.moved.names)))
+
+    @property
+    def stop_targets(self) -> tuple[StopTarget, ...]:
+        """Where those are told: who is there, and who may move (`MovedRobots`)."""
+        return tuple(
+            StopTarget(
+                link.robot,
+                link.identity,
+                self.moved.other_programs(link.name, link.identity),
+                link.topics_before,
+            )
+            for link in self._links.values()
+            if link.connected or link.name in self.moved
+        )
+
+    @staticmethod
+    def _is_heard(link: RobotLink | None) -> bool:
+        return link is not None and link.connected and not link.mute
+
+    def prove(self, report: StopReport, mark: int) -> None:
+        """Take over which robots a Stop that began at ``mark`` (`MovedRobots.mark`) proved to stand still."""
+        self.moved.note((name for name in report.silent if name not in self.moved), "stop")
+        for name in report.still:
+            self.moved.stood_still(name, report.programs(name), mark)
+        for name in set(report.names) - {*report.silent, *report.still}:
+            self.moved.told(name, mark)
+
+    def stopped(self, words: Mapping[str, tuple[str, str]], report: StopReport) -> None:
+        """Take over what robots did with a Stop; ``words`` say it by robot, each with its status.
+
+        What a robot that is not proven to stand still was asked ends when it says so itself.
         """
-        for name, (said, status) in words.items():
+        wrong = {name: robot.wrong for name, robot in report.by_name.items()}
+        for name, (last_stop, status) in words.items():
             link = self._links.get(name)
             if link is None:
                 continue
-            link.last_stop, link.last_stop_status, link.not_stopped = said, status, wrong.get(name, "")
+            link.last_stop, link.last_stop_status = last_stop, status
+            link.not_stopped = wrong.get(name, "")
             link.stop_began_s, link.stopping = None, False
+            link.has_proven_stop |= name in report.still
             if not link.not_stopped:
-                link.left_busy = False
                 self._tries.end_all(link, "canceled")
             self._alive.rest(name)
 
     def stands_still(self, names: Iterable[str]) -> None:
-        """A person says that these robots stand still."""
-        for link in map(self._links.get, names):
+        """Take the word of a person that these robots stand still."""
+        known = tuple(names)
+        self.moved.confirm(known)
+        for link in map(self._links.get, known):
             if link is not None:
-                link.not_stopped, link.earlier, link.left_busy = "", (), False
+                self._judge_motion(link)
 
     def take_settled(self) -> tuple[str, ...]:
         """The robots that were not stopped and have ended now, as they say, what would not end; once each."""
@@ -294,6 +339,8 @@ class Fleet:
             link.stopping = began_s is not None and self._clock() - began_s >= STOPPING_SHOWN_AFTER_S
         self._tries.look(self._links.values())
         self.gate.follow()
+        for link in self._links.values():
+            self._judge_motion(link)
 
     @property
     def claims(self) -> Mapping[str, Claim]:
@@ -326,6 +373,15 @@ class Fleet:
     def _identity_of(self, name: str) -> Identity | None:
         link = self._links.get(name)
         return None if link is None else link.identity
+
+    def _judge_motion(self, link: RobotLink) -> None:
+        """Say of a robot that may move and can't be heard why nobody knows that it stands still."""
+        if link.virtual and not link.connected:
+            self.moved.drop_ended(link.name)
+        motion = self.moved.motion(link.name)
+        link.may_move = motion.sentence if motion is not None and not self._is_heard(link) else ""
+        if motion is None:
+            link.not_stopped = ""
 
     def _get(self, name: str) -> RobotLink:
         link = self._links.get(name)
@@ -421,12 +477,7 @@ class Fleet:
                 robot=link.name, now=identity.words, before=before.words
             )
         )
-        goes_on, link.goes_on = link.goes_on, ""
-        if not self._processes.has_ended(before):
-            link.earlier = (before, *link.earlier)[:MOST_EARLIER]
-            link.not_stopped = link.not_stopped or goes_on
-        elif not link.earlier:
-            link.not_stopped = ""  # what did not stop runs no more
+        self._keep_going(link, before)
 
     def _leave_topics(self, link: RobotLink) -> None:
         """Its description names other topics: what was asked on the old ones has ended."""
@@ -464,12 +515,16 @@ class Fleet:
 
         self._submit(_("reach {robot}").format(robot=link.name), open_them)
 
-    def _away(self, link: RobotLink) -> None:
-        link.connected, link.gone_s = False, self._clock()
-        link.left_busy = link.left_busy or bool(link.running)
-        if not link.virtual:  # a robot goes on when its program ends; a virtual one is its program
+    def _keep_going(self, link: RobotLink, program: Identity | None) -> None:
+        """Enter what the robot itself could not end: from here on nobody hears whether it has."""
+        if link.goes_on and not link.virtual:  # a virtual robot is its program
+            self.moved.note([link.name], "action", program=program)
             link.not_stopped = link.not_stopped or link.goes_on
         link.goes_on = ""
+
+    def _away(self, link: RobotLink) -> None:
+        link.connected, link.gone_s = False, self._clock()
+        self._keep_going(link, link.identity)
         self.known.saw([link.robot])
         self._alive.rest(link.name)
         if link.watch is not None:
@@ -545,6 +600,14 @@ class Fleet:
         if answer is not None:
             self._tries.answer(link, answer)
             self._take_life(link, answer)
+            self._take_end(link, answer)
+
+    def _take_end(self, link: RobotLink, answer: Payload) -> None:
+        """Take a final answer: it ends a motion, unless the robot says that it may still move."""
+        id, state, error = answer.get("id"), answer.get("state"), answer.get("error")
+        is_final = isinstance(state, str) and state in FINAL_STATES and answer.get("op") in (None, "invoke")
+        if is_final and isinstance(id, str) and not may_move(link.name, said(error) if error else ""):
+            self.moved.ended(link.name, id)
 
     def _take_life(self, link: RobotLink, answer: Payload) -> None:
         """Take a robot's sign of life, which names the actions that it could not end."""

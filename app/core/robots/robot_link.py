@@ -82,12 +82,12 @@ class RobotLink:
     newest at the end. ``mute`` says that it did not answer a command; ``heard_s`` is when it last answered
     anything or was asked, ``answered_s`` when it last answered, ``gone_s`` since when it is away.
     ``not_stopped`` says why the last stop is not proven ("Arm may still move: the brake does not answer"),
-    ``goes_on`` what it says itself about actions that it could not end; both are empty when all is well.
+    ``goes_on`` what it says itself about actions that it could not end, ``may_move`` that it was told to move
+    and is not heard any more (`MovedRobots`); they are empty when all is well.
     ``stop_began_s`` is since when the answer to a stop is waited for, ``stopping`` whether that is long
     enough to be said.
-    ``identity`` is the program that it is; ``earlier`` are programs of its name that went away and may still
-    move it, ``topics_before`` those of its earlier descriptions. ``was_real`` says that it has not always
-    been virtual, ``left_busy`` that it did something for a person when it went away.
+    ``identity`` is the program that it is, ``topics_before`` are the topics of its earlier descriptions.
+    ``was_real`` says that it has not always been virtual, ``has_proven_stop`` that its program once did.
     """
 
     name: str
@@ -106,14 +106,14 @@ class RobotLink:
     last_stop_status: str = "error"
     not_stopped: str = ""
     goes_on: str = ""
+    may_move: str = ""
+    has_proven_stop: bool = False
     stop_began_s: float | None = None
     stopping: bool = False
     identity: Identity | None = None
-    earlier: tuple[Identity, ...] = ()
     topics_before: tuple[RobotTopics, ...] = ()
     is_opening: bool = False
     was_real: bool = False
-    left_busy: bool = False
     publisher: Publisher | None = None
     world: Publisher | None = None
     watch: Watch | None = None
@@ -134,7 +134,7 @@ class RobotLink:
 
         One that has not stopped, or has not answered yet, may still move when it is away.
         """
-        if self.not_stopped or (self.connected and self.goes_on):
+        if self.not_stopped or self.may_move or (self.connected and self.goes_on):
             return NOT_STOPPED
         if self.stopping:
             return STOPPING
@@ -154,8 +154,10 @@ class RobotLink:
     def state_words(self) -> str:
         """How it is, as people read it: ``ready``, ``may still move``, ``does not answer``."""
         state = self.state
+        if self.connected and self.mute and state == NOT_STOPPED and not self.not_stopped:
+            return _("does not answer")
         if state == NOT_STOPPED and (
-            may_move(self.name, self.goes_on) or may_move(self.name, self.not_stopped)
+            self.may_move or may_move(self.name, self.goes_on) or may_move(self.name, self.not_stopped)
         ):
             return _("may still move")
         if self.connected and state == "silent":

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from nep.i18n import _
 
 STOPPING_SHOWN_AFTER_S = 0.1
+StopStatus = Literal["ok", "off", "error"]
+"""How a stop is shown everywhere: the green check is only for ``ok``."""
 
 
 @dataclass(frozen=True)
@@ -17,8 +20,9 @@ class RobotStop:
     ``answered``: its own program said that it stands still. ``refused``: that said that it does not, and why
     (``error``). ``error`` without ``refused``: it could not be told. ``can_confirm`` is False for robots that
     never answer a stop (RIZE), and for programs that only listen to a robot's commands. ``program`` names
-    another program than the robot's own that serves its commands. ``waits`` says that other programs of the
-    same robot had not answered yet when this was told.
+    another program than the robot's own that serves its commands; ``node`` is the id of the program
+    that answered. ``waits`` says that other programs of the same robot had not answered yet when this was
+    told. ``waited_ms`` is how long the command waited until the robot was connected.
     """
 
     name: str
@@ -29,6 +33,8 @@ class RobotStop:
     refused: bool = False
     program: str = ""
     waits: bool = False
+    node: str = ""
+    waited_ms: float = 0.0
 
     @property
     def who(self) -> str:
@@ -47,6 +53,11 @@ class RobotStop:
     @property
     def sentence(self) -> str:
         """In words: "Pepper stopped (41 ms)"."""
+        if self.answered and self.waited_ms:
+            words = _("{robot} stopped ({elapsed} ms; it was not connected for {waited} ms of them)")
+            return words.format(
+                robot=self.who, elapsed=f"{self.elapsed_ms or 0:.0f}", waited=f"{self.waited_ms:.0f}"
+            )
         if self.answered:
             return _("{robot} stopped ({elapsed} ms)").format(
                 robot=self.who, elapsed=f"{self.elapsed_ms or 0:.0f}"
@@ -56,6 +67,11 @@ class RobotStop:
         if not self.can_confirm:
             return _("{robot}: stop sent; this robot cannot confirm").format(robot=self.name)
         return _("{wrong}. Switch it off by hand.").format(wrong=self.wrong)
+
+    @property
+    def status(self) -> StopStatus:
+        """``ok`` when it answered, ``off`` when it can't confirm, else ``error``."""
+        return "off" if not self.can_confirm else "ok" if self.answered else "error"
 
 
 @dataclass(frozen=True)
@@ -71,8 +87,18 @@ class StopReport:
 
     @property
     def proven(self) -> bool:
-        """Whether every robot that can confirm has."""
-        return not self.unproven
+        """Whether there was a robot to stop, and every one that can confirm has."""
+        return bool(self.robots) and not self.unproven
+
+    @property
+    def status(self) -> StopStatus:
+        """``ok`` only for a complete proof: every robot said itself that it stands still.
+
+        ``off`` when nobody refused or was silent, but a robot can't confirm, or there was none to stop.
+        """
+        if self.unproven:
+            return "error"
+        return "ok" if self.robots and set(self.names) == set(self.still) else "off"
 
     @property
     def unproven(self) -> tuple[RobotStop, ...]:
@@ -83,6 +109,20 @@ class StopReport:
     def silent(self) -> tuple[str, ...]:
         """The robots that are not proven to stand still, each once."""
         return tuple(dict.fromkeys(robot.name for robot in self.unproven))
+
+    @property
+    def by_name(self) -> Mapping[str, RobotStop]:
+        """What became of each robot: the worst of what its own and other programs that serve it said."""
+        worst: dict[str, RobotStop] = {}
+        for robot in self.robots:
+            before = worst.get(robot.name)
+            if before is None or (robot.wrong and not (before.wrong and not before.program)):
+                worst[robot.name] = robot
+        return worst
+
+    def programs(self, name: str) -> frozenset[str]:
+        """The programs of a robot that proved its stop, by node id."""
+        return frozenset(robot.node for robot in self.robots if robot.name == name and robot.answered)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -136,17 +176,19 @@ class RobotAnswered:
 
 @dataclass(frozen=True, slots=True)
 class OneStopped:
-    """One robot was told to stop while nothing ran."""
+    """One robot was told to stop while nothing ran, when the ledger was at ``mark`` (`MovedRobots.mark`)."""
 
     report: StopReport
+    mark: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class LateAnswer:
     """A robot answered when it was not waited for any more, or stands still after it had said no.
 
-    ``number`` is that of the stop; None for one robot's.
+    ``number`` is that of the stop; None for one robot's, which began at ``mark``.
     """
 
     number: int | None
     robot: RobotStop
+    mark: int = 0

@@ -27,20 +27,15 @@ from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.program_robots import ProgramRobots, owners_of
 from app.core.run.run_warnings import RunWarnings
 from app.core.run.runner import Runner, RunnerEvent
+from app.core.run.stop_news import StopNews
 from app.core.run.trial import Trial, TriedValue
 from app.core.run.view import (
-    STOP_AGAIN,
     RunState,
     RunView,
-    clock_words,
     place_of,
     result_words,
-    stop_status,
-    stop_words,
-    stops_by_name,
     view_of,
 )
-from app.core.run.view import unanswered_words as unanswered_words_of
 from app.core.run.wanted import Wanted
 from app.errors import AppError
 from nep.i18n import _
@@ -102,12 +97,12 @@ class Runs:
         self._used: tuple[str, ...] = ()
         self._breakpoints: tuple[str, ...] = ()  # as the program that runs knows them
         self._program_key: str | None = None  # the last one's: robots refuse what still comes from it
-        self.kept: frozenset[str] = frozenset()  # robots it used, until proven still; a stop reaches them
         self._labels: Mapping[str, str] = {}
         self._robots = ProgramRobots(fleet)
+        self._news = StopNews(fleet, alerts, console)
         self._run = RunState()
         self._view: tuple[RunState, Document, RunView] | None = None
-        self._stop_number = 0
+        self._stop_number = self._stop_mark = 0
         self._asked_again: set[str] = set()
         self._stop_thread: threading.Thread | None = None
         self.running_blocks: tuple[str, ...] = ()
@@ -134,6 +129,11 @@ class Runs:
         return self._run
 
     @property
+    def used(self) -> tuple[str, ...]:
+        """The robots that the program uses while it runs or is paused."""
+        return self._used if self.active else ()
+
+    @property
     def tried_value(self) -> TriedValue | None:
         """The block that was tried last, and the value that it had."""
         return self._trial.value
@@ -148,6 +148,7 @@ class Runs:
         self._view = None
         if self._run.nothing_in is not None and self._run.nothing_in is not self._documents.current.newest():
             self._run = replace(self._run, nothing_in=None)  # another behaviour shows, or this one was edited
+        self._settle()
         if self.block_warnings and self.document is not None and self.document.edits != self._warned_edits:
             self._warnings.clear()
             self.blocks_revision += 1
@@ -282,11 +283,14 @@ class Runs:
         self._stop_one(name)
 
     def _stop_one(self, name: str) -> None:
-        stopper, post = self._network.stopper, self._post_event
+        stopper, post, mark = self._network.stopper, self._post_event, self._fleet.moved.mark
         self._fleet.told_to_stop([name])
 
+        def late(robot: RobotStop) -> None:
+            post(LateAnswer(None, robot, mark))
+
         def stop_it() -> None:
-            post(OneStopped(report_of(stopper, (name,), on_late=lambda late: post(LateAnswer(None, late)))))
+            post(OneStopped(report_of(stopper, (name,), on_late=late), mark))
 
         threading.Thread(target=stop_it, name="studio-stop-one", daemon=True).start()
 
@@ -312,10 +316,15 @@ class Runs:
 
     def confirm_still(self) -> None:
         """A person says that the robot that did not answer stands still."""
-        if self._run.state == "unanswered":
+        if self._run.state == "unanswered" and self._run.report is not None:
+            self._fleet.stands_still(self._run.report.silent)
+            self._settle()
+
+    def _settle(self) -> None:
+        """Unlock Run when no robot of the last stop may move any more: it proved that since, or a person."""
+        report = self._run.report if self._run.state == "unanswered" else None
+        if report is not None and not any(name in self._fleet.moved for name in report.silent):
             self._run = replace(self._run, state="ready", report=None)
-            self._fleet.stands_still(self.kept)
-            self.kept = frozenset()
             self._alerts.resolve("stop")
 
     def close(self) -> None:
@@ -370,8 +379,8 @@ class Runs:
     def on_stop(self, event: StopDone | RobotAnswered | OneStopped | LateAnswer) -> None:
         """Take over what robots answered to the newest stop."""
         if isinstance(event, OneStopped):
-            self._tell_fleet(event.report)
-            self._tell_person(event.report, "stop")
+            self._news.tell_fleet(event.report, event.mark)
+            self._news.tell_person(event.report, "stop")
         elif isinstance(event, LateAnswer):
             self._on_late(event)
         elif event.number == self._stop_number:
@@ -380,27 +389,29 @@ class Runs:
                 self._run = replace(self._run, answered=answered)
                 if event.robot.wrong or not event.robot.waits:
                     same = [robot for robot in answered if robot.name == event.robot.name]
-                    self._tell_fleet(StopReport(tuple(same), 0.0))
+                    self._news.tell_fleet(StopReport(tuple(same), 0.0), self._stop_mark)
             else:
                 self._run = replace(self._run, dashed=bool(self.stopped_blocks))
                 self._take_report(event.report)
 
     def _take_report(self, report: StopReport) -> None:
         """How it stands is taken over before any words are made: no fault in them leaves it "stopping"."""
-        self._run = replace(self._run, state="proven" if report.proven else "unanswered", report=report)
-        self.kept = frozenset(report.silent)
-        self._tell_fleet(report)
-        self._run = replace(self._run, last_words=result_words(report)[0], restarts=False)
-        self._tell_person(report, self._run.name or "stop")
+        state = "unanswered" if report.unproven else "proven" if report.proven else "ready"
+        self._run = replace(self._run, state=state, report=report, last_status=report.status)
+        self._news.tell_fleet(report, self._stop_mark)
+        self._run = replace(
+            self._run, last_words=result_words(report), restarts=False, doubts=self._news.doubts(report)
+        )
+        self._news.tell_person(report, self._run.name or "stop")
         wanted, self._next = self._next, None
-        if wanted is not None and report.proven:
+        if wanted is not None and not report.unproven:
             self._begin(wanted)
 
     def _on_late(self, event: LateAnswer) -> None:
         """A robot answered too late: what it says now counts, if nothing else has happened since."""
         run = self._run
         if event.number is None:
-            self.on_stop(OneStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0)))
+            self.on_stop(OneStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0), event.mark))
         elif event.number == self._stop_number and run.state == "unanswered" and run.report is not None:
             self._take_report(run.report.with_late(event.robot))
 
@@ -441,7 +452,7 @@ class Runs:
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self._robots.begin(runner, asked, owners)
         self._breakpoints, self._program_key = program.breakpoints, runner.program_key
-        self.kept = frozenset(program.robots)
+        self._fleet.moved.note((robot.name for robot in used), "behaviour")
         self._variables = {variable.id: variable for variable in program.variables}
         if wanted.stack is None or not same:
             self._show_values({})  # what is tried leaves the other variables as they are
@@ -449,7 +460,10 @@ class Runs:
         self._edits.ran(document if wanted.stack is None else None, program)
         trying = self._trial.start(program, used)
         run = RunState("running", self._documents.title(document), begun=False, trying=trying)
-        self._run = replace(run, started_s=self._clock(), last_words=self._run.last_words)
+        before = self._run
+        self._run = replace(
+            run, started_s=self._clock(), last_words=before.last_words, last_status=before.last_status
+        )
         said = _("trying “{block}”").format(block=trying) if trying else _("started")
         self._console.add("info", self._run.name, said)
 
@@ -460,7 +474,10 @@ class Runs:
         if program is None or (program.starts and not wrong):
             return program
         if wanted.stack is None or not wrong:  # what is wrong with a block that is tried stands at the block
-            self._run = RunState(nothing_in=program, last_words=self._run.last_words)
+            before = self._run
+            self._run = RunState(
+                nothing_in=program, last_words=before.last_words, last_status=before.last_status
+            )
         self._set_errors(wrong)
         return None
 
@@ -508,13 +525,9 @@ class Runs:
             self._warnings.end()
         elif run.state not in {"stopping", "unanswered"}:
             elapsed_s = None
-        everybody = tuple(
-            link.name
-            for link in self._fleet.links
-            if link.connected or link.not_stopped or link.name in self.kept
-        )
         # those that an earlier stop has told and that have not answered: its own report is not waited for
-        asked = tuple(dict.fromkeys((*(names if names is not None else everybody), *self._fleet.stopping)))
+        wanted = self._fleet.stoppable if names is None else (*names, *self._fleet.unheard)
+        asked = tuple(dict.fromkeys((*wanted, *self._fleet.stopping)))
         self._run = replace(
             self._run,
             state="stopping",
@@ -529,6 +542,7 @@ class Runs:
             asked=asked,
         )
         self._fleet.told_to_stop(asked)
+        self._stop_mark = self._fleet.moved.mark
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
         work = partial(
@@ -559,30 +573,6 @@ class Runs:
                 runner.stop()
         self._post_event(
             StopDone(number, report_of(stopper, names, on_answer=answered, ends=ends, on_late=late))
-        )
-
-    def _tell_person(self, report: StopReport, origin: str) -> None:
-        for name, program in report.strangers:
-            said = _("“{program}” answered Stop in the name of {robot}; that does not count").format(
-                program=program, robot=name
-            )
-            self._console.add("error", origin, said)
-            detail = _("Find out what this program is and close it.")
-            self._alerts.put(f"stranger:{name}", "error", f"{said}.", detail)
-        words, good = result_words(report)
-        if good:
-            self._console.add("info", origin, words)
-            self._alerts.resolve("stop")
-        else:
-            title, detail, _compact, _confirm = unanswered_words_of(report)
-            self._console.add("error", origin, f"{words}: {title}")
-            self._alerts.put("stop", "error", f"{title}.", detail, button=_(STOP_AGAIN), action="run.stop")
-
-    def _tell_fleet(self, report: StopReport) -> None:
-        clock, stops = clock_words(time.localtime()), stops_by_name(report)
-        self._fleet.stopped(
-            {name: (stop_words(robot, clock), stop_status(robot)) for name, robot in stops.items()},
-            {name: robot.wrong for name, robot in stops.items()},
         )
 
     def _set_errors(self, errors: Mapping[str, str]) -> None:

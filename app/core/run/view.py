@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S, RobotStop, StopReport
+from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S, RobotStop, StopReport, StopStatus
 from nep.i18n import _, lazy, listed, ngettext, number
 
 MOST_NAMED = 4
@@ -22,10 +22,12 @@ STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 class RunState:
     """Where the run is, as a value: what happens makes another one.
 
-    ``state`` is ready, running, paused, stopping, proven or unanswered. ``warning`` is what a person should
-    know before a paused program goes on. Times are monotonic seconds; the program's clock stands while it is
-    paused (``held_s``, ``pause_began_s``). ``again``: the stop before this one is not proven. ``restarts``:
-    something is run as soon as this stop is proven. ``edited``: the behaviour is not what runs any more.
+    ``state`` is ready, running, paused, stopping, proven or unanswered; ready with a ``report`` after a stop
+    that had no robot to tell. ``doubts`` say why robots may move that did not answer (`MovedRobots`).
+    ``warning`` is what a person should know before a paused program goes on. Times are monotonic seconds; the
+    program's clock stands while it is paused (``held_s``, ``pause_began_s``). ``again``: the stop before this
+    one is not proven. ``restarts``: something is run as soon as this stop is proven. ``edited``: the behaviour
+    is not what runs any more.
     ``trying``: the words of the block that is tried alone, ``value`` what it gave. ``begun``: its scripts
     run, so that it feels what happens to robots; its process is there some tenths of a second before.
     """
@@ -54,6 +56,8 @@ class RunState:
     errors: Mapping[str, str] = field(default_factory=dict)
     nothing_in: object = None  # the program that Run was pressed for: it had nothing to run, or `errors`
     last_words: str = ""
+    last_status: StopStatus = "off"
+    doubts: tuple[str, ...] = ()
 
     def elapsed(self, now: float) -> float:
         """Seconds that the program has run, pauses left out."""
@@ -67,9 +71,10 @@ class RunState:
 class RunView:
     """Everything the run bar shows, large and compact.
 
-    ``result`` stands beside Stop with its colour (``result_ok``); ``last_stop`` is the small reminder while a
-    program runs; ``confirm`` are the words of the button with which a person says that a silent robot is
-    still. ``edited``: what runs is not what the blocks say now, so Restart is the next thing to do.
+    ``result`` stands beside Stop with its icon and colour (``result_status``); ``last_stop`` is the small
+    reminder while a program runs, with its own (``last_stop_status``); ``confirm`` are the words of the
+    button with which a person says that a silent robot is still. ``edited``: what runs is not what the blocks
+    say now, so Restart is the next thing to do.
     """
 
     state: str
@@ -84,8 +89,9 @@ class RunView:
     run_word: str = RUN
     stop_word: str = STOP
     result: str | None = None
-    result_ok: bool | None = None
+    result_status: StopStatus = "off"
     last_stop: str | None = None
+    last_stop_status: StopStatus = "off"
     confirm: str | None = None
     stop_filled: bool = True
     slow: bool = False
@@ -115,7 +121,8 @@ def view_of(
     view = replace(_view(run, connected, coming, now), slow=slow)
     if run.trying:
         return _tried(view, run)
-    return _named(view, run, now) if elsewhere and run.name and run.state != "ready" else view
+    is_named = elsewhere and run.name and (run.state != "ready" or _ended_without_robots(run))
+    return _named(view, run, now) if is_named else view
 
 
 def _tried(view: RunView, run: RunState) -> RunView:
@@ -123,7 +130,7 @@ def _tried(view: RunView, run: RunState) -> RunView:
     if view.state == "running":
         title = _("Trying “{block}”").format(block=run.trying)
         return replace(view, title=title, compact=title, run_word=RUN, edited=False)
-    if view.state == "proven":
+    if view.state == "proven" or _ended_without_robots(run):
         words = _("“{block}” stopped by a problem") if run.errors else _("“{block}” was stopped")
         detail = view.detail
         if run.finished:
@@ -157,7 +164,7 @@ def _named(view: RunView, run: RunState, now: float) -> RunView:
         return replace(view, title=_("{name} is paused").format(name=run.name))
     if view.state == "stopping":
         return replace(view, title=_("Stopping {name}").format(name=run.name))
-    if view.state == "proven":
+    if view.state == "proven" or _ended_without_robots(run):
         detail = "" if run.dashed and not run.errors else view.detail
         return replace(view, title=_ended_title(run, run.name), detail=detail)
     return view
@@ -174,6 +181,8 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
     }
     if run.state in views:
         return views[run.state](run, now)
+    if _ended_without_robots(run):
+        return replace(_proven(run, now), state="ready", stop_filled=bool(connected))
     title, detail = _("Ready"), connected_words(connected, coming)
     if run.nothing_in and run.errors:
         title, detail = _("Not started"), next(iter(run.errors.values()))
@@ -186,8 +195,15 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
         title,
         can_run=True,
         can_step=True,
+        result=run.last_words if run.report is not None else None,
         stop_filled=bool(connected),
     )
+
+
+def _ended_without_robots(run: RunState) -> bool:
+    """Whether a program has ended that had no robot to stop: how it ended is told, and nothing is proven."""
+    ran = run.finished or bool(run.errors) or run.elapsed_s is not None
+    return run.state == "ready" and run.report is not None and ran
 
 
 def _running(run: RunState, now: float) -> RunView:
@@ -206,6 +222,7 @@ def _running(run: RunState, now: float) -> RunView:
         edited=run.edited,
         run_word=RESTART,
         last_stop=run.last_words or None,
+        last_stop_status=run.last_status,
     )
 
 
@@ -221,6 +238,7 @@ def _paused(run: RunState, _now: float) -> RunView:
         edited=run.edited,
         run_word=GO_ON,
         last_stop=run.last_words or None,
+        last_stop_status=run.last_status,
     )
 
 
@@ -276,14 +294,22 @@ _ENDED = {
 
 
 def _proven(run: RunState, _now: float) -> RunView:
-    words, good = result_words(run.report) if run.report is not None and run.report.robots else ("", True)
+    report = run.report if run.report is not None and run.report.robots else None
+    words = result_words(report) if report is not None else ""
     title, detail = _ended_title(run), _("The dashed outline shows where") if run.dashed else ""
     if run.errors:
         detail = next(iter(run.errors.values()))
     elif run.finished:
         detail = _("Every script came to its end")
     return RunView(
-        "proven", title, detail, words or title, True, False, True, result=words or None, result_ok=good
+        "proven",
+        title,
+        detail,
+        words or title,
+        can_run=True,
+        can_step=True,
+        result=words or None,
+        result_status=report.status if report is not None else "off",
     )
 
 
@@ -297,16 +323,15 @@ def _ended_title(run: RunState, name: str = "") -> str:
 def _unanswered(run: RunState, now: float) -> RunView:
     if run.report is None:
         return _proven(run, now)
-    title, detail, compact, confirm = unanswered_words(run.report)
-    words, _good = result_words(run.report)
+    title, detail, compact, confirm = unanswered_words(run.report, run.doubts)
     return RunView(
         "unanswered",
         title,
         detail,
         compact,
         stop_word=STOP_AGAIN,
-        result=words,
-        result_ok=False,
+        result=result_words(run.report),
+        result_status=run.report.status,
         confirm=confirm,
     )
 
@@ -328,23 +353,23 @@ def connected_words(names: Sequence[str], coming: Sequence[str] = ()) -> str:
     return words.format(robots=listed(names))
 
 
-def result_words(report: StopReport) -> tuple[str, bool]:
-    """``all 2 robots stopped (41 ms)`` and whether every robot that can answer did."""
+def result_words(report: StopReport) -> str:
+    """What a stop brought: ``all 2 robots stopped (41 ms)``; its icon is that of `StopReport.status`."""
     names, still = report.names, report.still
     unsure = [robot.who for robot in report.robots if not robot.can_confirm]
     if report.unproven:
-        return _some_stopped(len(still), len(names)), False
+        return _some_stopped(len(still), len(names))
     if not names:
-        return _("no robot to stop"), True
+        return _("nothing to stop")
     if not still:
-        return _("stop sent; {robots} cannot confirm").format(robots=listed(unsure)), True
+        return _("stop sent; {robots} cannot confirm").format(robots=listed(unsure))
     time_ms = max(1, round(report.elapsed_ms))
     if unsure:
         words = _("{robots} stopped ({elapsed} ms); {others} cannot confirm")
-        return words.format(robots=listed(still), elapsed=time_ms, others=listed(unsure)), True
+        return words.format(robots=listed(still), elapsed=time_ms, others=listed(unsure))
     if len(names) == 1:
-        return _("{robot} stopped ({elapsed} ms)").format(robot=still[0], elapsed=time_ms), True
-    return _("all {count} robots stopped ({elapsed} ms)").format(count=len(names), elapsed=time_ms), True
+        return _("{robot} stopped ({elapsed} ms)").format(robot=still[0], elapsed=time_ms)
+    return _("all {count} robots stopped ({elapsed} ms)").format(count=len(names), elapsed=time_ms)
 
 
 def _some_stopped(stopped: int, count: int) -> str:
@@ -353,15 +378,22 @@ def _some_stopped(stopped: int, count: int) -> str:
     return _("{stopped} of {count} robots stopped").format(stopped=stopped, count=count)
 
 
-def unanswered_words(report: StopReport) -> tuple[str, str, str, str]:
+def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[str, str, str, str]:
     """Title, detail, compact sentence and the confirming button when robots are not proven to stand still.
 
     What a robot said itself ("Arm may still move: the brake is stuck") comes first, in its own words.
+    ``doubts`` say what moved them (`RunState`).
     """
     still = report.still
     names = listed(report.silent)
     them = listed(report.silent) if len(report.silent) <= 2 else _("them")
     detail = _("Switch {robots} off by hand.").format(robots=them)
+    if doubts:
+        detail = ngettext(
+            "{why}. Switch {robots} off by hand if it still moves.",
+            "{why}. Switch {robots} off by hand if they still move.",
+            len(report.silent),
+        ).format(why="; ".join(doubts[:MOST_NAMED]), robots=them)
     if still:
         slowest = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in still)
         detail = _("{robots} stopped ({elapsed} ms). {next_step}").format(
@@ -405,21 +437,6 @@ def stop_words(robot: RobotStop, clock: str) -> str:
     if robot.program:
         return _("“{program}” has not answered, at {time}").format(program=robot.program, time=clock)
     return _("not answered, at {time}").format(time=clock)
-
-
-def stop_status(robot: RobotStop) -> str:
-    """The status of these words: ``ok`` when it answered, ``off`` when it can't confirm, else ``error``."""
-    return "off" if not robot.can_confirm else "ok" if robot.answered else "error"
-
-
-def stops_by_name(report: StopReport) -> Mapping[str, RobotStop]:
-    """What became of each robot: the worst of what its own and other programs that serve it said."""
-    worst: dict[str, RobotStop] = {}
-    for robot in report.robots:
-        before = worst.get(robot.name)
-        if before is None or (robot.wrong and not (before.wrong and not before.program)):
-            worst[robot.name] = robot
-    return worst
 
 
 def clock_words(now: time.struct_time) -> str:

@@ -215,7 +215,7 @@ def test_who_takes_the_name_of_a_robot_in_motion_does_not_prove_its_stop(
     link = the_link(session)
     session.document.edited(workspace(started(block("control_wait", SECONDS=number(600)))))
     session.runs.run()
-    session.runs.kept = frozenset({"Pepper"})  # as if the program had used it
+    session.fleet.moved.note(["Pepper"], "behaviour")  # as if the program had used it
     before = link.identity
     pepper._node.close()
     thief = WireRobot(master.address)

@@ -74,7 +74,7 @@ def test_a_robot_that_refuses_stop_is_said_to_refuse_everywhere(session: Session
     assert "the brake does not answer" in view.title
     assert view.title.startswith("Arm may still move")
     assert view.detail == "Switch Arm off by hand."
-    assert (view.result_ok, view.confirm) == (False, "Arm is still")
+    assert (view.result_status, view.confirm) == ("error", "Arm is still")
     assert "did not answer" not in f"{view}"
     assert (link.state, link.chip.removeprefix("virtual, ")) == ("not stopped", "may still move")
     words, status = robots_chip(session)

@@ -53,7 +53,7 @@ def test_pepper_and_turtle_work_in_one_behaviour(session: Session, node: nep.Nod
         tick_until(session, lambda: "both" in printed(session), FOUND_S)
         assert {"Pepper says “Go”", "Turtle turns 20 °"} <= set(printed(session))
         tick_until(session, lambda: session.runs.view().state == "proven")
-        assert session.runs.view().result_ok
+        assert session.runs.view().result_status == "ok"
         with session.fleet.look_at("Turtle"):
             link = session.fleet.link("Turtle")
             assert link is not None
@@ -98,7 +98,7 @@ def test_nothing_moves_a_real_robot_before_the_answer(session: Session, node: ne
         session.runs.stop()  # Stop asks nobody, and takes the question away
         assert moving.question is None
         tick_until(session, lambda: session.runs.view().state == "proven")
-        assert session.runs.view().result_ok
+        assert session.runs.view().result_status == "ok"
 
 
 @pytest.mark.parametrize("topic", ["/Turtle/command", "robot_action"])
@@ -122,7 +122,7 @@ def test_a_behaviour_that_publishes_on_a_robots_topic_asks_and_is_stopped_too(
         assert "drive" not in heard
         moving.answer(let=True)
         tick_until(session, lambda: session.runs.running_blocks == ("w",), FOUND_S)
-        assert "Turtle" in session.runs.kept
+        assert "Turtle" in session.fleet.moved
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "proven")
         assert str(session.runs.view().result).startswith("Turtle stopped (")

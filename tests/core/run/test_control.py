@@ -84,16 +84,18 @@ def test_a_fault_of_the_stopper_of_one_robot_is_told(
     assert told[0].report.silent == ("Arm",)
 
 
-@pytest.mark.parametrize("place", ["result_words", "stop_words", "unanswered_words_of"])
+@pytest.mark.parametrize(
+    "place", ["control.result_words", "stop_news.stop_words", "stop_news.unanswered_words"]
+)
 def test_a_fault_in_the_words_of_a_stop_leaves_nothing_stopping(
     session: Session, monkeypatch: pytest.MonkeyPatch, place: str
 ) -> None:
     runs = session.runs
     runs._stop(("Arm",))
-    monkeypatch.setattr(f"app.core.run.control.{place}", failing)
+    monkeypatch.setattr(f"app.core.run.{place}", failing)
     with pytest.raises(OSError, match="out of order"):
         runs.on_stop(StopDone(runs._stop_number, StopReport((), 1.0).with_asked(["Arm"])))
-    assert (runs._run.state, runs.kept) == ("unanswered", {"Arm"})
+    assert (runs._run.state, session.fleet.moved.names) == ("unanswered", ("Arm",))
 
 
 def test_stop_stops_whatever_the_question_does(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -73,10 +73,10 @@ def test_a_name_that_could_not_be_told_is_in_the_report(stopper, robots):
     assert report.robots[1].sentence == "Nobody was not told to stop. Switch it off by hand."
 
 
-def test_no_robots_is_proven_at_once(stopper):
+def test_a_stop_without_robots_proves_nothing(stopper):
     stopper.set_robots(())
     report = stopper.stop_all()
-    assert (report.robots, report.proven) == ((), True)
+    assert (report.robots, report.proven, report.status) == ((), False, "off")
 
 
 def test_a_stop_that_failed_is_told_with_the_robots_words(stopper, robots):

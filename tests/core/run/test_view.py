@@ -78,7 +78,7 @@ def test_a_stop_after_one_that_is_not_proven_never_says_ready() -> None:
 def test_proven_says_how_long_it_took() -> None:
     view = view_of(after(PEPPER, TURTLE, elapsed_s=14.0, dashed=True), [], 0)
     assert (view.title, view.detail) == ("Stopped after 14 s", "The dashed outline shows where")
-    assert (view.result, view.result_ok) == ("all 2 robots stopped (41 ms)", True)
+    assert (view.result, view.result_status) == ("all 2 robots stopped (41 ms)", "ok")
     assert view.can_run
     assert view_of(after(PEPPER), [], 0).result == "Pepper stopped (41 ms)"
 
@@ -93,7 +93,7 @@ def test_not_answered_names_the_robot_and_what_a_hand_can_do() -> None:
         "Turtle did not answer",
         "Pepper stopped (38 ms). Switch Turtle off by hand.",
     )
-    assert (view.result, view.result_ok) == ("1 of 2 robots stopped", False)
+    assert (view.result, view.result_status) == ("1 of 2 robots stopped", "error")
     assert (view.stop_word, view.confirm) == ("Stop again", "Turtle is still")
     assert view.compact == "Turtle did not answer; switch it off by hand"
     assert (view.can_run, view.can_pause, view.can_step) == (False, False, False)

@@ -22,6 +22,7 @@ from app.core.network.master import MasterState
 from app.core.network.topics import Topic
 from app.core.robots.fleet import COMMAND_TYPE
 from app.core.robots.robot_link import RobotLink, topics_of
+from app.core.robots.stop_report import StopReport
 from app.core.robots.voices import RobotVoices
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
@@ -209,7 +210,7 @@ class Session(session_module.Session):
             *([self.source.listen(topics.world, "json")] if topics.world is not None else []),
         ]
         self.fleet.join(replace(robot, virtual=virtual), topics.description)
-        self.fleet.stopped({robot.name: ("answered in 41 ms, at 8:40", "ok")}, {})
+        self.fleet.stopped({robot.name: ("answered in 41 ms, at 8:40", "ok")}, StopReport((), 0.0))
         self.take_over()
         link = self.fleet.link(robot.name)
         assert link is not None

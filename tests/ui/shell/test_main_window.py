@@ -603,7 +603,13 @@ def test_results_are_never_cut_at_the_smallest_window(
     bar = window.run_bar
     bar.show_view(
         RunView(
-            "proven", "Stopped", "", "Stopped", can_run=True, result="Pepper stopped (41 ms)", result_ok=True
+            "proven",
+            "Stopped",
+            "",
+            "Stopped",
+            can_run=True,
+            result="Pepper stopped (41 ms)",
+            result_status="ok",
         )
     )
     qtbot.waitUntil(lambda: bar.result.width() >= bar.result.sizeHint().width())

@@ -36,12 +36,12 @@ VIEWS = {
     ),
     "proven": RunView(
         "proven", "Stopped after 14 s", "The dashed outline shows where", "Stopped after 14 s",
-        can_run=True, can_step=True, result="all 2 robots stopped (41 ms)", result_ok=True,
+        can_run=True, can_step=True, result="all 2 robots stopped (41 ms)", result_status="ok",
     ),
     "unanswered": RunView(
         "unanswered", "Turtle did not answer", "Pepper stopped (38 ms). Switch Turtle off by hand.",
         "Turtle did not answer; switch it off by hand", stop_word="Stop again",
-        result="1 of 2 robots stopped", result_ok=False, confirm="Turtle is still",
+        result="1 of 2 robots stopped", result_status="error", confirm="Turtle is still",
     ),
 }  # fmt: skip
 
@@ -207,7 +207,7 @@ def test_a_long_good_result_leaves_room_for_a_fault(qtbot, bar: RunBar) -> None:
     bar.show_view(fault)
     qtbot.waitUntil(lambda: bar.sentence.width() >= 180)
     assert bar.result.toolTip() == good
-    bar.show_view(replace(fault, result_ok=False))  # what is not good is never shortened for it
+    bar.show_view(replace(fault, result_status="error"))  # what is not good is never shortened for it
     qtbot.waitUntil(lambda: bar.result.width() >= bar.result.sizeHint().width())
 
 

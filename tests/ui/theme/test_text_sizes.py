@@ -47,7 +47,7 @@ VIEWS = (
         can_run=True,
         can_step=True,
         result="all 2 robots stopped (41 ms)",
-        result_ok=True,
+        result_status="ok",
     ),
     RunView(
         "unanswered",
@@ -56,7 +56,7 @@ VIEWS = (
         "Turtle did not answer; switch it off by hand",
         stop_word="Stop again",
         result="1 of 2 robots stopped",
-        result_ok=False,
+        result_status="error",
         confirm="Turtle is still",
     ),
 )

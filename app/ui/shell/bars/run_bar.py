@@ -6,6 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QFont, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
+from app.core.robots.stop_report import StopStatus
 from app.core.run.view import RESTART, RunView
 from app.ui.shell.actions.actions import Actions
 from app.ui.text import plain
@@ -151,6 +152,7 @@ class Result(QWidget):
         super().__init__()
         self._theme, self._compact = theme, compact
         self._look, self._text = "", ""
+        self._status: StopStatus = "off"
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self.updateGeometry)
         self.hide()
@@ -162,8 +164,13 @@ class Result(QWidget):
 
     @property
     def look(self) -> str:
-        """How they are shown: "ok", "error", "counting", "reminder" or ""."""
+        """How they are shown: "ok", "off", "error", "counting", "reminder" or ""."""
         return self._look
+
+    @property
+    def status(self) -> StopStatus:
+        """Whose icon and colour they have."""
+        return self._status
 
     def show_view(self, view: RunView) -> None:
         """Show what a stop brought."""
@@ -173,14 +180,15 @@ class Result(QWidget):
         elif view.state == "stopping" and view.result:
             look, text = "counting", view.result
         elif view.result:
-            look, text = ("ok" if view.result_ok else "error"), view.result
+            look, text = view.result_status, view.result
         elif view.last_stop and not self._compact:
             look, text = "reminder", view.last_stop
-        if (look, text) != (self._look, self._text):
-            self._look, self._text = look, text
+        status = view.last_stop_status if look == "reminder" else view.result_status
+        if (look, text, status) != (self._look, self._text, self._status):
+            self._look, self._text, self._status = look, text, status
             self.setAccessibleName(text)
             self.setToolTip(plain.tip(text))
-            if look in {"ok", "error"}:
+            if look in {"ok", "off", "error"}:
                 paint.announce(self, text)
             paint.show_when(self, bool(text))
             self.updateGeometry()
@@ -219,10 +227,10 @@ class Result(QWidget):
         elif self._look == "reminder":
             self._paint_reminder(painter, rect)
         else:
-            status = theme.status(self._look)
+            status = theme.status(self._status)
             radius = theme.radius("small" if self._compact else "large")
             paint.box(painter, rect, radius, theme.colour(status.tint or "panel"))
-            self._paint_line(painter, rect.adjusted(8 if self._compact else 13, 0, 0, 0), self._look)
+            self._paint_line(painter, rect.adjusted(8 if self._compact else 13, 0, 0, 0))
         painter.end()
 
     def _paint_reminder(self, painter: QPainter, rect: QRectF) -> None:
@@ -232,11 +240,11 @@ class Result(QWidget):
         paint.words(
             painter, upper, _("Last stop"), theme.font("body"), theme.colour("textSecondary"), paint.RIGHT
         )
-        self._paint_line(painter, QRectF(rect.left(), rect.center().y() + 1, rect.width(), high), "ok")
+        self._paint_line(painter, QRectF(rect.left(), rect.center().y() + 1, rect.width(), high))
 
-    def _paint_line(self, painter: QPainter, rect: QRectF, name: str) -> None:
+    def _paint_line(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        status = theme.status(name)
+        status = theme.status(self._status)
         side = self._icon()
         square = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
         paint_icon(painter, square, status.icon, theme.colour(status.colour))
@@ -336,7 +344,7 @@ class RunBar(Bar):
         )
         rest = self.width() - EDGES_PX - sum(each.sizeHint().width() for each in shown)
         left = max(scaled(LEAST_RESULT_PX), rest - min(self.sentence.full_width(), scaled(SENTENCE_PX)))
-        self.result.setMaximumWidth(round(left) if self.result.look == "ok" else QWIDGETSIZE_MAX)
+        self.result.setMaximumWidth(round(left) if self.result.look in {"ok", "off"} else QWIDGETSIZE_MAX)
 
     def show_view(self, view: RunView) -> None:
         """Show one of the six states. Restart has the place of Run; while paused that is Go on."""

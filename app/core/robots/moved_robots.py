@@ -1,0 +1,183 @@
+"""Robots that were told to move and have not proven since that they stand still.
+
+`MovedRobots` is the one source for which robots a Stop must name. A robot enters when something that moves it
+is sent, by whatever sent it. It leaves when its own program answered a Stop as still, when the end of the
+motion was seen in the robot's own final answer, or when a person confirms that it stands still. Freezing,
+dying, leaving the graph and coming back as another program do not remove it (docs/adr/0030-moved-robots.md).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from app.robots.identity import Identity
+from nep.i18n import _, lazy
+
+MovedBy = Literal[
+    "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", "program", "action", "stop"
+]
+"""What moved a robot. ``action``: it says itself that an action could not be ended; ``stop``: nobody knows,
+but a Stop was not proven."""
+MAX_MOTIONS = 64
+"""Motions of one robot that are told apart by their ids; further ones end only with a Stop."""
+
+_SENTENCES: dict[MovedBy, str] = {
+    "form": lazy("{robot} got a command from a form and has not answered since"),
+    "behaviour": lazy("{robot} got a command from a behaviour and has not answered since"),
+    "shelf": lazy("{robot} got a command from a message of the publish shelf and has not answered since"),
+    "key": lazy("{robot} got a command from a key and has not answered since"),
+    "alarm": lazy("{robot} got a command from an alarm and has not answered since"),
+    "replay": lazy("{robot} got a command from a replayed recording and has not answered since"),
+    "bridge": lazy("{robot} got a command from a bridge and has not answered since"),
+    "program": lazy("{robot} got a command from a Python program and has not answered since"),
+    "action": lazy("{robot} could not end an action and has not answered since"),
+    "stop": lazy("{robot} has not answered Stop"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Something that a robot was told to do and that nobody has seen to end.
+
+    ``number`` counts all motions, ``since_s`` is monotonic, ``program`` is the robot's program at that time.
+    ``id`` is that of the invocation; "" when its end can't be seen.
+    """
+
+    number: int
+    robot: str
+    by: MovedBy
+    since_s: float
+    program: Identity | None
+    id: str = ""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it is known what moved the robot."""
+        return self.by not in ("action", "stop")
+
+    @property
+    def sentence(self) -> str:
+        """Why nobody knows that the robot stands still, without a full stop."""
+        return _(_SENTENCES[self.by]).format(robot=self.robot)
+
+
+class MovedRobots:
+    """Ledger of robots that may move. One thread uses it (the window's)."""
+
+    def __init__(
+        self,
+        program_of: Callable[[str], Identity | None] = lambda _name: None,
+        has_ended: Callable[[Identity], bool] = lambda _program: False,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Nothing has moved yet.
+
+        Args:
+            program_of: Returns the program that a robot is now.
+            has_ended: Whether it is certain that a program does not run any more.
+            clock: Monotonic seconds.
+        """
+        self._program_of, self._has_ended, self._clock = program_of, has_ended, clock
+        self._motions: dict[str, list[Motion]] = {}
+        self._count = 0
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._motions
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The robots that may move, in the order in which they were told to."""
+        return tuple(self._motions)
+
+    @property
+    def mark(self) -> int:
+        """Number of the newest motion. A Stop that begins now proves nothing about later ones."""
+        return self._count
+
+    def motion(self, name: str) -> Motion | None:
+        """The newest motion of a robot whose cause is known, or None when it is not in the ledger.
+
+        That an action or a Stop did not end is told only when nothing else is known.
+        """
+        found = self._motions.get(name, [])
+        known = [motion for motion in found if motion.is_known] or found
+        return known[-1] if known else None
+
+    def other_programs(self, name: str, current: Identity | None) -> tuple[Identity, ...]:
+        """Programs besides the ``current`` one under which a robot was moved and that may still run."""
+        others = {
+            motion.program.node_id: motion.program
+            for motion in self._motions.get(name, ())
+            if motion.program is not None
+            and (current is None or motion.program.node_id != current.node_id)
+            and not self._has_ended(motion.program)
+        }
+        return tuple(others.values())
+
+    def note(
+        self, names: Iterable[str], by: MovedBy, *, id: str = "", program: Identity | None = None
+    ) -> None:
+        """Enter robots that are told to move; call this before the message is sent.
+
+        Args:
+            names: The robots.
+            by: What moves them.
+            id: Of the invocation, when the robot's final answer to it ends the motion.
+            program: The robot's program, when it is not the one that it is now.
+        """
+        for name in names:
+            self._count += 1
+            meant = program if program is not None else self._program_of(name)
+            motion = Motion(self._count, name, by, self._clock(), meant, id)
+            found = self._motions.setdefault(name, [])
+            if not id or len(found) >= MAX_MOTIONS:  # the newest of several that end together stands for them
+                motion = replace(motion, id="")
+                found[:] = [
+                    each for each in found if each.id or (each.by, each.program) != (by, motion.program)
+                ]
+            found.append(motion)
+
+    def ended(self, name: str, id: str) -> None:
+        """The robot's own final answer to this invocation says that it has ended."""
+        if id:
+            self._keep(name, lambda motion: motion.id != id)
+
+    def stood_still(self, name: str, programs: Collection[str], mark: int) -> None:
+        """Programs of a robot, by node id, proved a Stop that began at ``mark``: it stands still.
+
+        What a program was told that has not answered, and may still run, remains.
+        """
+        self._keep(
+            name,
+            lambda motion: (
+                motion.number > mark
+                or (
+                    motion.program is not None
+                    and motion.program.node_id not in programs
+                    and not self._has_ended(motion.program)
+                )
+            ),
+        )
+
+    def told(self, name: str, mark: int) -> None:
+        """A robot that can't confirm (RIZE) was told to stop at ``mark``; nothing more can be known."""
+        self._keep(name, lambda motion: motion.number > mark)
+
+    def confirm(self, names: Iterable[str]) -> None:
+        """A person says that these robots stand still."""
+        for name in names:
+            self._motions.pop(name, None)
+
+    def drop_ended(self, name: str) -> None:
+        """Forget what ended programs were told: a virtual robot is its program, and moves no more."""
+        self._keep(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
+
+    def _keep(self, name: str, stays: Callable[[Motion], bool]) -> None:
+        left = [motion for motion in self._motions.get(name, ()) if stays(motion)]
+        if left:
+            self._motions[name] = left
+        else:
+            self._motions.pop(name, None)

@@ -1,0 +1,105 @@
+"""Which robots a Stop must name: entered when told to move, removed only by proof, a seen end, or a person."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.core.robots.moved_robots import MAX_MOTIONS, MovedRobots
+from app.robots.identity import Identity
+
+OLD, NEW = Identity("old", "driver"), Identity("new", "driver")
+
+
+class Ledger(MovedRobots):
+    """A ledger of robots whose program is ``now``; those in ``ended`` do not run any more."""
+
+    def __init__(self) -> None:
+        self.now, self.ended_programs = OLD, set[Identity]()
+        super().__init__(lambda _name: self.now, self.ended_programs.__contains__, lambda: 7.0)
+
+
+@pytest.fixture
+def ledger() -> Ledger:
+    return Ledger()
+
+
+def test_a_robot_leaves_when_its_program_proves_a_stop(ledger: Ledger) -> None:
+    ledger.note(["Pepper"], "shelf")
+    ledger.stood_still("Pepper", {"stranger"}, ledger.mark)
+    assert ledger.names == ("Pepper",)
+    ledger.stood_still("Pepper", {"old"}, ledger.mark)
+    assert ledger.names == ()
+
+
+def test_a_stop_proves_nothing_about_what_was_sent_after_it_began(ledger: Ledger) -> None:
+    ledger.note(["Pepper"], "form", id="1")
+    mark = ledger.mark
+    ledger.note(["Pepper"], "key")
+    ledger.stood_still("Pepper", {"old"}, mark)
+    motion = ledger.motion("Pepper")
+    assert motion is not None
+    assert motion.by == "key"
+
+
+def test_a_final_answer_ends_only_its_own_motion(ledger: Ledger) -> None:
+    ledger.note(["Pepper"], "form", id="1")
+    ledger.note(["Pepper"], "form", id="2")
+    ledger.ended("Pepper", "1")
+    assert "Pepper" in ledger
+    ledger.ended("Pepper", "2")
+    assert "Pepper" not in ledger
+
+
+def test_a_final_answer_does_not_end_a_motion_that_goes_on(ledger: Ledger) -> None:
+    ledger.note(["Pepper"], "form")  # a speed: no id
+    ledger.ended("Pepper", "")
+    assert "Pepper" in ledger
+
+
+def test_a_new_program_proves_nothing_about_the_one_before_that_may_still_run(ledger: Ledger) -> None:
+    ledger.note(["Pepper"], "behaviour")
+    ledger.now = NEW
+    assert ledger.other_programs("Pepper", NEW) == (OLD,)
+    ledger.stood_still("Pepper", {"new"}, ledger.mark)
+    assert "Pepper" in ledger
+    ledger.ended_programs.add(OLD)
+    assert ledger.other_programs("Pepper", NEW) == ()
+    assert "Pepper" in ledger, "its program ended: that alone stops no real robot"
+    ledger.stood_still("Pepper", {"new"}, ledger.mark)
+    assert "Pepper" not in ledger
+
+
+def test_a_virtual_robot_is_its_program(ledger: Ledger) -> None:
+    ledger.note(["Pepper"], "behaviour")
+    ledger.drop_ended("Pepper")
+    assert "Pepper" in ledger
+    ledger.ended_programs.add(OLD)
+    ledger.drop_ended("Pepper")
+    assert "Pepper" not in ledger
+
+
+def test_a_person_is_believed(ledger: Ledger) -> None:
+    ledger.note(["Pepper", "Turtle"], "bridge")
+    ledger.confirm(["Turtle", "Nobody"])
+    assert ledger.names == ("Pepper",)
+
+
+def test_what_moved_it_is_told_rather_than_that_it_did_not_answer(ledger: Ledger) -> None:
+    ledger.note(["Pepper"], "alarm")
+    ledger.note(["Pepper"], "stop")
+    motion = ledger.motion("Pepper")
+    assert motion is not None
+    assert (motion.by, motion.since_s, motion.sentence) == ("alarm", 7.0, motion.sentence)
+    assert "alarm" in motion.sentence
+    assert ledger.motion("Turtle") is None
+
+
+def test_motions_are_bounded_and_none_is_forgotten(ledger: Ledger) -> None:
+    for number in range(3 * MAX_MOTIONS):
+        ledger.note(["Pepper"], "form", id=str(number))
+        ledger.note(["Pepper"], "key")
+    assert len(ledger._motions["Pepper"]) <= MAX_MOTIONS + 2
+    for number in range(3 * MAX_MOTIONS):
+        ledger.ended("Pepper", str(number))
+    ledger.confirm(["Turtle"])
+    assert "Pepper" in ledger
