@@ -577,6 +577,10 @@ class Session:
 
     def _keep_within_reach(self) -> None:
         """Whom a stop reaches: who is there, and who went away while a program used it or without a stop."""
+        if self.stopper is not None:
+            self.stopper.deliver()
+            for link in self.fleet.connected:
+                link.is_reached = self.stopper.reaches(link.name)
         targets = self.fleet.stop_targets
         stopper = self.stopper
         if stopper is not None and (targets != self._reachable or self._tries_to_reach):

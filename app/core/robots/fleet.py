@@ -6,7 +6,6 @@ Found by their description, watched by their sensors, tried out by their actions
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
@@ -14,6 +13,7 @@ from typing import Protocol
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.core.robots.announcements import Announcements, Claim, RizeNames
+from app.core.robots.held_messages import HeldMessages
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion_gate import MotionGate, MovableRobots
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
@@ -46,8 +46,10 @@ from nep.programs.robots.moving import COMMAND_TYPE as COMMAND_TYPE
 from nep.programs.robots.moving import MovingTopics
 from nep.protocol.graph_view import GraphView
 
-MOST_HELD = 256
-"""Answers of publishers that no master has told of yet, kept until the next graph."""
+MAX_HELD = 64
+"""Answers of one publisher that no master has told of yet, kept until the next graph."""
+MAX_ABSENT = 64
+"""Robots that went away and are told to stop all the same, in case that they still hear."""
 
 
 class RobotProcesses(Protocol):
@@ -97,7 +99,7 @@ class Fleet:
         self._announcements = Announcements(watches, self._senders, clock)
         self._names: dict[str, str] = {}
         self._view = GraphView(0, 0)
-        self._held: deque[tuple[str, Message]] = deque(maxlen=MOST_HELD)
+        self._held: dict[str, HeldMessages] = {}
         self._taken: dict[str, Claim] = {}
         self._notes: list[str] = []
         self._rize = RizeNames()
@@ -249,17 +251,17 @@ class Fleet:
 
     @property
     def stop_targets(self) -> tuple[StopTarget, ...]:
-        """Where those are told: who is there, and who may move (`MovedRobots`)."""
-        return tuple(
-            StopTarget(
-                link.robot,
-                link.identity,
-                self.moved.other_programs(link.name, link.identity),
-                link.topics_before,
-            )
-            for link in self._links.values()
-            if link.connected or link.name in self.moved
-        )
+        """Where those are told, and robots that went away after they had proven a stop or answered."""
+        here, absent = [], []
+        for link in self._links.values():
+            is_expected = link.connected or link.name in self.moved
+            earlier = self.moved.other_programs(link.name, link.identity)
+            target = StopTarget(link.robot, link.identity, earlier, link.topics_before, is_expected)
+            if is_expected:
+                here.append(target)
+            elif link.has_proven_stop or link.answered_s is not None:
+                absent.append(target)
+        return (*here, *absent[:MAX_ABSENT])
 
     @staticmethod
     def _is_heard(link: RobotLink | None) -> bool:
@@ -315,11 +317,12 @@ class Fleet:
         self._senders.learn(view, {rize.ANSWERS}.union(*topics))
         self._follow_announced()
         self._update_rize(view)
-        held, self._held = list(self._held), deque(maxlen=MOST_HELD)
-        for name, message in held:
+        held, self._held = self._held, {}
+        for name, messages in held.items():
             link = self._links.get(name)
-            if link is not None and self._is_from(link, message):
-                self._answer(link, message)
+            for message in messages.take() if link is not None else ():
+                if link is not None and self._is_from(link, message):
+                    self._answer(link, message)
         for link in self._links.values():
             if link.connected and link.publisher is None:
                 self._open_publisher(link)
@@ -583,7 +586,7 @@ class Fleet:
             if is_own:
                 self._answer(link, message)
             elif is_own is None:
-                self._held.append((link.name, message))
+                self._held.setdefault(link.name, HeldMessages(per_publisher=MAX_HELD)).put(message)
         for sensor in link.robot.sensors:
             if sensor.is_image:
                 continue

@@ -17,12 +17,14 @@ SENDER = "studio"
 """Who the commands of try-outs are from."""
 TRIES_KEPT = 40
 NOT_STOPPED = "not stopped"
+CONNECTING = "connecting"
 STOPPING = "stopping"
 FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
 STATE_WORDS = {
     NOT_STOPPED: lazy("not stopped"),
     STOPPING: lazy("stopping"),
     "away": lazy("away"),
+    CONNECTING: lazy("connecting"),
     "silent": lazy("silent"),
     "busy": lazy("busy"),
     "ready": lazy("ready"),
@@ -85,7 +87,7 @@ class RobotLink:
     ``goes_on`` what it says itself about actions that it could not end, ``may_move`` that it was told to move
     and is not heard any more (`MovedRobots`); they are empty when all is well.
     ``stop_began_s`` is since when the answer to a stop is waited for, ``stopping`` whether that is long
-    enough to be said.
+    enough to be said. ``is_reached`` says that a stop would arrive now.
     ``identity`` is the program that it is, ``topics_before`` are the topics of its earlier descriptions.
     ``was_real`` says that it has not always been virtual, ``has_proven_stop`` that its program once did.
     """
@@ -110,6 +112,7 @@ class RobotLink:
     has_proven_stop: bool = False
     stop_began_s: float | None = None
     stopping: bool = False
+    is_reached: bool = True
     identity: Identity | None = None
     topics_before: tuple[RobotTopics, ...] = ()
     is_opening: bool = False
@@ -130,7 +133,7 @@ class RobotLink:
 
     @property
     def state(self) -> str:
-        """``not stopped``, ``stopping``, ``away``, ``silent``, ``busy`` or ``ready``.
+        """``not stopped``, ``stopping``, ``away``, ``connecting``, ``silent``, ``busy`` or ``ready``.
 
         One that has not stopped, or has not answered yet, may still move when it is away.
         """
@@ -140,6 +143,8 @@ class RobotLink:
             return STOPPING
         if not self.connected:
             return "away"
+        if not self.is_reached:
+            return CONNECTING
         if self.silent is not None or self.mute:
             return "silent"
         return "busy" if self.running else "ready"

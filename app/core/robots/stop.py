@@ -10,14 +10,15 @@ import logging
 import threading
 import time
 import uuid
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from functools import partial
 
 from app.core.faults import error_words
+from app.core.robots.held_messages import HeldMessages
 from app.core.robots.stop_lines import StopLine, StopNode, StopTarget, StopWay
 from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.robots.stop_request import StopRequest
 from app.robots import rize
 from app.robots.description.description import Robot, RobotTopics
 from app.robots.identity import (
@@ -32,7 +33,6 @@ from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
-from nep.text import bounded_str
 
 _log = logging.getLogger("studio")
 RIZE = "rize"
@@ -40,10 +40,11 @@ NO_NETWORK = lazy("there is no connection to the network yet")
 LATE_S = 120.0
 """How long an answer that comes too late is still taken."""
 LATE_KEPT = 64
-UNKNOWN_KEPT = 32
 MOST_SERVING = 32
 """So many programs that serve one robot are waited for, and so many that only listen are named:"""
 MOST_LISTENING = 4
+POLL_S = 0.02
+"""How often it is looked whether a robot is connected at last."""
 LOOK_S = 0.1
 """How often the master is asked at most while an answer of an unknown publisher waits."""
 GRAPH_S = 0.3
@@ -60,46 +61,6 @@ def patience_s(robots: Iterable[Robot]) -> float:
     return min(LONGEST_STOP_S, max(STOP_TIMEOUT_S, needed_s))
 
 
-@dataclass
-class _Asked:
-    """A stop of one robot that is under way: what is known of each program that serves it, by node.
-
-    `serving` is empty until it is known who they are. `unknown` are answers of publishers that no master has
-    told of yet.
-    """
-
-    line: StopLine
-    id: str
-    sent_s: float
-    late: Callable[[RobotStop], object] | None
-    error: str = ""
-    serving: dict[str, RobotStop | None] = field(default_factory=dict)
-    programs: dict[str, str] = field(default_factory=dict)
-    strangers: dict[str, str] = field(default_factory=dict)
-    unknown: deque[Message] = field(default_factory=lambda: deque(maxlen=UNKNOWN_KEPT))
-    is_over: bool = False
-
-    @property
-    def is_settled(self) -> bool:
-        return bool(self.error) or (bool(self.serving) and None not in self.serving.values())
-
-    def news(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
-        """What has been said and was not told on yet, by node."""
-        found, waits = self.serving.items(), None in self.serving.values()
-        said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
-        return [(node, replace(each, waits=waits)) for node, each in said]
-
-    def results(self) -> list[RobotStop]:
-        """A line for each program; those that have said nothing did not answer."""
-        if not self.serving:
-            return [RobotStop(self.line.name, False, None, error=self.error)]
-        name, found = self.line.name, self.serving.items()
-        return [
-            each or RobotStop(name, False, None, error=self.error, program=self.programs.get(node, ""))
-            for node, each in found
-        ]
-
-
 class RobotStopper:
     """Keeps a way to each robot and stops them. Its methods may be called from any thread."""
 
@@ -112,7 +73,7 @@ class RobotStopper:
         self._making = threading.Lock()  # one thread at a time makes ways
         self._makers: list[threading.Thread] = []
         self._lines: dict[str, StopLine] = {}
-        self._asked: dict[str, _Asked] = {}
+        self._asked: dict[str, StopRequest] = {}
         self._view: GraphView | None = None
         self._looked_s = 0.0
         self._senders = Senders()
@@ -129,12 +90,13 @@ class RobotStopper:
             tell(said)
 
     def expect(self, targets: Iterable[StopTarget]) -> None:
-        """These are the programs of the robots now; it takes no time, `set_robots` does the rest."""
+        """These are the robots now; it takes no time, and `set_robots` does the rest.
+
+        A stop from here on waits for their connections instead of not knowing them.
+        """
         with self._changed:
             for target in targets:
-                line = self._lines.get(target.robot.name)
-                if line is not None:
-                    line.target = target
+                self._lines.setdefault(target.robot.name, StopLine(target)).target = target
 
     def set_robots(self, robots: Iterable[Robot | StopTarget]) -> None:
         """Keep a way to exactly these robots; connects to new ones, lets go of others.
@@ -166,13 +128,40 @@ class RobotStopper:
     def robots(self) -> tuple[str, ...]:
         """The names of the robots that can be stopped."""
         with self._changed:
-            return tuple(name for name, line in self._lines.items() if line.is_whole)
+            lines = [line for line in self._lines.values() if line.target.is_expected and line.is_whole]
+            return tuple(line.name for line in lines)
+
+    def reaches(self, name: str) -> bool:
+        """Return whether a stop would arrive now: the way exists, and the robot's program is connected."""
+        with self._changed:
+            line = self._lines.get(name)
+            way = None if line is None else line.ways.get(line.target.robot.topics)
+            return line is not None and way is not None and self._is_connected(line, way)
+
+    def deliver(self) -> None:
+        """Send stops again to robots that were not connected when they were sent, and are now.
+
+        Called with each tick: a stop is delivered however late the connection comes, within `LATE_S`.
+        """
+        with self._changed:
+            now = self._clock()
+            waiting = [each for each in self._asked.values() if each.is_over and now - each.sent_s <= LATE_S]
+        for each in waiting:
+            self._deliver(each)
+
+    def forget_late(self, names: Iterable[str]) -> None:
+        """Deliver no stop to these robots any more: a person says that they stand still."""
+        known = set(names)
+        with self._changed:
+            for id in [id for id, each in self._asked.items() if each.is_over and each.line.name in known]:
+                del self._asked[id]
 
     @property
     def problems(self) -> Mapping[str, str]:
         """Why robots can't be told to stop, by their names."""
         with self._changed:
-            return {name: line.error for name, line in self._lines.items() if line.error}
+            lines = [line for line in self._lines.values() if line.error and line.target.is_expected]
+            return {line.name: line.error for line in lines}
 
     def send_stop(self, names: Iterable[str] | None = None, ends: str | None = None) -> None:
         """Tell the robots to stop and do not wait.
@@ -190,6 +179,7 @@ class RobotStopper:
         on_answer: Callable[[RobotStop], object] | None = None,
         ends: str | None = None,
         on_late: Callable[[RobotStop], object] | None = None,
+        is_for_all: bool = False,
     ) -> StopReport:
         """Tell the robots (`names`, or all) to stop and wait until each has answered, `timeout_s` at most.
 
@@ -197,22 +187,27 @@ class RobotStopper:
         report has a line for each of `names`, also for one that could not be told. `on_answer` is called in
         this thread for each robot as it answers, and at the end for each that did not. `on_late` is called in
         the node's thread, or in that of `see`, when one answers later than that, or says at last that it
-        stands still. `ends` as in `send_stop`.
+        stands still. `ends` as in `send_stop`. With `is_for_all`, those that nobody waits for are told, too.
         """
         names = None if names is None else tuple(names)
         began = self._clock()
         lines = self._chosen(names)
         asked = [self._ask(line, ends, on_late) for line in lines]
-        self._make_missing(asked, ends)
+        if is_for_all:
+            for line in self._unexpected():
+                self._tell(line, _id(), ends)
+        self._make_missing(asked)
         told: set[tuple[str, str]] = set()
         until = began + (
             timeout_s if timeout_s is not None else patience_s(line.target.robot for line in lines)
         )
         while True:
             self._look_for(asked)
+            undelivered = [each for each in asked if not self._deliver(each)]
             with self._changed:
                 now = self._clock()
                 pause_s = min(until - now, LOOK_S if any(each.unknown for each in asked) else until - now)
+                pause_s = min(pause_s, POLL_S) if undelivered else pause_s
                 self._changed.wait_for(lambda: self._is_news(asked, told), max(0.0, pause_s))
                 news = [(each, node, said) for each in asked for node, said in each.news(told)]
             for each, node, said in news:
@@ -258,15 +253,16 @@ class RobotStopper:
 
     def _connect(self, robot: Robot, topics: RobotTopics) -> StopWay:
         if robot.dialect == RIZE:
-            return StopWay(self._node.new_pub(topics.command, "json", batch=False), None)
+            return StopWay(topics.command, self._node.new_pub(topics.command, "json", batch=False), None)
         publisher = self._node.new_pub(topics.command, "robot/command", batch=False)
         try:
-            return StopWay(publisher, self._node.new_sub(topics.answer, "robot/answer", sink=self._answers))
+            subscriber = self._node.new_sub(topics.answer, "robot/answer", sink=self._answers)
+            return StopWay(topics.command, publisher, subscriber)
         except NepError:
             publisher.close()
             raise
 
-    def _make_missing(self, asked: Sequence[_Asked], ends: str | None) -> None:
+    def _make_missing(self, asked: Sequence[StopRequest]) -> None:
         """Try once more, beside the stop, to reach those that could not be reached."""
         missing = [each for each in asked if not each.line.is_whole]
         if not missing:
@@ -278,7 +274,7 @@ class RobotStopper:
                 with self._making:
                     self._make(each.line)
                 new = each.line.ways.keys() - before
-                error = self._tell(each.line, each.id, ends, new) if new else each.line.untold
+                error = self._tell(each.line, each.id, each.ends, new) if new else each.line.untold
                 with self._changed:
                     each.error = error if not before else each.error
                     self._changed.notify_all()
@@ -292,16 +288,48 @@ class RobotStopper:
     def _chosen(self, names: Iterable[str] | None) -> list[StopLine]:
         with self._changed:
             if names is None:
-                return list(self._lines.values())
+                return [line for line in self._lines.values() if line.target.is_expected]
             return [self._lines[name] for name in dict.fromkeys(names) if name in self._lines]
 
-    def _ask(self, line: StopLine, ends: str | None, late: Callable[[RobotStop], object] | None) -> _Asked:
-        asked = _Asked(line, _id(), self._clock(), late)
+    def _ask(
+        self, line: StopLine, ends: str | None, late: Callable[[RobotStop], object] | None
+    ) -> StopRequest:
+        asked = StopRequest(line, _id(), self._clock(), late, ends)
         with self._changed:
             self._forget_old()
             self._asked[asked.id] = asked
+            if self._view is not None and line.target.robot.dialect != RIZE:
+                asked.serving |= self._serving(asked)
+            for topics, way in line.ways.items():
+                if self._is_connected(line, way):
+                    asked.sent(topics, asked.sent_s)
         asked.error = self._tell(line, asked.id, ends)
         return asked
+
+    def _unexpected(self) -> list[StopLine]:
+        with self._changed:
+            return [line for line in self._lines.values() if not line.target.is_expected]
+
+    def _is_connected(self, line: StopLine, way: StopWay) -> bool:
+        """With the lock held."""
+        return way.is_connected(line.target, hearing(self._view or GraphView(0, 0), way.topic))
+
+    def _deliver(self, asked: StopRequest) -> bool:
+        """Send the command on ways that have become connected; whether nothing is left to deliver."""
+        with self._changed:
+            if asked.is_answered or asked.line.target.robot.dialect == RIZE:
+                return True
+            ways = dict(asked.line.ways)
+            new = [
+                topics
+                for topics, way in ways.items()
+                if topics not in asked.delivered and self._is_connected(asked.line, way)
+            ]
+            for topics in new:
+                asked.sent(topics, self._clock())
+        if new:
+            self._tell(asked.line, asked.id, asked.ends, new)
+        return bool(asked.delivered or asked.error)
 
     def _tell(
         self, line: StopLine, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None
@@ -328,13 +356,13 @@ class RobotStopper:
 
     # ---- who must answer, and who did
 
-    def _is_news(self, asked: Sequence[_Asked], told: set[tuple[str, str]]) -> bool:
+    def _is_news(self, asked: Sequence[StopRequest], told: set[tuple[str, str]]) -> bool:
         """Whether there is something to tell, or to ask the master for."""
         if any(each.news(told) for each in asked) or all(each.is_settled for each in asked):
             return True
         return any(each.unknown for each in asked) and self._clock() - self._looked_s >= LOOK_S
 
-    def _look_for(self, asked: Sequence[_Asked]) -> None:
+    def _look_for(self, asked: Sequence[StopRequest]) -> None:
         """Find out who serves the robots, and ask the master who answered when that is not known."""
         with self._changed:
             waits = self._view is None or any(each.unknown for each in asked)
@@ -351,7 +379,7 @@ class RobotStopper:
                     each.serving |= self._serving(each)
                     self._judge_again(each)  # none of it is late: they are asked just now
 
-    def _serving(self, asked: _Asked) -> dict[str, RobotStop | None]:
+    def _serving(self, asked: StopRequest) -> dict[str, RobotStop | None]:
         """Who must answer: the robot's own program first, then whoever else serves its commands, by node.
 
         Programs that hear its commands and could not answer are named.
@@ -384,59 +412,49 @@ class RobotStopper:
         return found
 
     def _answers(self, messages: Sequence[Message]) -> None:
-        for message in messages:
-            told = _stop_answer(message)
-            if told is None:
-                continue
-            late = None
-            with self._changed:
-                asked = self._asked.get(bounded_str(told.get("id")))
-                if asked is not None:
-                    late = self._judge(asked, message)
-                    self._changed.notify_all()
-            if asked is not None and late is not None and asked.late is not None:
-                asked.late(late)
+        """Judge by the sender first: only what comes from a program that must answer is decoded."""
+        late: list[tuple[Callable[[RobotStop], object], RobotStop]] = []
+        with self._changed:
+            for message in messages:
+                node = self._senders.node_of(message)
+                for asked in self._asked.values():
+                    if message.topic in asked.line.answers:
+                        late += self._judge(asked, node, message)
+            self._changed.notify_all()
+        for tell, said in late:
+            tell(said)
 
-    def _judge_again(self, asked: _Asked) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
+    def _judge_again(self, asked: StopRequest) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
         """Look again at answers whose publishers were not known; what comes too late, and whom to tell.
 
-        The lock is held here: whoever is told may need it.
+        The lock is held here: whoever is told may need it. What is still unknown is let go of: its publisher
+        has not registered, or there is no master, and then nothing can be proven anyway.
         """
-        waiting, asked.unknown = list(asked.unknown), deque(maxlen=UNKNOWN_KEPT)
-        late = [self._judge(asked, message) for message in waiting]
-        return [(asked.late, said) for said in late if said is not None and asked.late is not None]
+        held = asked.unknown.take()
+        known = [(node, message) for message in held if (node := self._senders.node_of(message)) is not None]
+        return [said for node, message in known for said in self._judge(asked, node, message)]
 
-    def _judge(self, asked: _Asked, message: Message) -> RobotStop | None:
-        """Take an answer if it is of a program that must give one; what it says when it comes too late.
-
-        One that answers for another proves nothing. A refusal may be followed by the word that it stands
-        still after all, nothing else is taken back.
-        """
-        told = _stop_answer(message)
-        topics = {way.answer for way in asked.line.target.ways}
-        if told is None or told.get("state") not in ("succeeded", "failed") or message.topic not in topics:
-            return None
-        node = self._senders.node_of(message)
+    def _judge(
+        self, asked: StopRequest, node: str | None, message: Message
+    ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
+        """Take an answer if it is of a program that must give one; whom to tell when it comes too late."""
         if node is None or not asked.serving:
-            asked.unknown.append(message)
-            return None
+            asked.unknown.put(message)
+            return []
         if node not in asked.serving:
-            view = self._view or GraphView(0, 0)
-            asked.strangers[node] = identity_of(view, node).node or node
-            return None
-        before, is_still = asked.serving[node], told["state"] == "succeeded"
-        if before is not None and (before.answered or not is_still):
-            return None
-        name, program = asked.line.name, asked.programs.get(node, "")
-        elapsed_ms = (self._clock() - asked.sent_s) * 1000
-        error = "" if is_still else said_of_stop(name, told.get("error"))
-        said = RobotStop(name, is_still, elapsed_ms, error=error, refused=not is_still, program=program)
-        asked.serving[node] = said
-        return said if asked.is_over else None
+            if node in asked.foreign or len(asked.foreign) < MOST_SERVING:
+                asked.foreign.setdefault(node, HeldMessages(publishers=1)).put(message)
+            return []
+        name = asked.line.name
+        is_news = asked.accept(node, message, self._clock(), partial(said_of_stop, name))
+        said = asked.serving[node]
+        if not is_news or said is None or not asked.is_over or asked.late is None:
+            return []
+        return [(asked.late, said)]
 
     def _report(
         self,
-        asked: Sequence[_Asked],
+        asked: Sequence[StopRequest],
         told: set[tuple[str, str]],
         elapsed_ms: float,
         on_answer: Callable[[RobotStop], object] | None,
@@ -451,7 +469,12 @@ class RobotStopper:
                 for node, result in zip(each.serving or {"": None}, each.results(), strict=True)
                 if (each.id, node) not in told
             ]
-            strangers = [(each.line.name, program) for each in asked for program in each.strangers.values()]
+            view = self._view or GraphView(0, 0)
+            strangers = [
+                (each.line.name, identity_of(view, node).node or node)
+                for each in asked
+                for node in each.impostors()
+            ]
         for result in untold:
             if on_answer is not None:
                 on_answer(result)
@@ -462,16 +485,9 @@ class RobotStopper:
         now = self._clock()
         over = [id for id, each in self._asked.items() if each.is_over]
         for place, id in enumerate(over):
-            if place < len(over) - LATE_KEPT or now - self._asked[id].sent_s > LATE_S:
+            each = self._asked[id]
+            if each.is_proven or place < len(over) - LATE_KEPT or now - each.sent_s > LATE_S:
                 del self._asked[id]
-
-
-def _stop_answer(message: Message) -> Mapping[str, object] | None:
-    try:
-        payload = message.payload
-    except NepError:
-        return None
-    return payload if isinstance(payload, Mapping) and payload.get("op") == "stop" else None
 
 
 def _id() -> str:
@@ -485,12 +501,15 @@ def report_of(
     on_late: Callable[[RobotStop], object],
     on_answer: Callable[[RobotStop], object] | None = None,
     ends: str | None = None,
+    is_for_all: bool = False,
 ) -> StopReport:
     """Stop these robots. There is a report whatever happens: without one the run would stay "stopping"."""
     why = _(NO_NETWORK)
     if stopper is not None:
         try:
-            return stopper.stop_all(names, on_answer=on_answer, ends=ends, on_late=on_late)
+            return stopper.stop_all(
+                names, on_answer=on_answer, ends=ends, on_late=on_late, is_for_all=is_for_all
+            )
         except Exception as error:  # noqa: BLE001  whatever it is: these robots are not proven to stand still
             _log.exception("can't stop the robots")
             why = error_words(error)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -18,6 +18,16 @@ MOST_TOPICS = 8
 
 class StopPublisher(Protocol):
     """What is needed of NEP's publisher."""
+
+    @property
+    def subscribers(self) -> int:
+        """How many subscribers are connected."""
+        ...
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of nodes that subscribe and have not connected."""
+        ...
 
     def publish(self, payload: object) -> None:
         """Send one message."""
@@ -61,13 +71,15 @@ class StopTarget:
     """A robot that is to be stopped.
 
     ``identity`` is the program that it is (None: whoever announced it first), ``earlier`` are programs of
-    this name that may still run and move it, ``topics`` those of its earlier descriptions.
+    this name that may still run and move it, ``topics`` those of its earlier descriptions. One that is not
+    ``is_expected`` is told with the others, in case that it still hears, and nobody waits for its answer.
     """
 
     robot: Robot
     identity: Identity | None = None
     earlier: tuple[Identity, ...] = ()
     topics: tuple[RobotTopics, ...] = ()
+    is_expected: bool = True
 
     @property
     def ways(self) -> tuple[RobotTopics, ...]:
@@ -79,8 +91,24 @@ class StopTarget:
 class StopWay:
     """Where one robot is told to stop, and where it answers."""
 
+    topic: str
     publisher: StopPublisher
     subscriber: StopSubscriber | None
+    was_connected: bool = False
+
+    def is_connected(self, target: StopTarget, hearers: Collection[str]) -> bool:
+        """Whether what is published now arrives at the robot. ``hearers`` are the nodes that hear the topic.
+
+        Robots of RIZE can't be told apart on their common topic; they are taken for connected.
+        """
+        program = target.identity
+        if self.subscriber is None or program is None:
+            is_there = self.subscriber is None or self.publisher.subscribers > 0
+        else:
+            is_expected = program.node_id in hearers and program.node not in self.publisher.missing
+            is_there = is_expected and self.publisher.subscribers > 0
+        self.was_connected |= is_there
+        return is_there
 
     def close(self) -> None:
         """Let go of it."""
@@ -103,9 +131,21 @@ class StopLine:
         return self.target.robot.name
 
     @property
+    def answers(self) -> set[str]:
+        """The topics on which it answers."""
+        return {way.answer for way in self.target.ways}
+
+    @property
     def is_whole(self) -> bool:
         """Whether no way is missing."""
         return self.ways.keys() >= set(self.target.ways)
+
+    @property
+    def unconnected(self) -> str:
+        """Why it can't have heard anything, in a sentence; empty once one of its ways was connected."""
+        if any(way.was_connected for way in self.ways.values()):
+            return ""
+        return _("{robot} is not connected yet; Stop is sent as soon as it is").format(robot=self.name)
 
     @property
     def untold(self) -> str:

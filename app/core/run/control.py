@@ -317,7 +317,10 @@ class Runs:
     def confirm_still(self) -> None:
         """A person says that the robot that did not answer stands still."""
         if self._run.state == "unanswered" and self._run.report is not None:
-            self._fleet.stands_still(self._run.report.silent)
+            silent = self._run.report.silent
+            self._fleet.stands_still(silent)
+            if self._network.stopper is not None:
+                self._network.stopper.forget_late(silent)
             self._settle()
 
     def _settle(self) -> None:
@@ -546,7 +549,13 @@ class Runs:
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
         work = partial(
-            self._stop_all, self._stop_number, self._runner, self._network.stopper, asked, self._program_key
+            self._stop_all,
+            self._stop_number,
+            self._runner,
+            self._network.stopper,
+            asked,
+            self._program_key,
+            is_for_all=names is None,
         )
         self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
         self._stop_thread.start()
@@ -558,6 +567,8 @@ class Runs:
         stopper: RobotStopper | None,
         names: tuple[str, ...],
         ends: str | None,
+        *,
+        is_for_all: bool = False,
     ) -> None:
         def answered(robot: RobotStop) -> None:
             self._post_event(RobotAnswered(number, robot))
@@ -571,9 +582,8 @@ class Runs:
                     stopper.send_stop(ends=ends)
             with log_errors("end the program"):
                 runner.stop()
-        self._post_event(
-            StopDone(number, report_of(stopper, names, on_answer=answered, ends=ends, on_late=late))
-        )
+        report = report_of(stopper, names, on_answer=answered, ends=ends, on_late=late, is_for_all=is_for_all)
+        self._post_event(StopDone(number, report))
 
     def _set_errors(self, errors: Mapping[str, str]) -> None:
         self.block_errors = errors

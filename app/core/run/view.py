@@ -26,8 +26,8 @@ class RunState:
     that had no robot to tell. ``doubts`` say why robots may move that did not answer (`MovedRobots`).
     ``warning`` is what a person should know before a paused program goes on. Times are monotonic seconds; the
     program's clock stands while it is paused (``held_s``, ``pause_began_s``). ``again``: the stop before this
-    one is not proven. ``restarts``: something is run as soon as this stop is proven. ``edited``: the behaviour
-    is not what runs any more.
+    one is not proven. ``restarts``: something is run as soon as this stop is proven. ``edited``: the
+    behaviour is not what runs any more.
     ``trying``: the words of the block that is tried alone, ``value`` what it gave. ``begun``: its scripts
     run, so that it feels what happens to robots; its process is there some tenths of a second before.
     """

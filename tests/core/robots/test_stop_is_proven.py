@@ -258,7 +258,7 @@ def test_who_is_told_of_a_late_answer_may_ask_the_stopper(stopper, pepper) -> No
     publisher = pepper._answer._spec.id
     topic, payload = pepper.described.topics.answer, json.dumps(answer).encode()
     with stopper._changed:
-        asked.unknown.append(nep.Message(topic, payload, "json", "robot/answer", publisher=publisher))
+        asked.unknown.put(nep.Message(topic, payload, "json", "robot/answer", publisher=publisher))
     stopper.see(stopper._node.graph())
     until(lambda: free == [True])
 

@@ -1,0 +1,127 @@
+"""A stop of one robot that is under way: who must answer, and who did. No sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from app.core.robots.held_messages import HeldMessages
+from app.core.robots.stop_lines import StopLine
+from app.core.robots.stop_report import RobotStop
+from app.robots.description.description import RobotTopics
+from nep.errors import NepError
+from nep.messages.message import Message
+
+MAX_ANSWER_BYTES = 65_536
+"""A longer message is no answer to a stop."""
+SHOWN_WAIT_MS = 20.0
+"""A shorter wait for the connection is not told."""
+
+
+@dataclass
+class StopRequest:
+    """What is known of each program that serves a robot, by node.
+
+    ``serving`` is empty until it is known who they are. ``unknown`` are answers of publishers that no master
+    has told of yet, ``foreign`` those of programs that do not serve the robot, by node; nothing of them is
+    decoded before it is known whose they are. ``delivered`` are the ways on which the command went out while
+    the robot was connected, since ``delivered_s`` at the earliest.
+    """
+
+    line: StopLine
+    id: str
+    sent_s: float
+    late: Callable[[RobotStop], object] | None
+    ends: str | None = None
+    error: str = ""
+    serving: dict[str, RobotStop | None] = field(default_factory=dict)
+    programs: dict[str, str] = field(default_factory=dict)
+    unknown: HeldMessages = field(default_factory=HeldMessages)
+    foreign: dict[str, HeldMessages] = field(default_factory=dict)
+    delivered: set[RobotTopics] = field(default_factory=set)
+    delivered_s: float | None = None
+    is_over: bool = False
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether nobody is waited for any more."""
+        return bool(self.error) or self.is_answered
+
+    @property
+    def is_answered(self) -> bool:
+        """Whether all who must answer have said something."""
+        return bool(self.serving) and None not in self.serving.values()
+
+    @property
+    def is_proven(self) -> bool:
+        """Whether all who must answer said that the robot stands still: nothing more can come of it."""
+        return bool(self.serving) and all(each and each.answered for each in self.serving.values())
+
+    def sent(self, way: RobotTopics, now: float) -> None:
+        """The command went out on this way, on which the robot is connected."""
+        self.delivered.add(way)
+        if self.delivered_s is None:
+            self.delivered_s = now
+
+    def news(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
+        """What has been said and was not told on yet, by node."""
+        found, waits = self.serving.items(), None in self.serving.values()
+        said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
+        return [(node, replace(each, waits=waits)) for node, each in said]
+
+    def results(self) -> list[RobotStop]:
+        """A line for each program; those that have said nothing did not answer."""
+        error = self.error or self.line.unconnected
+        if not self.serving:
+            return [RobotStop(self.line.name, False, None, error=error)]
+        return [
+            each or RobotStop(self.line.name, False, None, error=error, program=self.programs.get(node, ""))
+            for node, each in self.serving.items()
+        ]
+
+    def accept(self, node: str, message: Message, now: float, words: Callable[[object], str]) -> bool:
+        """Take a message of a program that must answer; whether it changed what is known of it.
+
+        A refusal may be followed by the word that it stands still after all; nothing else is taken back.
+        ``words`` makes the sentence of a refusal from the robot's error.
+        """
+        told = answer_in(message)
+        state = None if told is None else told.get("state")
+        if told is None or told.get("id") != self.id or state not in ("succeeded", "failed"):
+            return False
+        before, is_still = self.serving[node], state == "succeeded"
+        if before is not None and (before.answered or not is_still):
+            return False
+        waited_ms = 0.0 if self.delivered_s is None else (self.delivered_s - self.sent_s) * 1000
+        self.serving[node] = RobotStop(
+            self.line.name,
+            is_still,
+            (now - self.sent_s) * 1000,
+            error="" if is_still else words(told.get("error")),
+            refused=not is_still,
+            program=self.programs.get(node, ""),
+            node=node,
+            waited_ms=waited_ms if waited_ms > SHOWN_WAIT_MS else 0.0,
+        )
+        return True
+
+    def impostors(self) -> list[str]:
+        """The programs, by node, that answered this stop without serving the robot."""
+        return [
+            node
+            for node, held in self.foreign.items()
+            if any(
+                (told := answer_in(each)) is not None and told.get("id") == self.id for each in held.take()
+            )
+        ]
+
+
+def answer_in(message: Message) -> Mapping[str, object] | None:
+    """Return the answer to a stop in a message, or None when it is none."""
+    if message.size_bytes > MAX_ANSWER_BYTES:
+        return None
+    try:
+        payload = message.payload
+    except (NepError, RecursionError):
+        return None
+    return payload if isinstance(payload, Mapping) and payload.get("op") == "stop" else None
