@@ -150,7 +150,9 @@ def test_alerts_of_health() -> None:
     alerts, now = Alerts(), [0.0]
     real = replace(PEPPER, virtual=False)
     links = [
-        SimpleNamespace(name=name, robot=robot, virtual=robot.virtual, connected=on, goes_on="", silent=None)
+        SimpleNamespace(
+            name=name, robot=robot, virtual=robot.virtual, connected=on, goes_on="", may_move="", silent=None
+        )
         for name, robot, on in (("Nao", real, False), ("Turtle", PEPPER, False), ("Pepper", real, False))
     ]
     fleet = cast("Fleet", SimpleNamespace(links=links, claims={}))

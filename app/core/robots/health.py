@@ -253,15 +253,16 @@ class Health:
         self._unreachable = set(problems)
 
     def _check_motion(self, link: RobotLink) -> None:
-        """Tell of a robot that says itself that it could not end an action."""
-        if not (link.connected and link.goes_on):
+        """Tell of a robot that could not end an action, as it says, or may move and can't be heard."""
+        wrong = link.goes_on if link.connected and link.goes_on else link.may_move
+        if not wrong:
             self._alerts.resolve(f"moving:{link.name}")
             return
         said = _("Switch it off by hand if it does not stand still.")
         self._alerts.put(
             f"moving:{link.name}",
             "error",
-            f"{link.goes_on}.",
+            f"{wrong}.",
             said,
             button=_("Stop"),
             action="run.stop",

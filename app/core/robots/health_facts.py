@@ -140,6 +140,10 @@ def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[flo
 def _stop(link: RobotLink) -> HealthFact:
     if link.goes_on:
         return HealthFact(STOP, "error", link.goes_on)
+    if link.may_move:
+        return HealthFact(STOP, "error", link.may_move)
+    if link.connected and not link.is_reached:
+        return HealthFact(STOP, "off", _("would not arrive yet; the robot is being connected"))
     if link.stopping:
         return HealthFact(STOP, "off", _("told to stop; its answer is waited for"))
     if link.last_stop is not None:

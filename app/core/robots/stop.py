@@ -55,17 +55,23 @@ MARGIN_S = 0.5
 LONGEST_STOP_S = 10.0
 
 
-def patience_s(robots: Iterable[Robot]) -> float:
+def patience_s(robots: Iterable[Robot], longest_s: float = LONGEST_STOP_S) -> float:
     """How long these robots are waited for: longer than their drivers wait for what they stop."""
     needed_s = max((robot.safe_stop.within_s + MARGIN_S for robot in robots), default=0.0)
-    return min(LONGEST_STOP_S, max(STOP_TIMEOUT_S, needed_s))
+    return min(longest_s, max(STOP_TIMEOUT_S, needed_s))
 
 
 class RobotStopper:
     """Keeps a way to each robot and stops them. Its methods may be called from any thread."""
 
-    def __init__(self, node: StopNode, clock: Callable[[], float] = time.monotonic) -> None:
-        """No robots yet: `set_robots`."""
+    def __init__(
+        self,
+        node: StopNode,
+        clock: Callable[[], float] = time.monotonic,
+        longest_s: float = LONGEST_STOP_S,
+    ) -> None:
+        """No robots yet: `set_robots`. Their answers are waited for ``longest_s`` at most."""
+        self._longest_s = longest_s
         self._node = node
         self._clock = clock
         self._sender = f"stopper-{uuid.uuid4().hex[:8]}"
@@ -199,7 +205,9 @@ class RobotStopper:
         self._make_missing(asked)
         told: set[tuple[str, str]] = set()
         until = began + (
-            timeout_s if timeout_s is not None else patience_s(line.target.robot for line in lines)
+            timeout_s
+            if timeout_s is not None
+            else patience_s((line.target.robot for line in lines), self._longest_s)
         )
         while True:
             self._look_for(asked)

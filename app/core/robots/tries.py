@@ -112,6 +112,7 @@ class Tries:
             return
         left_s = made.left_s
         if left_s is not None and left_s < -GRACE_S:
+            link.mute = True  # until it answers
             self._send_cancel(link, made)
             self._end(
                 link,

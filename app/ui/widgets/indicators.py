@@ -34,7 +34,7 @@ SPOKEN = {
 # the status that a chip gives what `RobotLink.state` says
 ROBOT_STATUS = {
     "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
-    "away": "off",
+    "away": "off", "connecting": "off",
 }  # fmt: skip
 
 

@@ -111,7 +111,7 @@ def test_a_taken_port_leads_to_the_doctor_and_other_notes_of_the_master_do_not(c
 def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
     shown = SimpleNamespace(sensors=())
     return SimpleNamespace(
-        name="Rover", virtual=virtual, connected=connected, silent=None, robot=shown, goes_on=""
+        name="Rover", virtual=virtual, connected=connected, silent=None, robot=shown, goes_on="", may_move=""
     )
 
 

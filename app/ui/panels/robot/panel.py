@@ -143,7 +143,7 @@ class RobotPanel(OneRobotPanel):
         self._show_sound()
         if self._large is not None:
             self._large.raise_()  # a panel that comes to the front of its tabs would lie over it
-        self.chip.set(link.chip, ROBOT_STATUS.get(link.state, "ok"))
+        self.chip.set(link.chip, ROBOT_STATUS[link.state])
         if link.drawing is not None:
             now = time.monotonic()
             if link.drawing is not self._told:

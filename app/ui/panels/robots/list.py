@@ -70,7 +70,7 @@ class RobotItem(PaintedButton):
 
     def _show(self, state: str, where: str, *, away: bool) -> None:
         said = _(STATE_WORDS[state])
-        self.chip.set(said, ROBOT_STATUS.get(state, "ok"))
+        self.chip.set(said, ROBOT_STATUS[state])
         self.where, self._away = where, away
         self.setAccessibleName(f"{self.name}, {where}, {said}")
         self.update()

@@ -269,7 +269,7 @@ class RobotsPanel(OneRobotPanel):
     def _show_link(self, link: RobotLink) -> None:
         self._make_forms()
         if self._new("head", link.state, link.chip):
-            self.chip.set(link.state_words, ROBOT_STATUS.get(link.state, "ok"))
+            self.chip.set(link.state_words, ROBOT_STATUS[link.state])
         may_move = link.state in {NOT_STOPPED, STOPPING}
         for name, card in self.cards.items():
             made = link.invocations.get(name)

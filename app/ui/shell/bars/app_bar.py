@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
-from app.core.robots.robot_link import RobotLink
+from app.core.robots.robot_link import CONNECTING, RobotLink
 from app.core.run.view import connected_words
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
@@ -31,6 +31,7 @@ CHIP_WORDS = {
     "ready": lazy("{robot} ready"),
     "busy": lazy("{robot} moving"),
     "away": lazy("{robot} away"),
+    "connecting": lazy("{robot} is being connected"),
     "paused": lazy("{robot} holds still"),
     "running": lazy("{robot} running"),
 }
@@ -258,9 +259,10 @@ def robots_chip(session: Session) -> tuple[str, str]:
         if len(links) > 1:
             return _("{robot}: {state}").format(robot=silent[0].name, state=words), "error"
         return words[:1].upper() + words[1:], "error"
+    status = "off" if any(link.state == CONNECTING for link in links) else "ok"
     if len(links) > 1:
-        return ngettext("{count} robot", "{count} robots", len(links)).format(count=len(links)), "ok"
-    return _doing(session, links[0]), "ok"
+        return ngettext("{count} robot", "{count} robots", len(links)).format(count=len(links)), status
+    return _doing(session, links[0]), status
 
 
 def _doing(session: Session, link: RobotLink) -> str:
