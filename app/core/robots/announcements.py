@@ -8,7 +8,8 @@ listens to ``robot_action`` is taken for one.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from app.core.network.mailbox import Batch
@@ -47,7 +48,8 @@ class Claim:
 class _Announced:
     """A description topic: whose it is, and the newest description of each of its publishers.
 
-    ``owners`` are the nodes whose it was, the newest at the front. What they said is kept while they are not
+    ``place`` is how many topics the same node announces before it. ``owners`` are the nodes whose it was, the
+    newest at the front. What they said is kept while they are not
     listed: a latched message comes once, and a program that only slept comes back over the same connection.
     """
 
@@ -58,6 +60,8 @@ class _Announced:
     parsed: Message | None = None
     robot: Robot | None = None
     wrong: Claim | None = None
+    is_unreadable: bool = False
+    place: int = 0
     twins: tuple[Identity, ...] = ()
 
 
@@ -65,14 +69,23 @@ class Announcements:
     """The descriptions on the network, each with the program that it counts from. One thread uses it."""
 
     def __init__(
-        self, watches: Watches, senders: Senders, clock: Callable[[], float] = time.monotonic
+        self,
+        watches: Watches,
+        senders: Senders,
+        clock: Callable[[], float] = time.monotonic,
+        is_proven: Callable[[str], bool] = lambda _topic: False,
     ) -> None:
-        """``watches`` subscribes description topics; ``senders`` learns who publishes them."""
+        """``watches`` subscribes description topics; ``senders`` learns who publishes them.
+
+        The robot of a topic that ``is_proven`` (it has answered, or may move) makes room for no other.
+        """
+        self._is_proven = is_proven
         self._watches, self._senders, self._clock = watches, senders, clock
         self._may_read_s, self._looked_s = READING_S, clock()
         self._waiting: set[str] = set()
         self._topics: dict[str, _Announced] = {}
-        self._left_out = 0
+        self.left_out: tuple[str, ...] = ()
+        """Description topics of robots beyond `MOST_ROBOTS`."""
 
     def is_announced(self, topic: str) -> bool:
         """Whether somebody announces a robot on this topic now."""
@@ -85,6 +98,13 @@ class Announcements:
         for topic, known in self._topics.items():
             if known.watch is not None and known.robot is not None and known.owner is not None:
                 yield topic, known.robot, known.owner
+
+    @property
+    def unreadable(self) -> tuple[str, ...]:
+        """Description topics whose descriptions can't be used."""
+        return tuple(
+            topic for topic, known in self._topics.items() if known.is_unreadable and known.robot is None
+        )
 
     @property
     def claims(self) -> Mapping[str, Claim]:
@@ -106,12 +126,12 @@ class Announcements:
                 )
             elif known.wrong is not None:
                 found[topic] = known.wrong
-        if self._left_out:
+        if self.left_out:
             title = ngettext(
                 "{count} more robot than the {most} that Studio shows is announced.",
                 "{count} more robots than the {most} that Studio shows are announced.",
-                self._left_out,
-            ).format(count=self._left_out, most=MOST_ROBOTS)
+                len(self.left_out),
+            ).format(count=len(self.left_out), most=MOST_ROBOTS)
             found["robots"] = Claim(title, _("Find out which program announces them and close it."))
         return found
 
@@ -126,13 +146,14 @@ class Announcements:
         for topic, known in self._topics.items():
             if topic not in there:
                 self._end(known)
-        self._left_out = 0
-        for topic, nodes in there.items():
-            begun = self._topics.get(topic) or self._begin(topic)
+        left_out: list[str] = []
+        for place, topic in _fairly(there):
+            nodes = there[topic]
+            begun = self._topics.get(topic) or self._begin(topic, place, left_out)
             if begun is None:
-                self._left_out += 1
+                left_out.append(topic)
                 continue
-            known = begun
+            known, begun.place = begun, place
             if known.watch is None:
                 known.watch = self._watches.open([topic])
             if known.owner is None or known.owner.node_id not in nodes:
@@ -148,6 +169,7 @@ class Announcements:
                 if id in ids or self._senders.node_of(message) in known.owners
             }
             self._waiting.add(topic)
+        self.left_out = tuple(left_out)
         self._read()
 
     def add(self, batches: Mapping[str, Batch]) -> bool:
@@ -165,13 +187,21 @@ class Announcements:
 
     # -- inside ----------------------------------------------------------------------------------------------
 
-    def _begin(self, topic: str) -> _Announced | None:
-        """A new topic; None when there are too many. Topics that are gone make room."""
+    def _begin(self, topic: str, place: int, left_out: list[str]) -> _Announced | None:
+        """Return a new topic; None when there are too many.
+
+        Topics that are gone make room, then those of nodes that announce more robots than this one.
+        """
         if len(self._topics) >= MOST_ROBOTS:
-            gone = next((name for name, known in self._topics.items() if known.watch is None), None)
+            strangers = [name for name in self._topics if not self._is_proven(name)]
+            gone = next((name for name in strangers if self._topics[name].watch is None), None)
+            last = max(strangers, key=lambda name: self._topics[name].place, default=None)
+            if gone is None and last is not None and self._topics[last].place > place:
+                gone = last
+                left_out.append(last)
             if gone is None:
                 return None
-            del self._topics[gone]
+            self._end(self._topics.pop(gone))
         return self._topics.setdefault(topic, _Announced())
 
     def _end(self, known: _Announced) -> None:
@@ -230,7 +260,7 @@ class Announcements:
 
     def _parse(self, topic: str, newest: Message) -> None:
         known = self._topics[topic]
-        known.parsed, known.wrong = newest, None
+        known.parsed, known.wrong, known.is_unreadable = newest, None, False
         try:
             robot = announced(newest)
         except NepError:
@@ -245,12 +275,22 @@ class Announcements:
                     "It comes from {program}, whose driver is to be mended. What it said before still counts."
                 )
             )
-            known.wrong = Claim(said, words.format(program=whose))
+            known.wrong, known.is_unreadable = Claim(said, words.format(program=whose)), True
             return
         wrong = wrong_topic(robot, topic)
         known.robot = robot if wrong is None else None
         if wrong is not None:
             known.wrong = Claim(f"{wrong}.", _("Find out what this program is and close it."))
+
+
+def _fairly(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
+    """Description topics by how many the same node announces before: each node's first comes first."""
+    counts: Counter[str] = Counter()
+    placed = []
+    for topic, nodes in there.items():
+        placed.append((counts[nodes[0]], topic))
+        counts[nodes[0]] += 1
+    return sorted(placed, key=lambda each: each[0])
 
 
 class RizeNames:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
@@ -19,7 +18,9 @@ from app.core.robots.motion_gate import MotionGate, MovableRobots
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
 from app.core.robots.moved_robots import MovedRobots
 from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink, topics_of
+from app.core.robots.robot_processes import AllVirtual, RobotProcesses
 from app.core.robots.stop_lines import MOST_TOPICS, StopTarget
+from app.core.robots.stop_reach import targets_of, unlisted_targets
 from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S, StopReport
 from app.core.robots.tries import Tries
 from app.core.storage.settings import Settings
@@ -48,30 +49,6 @@ from nep.protocol.graph_view import GraphView
 
 MAX_HELD = 64
 """Answers of one publisher that no master has told of yet, kept until the next graph."""
-MAX_ABSENT = 64
-"""Robots that went away and are told to stop all the same, in case that they still hear."""
-
-
-class RobotProcesses(Protocol):
-    """What is needed to know about the processes of robots."""
-
-    def is_ours(self, identity: Identity) -> bool:
-        """Whether this program is a virtual robot of this person."""
-
-    def has_ended(self, identity: Identity) -> bool:
-        """Whether it is sure that this program runs no more."""
-
-
-class AllVirtual:
-    """Believes every robot that says that it is virtual (what tests need)."""
-
-    def is_ours(self, identity: Identity) -> bool:  # noqa: ARG002
-        """All are."""
-        return True
-
-    def has_ended(self, identity: Identity) -> bool:  # noqa: ARG002
-        """Nobody knows."""
-        return False
 
 
 class Fleet:
@@ -96,7 +73,8 @@ class Fleet:
         self._links: dict[str, RobotLink] = {}
         self._processes = processes if processes is not None else AllVirtual()
         self._senders = Senders()
-        self._announcements = Announcements(watches, self._senders, clock)
+        self._announcements = Announcements(watches, self._senders, clock, self._is_proven)
+        self._unlisted: tuple[StopTarget, ...] = ()
         self._names: dict[str, str] = {}
         self._view = GraphView(0, 0)
         self._held: dict[str, HeldMessages] = {}
@@ -247,33 +225,17 @@ class Fleet:
     @property
     def stoppable(self) -> tuple[str, ...]:
         """The robots that a Stop of all robots tells and waits for."""
-        return tuple(dict.fromkeys((*(link.name for link in self.connected), *self.moved.names)))
+        unlisted = (target.robot.name for target in self._unlisted if target.is_expected)
+        return tuple(dict.fromkeys((*(link.name for link in self.connected), *self.moved.names, *unlisted)))
 
     @property
     def stop_targets(self) -> tuple[StopTarget, ...]:
-        """Where those are told, and robots that went away after they had proven a stop or answered."""
-        here, absent = [], []
-        for link in self._links.values():
-            is_expected = link.connected or link.name in self.moved
-            earlier = self.moved.other_programs(link.name, link.identity)
-            target = StopTarget(link.robot, link.identity, earlier, link.topics_before, is_expected)
-            if is_expected:
-                here.append(target)
-            elif link.has_proven_stop or link.answered_s is not None:
-                absent.append(target)
-        return (*here, *absent[:MAX_ABSENT])
+        """Where robots are told to stop, also those that nobody waits for."""
+        return targets_of(self._links.values(), self.moved, self._unlisted)
 
     @staticmethod
     def _is_heard(link: RobotLink | None) -> bool:
         return link is not None and link.connected and not link.mute
-
-    def prove(self, report: StopReport, mark: int) -> None:
-        """Take over which robots a Stop that began at ``mark`` (`MovedRobots.mark`) proved to stand still."""
-        self.moved.note((name for name in report.silent if name not in self.moved), "stop")
-        for name in report.still:
-            self.moved.stood_still(name, report.programs(name), mark)
-        for name in set(report.names) - {*report.silent, *report.still}:
-            self.moved.told(name, mark)
 
     def stopped(self, words: Mapping[str, tuple[str, str]], report: StopReport) -> None:
         """Take over what robots did with a Stop; ``words`` say it by robot, each with its status.
@@ -316,6 +278,11 @@ class Fleet:
         topics = (self._topics_that_count(link.robot) for link in self._links.values())
         self._senders.learn(view, {rize.ANSWERS}.union(*topics))
         self._follow_announced()
+        known = self._announcements
+        self._unlisted = (
+            *unlisted_targets(view, known.left_out),
+            *unlisted_targets(view, known.unreadable, is_expected=False),
+        )
         self._update_rize(view)
         held, self._held = self._held, {}
         for name, messages in held.items():
@@ -385,6 +352,10 @@ class Fleet:
         link.may_move = motion.sentence if motion is not None and not self._is_heard(link) else ""
         if motion is None:
             link.not_stopped = ""
+
+    def _is_proven(self, topic: str) -> bool:
+        link = self._links.get(self._names.get(topic, ""))
+        return link is not None and (link.has_proven_stop or link.name in self.moved)
 
     def _get(self, name: str) -> RobotLink:
         link = self._links.get(name)
@@ -461,7 +432,8 @@ class Fleet:
         link.connected, link.gone_s = True, None
         if before.topics != robot.topics or before.dialect != robot.dialect:
             if before.dialect == robot.dialect:
-                link.topics_before = tuple(dict.fromkeys((before.topics, *link.topics_before)))[:MOST_TOPICS]
+                known = dict.fromkeys((*link.topics_before, before.topics))
+                link.topics_before = tuple(known)[:MOST_TOPICS]
             self._leave_topics(link)
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.answer])

@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from app.core.robots.stop_report import StopReport
 from app.robots.identity import Identity
 from nep.i18n import _, lazy
 
@@ -161,6 +162,14 @@ class MovedRobots:
                 )
             ),
         )
+
+    def take(self, report: StopReport, mark: int) -> None:
+        """Take over what a Stop that began at ``mark`` proved, and which robots it did not prove still."""
+        self.note((name for name in report.silent if name not in self), "stop")
+        for name in report.still:
+            self.stood_still(name, report.programs(name), mark)
+        for name in set(report.names) - {*report.silent, *report.still}:
+            self.told(name, mark)
 
     def told(self, name: str, mark: int) -> None:
         """A robot that can't confirm (RIZE) was told to stop at ``mark``; nothing more can be known."""

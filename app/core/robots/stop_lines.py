@@ -12,8 +12,8 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
-MOST_TOPICS = 8
-"""So many command topics of one robot are kept, of earlier descriptions too."""
+MOST_TOPICS = 32
+"""So many command topics of one robot are kept: the present ones, and the first of earlier descriptions."""
 
 
 class StopPublisher(Protocol):

@@ -1,4 +1,4 @@
-"""A network without sockets: robots that obey, freeze, die and come back, and strangers that send anything."""
+"""A network without sockets: robots that obey, freeze, die and come back, and strangers."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ class FakeNetwork:
             for sink_of_all in self._session_sinks:
                 sink_of_all(topic, [message])
 
-    def graph(self, timeout_s: float = 2.0) -> GraphView:  # noqa: ARG002
+    def graph(self, timeout_s: float = 2.0) -> GraphView:
         """Who is there, strangers first."""
         self._revision += 1
         nodes: dict[str, NodeInfo] = {
@@ -197,10 +197,10 @@ class FakeNetwork:
 
     # ---- Studio's node
 
-    def new_pub(self, topic: str, msg_type: str = "json", **_how: object) -> FakePublisher:  # noqa: ARG002
+    def new_pub(self, topic: str, msg_type: str = "json", **_how: object) -> FakePublisher:
         return FakePublisher(self, topic)
 
-    def new_sub(self, topic: str, msg_type: str = "json", *, sink: Answers, **_how: object) -> FakeSubscriber:  # noqa: ARG002
+    def new_sub(self, topic: str, msg_type: str = "json", *, sink: Answers, **_how: object) -> FakeSubscriber:
         return FakeSubscriber(self.sinks, topic, sink)
 
     # ---- the session's source
@@ -220,7 +220,7 @@ class FakeNetwork:
     def unwatch(self, topic: str) -> None:
         self._watched.discard(topic)
 
-    def submit(self, what: str, job: Job) -> None:  # noqa: ARG002
+    def submit(self, what: str, job: Job) -> None:
         try:
             job(cast("Node", self))
         except NepError:

@@ -1,4 +1,4 @@
-"""Which robots a Stop must name: entered when told to move, removed only by proof, a seen end, or a person."""
+"""Ledger of robots that may move: entered when told to, removed by proof, a seen end, or a person."""
 
 from __future__ import annotations
 

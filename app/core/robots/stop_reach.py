@@ -1,0 +1,85 @@
+"""Whom a Stop reaches: robots that are there, may move, were there, or are not shown. No sockets.
+
+Not shown are robots beyond the limit of the list and those whose description can't be used: they are reached
+at the command topics that the graph knows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from app.core.robots.moved_robots import MovedRobots
+from app.core.robots.robot_link import RobotLink
+from app.core.robots.stop_lines import StopTarget
+from app.robots.description.description import Robot, RobotTopics, SafeStop, topic_of
+from app.robots.identity import hearing, identity_of, publishing
+from nep.protocol.graph_view import GraphView
+
+MAX_UNLISTED = 256
+"""So many have a way that Stop can use; further ones are named by it as not told."""
+MAX_ABSENT = 64
+"""Robots that went away after they had answered, and are told in case that they still hear."""
+_COMMAND, _ANSWER = "robot/command", "robot/answer"
+_STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, confirmed=True)
+
+
+def targets_of(
+    links: Iterable[RobotLink], moved: MovedRobots, unlisted: Sequence[StopTarget]
+) -> tuple[StopTarget, ...]:
+    """Return where robots are told to stop; nobody waits for those that went away and do not move."""
+    here, absent = [], []
+    for link in links:
+        is_expected = link.connected or link.name in moved
+        earlier = moved.other_programs(link.name, link.identity)
+        target = StopTarget(link.robot, link.identity, earlier, link.topics_before, is_expected)
+        if is_expected:
+            here.append(target)
+        elif link.has_proven_stop or link.answered_s is not None:
+            absent.append(target)
+    names = {target.robot.name for target in here}
+    others = [target for target in unlisted if target.robot.name not in names]
+    return (*here, *absent[:MAX_ABSENT], *others[:MAX_UNLISTED])
+
+
+def unlisted_targets(
+    view: GraphView, topics: Iterable[str], *, is_expected: bool = True
+) -> tuple[StopTarget, ...]:
+    """Return where the robots of these description topics are told to stop.
+
+    Those whose commands nobody hears are left out: nothing could be stopped.
+    """
+    wanted = [topic for topic in topics if topic_of(_name_of(topic), "description") == topic]
+    if not wanted:
+        return ()
+    heard, answered = _by_node(view, _COMMAND), _by_node(view, _ANSWER)
+    found = []
+    for topic in wanted:
+        name, nodes = _name_of(topic), publishing(view, topic)
+        node = nodes[0] if nodes else ""
+        home = topic_of(name, "command")
+        own = [each for each in heard.get(node, ()) if each != home]
+        commands = [*([home] if hearing(view, home) else []), *own]
+        answers = answered.get(node, ())
+        answer = topic_of(name, "answer")
+        answer = answer if answer in answers or not answers else answers[0]
+        ways = [RobotTopics(topic, command, answer) for command in commands]
+        if ways:
+            robot = Robot(name, "", name, False, "native", (), (), (), _STOP, (), ways[0], {})
+            identity = identity_of(view, node) if node else None
+            found.append(StopTarget(robot, identity, topics=tuple(ways[1:]), is_expected=is_expected))
+    return tuple(found)
+
+
+def _name_of(topic: str) -> str:
+    return topic.removesuffix("/description").strip("/")
+
+
+def _by_node(view: GraphView, msg_type: str) -> Mapping[str, list[str]]:
+    """The topics of a type that each node hears (commands) or publishes (answers)."""
+    found: dict[str, list[str]] = {}
+    for topic, info in view.topics.items():
+        if info.msg_type == msg_type:
+            nodes = hearing(view, topic) if msg_type == _COMMAND else publishing(view, topic)
+            for node in nodes:
+                found.setdefault(node, []).append(topic)
+    return found
