@@ -1,4 +1,7 @@
-"""`python -m app run FILE`: a behaviour with no window, on the virtual robot."""
+"""`python -m app run FILE`: a behaviour with no window, on the virtual robot.
+
+`tests/test_readme.py` runs an example to its end.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from tests.e2e.behaviours import EXAMPLES, forever, say, started, turn, write
+from tests.e2e.behaviours import forever, say, started, turn, write
 from tests.e2e.programs import Program
 
 pytestmark = pytest.mark.timeout(240)
@@ -23,15 +26,6 @@ def pepper(master: Master) -> Iterator[Program]:
 
 def run(file: Path, *arguments: str) -> Program:
     return Program("-m", "app", "run", str(file), *arguments)
-
-
-def test_an_example_runs_to_its_end(pepper: Program) -> None:
-    with run(EXAMPLES / "1-greeting.nepb", "--robot-wait", "30") as program:
-        program.says("“Greeting” runs", 40)
-        program.says("Pepper says “Hello! I am Pepper.”")
-        assert program.wait(60) == 0, program.lines
-        assert any(line.startswith("Pepper stopped (") for line in program.lines)
-        assert any(line.startswith("ended after ") for line in program.lines)
 
 
 def test_ctrl_c_stops_program_and_robot(pepper: Program, tmp_path: Path) -> None:
