@@ -122,7 +122,9 @@ class Node(ServiceNode):
             computer=computer_id(),
         )
         self._transport: Transport = self._backend.open(record)
-        self._services = OwnedServices(self._transport, self._backend, self._wait_s, self._new_id, self._wake)
+        self._services = OwnedServices(
+            self._transport, self._backend, self._wait_s, self._new_id, self._wake, self._closed_error
+        )
         self._work = Work(name, self._transport, time.monotonic, self._services)
         _alive.add(self)
         _close_with_worker()
@@ -213,8 +215,10 @@ class Node(ServiceNode):
         publisher = Publisher(transport, spec, self._publishers.discard, is_strict=self._is_strict)
         with self._lock:
             self._publishers.add(publisher)
-            if self._is_closed:
-                publisher.node_closes()
+            is_late = self._is_closed
+        if is_late:
+            publisher.close(0.0)
+            raise self._closed_error()
         return publisher
 
     def new_sub(
@@ -356,6 +360,10 @@ class Node(ServiceNode):
         subscriber = new_subscriber(transport, spec, self._forget, msg_type)
         with self._lock:
             self._subscribers.add(subscriber)
+            is_late = self._is_closed
+        if is_late:
+            subscriber.close()
+            raise self._closed_error()
         return subscriber
 
     def _forget(self, subscriber: Subscriber) -> None:
@@ -422,6 +430,7 @@ class Node(ServiceNode):
         """Unregister and end; what was published is delivered first, within `timeout_s`. May be called twice.
 
         What could not be delivered is logged as a warning. Happens by itself when the interpreter ends.
+        `new_pub`, `new_sub` and the like raise `ClosedError` when it comes while another thread is in them.
         """
         limit("timeout_s", timeout_s)
         _close((self,), timeout_s)

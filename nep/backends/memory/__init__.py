@@ -10,14 +10,15 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
 from nep.backends.memory.services import MemoryClient, MemoryServer, MemoryServices, ServiceHub
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
 from nep.backends.waking import WakingSubscriber
-from nep.errors import NepError
+from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.clocks import OWN_CLOCK
 from nep.messages.encoded import Encoded
@@ -68,8 +69,8 @@ class _Hub(ServiceHub):
     def forget(self, node_id: str) -> None:
         """A node leaves."""
         with self.lock:
-            self.transports.pop(node_id, None)
-            self.ask(requests.Leave(node_id))
+            if self.transports.pop(node_id, None) is not None:
+                self.ask(requests.Leave(node_id))
 
     def view(self) -> GraphView:
         """The graph with everybody's statistics of this moment."""
@@ -197,6 +198,8 @@ class MemorySubscriber(WakingSubscriber):
     def put(self, message: Message) -> None:
         """Called by publishers."""
         with self._transport.changed:
+            if self.is_closed:
+                return
             dropped = self.inbox.put(message)
             self.received += 1 - dropped
             self.lost += dropped
@@ -210,7 +213,7 @@ class MemorySubscriber(WakingSubscriber):
     def poll(self) -> Message | None:
         """The next message if one is there."""
         with self._transport.changed:
-            return self.inbox.take()
+            return None if self.is_closed else self.inbox.take()
 
     def receive(self, timeout_s: float) -> Message | None:
         """The next message, waited for."""
@@ -245,6 +248,7 @@ class MemorySubscriber(WakingSubscriber):
             self.hub.ask(requests.RemoveSubscriber(self._transport.node.id, self.spec.id))
         self._transport.wake()
         with self._changed:
+            self.inbox.take_all()
             self.tell_waiting()
 
 
@@ -256,18 +260,16 @@ class MemoryTransport:
         self.changed = threading.Condition()
         self._wakes = 0
         self._load = CpuLoad()
-        self._hubs: set[_Hub] = set()
         self._publishers: tuple[MemoryPublisher, ...] = ()
         self._subscribers: tuple[MemorySubscriber, ...] = ()
         self._sinks: list[MemorySubscriber] = []
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
-        self._services = MemoryServices(node, self._join)
+        self._services = MemoryServices(node, self._joined)
 
     def publisher(self, spec: PublisherSpec) -> MemoryPublisher:
         """Register a publisher."""
-        hub = self._join(spec.configuration)
-        with hub.lock:
+        with self._joined(spec.configuration) as hub:
             record = PublisherRecord(
                 spec.id,
                 spec.topic,
@@ -285,8 +287,7 @@ class MemoryTransport:
 
     def subscriber(self, spec: SubscriberSpec) -> MemorySubscriber:
         """Register a subscriber, and hand it what is latched."""
-        hub = self._join(spec.configuration)
-        with hub.lock:
+        with self._joined(spec.configuration) as hub:
             record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, pattern=spec.is_pattern)
             hub.ask(requests.AddSubscriber(self.node, record))
             subscriber = MemorySubscriber(self, hub, spec)
@@ -375,18 +376,23 @@ class MemoryTransport:
         self._sinks = []
         for publisher in self._publishers:
             publisher.close(timeout_s)
-        for hub in self._hubs:
+        with _hubs_lock:
+            hubs = tuple(_hubs.values())
+        for hub in hubs:
             hub.forget(self.node.id)
         self.wake()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(timeout_s)
 
-    def _join(self, configuration: Configuration) -> _Hub:
+    @contextmanager
+    def _joined(self, configuration: Configuration) -> Iterator[_Hub]:
+        """The hub that this node is in, with its lock held. Raises `ClosedError`."""
         hub = _hub(configuration)
-        with hub.lock:
+        with hub.lock:  # whoever closes the node takes it once more after `_closing` is set
+            if self._closing.is_set():
+                raise ClosedError(f"node '{self.node.name}'")
             hub.transports[self.node.id] = self
-            self._hubs.add(hub)
-        return hub
+            yield hub
 
     def _pour(self, subscriber: MemorySubscriber) -> None:
         with self.changed:  # who closes the node meanwhile finds no thread, or one that has begun

@@ -8,6 +8,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 from nep.backends.connection import Configuration
@@ -285,19 +286,20 @@ class MemoryClient:
 
 
 class MemoryServices:
-    """The servers and clients of one node. Part of `MemoryTransport`; `join` gives the hub."""
+    """The servers and clients of one node. Part of `MemoryTransport`; `joined` gives the hub, locked."""
 
-    def __init__(self, node: NodeRecord, join: Callable[[Configuration], ServiceHub]) -> None:
+    def __init__(
+        self, node: NodeRecord, joined: Callable[[Configuration], AbstractContextManager[ServiceHub]]
+    ) -> None:
         self._node = node
-        self._join = join
+        self._joined = joined
         self._deadlines = Deadlines(node.name)
         self._servers: tuple[MemoryServer, ...] = ()
         self._clients: tuple[MemoryClient, ...] = ()
 
     def server(self, spec: ServerSpec) -> MemoryServer:
         """Register a server; it gets the calls that wait."""
-        hub = self._join(spec.configuration)
-        with hub.lock:
+        with self._joined(spec.configuration) as hub:
             record = PublisherRecord(
                 spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, ("memory",), number=spec.number
             )
@@ -311,8 +313,7 @@ class MemoryServices:
 
     def client(self, spec: ClientSpec) -> MemoryClient:
         """Register a client."""
-        hub = self._join(spec.configuration)
-        with hub.lock:
+        with self._joined(spec.configuration) as hub:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
             hub.ask(requests.AddSubscriber(self._node, record))
             client = MemoryClient(self._node.id, hub, spec, self._deadlines)

@@ -125,5 +125,9 @@ class NanomsgTransport(ZeromqTransport):
         with closed_on_error(readable.close):
             self._attached[spec.id] = readable.endpoint
             self._keep(subscriber)
-        io.add(subscriber)
+        try:
+            self._serve(io, subscriber)
+        except BaseException:
+            subscriber.close()
+            raise
         return subscriber

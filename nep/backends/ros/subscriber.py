@@ -209,7 +209,7 @@ class RospySubscriber(WakingSubscriber):
     def poll(self) -> Message | None:
         """The next message if one is there. Raises `RosShutdownError` when none can come any more."""
         with self._owner.changed:
-            message = self.inbox.take()
+            message = None if self.is_closed else self.inbox.take()
         if message is None and self.process.is_over and not self.is_closed:
             raise RosShutdownError
         return message
@@ -238,6 +238,7 @@ class RospySubscriber(WakingSubscriber):
             if self.is_closed:
                 return
             self.is_closed = True
+            self.inbox.take_all()
             self.tell_waiting()
             self.process.subscribed[self.topic] -= 1
         self.process.at_shutdown.discard(self._rospy_ends)

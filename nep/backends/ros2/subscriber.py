@@ -233,6 +233,8 @@ class Ros2Subscriber(WakingSubscriber):
 
     def _put(self, messages: list[Message]) -> None:
         with self._transport.changed:
+            if self.is_closed:
+                return
             for message in messages:
                 dropped = self.inbox.put(message)
                 self.received += 1 - dropped
@@ -249,7 +251,7 @@ class Ros2Subscriber(WakingSubscriber):
     def poll(self) -> Message | None:
         """The next message if one is there."""
         with self._transport.changed:
-            return self.inbox.take()
+            return None if self.is_closed else self.inbox.take()
 
     def receive(self, timeout_s: float) -> Message | None:
         """The next message, waited for."""
@@ -312,6 +314,7 @@ class Ros2Subscriber(WakingSubscriber):
                 self._participant.withdraw(self._transport.node.id, "reader", reader)
             self._readers.clear()
         with self._transport.changed:
+            self.inbox.take_all()
             self.tell_waiting()
         self._transport.forget(self)
         self._transport.wake()

@@ -364,6 +364,11 @@ class SharedContext:
                 return
         waker.close()
 
+    def join(self) -> None:
+        """Count one more user of a context that has one: it is not terminated before `leave`."""
+        with _lock:
+            self.users += 1
+
     def leave(self) -> None:
         """Whoever joined has closed all its sockets. The last one ends thread and context."""
         with _lock:

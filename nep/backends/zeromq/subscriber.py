@@ -346,6 +346,7 @@ class SocketSubscriber(Generic[R]):
             self.is_closed = True
             self.payloads.clear()
             self.ready.clear()
+            self._inbox.take_all()
             self._wake_waiters()
         self._on_close(self.spec.id)
         self._io.remove(self)

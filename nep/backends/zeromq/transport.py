@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
+from typing import Any, Protocol
 from weakref import WeakSet
 
 import zmq
@@ -19,7 +19,7 @@ from nep.backends.base import (
     SubscriberSpec,
     SubscriberTransport,
 )
-from nep.backends.connection import Configuration, Direct
+from nep.backends.connection import Configuration, Direct, Hybrid
 from nep.backends.services import (
     CallQueue,
     ClientSpec,
@@ -143,9 +143,13 @@ class ZeromqTransport:
 
     def publisher(self, spec: PublisherSpec) -> PublisherTransport:
         """A new publisher. See `Transport.publisher`."""
-        if isinstance(spec.configuration, Direct):
-            return self._direct_publisher(spec, spec.configuration)
-        session = self._session(spec.configuration.master)
+        with self._opening():
+            if isinstance(spec.configuration, Direct):
+                return self._direct_publisher(spec, spec.configuration)
+            return self._native_publisher(spec, spec.configuration)
+
+    def _native_publisher(self, spec: PublisherSpec, configuration: Hybrid) -> MasteredPublisher:
+        session = self._session(configuration.master)
         session.wait_for_name(spec.wait_s)
         closer = self._publisher_closer(lambda: session.remove_publisher(spec.id, publisher.count))
         # Made before the socket is bound: what it sets applies to connections of later binds only.
@@ -209,7 +213,7 @@ class ZeromqTransport:
         with self._lock:
             self._check_open()
             self._publishers[publisher.spec.id] = publisher
-        self._io.add(publisher)
+            self._io.add(publisher)  # before `close` can remove it, which takes this lock first
 
     def _publisher_closer(self, unregister: Callable[[], None]) -> Callable[[OwnedPublisher, float], None]:
         def close(publisher: OwnedPublisher, timeout_s: float) -> None:
@@ -228,9 +232,15 @@ class ZeromqTransport:
 
     def subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
         """A new subscriber. See `Transport.subscriber`."""
-        if isinstance(spec.configuration, Direct):
-            return self._direct_subscriber(spec, spec.configuration)
-        session = self._session(spec.configuration.master)
+        with self._opening():
+            if isinstance(spec.configuration, Direct):
+                return self._direct_subscriber(spec, spec.configuration)
+            return self._native_subscriber(spec, spec.configuration)
+
+    def _native_subscriber(
+        self, spec: SubscriberSpec, configuration: Hybrid
+    ) -> NativeSubscriber | PatternSubscriber:
+        session = self._session(configuration.master)
         session.wait_for_name(spec.wait_s)
 
         def forget(subscriber: int) -> None:
@@ -258,7 +268,7 @@ class ZeromqTransport:
                 )
             subscriber.begin(reply.publishers)
             if isinstance(subscriber, NativeSubscriber):
-                io.add(subscriber)
+                self._serve(io, subscriber)
             with self._waker() as waker:
                 subscriber.wait_for((each.publisher.id for each in reply.publishers), HANDSHAKE_S, waker)
         except BaseException:
@@ -280,8 +290,8 @@ class ZeromqTransport:
         with closed_on_error(socket.close):
             self._attached[spec.id] = attach(socket, direct, is_publisher=False)
             self._keep(subscriber)
-        io.add(subscriber)
         try:
+            self._serve(io, subscriber)
             if isinstance(subscriber, NativeSubscriber):
                 with self._waker() as waker:
                     subscriber.wait_for_any(DIRECT_WAIT_S, waker)
@@ -307,6 +317,27 @@ class ZeromqTransport:
             self._check_open()
             self._subscribers[subscriber.spec.id] = subscriber
 
+    def _serve(self, io: IoThread, subscriber: SocketSubscriber[Any]) -> None:
+        """Serve a subscriber unless it was closed meanwhile. Raises `ClosedError`."""
+        with self._lock:
+            if subscriber.spec.id not in self._subscribers:
+                raise ClosedError(f"node '{self._node.name}'")
+            io.add(subscriber)  # before `close` can remove it, which takes this lock first
+
+    @contextmanager
+    def _opening(self) -> Iterator[None]:
+        """Keep the context while sockets are opened in it, also when `close` ends the last node meanwhile.
+
+        Raises `ClosedError`.
+        """
+        with self._lock:
+            self._check_open()
+            self._shared.join()
+        try:
+            yield
+        finally:
+            self._shared.leave()
+
     def _check_open(self) -> None:
         """With the lock held. Raises `ClosedError`."""
         if self._is_closed:
@@ -327,15 +358,18 @@ class ZeromqTransport:
 
     def server(self, spec: ServerSpec) -> ServerTransport:
         """A new server. See `ServiceTransport.server`."""
-        return self._services.server(spec)
+        with self._opening():
+            return self._services.server(spec)
 
     def client(self, spec: ClientSpec) -> ClientTransport:
         """A new client. See `ServiceTransport.client`."""
-        return self._services.client(spec)
+        with self._opening():
+            return self._services.client(spec)
 
     def survey(self, spec: ClientSpec) -> SurveyTransport:
         """A new surveyor. See `ServiceTransport.survey`."""
-        return self._services.survey(spec)
+        with self._opening():
+            return self._services.survey(spec)
 
     # ---- waiting
 
@@ -417,7 +451,8 @@ class ZeromqTransport:
         """Who is there. See `Transport.graph`."""
         if isinstance(configuration, Direct):
             raise NepError(_("a direct connection has no master; ask with a hybrid one"))
-        return self._session(configuration.master).look(timeout_s)
+        with self._opening():
+            return self._session(configuration.master).look(timeout_s)
 
     def begin_close(self) -> None:
         """Say that all ends here, and wait for nothing. See `Transport.begin_close`."""

@@ -10,7 +10,7 @@ from typing import TypeVar, cast
 from nep.backends.base import Backend, Transport
 from nep.backends.connection import Configuration
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec, ServiceTransport
-from nep.errors import NepError
+from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.codecs import Codec, codec_numbered
 from nep.patterns.services.client import Client
@@ -28,7 +28,8 @@ S = TypeVar("S", bound=Server)
 class OwnedServices:
     """Makes them through the node's transport, and ends them with the node. May be used from any thread.
 
-    `new_id` gives the id of each, and the number that proves it. `wake` wakes who spins.
+    `new_id` gives the id of each, and the number that proves it. `wake` wakes who spins. `closed_error` makes
+    what is raised when the node was closed meanwhile.
     """
 
     def __init__(
@@ -38,7 +39,10 @@ class OwnedServices:
         wait_s: float | None,
         new_id: Callable[[], tuple[int, int]],
         wake: Callable[[], None],
+        closed_error: Callable[[], ClosedError],
     ) -> None:
+        self._closed_error = closed_error
+        self._is_closed = False
         self._transport = transport
         self._backend = backend
         self._wait_s = wait_s
@@ -100,6 +104,7 @@ class OwnedServices:
         with self._lock:
             self._servers = (*self._servers, made)
             self.has_servers = True
+        self._check_open(made)
         self._wake()  # who spins already answers its calls now
         return made
 
@@ -117,6 +122,7 @@ class OwnedServices:
         made = Client(self._able().client(spec), service, spec.codec, limit_s, self._forget, types)
         with self._lock:
             self._clients = (*self._clients, made)
+        self._check_open(made)
         return made
 
     def surveyor(
@@ -134,7 +140,14 @@ class OwnedServices:
         made = Surveyor(able.survey(spec), spec.service, spec.codec, limit_s, self._forget, types)
         with self._lock:
             self._clients = (*self._clients, made)
+        self._check_open(made)
         return made
+
+    def _check_open(self, made: Server | Client | Surveyor) -> None:
+        """Close what was made while the node was closed, which may not know of it. Raises `ClosedError`."""
+        if self._is_closed:
+            made.close()
+            raise self._closed_error()
 
     def _client_spec(self, service: str, configuration: Configuration, msg_type: str) -> ClientSpec:
         codec_of = self._backend.codec_of_calls or self._backend.codec_for
@@ -189,6 +202,8 @@ class OwnedServices:
     def finish_calls(self, timeout_s: float) -> None:
         """The transport takes no calls any more: wait for those that threads of the servers carry out."""
         deadline = time.monotonic() + timeout_s
+        with self._lock:
+            self._is_closed = True
         for server in self._servers:
             server.join(max(0.0, deadline - time.monotonic()))
 
@@ -207,6 +222,7 @@ class OwnedServices:
     def forked(self) -> None:
         """In a child that was forked. See `nep.system.forks`."""
         self._lock = threading.Lock()
+        self._is_closed = True
         for server in self._servers:
             server.forked()
         for client in self._clients:

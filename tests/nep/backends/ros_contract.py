@@ -52,6 +52,7 @@ for _name in (
     "test_a_full_inbox_drops_the_oldest_and_counts",
     "test_a_callback_s_full_inbox_drops_the_oldest_and_counts",
     "test_what_can_still_be_changed_is_copied",
+    "test_closing_discards_unread_messages",
 ):
     globals()[_name] = getattr(contract, _name)
 

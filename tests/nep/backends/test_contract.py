@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import threading
@@ -516,6 +517,21 @@ def test_closing(make: Make) -> None:
         node.new_sub("topic")
 
 
+def test_closing_discards_unread_messages(make: Make) -> None:
+    sub, pub = make("b").new_sub("unread", "json"), make("a").new_pub("unread", "json")
+    for n in range(3):
+        pub.publish(n)
+    eventually(lambda: sub.received == 3)
+    assert sub.listen() == (True, 0)
+    sub.close()
+    pub.publish(3)
+    with pytest.raises(nep.ClosedError):
+        sub.listen()
+    assert [
+        each for each in gc.get_objects() if isinstance(each, nep.Message) and each.topic == "unread"
+    ] == []
+
+
 def test_a_reader_in_another_thread_is_released_by_closing(make: Make) -> None:
     node = make("b")
     sub = node.new_sub("topic")
@@ -534,6 +550,38 @@ def test_a_reader_in_another_thread_is_released_by_closing(make: Make) -> None:
     node.close()
     thread.join(30.0)
     assert ended == ["raised", "stopped"]
+
+
+@pytest.mark.usefixtures("frequent_switching")
+def test_opening_while_another_thread_closes_the_node_raises_closed_error(make: Make) -> None:
+    raised: list[BaseException] = []
+
+    def open_all(node: nep.Node, has_begun: threading.Event) -> None:
+        try:
+            while True:
+                has_begun.set()
+                for n in "abc":
+                    node.new_sub(f"closing/{n}")
+                    node.new_server(f"closing/{n}", str)
+                    node.new_client(f"closing/{n}")
+                    node.new_callback(f"closing/{n}", "json", print)
+                    node.new_pub(f"closing/{n}")
+        except BaseException as error:  # noqa: BLE001 - whatever it is, it is judged below
+            raised.append(error)
+
+    for _ in range(8):
+        node, has_begun = make("closing"), threading.Event()
+        threads = [threading.Thread(target=open_all, args=(node, has_begun)) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        has_begun.wait(30.0)
+        node.close()
+        for thread in threads:
+            thread.join(30.0)
+    assert [each for each in raised if not isinstance(each, nep.ClosedError)] == []
+    assert len(raised) == 16
+    other = make("other")
+    eventually(lambda: "closing" not in names(other.graph()), 5.0)
 
 
 def test_the_graph_knows_everybody(make: Make) -> None:

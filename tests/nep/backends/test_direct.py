@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import threading
 from collections.abc import Iterator
 
 import cv2
@@ -171,3 +172,29 @@ def test_what_cannot_be() -> None:
                 node.direct(port=port)
         with pytest.raises(nep.NepError, match="'memory' has no direct connections"):
             node.new_pub("t", "json", node.direct())
+
+
+@pytest.mark.usefixtures("frequent_switching")
+def test_opening_while_another_thread_closes_the_last_node_raises_closed_error() -> None:
+    """The context of ZeroMQ ends with the last node, but not while another thread opens a socket in it."""
+    raised: list[BaseException] = []
+
+    def subscribe(node: nep.Node, has_begun: threading.Event) -> None:
+        try:
+            while True:
+                node.new_sub("t", "json", node.direct("127.0.0.1", 1))
+                has_begun.set()
+        except BaseException as error:  # noqa: BLE001 - whatever it is, it is judged below
+            raised.append(error)
+
+    for _ in range(60):
+        node, has_begun = nep.node("closing", master="127.0.0.1:1"), threading.Event()
+        threads = [threading.Thread(target=subscribe, args=(node, has_begun)) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        has_begun.wait(30.0)
+        node.close()
+        for thread in threads:
+            thread.join(30.0)
+    assert [each for each in raised if not isinstance(each, nep.ClosedError)] == []
+    assert len(raised) == 180

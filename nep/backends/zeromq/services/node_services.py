@@ -110,13 +110,17 @@ class ZeromqServices:
 
     def _hold(self, owner: RouterServer | TcpServer | SocketClient) -> None:
         with self._lock:
-            if self._is_closed:
-                raise ClosedError(f"node '{self._node_name}'")
+            self._check_open()
             if isinstance(owner, SocketClient):
                 self._clients.add(owner)
             else:
                 self._servers.add(owner)
-        self._shared.io.add(owner)
+            self._shared.io.add(owner)  # before `close` can remove it, which takes this lock first
+
+    def _check_open(self) -> None:
+        """With the lock held. Raises `ClosedError`."""
+        if self._is_closed:
+            raise ClosedError(f"node '{self._node_name}'")
 
     # ---- clients
 
@@ -160,6 +164,7 @@ class ZeromqServices:
 
         survey = SurveyClient(spec, ask_at, close)
         with self._lock:
+            self._check_open()
             self._surveys.add(survey)
         try:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
