@@ -1,6 +1,6 @@
 """The paper's two scenarios: ping-pong between two programs, by nep and by what there is beside it.
 
-    python3 dev.py bench paper                  both, six minutes
+    python3 dev.py bench paper                  both: four minutes, and most of an hour for 200 trips a size
     python3 dev.py bench paper -- --write       and make docs/figures.md of it, with its pictures
     python3 dev.py bench paper -- --scenarios local --rows nep --kinds string json --seconds 60
     python3 dev.py bench paper -- --from docs/figures.json --write      make them again, without measuring
@@ -10,12 +10,14 @@
 
 Each message is encoded, sent, received, decoded, and the same way back; both ends are processes of their own
 that do nothing else (`paper_ends.py`). Kinds are the paper's `string` and `json` (a map with one text), and
-`bytes`. All rows, kinds and sizes are interleaved in random order in each block, until the time is over.
+`bytes`. All rows, kinds and sizes are interleaved in random order in each block: of L-local there are as many
+as there is time for, of R-remote ten with twenty trips of each size.
 "plain again" is plain pyzmq against itself: a size counts only when that is within 5 %.
 
 Rows that cannot be run say why, and the others are measured. rosbridge is in no package registry: give the
 folder of its sources (--rosbridge-sources, see `rosbridge.py`), or the address of a server that runs
-(--rosbridge ws://127.0.0.1:9090, L-local only; its ROS master is $ROS_MASTER_URI).
+(--rosbridge ws://127.0.0.1:9090, L-local only; its ROS master is $ROS_MASTER_URI). The original NEP needs a
+Python 2.7 (--python2, see `paper_original.py`).
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
+import math
 import os
 import platform
 import random
@@ -40,8 +43,8 @@ from pathlib import Path
 from typing import Any
 
 from link import HOSTS, LinkError, Wifi, joined, why_no_networks
-from paper_ends import ENDS, KINDS
-from paper_figures import AGAIN, PLAIN, does_count, goals, report, write
+from paper_ends import KINDS
+from paper_figures import AGAIN, PLAIN, ROWS, does_count, goals, report, write
 from paper_pairs import NotRunError, Pair, Places, around, end, guard
 
 from nep.backends.ros.library import PLACES
@@ -51,13 +54,13 @@ SIZES = {
     "local": tuple(1024 * n for n in (1, 4, 16, 64, 256, 1024, 4096, 8192)),
     "remote": tuple(1024 * n for n in (1, 4, 16, 64, 256, 1024)),
 }
-TRIPS = {"local": ((256 * 1024, 20), (1024 * 1024, 10)), "remote": ((16 * 1024, 8), (64 * 1024, 4))}
+TRIPS = {"local": ((256 * 1024, 20), (1024 * 1024, 10)), "remote": ()}
 """So many trips in a block up to these sizes."""
-LARGE_TRIPS = {"local": 5, "remote": 2}
+LARGE_TRIPS = {"local": 5, "remote": 20}
+REMOTE_BLOCKS = 10
+"""R-remote takes 200 trips of each size, as the paper does, however long that takes."""
 WARM_TRIPS = {"local": 1, "remote": 0}
 """So many more come first and are not counted: they pay for waking both ends."""
-SHARES = {"local": 2 / 3, "remote": 1 / 3}
-"""How the time is divided between the scenarios."""
 PACKAGES = ("pyzmq", "pynng", "eclipse-zenoh", "iceoryx2", "orjson", "roslibpy")
 Cell = tuple[str, str, int]
 """Row, kind and size."""
@@ -90,7 +93,8 @@ def start_pairs(
 
 def measure(arguments: argparse.Namespace, scenario: str, places: Places) -> dict[str, Any]:
     """All blocks of a scenario for which there is time."""
-    ends_at = time.monotonic() + arguments.seconds * share(scenario, arguments.scenarios)
+    ends_at = time.monotonic() + arguments.seconds if scenario == "local" else math.inf
+    most_blocks = arguments.blocks or (-1 if scenario == "local" else REMOTE_BLOCKS)
     taken: dict[Cell, list[float]] = {}
     sizes = sizes_of(scenario, arguments)
     with ExitStack() as stack:
@@ -98,12 +102,12 @@ def measure(arguments: argparse.Namespace, scenario: str, places: Places) -> dic
         names = (*pairs, *([AGAIN] if PLAIN in pairs else []))
         cells = list(itertools.product(names, arguments.kinds, sizes))
         blocks = 0
-        while pairs and blocks != (arguments.blocks or -1):
+        while pairs and blocks != most_blocks:
             for name, kind, size in random.sample(cells, len(cells)):
                 row = PLAIN if name == AGAIN else name
                 if blocks and time.monotonic() > ends_at:
                     break  # the first block is always whole
-                if row not in pairs:
+                if row not in pairs or kind not in pairs[row].kinds:
                     continue
                 try:
                     came = pairs[row].take(kind, size, trips(scenario, size), WARM_TRIPS[scenario])
@@ -122,11 +126,6 @@ def measure(arguments: argparse.Namespace, scenario: str, places: Places) -> dic
     }
 
 
-def share(scenario: str, scenarios: Sequence[str]) -> float:
-    """What part of the time it has beside the others."""
-    return SHARES[scenario] / sum(SHARES[each] for each in scenarios)
-
-
 def cell_of(cell: Cell, seconds: Sequence[float]) -> dict[str, Any]:
     """What is kept of a cell."""
     row, kind, size = cell
@@ -143,7 +142,7 @@ def cell_of(cell: Cell, seconds: Sequence[float]) -> dict[str, Any]:
 def measure_local(arguments: argparse.Namespace) -> dict[str, Any]:
     """L-local, all of it at 127.0.0.1."""
     here = ("127.0.0.1", "127.0.0.1")
-    with around(here, (), arguments.rosbridge, arguments.rosbridge_sources) as places:
+    with around(here, (), arguments.rosbridge, arguments.rosbridge_sources, arguments.python2) as places:
         return {"name": "local", "link": "loopback", **measure(arguments, "local", places)}
 
 
@@ -176,7 +175,9 @@ def inside(arguments: argparse.Namespace) -> None:
     try:
         with ExitStack() as stack:
             link = stack.enter_context(joined(wifi))
-            places = stack.enter_context(around(HOSTS, link.elsewhere, "", arguments.rosbridge_sources))
+            places = stack.enter_context(
+                around(HOSTS, link.elsewhere, "", arguments.rosbridge_sources, arguments.python2)
+            )
             found = measure(arguments, "remote", places)
         delay = f"{wifi.delay_ms:g} ± {wifi.jitter_ms:g} ms each way"
         said = f"{delay}, {wifi.rate_mbit:g} Mbit/s, by {link.made_by}"
@@ -245,14 +246,17 @@ def asked() -> argparse.Namespace:
     )
     parser.add_argument("--scenarios", nargs="+", choices=SIZES, default=list(SIZES))
     parser.add_argument(
-        "--rows", nargs="+", choices=ENDS, default=list(ENDS), help=f"{PLAIN} is always there"
+        "--rows", nargs="+", choices=ROWS, default=list(ROWS), help=f"{PLAIN} is always there"
     )
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
     parser.add_argument("--sizes", nargs="+", type=int, default=[], help="of those that there are; else all")
-    parser.add_argument("--seconds", type=float, default=360.0, help="for all; the first block is whole")
-    parser.add_argument("--blocks", type=int, default=0, help="at most; else as many as there is time for")
+    parser.add_argument("--seconds", type=float, default=240.0, help="for L-local; its first block is whole")
+    parser.add_argument(
+        "--blocks", type=int, default=0, help="at most; else as many as there is time for, ten in R-remote"
+    )
     parser.add_argument("--rosbridge", default="", help="the address of a running server")
     parser.add_argument("--rosbridge-sources", default="", help="a folder with rosbridge_suite, branch ros1")
+    parser.add_argument("--python2", default="python2.7", help="a Python 2.7 that has nep 0.5.3.5")
     parser.add_argument("--delay-ms", type=float, default=wifi.delay_ms, help="of the link, in one direction")
     parser.add_argument("--jitter-ms", type=float, default=wifi.jitter_ms)
     parser.add_argument("--rate-mbit", type=float, default=wifi.rate_mbit)

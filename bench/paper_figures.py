@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from blocks import TRUSTED, is_trusted
 from paper_ends import ENDS, KINDS
+from paper_original import ROW as ORIGINAL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,17 +19,17 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[1]
 AGAIN, PLAIN, NEP = "plain again", "plain pyzmq", "nep"
-ROWS = tuple(ENDS)
+ROWS = (*ENDS, ORIGINAL)
 TITLES = {
-    "local": (9, "L-local", "two programs on one computer"),
-    "remote": (10, "R-remote", "two programs, joined by a link with a Wi-Fi's delay and rate"),
+    "remote": (9, "R-remote", "two programs, joined by a link with a Wi-Fi's delay and rate"),
+    "local": (10, "L-local", "two programs on one computer"),
 }
 """The figure's number in the paper, the scenario's name there, and what it is."""
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 JUDGED, LARGEST = 16 * 1024, 8192 * 1024
 TOKENS = ROOT / "resources" / "theme" / "tokens.json"
 FONTS = ROOT / "resources" / "fonts"
-MARKS = "osD^vPX"
+MARKS = "osD^vPX*"
 
 Found = Mapping[str, Any]
 
@@ -85,6 +86,11 @@ class Scenario:
         ratios = [self.ratio(row, other, kind, size) for size in sizes]
         known = [math.log(each) for each in ratios if each is not None]
         return math.exp(statistics.fmean(known)) if known and len(known) == len(ratios) else None
+
+
+def scenarios(found: Found) -> list[Scenario]:
+    """The scenarios of a run, in the order of the paper's figures."""
+    return sorted(map(Scenario, found["scenarios"]), key=lambda each: each.number)
 
 
 def goals(found: Found) -> list[Goal]:
@@ -213,7 +219,7 @@ def report(found: Found, pictures: str = "") -> str:
         ),
     ]
     parts += [f"{TITLES[name][1]}: not run, {why}" for name, why in found["not_run"].items()]
-    for scenario in map(Scenario, found["scenarios"]):
+    for scenario in scenarios(found):
         if pictures:
             name = f"figure-{scenario.number}"
             parts.append(f"![{scenario.title}: round trips by size]({pictures}/{name}.svg)")
@@ -257,7 +263,7 @@ def draw(found: Found, folder: Path) -> list[Path]:
         "savefig.facecolor": colours["panel"],
     }  # fmt: skip
     with mpl.rc_context(style):
-        for scenario in map(Scenario, found["scenarios"]):
+        for scenario in scenarios(found):
             figure = Figure(figsize=(12, 5), layout="constrained")
             plot(figure, scenario, colours)
             for ending, metadata in (("svg", {"Date": None}), ("png", {"Software": None})):
@@ -270,7 +276,8 @@ def draw(found: Found, folder: Path) -> list[Path]:
 def plot(figure: Figure, scenario: Scenario, colours: Mapping[str, Any]) -> None:
     """A panel for each kind, and what the lines are below them."""
     others = [row for row in ROWS if row != PLAIN]
-    palette = dict(zip(others, colours["series"], strict=True)) | {PLAIN: colours["textTertiary"]}
+    palette = dict(zip(others, (*colours["series"], colours["stop"]), strict=True))
+    palette[PLAIN] = colours["textTertiary"]
     panels = figure.subplots(1, len(scenario.kinds), sharey=True, squeeze=False)[0]
     for axes, kind in zip(panels, scenario.kinds, strict=True):
         for row in scenario.rows:

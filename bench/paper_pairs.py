@@ -18,6 +18,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from paper_ends import KINDS
+from paper_original import END as ORIGINAL_END
+from paper_original import KINDS as ORIGINAL_KINDS
+from paper_original import ROW as ORIGINAL
+from paper_original import why_missing
+
 HERE = Path(__file__).parent
 START_S = 60.0
 END_S = 15.0
@@ -43,6 +49,7 @@ class Places:
     ros_master: str = ""
     rosbridge: str = ""
     rosbridge_master: str = ""
+    python2: str = ""
     missing: Mapping[str, str] = field(default_factory=dict)
     """Why rows cannot be run, by their names."""
 
@@ -79,6 +86,14 @@ class Places:
             path.write_text(json.dumps(settings), encoding="utf-8")
             files.append(str(path))
         return files[0], files[1]
+
+    def program(self, row: str) -> tuple[str, ...]:
+        """The command of an end, before its arguments."""
+        if row != ORIGINAL:
+            return (sys.executable, str(HERE / "paper_ends.py"))
+        path = self.folder / "paper_original_end.py"
+        path.write_text(ORIGINAL_END, encoding="utf-8")
+        return (self.python2, "-E", str(path))  # without PYTHONPATH, which leads to our nep
 
 
 class Process:
@@ -131,7 +146,8 @@ class Pair:
 
     def __init__(self, row: str, places: Places) -> None:
         own, others = places.of(row)
-        program = (sys.executable, str(HERE / "paper_ends.py"))
+        program = places.program(row)
+        self.kinds = ORIGINAL_KINDS if row == ORIGINAL else KINDS
         commands = (
             (*program, "ping", row, places.hosts[0], own),
             (*places.elsewhere, *program, "pong", row, places.hosts[1], others),
@@ -239,13 +255,20 @@ def until_open(process: subprocess.Popen[bytes], folder: Path, at: tuple[str, in
 
 @contextmanager
 def around(
-    hosts: tuple[str, str], elsewhere: tuple[str, ...], rosbridge_at: str, rosbridge_sources: str
+    hosts: tuple[str, str],
+    elsewhere: tuple[str, ...],
+    rosbridge_at: str,
+    rosbridge_sources: str,
+    python2: str,
 ) -> Iterator[Places]:
     """The places where rows meet, with a ROS master and a rosbridge server where these can be had."""
     missing = {}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nep-paper-")))
-        places = Places(hosts, elsewhere, folder)
+        places = Places(hosts, elsewhere, folder, python2=python2)
+        why = why_missing(python2)
+        if why:
+            missing[ORIGINAL] = why
         try:
             master = stack.enter_context(ros_master(hosts[0], folder))
             places = replace(places, ros_master=master)

@@ -57,6 +57,11 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
 
 
 @pytest.fixture
+def paper(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    yield from imported("paper", monkeypatch)
+
+
+@pytest.fixture
 def fan(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
     yield from imported("nep_fan", monkeypatch)
 
@@ -112,6 +117,24 @@ def test_a_part_of_the_sizes_reaches_no_goal(figures: ModuleType) -> None:
     assert figures.goals(found(sizes=SIZES[:2])) == []
 
 
+def test_figures_have_the_paper_s_numbers(figures: ModuleType) -> None:
+    """Figure 9 of the paper is R-remote, figure 10 is L-local."""
+    run = found()
+    run["scenarios"].append(run["scenarios"][0] | {"name": "remote"})
+    said = figures.report(run, "images")
+    heads = [line for line in said.splitlines() if line.startswith(("### Figure", "!["))]
+    assert [line.partition(":")[0] for line in heads] == [
+        "![R-remote", "### Figure 9", "![L-local", "### Figure 10",
+    ]  # fmt: skip
+    assert "### Figure 9: R-remote" in said
+    assert "### Figure 10: L-local" in said
+
+
+def test_r_remote_takes_200_trips_of_each_size(paper: ModuleType) -> None:
+    for size in paper.SIZES["remote"]:
+        assert paper.REMOTE_BLOCKS * paper.trips("remote", size) == 200
+
+
 def test_what_was_not_run_is_said(figures: ModuleType) -> None:
     said = figures.report(found())
     assert "- rospy: not run, it is missing" in said
@@ -131,8 +154,8 @@ def test_writing_replaces_what_was_measured_and_nothing_else(figures: ModuleType
     assert "old" not in text
     assert "| 16 kB | 0.016 (0.033) | 0.007 (0.013) | 1.00 |  |" in text
     assert json.loads((tmp_path / "figures.json").read_text(encoding="utf-8")) == found()
-    assert "<svg" in (tmp_path / "images" / "figure-9.svg").read_text(encoding="utf-8")
-    assert (tmp_path / "images" / "figure-9.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in (tmp_path / "images" / "figure-10.svg").read_text(encoding="utf-8")
+    assert (tmp_path / "images" / "figure-10.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_document_says_what_its_numbers_say(figures: ModuleType) -> None:
@@ -214,8 +237,12 @@ def test_both_scenarios_are_measured_and_rows_that_are_missing_say_so(
 ) -> None:
     need_networks(figures)
     keep = tmp_path / "found.json"
-    command = [sys.executable, str(BENCH / "paper.py"), "--rows", "nep", "rosbridge", "--kinds", "json"]
+    command = [sys.executable, str(BENCH / "paper.py"), "--rows", "nep", "nep 0.5.3.5", "rosbridge"]
     command += [
+        "--kinds",
+        "json",
+        "--python2",
+        str(tmp_path / "python2.7"),
         "--sizes",
         "1024",
         "--blocks",
@@ -236,6 +263,7 @@ def test_both_scenarios_are_measured_and_rows_that_are_missing_say_so(
         assert set(cells) == {"plain pyzmq", "plain again", "nep"}
         assert all(0 < each["median_ms"] <= each["p95_ms"] for each in cells.values())
         assert "no server" in scenarios[name]["not_run"]["rosbridge"]
+        assert "--python2" in scenarios[name]["not_run"]["nep 0.5.3.5"]
     if "remote" in scenarios:  # ours is delayed, so the way there and back takes 10 ms
         assert all(each["median_ms"] >= 10.0 for each in scenarios["remote"]["cells"])
     else:
