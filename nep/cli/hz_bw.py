@@ -14,7 +14,7 @@ import typer
 
 from nep.cli.complete import complete_topic
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
-from nep.cli.rate_window import AgeWindow, Bandwidth, Delay, Frequency, RateWindow
+from nep.cli.rate_window import AgeWindow, Bandwidth, Delay, Frequency, RateWindow, ReplayFilter
 from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
 from nep.cli.topic_wait import TopicWait, node_for
 from nep.errors import WaitTimeoutError
@@ -164,11 +164,13 @@ class _Report:
             waiting.look_again()
 
     def _listen(self, node: Node, topic: str, msg_type: str) -> Subscriber:
-        window = self._windows[topic]
+        window, replays = self._windows[topic], ReplayFilter(time.monotonic())
 
         def take(messages: Sequence[Message]) -> None:
             now = time.monotonic()
             for message in messages:
+                if replays.is_replay(message, now):
+                    continue
                 stamp_s = None if message.stamp_ns is None else message.stamp_ns / 1e9
                 window.add(now, stamp_s, message.size_bytes)
 

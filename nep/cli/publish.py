@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import errno
 import itertools
+import math
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +33,7 @@ from nep.text import escaped
 _SHOWN = 40
 _MOST_BYTES = 10**9
 """What a file may have: far more than a message, but a device such as /dev/zero has no end."""
+_MAX_CATCH_UP_S = 0.01
 _TEXT_TYPES = frozenset({"string"})
 _BYTE_TYPES = frozenset({"bytes", "image", "images"})
 
@@ -108,7 +111,7 @@ def publish(
             if payload == "-":
                 _publish_lines(publisher, kind)
             else:
-                _repeat(publisher, value, rate_hz or 1.0, count if rate_hz is not None else 1)
+                repeat(partial(publisher.publish, value), rate_hz or 1.0, count if rate_hz is not None else 1)
             said = _("published {count} on '{topic}' ({kind}) to {people}")
             people = _people(publisher.subscribers)
             say(said.format(count=publisher.count, topic=topic, kind=kind, people=people))
@@ -223,15 +226,30 @@ def _lines() -> Iterator[bytes]:
         raise NepError(_("the standard input cannot be read: {why}").format(why=why)) from error
 
 
-def _repeat(publisher: Publisher, value: object, rate_hz: float, count: int) -> None:
-    """Publish at even distances, by the clock, so that slow publishing does not add up."""
-    never = threading.Event()
-    started = time.monotonic()
+def repeat(
+    send: Callable[[], object],
+    rate_hz: float,
+    count: int,
+    *,
+    clock: Callable[[], float] = time.monotonic,
+    wait: Callable[[float], object] | None = None,
+) -> None:
+    """Call `send` `count` times, 0 for ever, in phase with the clock so that small delays don't add up.
+
+    After a delay of more than `_MAX_CATCH_UP_S` (the computer slept, the program was stopped) the missed
+    turns are skipped: sent at once they would be a burst.
+    """
+    wait_s, period_s = wait or threading.Event().wait, 1 / rate_hz
+    due = clock()
     for number in itertools.count(1):
-        publisher.publish(value)
+        send()
         if number == count:
             return
-        never.wait(max(0.0, started + number / rate_hz - time.monotonic()))
+        due += period_s
+        late_s = clock() - due
+        if late_s > _MAX_CATCH_UP_S:
+            due += math.ceil(late_s / period_s) * period_s
+        wait_s(max(0.0, due - clock()))
 
 
 def _wait_for_ever() -> None:

@@ -9,7 +9,9 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["MOST", "AgeWindow", "Bandwidth", "Delay", "Frequency", "RateWindow"]
+from nep.messages.message import Message
+
+__all__ = ["MOST", "AgeWindow", "Bandwidth", "Delay", "Frequency", "RateWindow", "ReplayFilter"]
 
 MOST = 100_000
 """Messages that a window holds at most; a faster topic is measured over a shorter time."""
@@ -98,6 +100,30 @@ class RateWindow:
             while self._kept and now - self._kept[0][0] > self._seconds:
                 self._kept.popleft()
             return list(self._kept)
+
+
+class ReplayFilter:
+    """Recognizes messages that latched publishers kept for new subscribers: they say nothing about the rate.
+
+    `opened` is when the subscription began (s, monotonic). Not thread-safe.
+    """
+
+    def __init__(self, opened: float) -> None:
+        self._opened = opened
+        self._publishers: set[int | None] = set()
+
+    def is_replay(self, message: Message, now: float) -> bool:
+        """Whether a message that arrived `now` (s, monotonic) was published before the subscription began.
+
+        While the publisher's clock isn't compared with this one, the first message of each latched publisher
+        counts as a replay.
+        """
+        if not message.is_latched:
+            return False
+        is_first = message.publisher not in self._publishers
+        self._publishers.add(message.publisher)
+        age_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
+        return is_first if age_s is None or uncertainty_s is None else now - age_s < self._opened
 
 
 class AgeWindow(RateWindow):

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 import orjson
 
 from nep.i18n import _
+from nep.messages.codecs import numpy_option
 from nep.text import escaped, shortened
 
 __all__ = ["ids_as_text", "json_of", "presented"]
@@ -21,7 +22,6 @@ MOST_DEPTH = 40
 _DEEPEST = 200
 """How deep JSON is written; deeper values are told by their first letters."""
 _IDS = frozenset({"id", "publisher"})
-_OPTIONS = orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY
 _CONTROL = re.compile("[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
 _SAFE_INTEGERS = range(-(1 << 63), 1 << 64)
 
@@ -31,7 +31,7 @@ def json_of(value: object, *, indent: bool = False) -> bytes:
 
     Letters that a terminal obeys are written as `\u009b`, which says the same.
     """
-    option = _OPTIONS | (orjson.OPT_INDENT_2 if indent else 0)
+    option = orjson.OPT_NON_STR_KEYS | numpy_option() | (orjson.OPT_INDENT_2 if indent else 0)
     try:
         data = orjson.dumps(value, default=_plain, option=option)
     except TypeError:  # too deep, keys or numbers that JSON does not have

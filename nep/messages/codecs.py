@@ -23,6 +23,7 @@ import json
 import logging
 import math
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from datetime import date, datetime, time, timezone
@@ -51,11 +52,13 @@ __all__ = [
     "codec_for",
     "codec_numbered",
     "nan_in",
+    "numpy_option",
     "ordinary",
 ]
 
 _BYTES = (bytes, bytearray, memoryview)
 _NUMPY = orjson.OPT_SERIALIZE_NUMPY
+_modules = sys.modules
 
 AGAIN_S = 10.0
 """A topic that goes on sending them is told of so seldom."""
@@ -92,13 +95,23 @@ def _plain(value: object) -> object:
     raise TypeError(_("'{kind}' has no form in it").format(kind=type(value).__name__))
 
 
+def numpy_option() -> int:
+    """Return orjson's option for numpy values, or 0 until numpy is imported.
+
+    With the option set, orjson imports numpy at the first value that it does not know, which takes 0.1 s:
+    a publisher would stall. Without numpy loaded there can be no numpy values.
+    """
+    return _NUMPY if "numpy" in _modules else 0
+
+
 def _encode_json(payload: object) -> Encoded:
+    option = numpy_option()
     try:
-        return encoded((_ordinary_json(payload), None))
+        return encoded((_checked(orjson.dumps(payload, _plain, option), payload), None))
     except TypeError:
         pass  # number keys need the slower way; everything else fails again with its reason
     try:
-        data = orjson.dumps(payload, _plain, _NUMPY | orjson.OPT_NON_STR_KEYS)
+        data = orjson.dumps(payload, _plain, option | orjson.OPT_NON_STR_KEYS)
     except (TypeError, RecursionError) as error:
         # orjson itself takes 254 levels, and says so in words of its own
         is_deep = isinstance(error, RecursionError) or "Recursion limit" in str(error)
@@ -110,7 +123,12 @@ def _encode_json(payload: object) -> Encoded:
 
 
 def _ordinary_json(payload: object) -> bytes:
-    data = orjson.dumps(payload, _plain, _NUMPY)
+    # `numpy_option` spelled out: the call itself would cost a tenth of a small message
+    return _checked(orjson.dumps(payload, _plain, _NUMPY if "numpy" in _modules else 0), payload)
+
+
+def _checked(data: bytes, payload: object) -> bytes:
+    """Return encoded JSON. Raises `EncodeError` when it is nested too deeply."""
     if len(data) > 2 * MAX_LEVELS and json_is_too_deep(data):
         raise EncodeError("json", type(payload).__name__, too_deep())
     return data

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from nep.backends.base import QuickPublish
 from nep.messages.codecs import NULL
+from nep.messages.encoded import Encoded
 from nep.protocol.batch import BATCH_MAX
 
 __all__ = ["MOST", "SMALL_BYTES", "SOON_NS", "WAIT_NS", "PendingBatch"]
@@ -94,7 +95,7 @@ class PendingBatch:
                 slowly(payload, strict=True)
                 return
             stamp_ns = _time_ns()
-            if owner.is_closed or way.problem or not way.is_heard:
+            if owner.is_closed or way.problem or not way.is_heard or type(payload) is Encoded:
                 slowly(payload)
                 return
             try:

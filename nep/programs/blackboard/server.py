@@ -18,6 +18,7 @@ import orjson
 
 from nep.errors import BadKeyError, NepError
 from nep.i18n import _
+from nep.messages.codecs import numpy_option
 from nep.nodes.node import Node
 from nep.programs.blackboard.board import Blackboard, BlackboardChange, BlackboardEntry
 from nep.system.arguments import seconds
@@ -32,7 +33,6 @@ DEFAULT_NAME = "blackboard"
 MOST_ENTRIES = 10_000
 """An answer has so many at most, and tells how many more there are."""
 _MOST_ANSWER_BYTES = 32 * 2**20
-_ANYTHING = orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY
 
 
 def service_of(name: str, what: str) -> str:
@@ -81,7 +81,7 @@ class BlackboardServer:
         room = _MOST_ANSWER_BYTES
         for each in young[:MOST_ENTRIES]:
             entry = _as_map(each)
-            room -= len(orjson.dumps(entry, option=_ANYTHING))
+            room -= len(orjson.dumps(entry, option=orjson.OPT_NON_STR_KEYS | numpy_option()))
             if room < 0 and entries:
                 break
             entries.append(entry)
@@ -150,7 +150,7 @@ def _as_map(entry: BlackboardEntry) -> dict[str, object]:
 def _sendable(value: object) -> object:
     """`value` itself when JSON has it, else how Python writes it: one value must not hide all others."""
     try:
-        orjson.dumps(value, option=_ANYTHING)
+        orjson.dumps(value, option=orjson.OPT_NON_STR_KEYS | numpy_option())
     except (TypeError, ValueError, RecursionError):
         try:
             return ascii(value)

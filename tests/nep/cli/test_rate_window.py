@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import threading
 import time
@@ -10,9 +11,12 @@ import pytest
 
 import nep
 from nep.cli.hz_bw import _DelayReport, age, bw, gap, hz
-from nep.cli.rate_window import MOST, AgeWindow, Delay, RateWindow
+from nep.cli.publish import repeat
+from nep.cli.rate_window import MOST, AgeWindow, Delay, RateWindow, ReplayFilter
 from nep.cli.screen import say
 from nep.errors import BadTopicError, WaitTimeoutError
+from nep.messages.clocks import NOT_COMPARED, OWN_CLOCK
+from nep.messages.message import arrived, kind_of
 
 
 def test_gaps_are_those_of_the_publishers_clock():
@@ -206,3 +210,57 @@ def test_clocks_that_nobody_compared_are_named_once(capsys):
     for _ in range(5):
         report._show("t")
     assert capsys.readouterr().err.count("clocks of two computers, not corrected") == 1
+
+
+def _latched(stamp_ns, clock=OWN_CLOCK, publisher=1):
+    return arrived(kind_of("t", "json", "json", is_latched=True, clock=clock), b"1", stamp_ns, 1, publisher)
+
+
+def test_messages_kept_for_new_subscribers_are_replays():
+    opened, now = time.monotonic(), time.time_ns()
+    replays = ReplayFilter(opened)
+    assert replays.is_replay(_latched(now - 10_000_000), opened)
+    assert replays.is_replay(_latched(now - 5_000_000), opened)
+    assert not replays.is_replay(_latched(now), opened + 1.0)
+    assert not replays.is_replay(arrived(kind_of("t", "json", "json"), b"1", 0, 1, 1), opened)
+
+
+def test_with_uncompared_clocks_the_first_message_of_a_latched_publisher_is_a_replay():
+    replays = ReplayFilter(0.0)
+    for publisher in (1, 2):
+        first, second = (_latched(0, NOT_COMPARED, publisher) for _ in range(2))
+        assert replays.is_replay(first, 5.0)
+        assert not replays.is_replay(second, 5.0)
+
+
+class _FakeClock:
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+    def wait(self, seconds):
+        self.now += seconds
+
+
+def test_published_messages_keep_the_rate_and_skip_turns_missed_during_a_stall():
+    clock, sent = _FakeClock(), []
+
+    def send():
+        sent.append(clock.now)
+        clock.now += 0.23 if len(sent) == 5 else 0.004
+
+    repeat(send, 50.0, 20, clock=clock, wait=clock.wait)
+    gaps = [later - earlier for earlier, later in itertools.pairwise(sent)]
+    assert gaps == pytest.approx([0.02] * 4 + [0.24] + [0.02] * 14)
+
+
+def test_high_rates_catch_up_with_late_wake_ups():
+    clock, sent = _FakeClock(), []
+
+    def oversleep(seconds):
+        clock.now += seconds + 0.003 if seconds else 0.0
+
+    repeat(lambda: sent.append(clock.now), 1000.0, 1000, clock=clock, wait=oversleep)
+    assert sent[-1] - sent[0] == pytest.approx(0.999, abs=0.004)

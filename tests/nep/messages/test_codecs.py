@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
+import subprocess
+import sys
 import uuid
 from datetime import date, datetime, time, timedelta, timezone
 from enum import Enum
@@ -307,3 +309,18 @@ def test_files_pass_unchanged(picture: np.ndarray, ending: str) -> None:
 def test_broken_pictures(data: bytes, extension: dict[str, object]) -> None:
     with pytest.raises(DecodeError):
         codec("image").decode(memoryview(data), extension)
+
+
+def test_encoding_an_unknown_value_does_not_import_numpy():
+    """orjson would, in the middle of `publish`: the publisher stalled for 0.1 s at its first subscriber."""
+    code = (
+        "import sys\n"
+        "from nep.messages.codecs import JSON, Encoded, ordinary\n"
+        "for encode in (JSON.encode, ordinary(JSON)):\n"
+        "    for payload in ({1, 2}, Encoded(b'1')):\n"
+        "        try: encode(payload)\n"
+        "        except Exception: pass\n"
+        "assert 'orjson' in sys.modules\n"
+        "sys.exit('numpy' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
