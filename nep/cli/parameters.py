@@ -14,6 +14,7 @@ import orjson
 import typer
 
 from nep.cli.complete import complete_node
+from nep.cli.json_input import parse_json, text_of
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, say, show_json, show_table, write
@@ -168,10 +169,7 @@ def load(
 ) -> None:
     """Set the parameters that a file has: all of them, or none."""
     shown = escaped(str(file))
-    try:
-        values = orjson.loads(read_file(file, "json"))
-    except orjson.JSONDecodeError as error:
-        raise NepError(_("'{file}' is no JSON: {reason}").format(file=shown, reason=error)) from error
+    values = parse_json(text_of(read_file(file, "json"), str(file)), file=str(file))
     if not isinstance(values, dict):
         raise NepError(_("'{file}' has no map of names and values").format(file=shown))
     with _parameters(node, master) as theirs:

@@ -14,10 +14,10 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import orjson
 import typer
 
 from nep.cli.complete import complete_topic
+from nep.cli.json_input import parse_json, text_of
 from nep.cli.options import MasterOption
 from nep.cli.screen import say, size
 from nep.cli.topic_wait import node_for
@@ -28,9 +28,7 @@ from nep.messages.encoded import Encoded
 from nep.nodes.arguments import text
 from nep.nodes.publisher import Publisher
 from nep.protocol.graph_view import TopicInfo
-from nep.text import escaped
 
-_SHOWN = 40
 _MOST_BYTES = 10**9
 """What a file may have: far more than a message, but a device such as /dev/zero has no end."""
 _MAX_CATCH_UP_S = 0.01
@@ -134,37 +132,30 @@ def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
         say(_("the type '{kind}' is sent as JSON; did you mean '{near}'?").format(kind=kind, near=near[0]))
 
 
-def encoded_of(text: str, msg_type: str) -> Encoded:
-    """The bytes of `value_of`: a person wants to know at once what cannot be sent. Raises as it does."""
-    return codec_for(msg_type).encode(value_of(text, msg_type))
+def encoded_of(text: str, msg_type: str, first_line: int = 1) -> Encoded:
+    """Return the encoded `value_of`, so that what can't be sent is an error at once. Raises as it does."""
+    return codec_for(msg_type).encode(value_of(text, msg_type, first_line))
 
 
-def value_of(text: str, msg_type: str) -> object:
-    """The payload that `text` stands for. Raises `NepError` with a sentence."""
+def value_of(text: str, msg_type: str, first_line: int = 1) -> object:
+    """Return the payload that `text` stands for. Raises `NepError`.
+
+    `first_line` is the number of the text's first line in the standard input.
+    """
+    file: str | None = None
     if text.startswith("@"):
         data = read_file(Path(text[1:]), msg_type)
         if msg_type in _BYTE_TYPES:
             return data
-        try:
-            text = data.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise NepError(
-                _("byte {start} of '{text}' is no UTF-8; save it as UTF-8").format(
-                    start=error.start + 1, text=text[1:]
-                )
-            ) from error
+        file, text = text[1:], text_of(data, text[1:])
     if msg_type in _TEXT_TYPES:
         return text
     if msg_type == "bytes":
         return _bytes_typed(text)
     if msg_type in _BYTE_TYPES:
         raise EncodeError(msg_type, "str", _("name a JPEG or PNG file: @picture.jpg"))
-    try:
-        return orjson.loads(text)
-    except orjson.JSONDecodeError as error:
-        shown = escaped(text if len(text) <= _SHOWN else f"{text[:_SHOWN]} …")
-        said = _("'{shown}' is no JSON; put a text into quotes ('{quoted}'), or use --type string")
-        raise NepError(said.format(shown=shown, quoted=escaped(f'"{text[:20]}"'))) from error
+    allow_nan = codec_for(msg_type).name == "msgpack"
+    return parse_json(text, file=file, first_line=first_line, allow_nan=allow_nan, other_types=True)
 
 
 def _bytes_typed(text: str) -> bytes:
@@ -211,7 +202,7 @@ def _publish_lines(publisher: Publisher, msg_type: str) -> None:
         except UnicodeDecodeError as error:
             said = _("byte {byte} of line {line} is no UTF-8; save the text as UTF-8, or use --type bytes")
             raise NepError(said.format(byte=error.start + 1, line=number)) from error
-        publisher.publish(encoded_of(text, msg_type))
+        publisher.publish(encoded_of(text, msg_type, number))
 
 
 def _lines() -> Iterator[bytes]:

@@ -7,10 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-import orjson
 import typer
 
 from nep.cli.complete import complete_service
+from nep.cli.json_input import parse_json, text_of
 from nep.cli.options import JsonOption, MasterOption, checked_time
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, say, show_alerts, show_json, show_table, size, write
@@ -23,14 +23,13 @@ from nep.masters.process import view
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView, ServiceInfo
 from nep.protocol.service_wire import check_service
-from nep.text import escaped, shortened
+from nep.text import escaped
 
 app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
     help=_("Who answers calls: list the services, look into one, call it."),
 )
-_SHOWN = 40
 _TIMEOUT_S = 5.0
 _COLUMNS = (
     TextColumn(lazy("service"), style="bold", is_whole=True),
@@ -168,12 +167,10 @@ def _view(master: str | None, backend: str | None) -> GraphView:
 
 def _request(text: str) -> object:
     """The value that is meant. Raises `NepError`."""
-    given: str | bytes = read_file(Path(text[1:]), "json") if text.startswith("@") else text
-    try:
-        return orjson.loads(given)
-    except orjson.JSONDecodeError as error:
-        said = _("'{shown}' is no JSON; put texts into quotes, such as '{example}'")
-        raise NepError(said.format(shown=shortened(text, _SHOWN), example='{"name": "Ada"}')) from error
+    if not text.startswith("@"):
+        return parse_json(text)
+    file = text[1:]
+    return parse_json(text_of(read_file(Path(file), "json"), file), file=file)
 
 
 def _found(service: str, graph: GraphView) -> ServiceInfo:

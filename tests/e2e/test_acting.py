@@ -79,7 +79,7 @@ def test_a_message_is_written_armed_and_sent_until_stop(studio: Studio, address:
         write(studio, fingers, "Topic", "/lamp", kind="TopicEdit")
         fingers.press("Escape")  # what is offered
         write(studio, fingers, "The message", '{"level": 0.4 "on": true}')
-        studio.says("Line 1 needs a comma between two values.")
+        studio.says("a comma is missing between two values")
         assert seen.heard == []
         studio.click("Put it right")
         studio.click("Arm and send")

@@ -20,6 +20,7 @@ from typing import NoReturn
 
 from nep.errors import NepError, did_you_mean
 from nep.i18n import _
+from nep.messages.json_fault import find_json_fault
 from nep.programs.alarms.history import AlarmHistory, record_from, record_plain
 from nep.programs.alarms.rule import (
     ACTION_KINDS,
@@ -35,7 +36,7 @@ from nep.programs.alarms.rule import (
     new_id,
     problem_of,
 )
-from nep.text import escaped, quotable, shortened
+from nep.text import quotable
 
 __all__ = [
     "EXAMPLE",
@@ -130,14 +131,13 @@ def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
         line = data[: error.start].count(b"\n") + 1
         said = _("line {line} of '{path}' is no UTF-8; save it as UTF-8")
         raise NepError(said.format(line=line, path=path)) from error
-    try:
-        value = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise NepError(_json_sentence(path, error)) from error
-    except (ValueError, RecursionError) as error:  # a number with thousands of digits, or much too deep
-        said = _("'{path}' is no file of alarms: {reason}")
-        raise NepError(said.format(path=path, reason=escaped(shortened(str(error), 200)))) from error
-    return _Reader(path, text, lenient=lenient).file(value)
+    fault = find_json_fault(text, allow_nan=True)
+    if fault is not None:
+        said = _(
+            "'{path}' is not valid JSON: line {line}, column {column}: {reason}; see 'nep watch --example'"
+        )
+        raise NepError(said.format(path=path, line=fault.line, column=fault.column, reason=fault.reason))
+    return _Reader(path, text, lenient=lenient).file(json.loads(text))
 
 
 def alarms_text(rules: Sequence[AlarmRule], history: AlarmHistory | None = None) -> bytes:
@@ -148,14 +148,6 @@ def alarms_text(rules: Sequence[AlarmRule], history: AlarmHistory | None = None)
         value["history"] = records
     text = json.dumps(value, indent=1, ensure_ascii=False) + "\n"
     return text.encode("utf-8", "backslashreplace")
-
-
-def _json_sentence(path: str, error: json.JSONDecodeError) -> str:
-    said = _(
-        "line {line} of '{path}' is no JSON: {reason}; 'nep watch --example' shows what a file looks like"
-    )
-    reason = escaped(error.msg[:1].lower() + error.msg[1:])
-    return said.format(line=error.lineno, path=path, reason=reason)
 
 
 def _rule_plain(rule: AlarmRule) -> dict[str, object]:

@@ -72,12 +72,15 @@ def test_what_is_wrong_is_a_sentence_and_arms_nothing(session: Session) -> None:
     acting = session.acting
     for message, sentence in (
         (KeptMessage("b", "No topic", " "), "Choose a topic first."),
-        (KeptMessage("b", "Wrong", "/t", "json", '{"a": }'), "Line 1 has no value after the colon."),
+        (
+            KeptMessage("b", "Wrong", "/t", "json", '{"a": }'),
+            "Line 1, column 6: a value is missing after the colon.",
+        ),
         (KeptMessage("b", "Open", "/t", "json", '{"a": {yaw}}'), "Fill in “yaw” first."),
         (KeptMessage("b", "Picture", "/t", "image"), "Messages of the type image can't be written by hand."),
     ):
         assert acting.send(message) == sentence
-    assert acting.call("sum", '{"a"', 1.0) == "Line 1 needs a colon after the name."
+    assert acting.call("sum", '{"a"', 1.0) == "Line 1, column 5: a colon is missing after the name."
     assert not acting.arming.is_on
 
 

@@ -100,8 +100,8 @@ def test_what_is_wrong_is_said_with_its_line(alarm: object, said: str) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "line 1 of 'f.json' is no JSON"),
-        ('{"alarms": [\n{"when": }]}', "line 2 of 'f.json' is no JSON"),
+        ("", "'f.json' is not valid JSON: line 1"),
+        ('{"alarms": [\n{"when": }]}', "'f.json' is not valid JSON: line 2, column 9"),
         ("[]", "no file of alarms"),
         ('{"format": 2, "alarms": []}', "newer version"),
         ('{"format": true, "alarms": []}', "'format': it must be 1"),

@@ -227,7 +227,7 @@ def test_the_type_is_the_one_that_the_topic_has(running_master, type_in):
 def test_bad_input_is_a_sentence_and_code_1(running_master, type_in):
     done = type_in("topic", "pub", "t", "no JSON at all")
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("nep: 'no JSON at all' is no JSON; ")
+    assert done.stderr.startswith("nep: 'no JSON at all' is not JSON; ")
     assert type_in("topic", "pub", "bad topic", "1").returncode == 1
     assert "'bad topic'" in type_in("topic", "pub", "bad topic", "1").stderr
     assert type_in("topic", "pub", "t", "1", "--rate", "0").returncode == 2

@@ -16,7 +16,8 @@ from nep.cli.rate_window import MOST, AgeWindow, Delay, RateWindow, ReplayFilter
 from nep.cli.screen import say
 from nep.errors import BadTopicError, WaitTimeoutError
 from nep.messages.clocks import NOT_COMPARED, OWN_CLOCK
-from nep.messages.message import arrived, kind_of
+from nep.messages.message import arrived as new_arrived
+from nep.messages.message import kind_of
 
 
 def test_gaps_are_those_of_the_publishers_clock():
@@ -213,7 +214,9 @@ def test_clocks_that_nobody_compared_are_named_once(capsys):
 
 
 def _latched(stamp_ns, clock=OWN_CLOCK, publisher=1):
-    return arrived(kind_of("t", "json", "json", is_latched=True, clock=clock), b"1", stamp_ns, 1, publisher)
+    return new_arrived(
+        kind_of("t", "json", "json", is_latched=True, clock=clock), b"1", stamp_ns, 1, publisher
+    )
 
 
 def test_messages_kept_for_new_subscribers_are_replays():
@@ -222,7 +225,7 @@ def test_messages_kept_for_new_subscribers_are_replays():
     assert replays.is_replay(_latched(now - 10_000_000), opened)
     assert replays.is_replay(_latched(now - 5_000_000), opened)
     assert not replays.is_replay(_latched(now), opened + 1.0)
-    assert not replays.is_replay(arrived(kind_of("t", "json", "json"), b"1", 0, 1, 1), opened)
+    assert not replays.is_replay(new_arrived(kind_of("t", "json", "json"), b"1", 0, 1, 1), opened)
 
 
 def test_with_uncompared_clocks_the_first_message_of_a_latched_publisher_is_a_replay():

@@ -104,7 +104,7 @@ def test_what_goes_wrong_is_one_sentence(arm, type_in, tmp_path):
             ("/arm/mov", "{}", "--timeout", "0.1"),
             "no server for '/arm/mov' within 0.1 s; did you mean '/arm/move'?",
         ),
-        ((SERVICE, "{oops"), "'{oops' is no JSON; put texts into quotes, such as '{\"name\": \"Ada\"}'"),
+        ((SERVICE, "{oops"), "'{oops' is not valid JSON: line 1, column 2: "),
         (("bad name", "{}"), "topic"),
         ((SERVICE, f"@{tmp_path / 'none'}"), "cannot be read"),
     ):

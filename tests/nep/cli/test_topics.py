@@ -90,7 +90,7 @@ def test_the_type_decides_what_a_text_stands_for(text, msg_type, value):
 
 
 def test_text_that_is_no_json_says_what_to_do():
-    with pytest.raises(NepError, match=r"'hello' is no JSON; .* --type string"):
+    with pytest.raises(NepError, match=r"'hello' is not JSON; .* --type string"):
         value_of("hello", "json")
 
 

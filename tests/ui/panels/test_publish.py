@@ -55,7 +55,7 @@ def states(panel: PublishPanel) -> list[str]:
 def test_a_fault_is_said_where_it_is_and_put_right_by_a_press(window, panel) -> None:
     form = panel.form
     assert form.message == LOOK
-    assert form.sentence.text() == "Line 3 needs a comma at its end. It cannot be sent yet."
+    assert form.sentence.text().startswith("Line 3, column ")
     assert form.edit.wrong_line == 3
     assert not form.send.isEnabled()
     assert states(panel) == ["line 3", "not armed"]

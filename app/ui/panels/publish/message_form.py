@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.run.acting.json_text import MOST_LETTERS, JsonFault, pretty, read_json
+from app.core.run.acting.json_text import MOST_LETTERS, pretty, read_json
 from app.core.run.acting.sending import LEAST_HZ, MOST_HZ
 from app.core.run.acting.shelf import NAME_LETTERS, KeptMessage
 from app.core.run.acting.templates import is_plain
@@ -32,6 +32,7 @@ from app.ui.widgets.inputs.json_edit import JsonEdit
 from app.ui.widgets.menus import EditMenu
 from nep.errors import NepError
 from nep.i18n import _
+from nep.messages.json_fault import JsonFault
 
 LABEL_PX = 80
 RATE_PX = 84
@@ -241,7 +242,7 @@ class MessageForm(QWidget):
             self.sentence.setText(words)
         self.fault_icon.setVisible(bool(problem))
         self.sentence.setVisible(bool(problem))
-        self.mend.setVisible(fault is not None and fault.mend is not None)
+        self.mend.setVisible(fault is not None and fault.fix is not None)
 
     # -- what a person does -------------------------------------------------------------------------------
 
@@ -293,8 +294,8 @@ class MessageForm(QWidget):
     def put_right(self) -> None:
         """Do what mends the first fault."""
         fault: JsonFault | None = self.read.fault
-        if fault is not None and fault.mend is not None:
-            self.edit.replace(fault.mend.start, fault.mend.end, fault.mend.text)
+        if fault is not None and fault.fix is not None:
+            self.edit.replace(fault.fix.start, fault.fix.end, fault.fix.text)
             self.edit.setFocus(Qt.FocusReason.OtherFocusReason)
 
 

@@ -298,7 +298,7 @@ class ServicesPanel(PanelWidget):
         said = fault.sentence if fault is not None else self._problem()
         self.sentence.setText(said)
         self.sentence.setVisible(bool(said))
-        self.mend.setVisible(fault is not None and fault.mend is not None)
+        self.mend.setVisible(fault is not None and fault.fix is not None)
         self._say_call()
 
     def _read(self) -> JsonText:
@@ -366,8 +366,8 @@ class ServicesPanel(PanelWidget):
 
     def _put_right(self) -> None:
         fault = self._read().fault
-        if fault is not None and fault.mend is not None:
-            self.edit.replace(fault.mend.start, fault.mend.end, fault.mend.text)
+        if fault is not None and fault.fix is not None:
+            self.edit.replace(fault.fix.start, fault.fix.end, fault.fix.text)
 
     def call(self) -> None:
         """Call the chosen service."""

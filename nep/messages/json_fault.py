@@ -1,0 +1,218 @@
+"""Explain where and why a text is not JSON, for editors, the command line and files that people write."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass
+
+import orjson
+
+from nep.i18n import _
+from nep.text import shortened
+
+__all__ = ["JsonFault", "JsonFix", "find_json_fault", "looks_like_json"]
+
+_MAX_WORD_LENGTH = 30
+_STRING_OR_CONSTANT = re.compile(r'"(?:[^"\\\n]|\\.)*"?|(?P<constant>-?\b(?:NaN|Infinity)\b)')
+_WORD = re.compile(r"[^\W\d][\w.-]*")
+_CLOSING = {"{": "}", "[": "]"}
+_OTHER_LANGUAGES = {"True": "true", "False": "false", "None": "null", "undefined": "null", "nil": "null"}
+_JSON_START = re.compile(r'\s*(?:[{["]|-?\d|-?(?:Infinity|NaN)\b|(?:true|false|null)\b)')
+
+
+@dataclass(frozen=True, slots=True)
+class JsonFix:
+    """Edit that repairs a fault: replace the characters from ``start`` to ``end`` with ``text``."""
+
+    start: int
+    end: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class JsonFault:
+    """First position at which a text is not JSON.
+
+    ``line`` and ``column`` count from 1. ``reason`` goes into a sentence: lower case, no full stop.
+    ``is_nan``: the fault is NaN or an infinity, which Python's ``json`` writes and msgpack has.
+    """
+
+    line: int
+    column: int
+    reason: str
+    fix: JsonFix | None = None
+    is_nan: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """The fault as a sentence for the window."""
+        return _("Line {line}, column {column}: {reason}.").format(
+            line=self.line, column=self.column, reason=self.reason
+        )
+
+
+def looks_like_json(text: str) -> bool:
+    """Whether `text` begins as JSON does, so that its author probably meant JSON rather than plain text."""
+    return _JSON_START.match(text) is not None
+
+
+def find_json_fault(text: str, *, allow_nan: bool = False) -> JsonFault | None:
+    """Return the first fault of `text`, None when it is JSON that nep can publish.
+
+    With `allow_nan`, NaN and Infinity are values, too.
+    """
+    try:
+        json.loads(text, parse_constant=float if allow_nan else _reject_constant, parse_float=_finite)
+    except json.JSONDecodeError as error:
+        return _explain(text, error)
+    except _ConstantError:
+        return _constant(text)
+    except RecursionError:
+        return JsonFault(1, 1, _("too many nested levels"))
+    except ValueError:  # Python reads no numbers of thousands of digits, and 1e999 as infinity
+        return JsonFault(1, 1, _("a number is too large"))
+    return None if allow_nan else _stricter_fault(text)
+
+
+def _stricter_fault(text: str) -> JsonFault | None:
+    """What Python's reader takes and nep's doesn't: surrogates, a thousand levels."""
+    try:
+        orjson.loads(text)
+    except orjson.JSONDecodeError as error:
+        if "depth" in error.msg:
+            return JsonFault(1, 1, _("too many nested levels"))
+        if "infinity" in error.msg:
+            return JsonFault(1, 1, _("a number is too large"))
+        return _at(text, error.pos, _("half of a surrogate pair is not a character"))
+    return None
+
+
+class _ConstantError(Exception):
+    pass
+
+
+def _reject_constant(_constant: str) -> object:
+    raise _ConstantError
+
+
+def _finite(digits: str) -> float:
+    value = float(digits)
+    if math.isinf(value):
+        raise ValueError(digits)
+    return value
+
+
+def _constant(text: str) -> JsonFault:
+    found = next(each for each in _STRING_OR_CONSTANT.finditer(text) if each["constant"] is not None)
+    fix = JsonFix(found.start(), found.end(), "null")
+    return _at(text, found.start(), _("{word} is not JSON; use null").format(word=found[0]), fix, is_nan=True)
+
+
+def _at(
+    text: str, position: int, reason: str, fix: JsonFix | None = None, *, is_nan: bool = False
+) -> JsonFault:
+    line = text.count("\n", 0, position) + 1
+    column = position - (text.rfind("\n", 0, position) + 1) + 1
+    return JsonFault(line, column, reason, fix, is_nan)
+
+
+def _explain(text: str, error: json.JSONDecodeError) -> JsonFault:
+    position, message = error.pos, error.msg
+    if not text.strip():
+        example = _("there is no text; write JSON, such as {example}").format(example='{"x": 1}')
+        return _at(text, 0, example)
+    if message.startswith(("Unterminated", "Invalid control")):
+        return _open_string(text, position)
+    if message.startswith("Invalid \\"):
+        fix = JsonFix(position, position, "\\") if text[position : position + 1] == "\\" else None
+        return _at(text, position, _("a text contains a single \\; write \\\\"), fix)
+    if message.startswith("Extra data"):
+        return _at(text, position, _("something follows after the end of the first value"))
+    if message.startswith("Illegal trailing comma"):
+        return _trailing_comma(text, text.rfind(",", 0, position + 1))
+    return _unexpected(text, position, message)
+
+
+def _unexpected(text: str, position: int, message: str) -> JsonFault:
+    here, end = text[position : position + 1], len(text[:position].rstrip())
+    last = text[end - 1 : end]
+    if here in {"}", "]"} and last == ",":
+        return _trailing_comma(text, end - 1)
+    if message.startswith("Expecting ':'"):
+        return _at(text, end, _("a colon is missing after the name"), JsonFix(end, end, ":"))
+    if not here:
+        return _unclosed(text, end)
+    if message.startswith("Expecting ','"):
+        return _missing_comma(text, position, end)
+    if here in {"}", "]", ","} and last == ":":
+        return _at(text, end, _("a value is missing after the colon"))
+    return _missing_value(text, position, is_name=message.startswith("Expecting property name"))
+
+
+def _trailing_comma(text: str, position: int) -> JsonFault:
+    return _at(text, position, _("there is a comma too many"), JsonFix(position, position + 1, ""))
+
+
+def _missing_comma(text: str, position: int, end: int) -> JsonFault:
+    here = text[position]
+    if here in {"}", "]"}:
+        return _at(text, position, _("{sign} does not match the opening bracket").format(sign=here))
+    if position == end and (here.isalnum() or here in "._"):
+        return _at(text, position, _("JSON has no such number"))
+    return _at(text, end, _("a comma is missing between two values"), JsonFix(end, end, ","))
+
+
+def _unclosed(text: str, end: int) -> JsonFault:
+    """The text ends before its value does."""
+    opened: list[str] = []
+    for found in re.finditer(r'"(?:[^"\\\n]|\\.)*"|[{}\[\]]', text):
+        sign = found[0]
+        if sign in _CLOSING:
+            opened.append(sign)
+        elif sign in {"}", "]"} and opened:
+            opened.pop()
+    if not opened:
+        return _at(text, end, _("a value is missing at the end"))
+    missing = "".join(_CLOSING[sign] for sign in reversed(opened))
+    fix = JsonFix(end, end, missing) if text[end - 1] not in ",:" else None
+    shown = shortened(missing, _MAX_WORD_LENGTH)
+    return _at(text, end, _("a closing {signs} is missing at the end").format(signs=shown), fix)
+
+
+def _missing_value(text: str, position: int, *, is_name: bool) -> JsonFault:
+    word = _WORD.match(text, position)
+    if text[position] == "'":
+        end = text.find("'", position + 1)
+        inside = text[position + 1 : end] if end > position else ""
+        is_plain = bool(inside) and not any(sign in inside for sign in '"\\\n')
+        fix = JsonFix(position, end + 1, f'"{inside}"') if is_plain else None
+        return _at(text, position, _("JSON takes double quotes, not single ones"), fix)
+    if word is None:
+        reason = _("a name in double quotes is expected") if is_name else _("a value is expected")
+        return _at(text, position, reason)
+    known = _OTHER_LANGUAGES.get(word[0])
+    if known is not None and not is_name:
+        fix = JsonFix(position, word.end(), known)
+        return _at(
+            text, position, _("JSON writes {right}, not {word}").format(word=word[0], right=known), fix
+        )
+    shown = shortened(word[0], _MAX_WORD_LENGTH)
+    fix = JsonFix(position, word.end(), f'"{word[0]}"')
+    return _at(text, position, _("{word} needs double quotes around it").format(word=shown), fix)
+
+
+def _open_string(text: str, position: int) -> JsonFault:
+    """A string has no closing quote, or contains a character that must be escaped."""
+    sign = text[position : position + 1]
+    if sign == "\t":
+        fix = JsonFix(position, position + 1, "\\t")
+        return _at(text, position, _("a text contains a tab; write \\t"), fix)
+    if sign and sign not in {'"', "\n", "\r"}:
+        return _at(text, position, _("a text contains an invisible character; delete it"))
+    start = text.rfind("\n", 0, position) + 1
+    end = text.find("\n", position)
+    line = text[start : end if end >= 0 else len(text)].rstrip()
+    close = start + len(line[:-1].rstrip() if line.endswith(",") else line)
+    return _at(text, position, _("a text has no closing quote"), JsonFix(close, close, '"'))
